@@ -1,4 +1,4 @@
-//! What a link does to its packets.
+//! Configuration of a link: all impairments of one direction, in the order in which packets pass their stages.
 
 use alloc::format;
 use alloc::string::String;
@@ -25,57 +25,58 @@ use crate::stages::reorder::Reorder;
 use crate::stages::slots::Slots;
 use crate::stages::{corruption, delay, loss, order, outage, path_trace, reorder, slots};
 
-/// The configuration of one directed link: which impairments it has, each checked when it was made.
+/// Configuration of one directed link: its impairments, each checked when it was made.
 ///
 /// The default is the ideal link: no loss, no queue, no delay. Packets pass the stages in the order of the fields, unless `layout` says otherwise.
 #[derive(Clone, PartialEq, Default)]
 pub struct LinkConfig {
-    /// The largest packet that the link takes; `None`: any.
+    /// Largest packet that the link takes. `None` admits packets of any size.
     pub mtu: Option<Bytes>,
-    /// When the link is down. A packet offered meanwhile is dropped; packets already on the way arrive.
+    /// Spans during which the link is down. A packet offered during a span is dropped; packets already on the way arrive.
     pub outages: Outages,
-    /// Which packets are lost. Loss stands before the queue: a lost packet uses no bandwidth.
+    /// Model of loss. Loss stands before the queue, so that a lost packet uses no bandwidth.
     pub loss: Loss,
-    /// Whether a packet that understands ECN is marked where another would be lost.
+    /// Whether a packet that supports ECN is marked instead of lost.
     pub marks_instead_of_loss: bool,
-    /// Which packets are sent twice. The copy goes its own way from here on.
+    /// Chance that a packet is sent twice. After this stage the copy passes all later stages independently of the original.
     pub duplication: Chance,
-    /// Which bits are flipped.
+    /// Model of flipped bits. `None` flips no bit.
     pub corruption: Option<Corruption>,
-    /// How many packets may be inside the link, waiting and propagating together, when another comes; `None`: any number.
+    /// Number of packets that may be inside the link, waiting and propagating together, when another packet is offered. `None` sets no limit.
     pub limit: Option<u64>,
-    /// How much may leave in bursts; `None`: anything.
+    /// Bucket that limits bursts. `None` lets every burst pass.
     pub token_bucket: Option<TokenBucket>,
-    /// The rate at which packets are serialised, and the queue before it; `None`: unlimited, nothing waits.
+    /// Rate at which packets are serialised, and the queue before the serialiser. `None` means an unlimited rate, at which no packet waits.
     pub bottleneck: Option<Bottleneck>,
-    /// When the link sends at all; `None`: always.
+    /// Slots in which the link sends. `None` means that the link sends at any time.
     pub slots: Option<Slots>,
     /// Packets that are put out of order on purpose.
     pub reorder: Option<Reorder>,
-    /// A recorded delay and loss, on top of the others.
+    /// Recorded delay and loss, in addition to `delay` and `loss`.
     pub trace: Option<PathTrace>,
-    /// The propagation delay and its jitter.
+    /// Propagation delay with its jitter.
     pub delay: Delay,
-    /// Impairments that describe themselves: what they lose is lost after `loss`, what they add to the delay is added to that of `delay`.
+    /// Impairments that describe themselves. Their losses come after `loss`, and their delays are added to `delay`.
     pub listed: Impairments,
-    /// Whether a packet may overtake another.
+    /// Policy that says whether a packet may overtake another packet.
     pub order: Order,
-    /// In which order packets pass the stages.
+    /// Order in which packets pass the stages.
     pub layout: Layout,
 }
 
-/// In which order packets pass the stages.
+/// Order in which packets pass the stages.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Layout {
-    /// That of the fields of [`LinkConfig`]: first what the network does, then the queue, then propagation.
+    /// Order of the fields of [`LinkConfig`]: the network's impairments, then the queue, then propagation.
     #[default]
     Physical,
-    /// That of `netem`: duplication before loss, and the rate and the slots behind the delay, so that a queue forms of what has already travelled.
+    /// Order of `netem`: duplication comes before loss, and rate and slots come after the delay, so that packets queue after propagation.
     Netem,
 }
 
 impl fmt::Debug for LinkConfig {
-    /// The listed impairments are shown only where there are any: fingerprints of records are made of this text.
+    /// Shows the listed impairments only if at least one is configured, because fingerprints of records are computed from this text and must not change when
+    /// the list grows.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut shown = f.debug_struct("LinkConfig");
         shown.field("mtu", &self.mtu).field("outages", &self.outages).field("loss", &self.loss);
@@ -91,13 +92,13 @@ impl fmt::Debug for LinkConfig {
 }
 
 impl LinkConfig {
-    /// Whether this link draws random numbers for loss or for jitter, which most random links do.
+    /// Returns whether this link draws random numbers for loss or for jitter, as most random links do. [`has_chance`](Self::has_chance) covers all stages.
     #[must_use]
     pub fn is_random(&self) -> bool {
         self.loss.is_random() || self.delay.jitter().is_some()
     }
 
-    /// Whether anything that this link does is left to chance.
+    /// Returns whether the fate of a packet depends on any random number.
     #[must_use]
     pub fn has_chance(&self) -> bool {
         self.is_random()
@@ -111,34 +112,35 @@ impl LinkConfig {
             || self.bottleneck.as_ref().is_some_and(|bottleneck| matches!(bottleneck.discipline, Discipline::Red(_)))
     }
 
-    /// Whether all that this link does is to delay every packet by the same span.
+    /// Returns whether the link only delays packets, every packet by the same span.
     #[must_use]
     pub fn is_constant_delay(&self) -> bool {
-        // The order policy counts: a live change to a shorter delay lets later packets overtake. The order of stages does not where there is one.
+        // A link with another order policy is excluded: after a live change to a shorter delay, later packets may overtake. The layout is ignored,
+        // because a link with one stage has no order of stages.
         *self == Self { layout: self.layout, delay: Delay::constant(self.delay.mean()), ..Self::default() }
     }
 
-    /// Whether a packet's fate is known as soon as it is offered, and there are no copies: nothing waits, nothing is counted.
+    /// Returns whether a packet's fate is known as soon as the packet is offered, and no packet is copied. Such a link holds and counts no packet.
     pub(crate) fn is_direct(&self) -> bool {
-        // In both layouts these follow each other in the same order.
+        // Outages, loss, delay and order follow each other in the same order in both layouts, so either layout is accepted.
         let Self { layout, outages, loss, delay, order, .. } = self.clone();
         *self == Self { layout, outages, loss, delay, order, ..Self::default() }
     }
 
-    /// Without its bottleneck, and without a token bucket that no packet of that load waits for.
+    /// Returns the configuration without its bottleneck, and without a token bucket in which no packet of `load` waits.
     fn without_queues(&self, load: Load) -> Self {
-        // Behind jitter packets come closer together than they were offered.
+        // After jitter, packets can be closer together than they were offered. In the layout of netem the bucket comes after jitter.
         let keeps_gaps = self.layout == Layout::Physical || self.delay.jitter().is_none();
         let token_bucket = self.token_bucket.filter(|bucket| !(keeps_gaps && bucket.lets_all_pass(load)));
         Self { bottleneck: None, token_bucket, ..self.clone() }
     }
 
-    /// Whether it is [direct](LinkConfig::is_direct) under that load without its bottleneck.
+    /// Returns whether the link is [direct](LinkConfig::is_direct) under `load` once its bottleneck is removed.
     pub(crate) fn is_direct_but_for_queue(&self, load: Load) -> bool {
         self.without_queues(load).is_direct()
     }
 
-    /// Whether a packet of that load may wait for a line or for tokens.
+    /// Returns whether a packet of `load` can wait for the serialiser or for tokens.
     #[must_use]
     pub fn makes_wait(&self, load: Load) -> bool {
         let waits_for_line =
@@ -146,7 +148,8 @@ impl LinkConfig {
         waits_for_line || self.without_queues(load).token_bucket.is_some()
     }
 
-    /// The span by which it delays every packet of that load, if that is all that it does: the time on a line, if it has one for which none waits, and the delay.
+    /// Returns the span by which the link delays every packet of `load`, or `None` if the link does anything else. The span is the time on the line, if no
+    /// packet waits for the line, plus the propagation delay.
     #[must_use]
     pub fn constant_delay_of(&self, load: Load) -> Option<Duration> {
         let line = self.bottleneck.as_ref().map_or(Some(Duration::ZERO), |bottleneck| bottleneck.time_without_wait(load))?;
@@ -154,13 +157,13 @@ impl LinkConfig {
     }
 }
 
-/// The parameters of the largest packet.
+/// Parameter of the largest packet.
 const MTU: [Key; 1] = [usual("mtu", Form::AnyOf(&[Form::Size, UNLIMITED]), "\"unlimited\"", "Larger packets are dropped")];
-/// The parameters of how many packets may be inside.
+/// Parameter of the number of packets inside the link.
 const LIMIT: [Key; 1] =
     [usual("limit", Form::Like(&["1000 packets", "unlimited"]), "\"unlimited\"", "How many packets may be inside, waiting and propagating together")];
 
-/// The parameters of a link, stage by stage, in the order in which they are explained.
+/// Parameters of a link, grouped by stage, in the order in which `explain` lists them.
 pub const LINK_PARAMETERS: [&[Key]; 14] = [
     &delay::KEYS,
     &order::KEYS,
@@ -179,7 +182,7 @@ pub const LINK_PARAMETERS: [&[Key]; 14] = [
 ];
 
 impl LinkConfig {
-    /// The stages in words with their numbers, in the order in which packets pass them.
+    /// Returns the stages in words with their numbers, in the order of the fields, joined by ", then ".
     pub(crate) fn words(&self) -> String {
         let Self { mtu, outages, loss, marks_instead_of_loss, duplication, corruption, limit, token_bucket, .. } = self;
         let mut stages = Vec::new();

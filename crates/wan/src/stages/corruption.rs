@@ -1,4 +1,4 @@
-//! Bits that are flipped on the way.
+//! Corruption: bits of a packet that are flipped on the way.
 
 use alloc::collections::BTreeSet;
 use alloc::format;
@@ -16,46 +16,47 @@ use crate::packet::damage::Damage;
 use crate::parameters::{Choices, Form, Key, MOST_OF_32_BITS, Table, optional, usual, words};
 use crate::random::{PacketDraws, Purpose, unit};
 
-/// Which bits of which packets are flipped, and whether the receiver notices.
+/// Model of flipped bits, and of the receiver's check.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Corruption {
-    /// How bits are chosen.
+    /// Way of choosing bits.
     pub bits: Flips,
-    /// The bytes that may be hit, counted from the packet's begin; `None`: the whole packet. What lies beyond a packet's end does not count, nor what lies
-    /// beyond 65,536 bytes: no datagram is longer.
+    /// Bytes whose bits may be flipped, counted from the packet's begin. `None` means the whole packet. Bytes after the packet's end are ignored, and so are
+    /// bytes from 65,536 on, because no datagram is longer.
     pub within: Option<Range<u64>>,
-    /// What the receiver does with a damaged packet.
+    /// Treatment of a damaged packet by the receiver.
     pub checksum: Checksum,
 }
 
-/// How bits are chosen.
+/// Way of choosing bits.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Flips {
-    /// Some packets are damaged, each of them in `count` different bits, every set of them equally likely; in all bits of a packet that has fewer.
+    /// Some packets are damaged, each in `count` different bits; every set of bits is equally likely. A packet with fewer bits is damaged in all bits.
     Bits {
-        /// Which packets.
+        /// Chance that a packet is damaged.
         packets: Chance,
-        /// How many bits of each.
+        /// Number of flipped bits of each damaged packet.
         count: u32,
     },
-    /// Every bit for itself, with this probability.
+    /// Every bit is flipped independently with this probability.
     Rate(Probability),
 }
 
-/// What the receiver does with a damaged packet.
+/// Treatment of a damaged packet by the receiver.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Checksum {
-    /// It discards it when it arrives, as a network stack does whose checksum fails. That a checksum may miss damage is not modelled.
+    /// The receiver discards the packet on arrival, like a network stack whose checksum fails. Damage that a checksum misses is not modelled.
     #[default]
     Discards,
-    /// It takes it: the checksum was computed after the damage, or there is none.
+    /// The receiver takes the packet, because the checksum was computed after the damage or does not exist.
     Passes,
 }
 
-/// Number of bytes at the begin of a packet that can be hit: the damage to a packet is a list, and a size alone takes no memory.
+/// Number of bytes at the begin of a packet that can be damaged. A bound is needed because the size of a packet is a number without memory, but the damage to
+/// a packet is a list of bits.
 const LONGEST: u64 = 1 << 16;
 
-/// The stage: the configuration and the answer before.
+/// Stage with the configuration and the state of the chance of damage.
 #[derive(Clone, Debug)]
 pub(crate) struct CorruptionStage {
     config: Corruption,
@@ -63,6 +64,7 @@ pub(crate) struct CorruptionStage {
 }
 
 impl CorruptionStage {
+    /// Returns the stage with the configuration `config`, or `None` without a configuration. Correlated damage continues from the previous packet.
     pub(crate) fn reconfigured(before: Option<Self>, config: Option<Corruption>) -> Option<Self> {
         let config = config?;
         let before = before.and_then(|stage| stage.packets);
@@ -77,8 +79,9 @@ impl CorruptionStage {
         self.config.checksum
     }
 
-    /// The damage to a packet.
+    /// Returns the damage to a packet, or `None` if no bit is flipped.
     pub(crate) fn damage(&mut self, info: PacketInfo, packet: PacketDraws) -> Option<Damage> {
+        // Bits are counted from `first`. A range outside the packet becomes empty, and no bit is flipped.
         let (start, end) = self.config.within.as_ref().map_or((0, LONGEST), |within| (within.start, within.end));
         let end = end.min(info.size.get()).min(LONGEST);
         let first = 8 * start.min(end);
@@ -96,12 +99,14 @@ impl CorruptionStage {
     }
 }
 
-/// `wanted` different numbers below `count`, every set equally likely (Floyd; Bentley & Floyd, CACM 30(9), 1987).
+/// Returns `wanted` different numbers below `count` in ascending order, every set equally likely (Floyd; Bentley & Floyd, CACM 30(9), 1987). Returns all
+/// numbers if `count` is at most `wanted`.
 fn some_of(count: u64, wanted: u32, packet: PacketDraws) -> Vec<u64> {
     let mut more = packet.more(Purpose::Corruption);
     let mut chosen = BTreeSet::new();
     for last in count.saturating_sub(wanted.into())..count {
         let candidate = below(last + 1, more.next_word());
+        // `last` is above all numbers chosen in earlier rounds, so it is new.
         if !chosen.insert(candidate) {
             chosen.insert(last);
         }
@@ -109,13 +114,15 @@ fn some_of(count: u64, wanted: u32, packet: PacketDraws) -> Vec<u64> {
     chosen.into_iter().collect()
 }
 
-/// A number below `bound`: the word scaled, whose bias is at most bound·2⁻⁶⁴.
+/// Returns a number below `bound`, scaled from the word. The bias is at most bound·2⁻⁶⁴.
 fn below(bound: u64, word: u64) -> u64 {
     ((u128::from(bound) * u128::from(word)) >> 64) as u64
 }
 
-/// Each of the numbers below `count` with that probability: gaps between them are geometric, drawn by inversion.
+/// Returns the numbers below `count` of a choice that takes each number with probability `rate`. Gaps between chosen numbers are geometric, and are drawn by
+/// inversion.
 fn each_with(count: u64, rate: Probability, packet: PacketDraws) -> Vec<u64> {
+    // At the rates 0 and 1 the logarithm below would be zero or infinite.
     if rate == Probability::ZERO {
         return Vec::new();
     }
@@ -127,7 +134,7 @@ fn each_with(count: u64, rate: Probability, packet: PacketDraws) -> Vec<u64> {
     let mut chosen = Vec::new();
     let mut next = 0_u64;
     loop {
-        // 1 − u lies in (0, 1]: its logarithm is finite.
+        // 1 − u lies in (0, 1], so its logarithm is finite.
         let gap = libm::floor(libm::log(1.0 - unit(draws.next_word())) / log_of_whole);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative, and saturates far beyond any packet")]
         let gap = gap as u64;
@@ -140,7 +147,7 @@ fn each_with(count: u64, rate: Probability, packet: PacketDraws) -> Vec<u64> {
     }
 }
 
-/// The parameter of flipped bits.
+/// Parameter of flipped bits.
 pub(crate) const KEYS: [Key; 1] =
     [usual("corrupt", CORRUPT, "0", "Probability that a bit of a packet is flipped, or a table that says which bits and what the receiver does")];
 const CORRUPT: Form = Form::AnyOf(&[Form::Probability, Form::Table(&CORRUPT_TABLE)]);
@@ -157,13 +164,13 @@ static CORRUPT_TABLE: Table = Table::of(&[
 const CHECKSUMS: [(&str, &str); 2] = words(&Checksum::CHOICES);
 
 impl Checksum {
-    /// The words of files.
+    /// Names of the treatments in files, each with its value and its description.
     pub const CHOICES: Choices<Self, 2> =
         [("discards", Self::Discards, "it is dropped when it arrives"), ("passes", Self::Passes, "it is taken, and the peer's own checks decide")];
 }
 
 impl Corruption {
-    /// The flipped bits in words.
+    /// Returns the flipped bits in words.
     pub(crate) fn words(&self) -> String {
         let bits = match self.bits {
             Flips::Bits { packets, count } => format!("{} flipped in {}", Counted(count, "bit"), packets.words()),
@@ -198,7 +205,7 @@ mod tests {
         Flips::Bits { packets: Chance::independent(Probability::ONE), count }
     }
 
-    /// Each of 64 bits is hit as often as another: χ² with 63 degrees of freedom is below 119 but once in 10⁵.
+    /// Each of 64 bits is equally likely to be flipped: χ² with 63 degrees of freedom exceeds 119 once in 10⁵.
     #[test]
     fn every_bit_is_as_likely_as_another() {
         let mut hits = [0_u32; 64];
@@ -212,13 +219,13 @@ mod tests {
         assert!(chi_square < 119.0, "{chi_square}");
     }
 
-    /// The number of flipped bits of 512 at a rate of 0.01 has the mean 5.12 and the variance 5.07; of 20 000 packets the mean is known to 0.016.
+    /// The number of flipped bits of 512 at a rate of 0.01 has the mean 5.12 and the variance 5.07. The mean of 20 000 packets has a standard error of 0.016.
     #[test]
     fn a_bit_error_rate_flips_that_fraction_of_the_bits() {
         let damages = damages(stage(Flips::Rate(Probability::new(0.01).unwrap()), None), 64, 20_000);
         let flipped: usize = damages.iter().flatten().map(|damage| damage.bits().len()).sum();
         assert!((flipped as f64 / 20_000.0 - 5.12).abs() < 4.5 * 0.016);
-        // Whole with probability 0.99^512 = 0.005832: 116.6 of 20 000, Poisson.
+        // A packet is undamaged with probability 0.99^512 = 0.005832: 116.6 of 20 000 packets, Poisson.
         let whole = damages.iter().filter(|damage| damage.is_none()).count();
         assert!((68..=166).contains(&whole), "{whole}");
     }

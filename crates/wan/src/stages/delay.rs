@@ -1,4 +1,4 @@
-//! Propagation delay with jitter.
+//! Propagation delay with jitter: configuration, checks, and the stage that draws the delay of each packet.
 
 use alloc::boxed::Box;
 use alloc::format;
@@ -19,45 +19,46 @@ use crate::random::{PacketDraws, Purpose};
 /// Random variation of the delay around its mean.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Jitter {
-    /// The standard deviation.
+    /// Standard deviation of the delay.
     pub sd: Duration,
-    /// The law: see [`crate::law`] for what each is, and what it does at the floor.
+    /// Law of the delay. [`crate::law`] describes each law and its shape at the floor.
     pub distribution: Distribution,
-    /// No packet is faster than this.
+    /// Least delay: no packet is faster.
     pub floor: Duration,
-    /// How much the delay of a packet depends on that of the one before. The law of each delay stays the same.
+    /// Dependence of a packet's delay on the delay of the previous packet. The law of each single delay stays the same.
     pub correlation: Correlation,
 }
 
-/// How delays of successive packets hang together: as images of a Gaussian chain, z(n) = φ·z(n−1) + √(1−φ²)·ε(n), delay = F⁻¹(Φ(z)), a Gaussian copula.
+/// Dependence between delays of successive packets. Delays are images of a Gaussian chain, z(n) = φ·z(n−1) + √(1−φ²)·ε(n), delay = F⁻¹(Φ(z)): a Gaussian
+/// copula.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub enum Correlation {
-    /// Not at all.
+    /// Independent delays.
     #[default]
     None,
-    /// The autocorrelation of the delays at lag one, whatever the time between packets. φ follows from it and the law.
+    /// Autocorrelation of the delays at lag one, whatever the time between packets. φ follows from the autocorrelation and the law.
     PerPacket(f64),
-    /// φ = e^(−Δ/τ) for packets Δ apart, this being τ: the chain is an Ornstein–Uhlenbeck process, and how fast the delay changes does not depend on how
-    /// many packets are sent. With τ far above the spacing packets seldom overtake each other.
+    /// Correlation time τ, with φ = e^(−Δ/τ) for packets Δ apart. The chain is an Ornstein–Uhlenbeck process, and the speed at which the delay changes does
+    /// not depend on the number of packets. If τ is far above the spacing of packets, packets rarely overtake each other.
     InTime(Duration),
 }
 
 impl Jitter {
-    /// Independent jitter without a floor.
+    /// Returns independent jitter without a floor.
     #[must_use]
     pub const fn new(sd: Duration, distribution: Distribution) -> Self {
         Self { sd, distribution, floor: Duration::ZERO, correlation: Correlation::None }
     }
 }
 
-/// A propagation delay: a mean and, perhaps, jitter around it.
+/// Propagation delay: a mean with optional jitter around the mean.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Delay {
     mean: Duration,
     jitter: Option<Arc<Checked>>,
 }
 
-/// Jitter that was checked, with what was computed from it once for all links.
+/// Checked jitter, with the law and the memory computed from it. Shared by all links with this delay, so that both are computed once.
 #[derive(PartialEq, Debug)]
 struct Checked {
     jitter: Jitter,
@@ -65,7 +66,7 @@ struct Checked {
     memory: Memory,
 }
 
-/// What φ is.
+/// Origin of φ in the Gaussian chain.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Memory {
     None,
@@ -73,39 +74,39 @@ enum Memory {
     InTime { tau_nanos: f64 },
 }
 
-/// Why a delay is refused.
+/// Reason for which a delay is refused.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum DelayError {
-    /// A law with a least value would begin below the floor, where it could not be kept, or its deviation is too large for its mean.
+    /// A law with a least value would begin below the floor and cannot be cut there, or the deviation is too large for the mean.
     ReachesBelowFloor {
-        /// The name of the law.
+        /// Name of the law.
         law: &'static str,
-        /// The mean delay.
+        /// Mean delay.
         mean: Duration,
-        /// The standard deviation.
+        /// Standard deviation.
         sd: Duration,
-        /// The floor.
+        /// Floor.
         floor: Duration,
-        /// The largest possible deviation.
+        /// Largest deviation that is accepted.
         largest: Duration,
     },
     /// The floor lies above the mean.
     FloorAboveMean {
-        /// The mean delay.
+        /// Mean delay.
         mean: Duration,
-        /// The floor.
+        /// Floor.
         floor: Duration,
     },
-    /// No delays with this law have this correlation.
+    /// Delays with this law cannot have this correlation.
     Correlation {
-        /// What was asked for.
+        /// Correlation that was asked for.
         asked: f64,
-        /// The least that there is.
+        /// Least correlation of delays with this law.
         least: f64,
     },
-    /// A correlation time of zero.
+    /// The correlation time is zero.
     NoTime,
-    /// More than 292 years, which cannot be counted with a sign.
+    /// A span exceeds 292 years, or a deviation exceeds 146 years, which a signed number of nanoseconds cannot hold.
     TooLong,
 }
 
@@ -135,17 +136,17 @@ impl fmt::Display for DelayError {
 
 impl core::error::Error for DelayError {}
 
-/// The longest delay and deviation: what an `i64` of nanoseconds holds.
+/// Longest delay: the nanoseconds that an `i64` holds. A deviation may have half of it.
 const LONGEST: Duration = Duration::from_nanos(i64::MAX.unsigned_abs());
 
 impl Delay {
-    /// One delay for all packets.
+    /// Returns a delay that is the same for all packets.
     #[must_use]
     pub const fn constant(mean: Duration) -> Self {
         Self { mean, jitter: None }
     }
 
-    /// A delay with jitter. A deviation of zero is no jitter: nothing is drawn.
+    /// Returns a delay with jitter. With a deviation of zero the delay is constant and no random number is drawn.
     ///
     /// # Errors
     ///
@@ -161,7 +162,7 @@ impl Delay {
             Correlation::None => Memory::None,
             Correlation::InTime(tau) if tau.is_zero() => return Err(DelayError::NoTime),
             Correlation::InTime(tau) => Memory::InTime { tau_nanos: nanos(tau) },
-            // No NaN passes the comparison.
+            // NaN fails both comparisons and is refused here. The law refuses correlations below its least possible correlation.
             Correlation::PerPacket(rho) if !(rho > -2.0 && rho < 1.0) => return Err(DelayError::Correlation { asked: rho, least: -1.0 }),
             Correlation::PerPacket(rho) => match law.gaussian_correlation(rho).map_err(explained)? {
                 0.0 => Memory::None,
@@ -172,31 +173,32 @@ impl Delay {
         Ok(Self { mean, jitter: jitters.then(|| Arc::new(Checked { jitter, law, memory })) })
     }
 
-    /// The mean delay asked for.
+    /// Returns the configured mean delay.
     #[must_use]
     pub const fn mean(&self) -> Duration {
         self.mean
     }
 
-    /// The jitter, if there is any.
+    /// Returns the jitter, or `None` for a constant delay.
     #[must_use]
     pub fn jitter(&self) -> Option<&Jitter> {
         self.jitter.as_deref().map(|checked| &checked.jitter)
     }
 
-    /// The law of the delay of a packet \[ns\], if there is jitter.
+    /// Returns the law of a packet's delay \[ns\], or `None` for a constant delay.
     #[must_use]
     pub fn law(&self) -> Option<&Law> {
         self.jitter.as_deref().map(|checked| &checked.law)
     }
 
-    /// No packet is faster than this.
+    /// Returns the least delay of a packet.
     #[must_use]
     pub fn least(&self) -> Duration {
         self.law().map_or(self.mean, |law| Duration::from_nanos(count(law.least())))
     }
 }
 
+/// Returns the error of a delay for an error of its law.
 fn explain(error: LawError, mean: Duration, jitter: &Jitter) -> DelayError {
     let Jitter { sd, floor, .. } = *jitter;
     match error {
@@ -208,35 +210,35 @@ fn explain(error: LawError, mean: Duration, jitter: &Jitter) -> DelayError {
         LawError::FloorAboveMean { .. } => DelayError::FloorAboveMean { mean, floor },
         LawError::NotACorrelation { found } => DelayError::Correlation { asked: found, least: -1.0 },
         LawError::TooNegative { asked, least } => DelayError::Correlation { asked, least },
-        // Spans are finite and not negative.
+        // Both errors cannot occur, because spans are finite and not negative.
         LawError::NotFinite { .. } | LawError::NegativeDeviation { .. } => DelayError::TooLong,
     }
 }
 
-/// The delay stage: draws the delay of each packet.
+/// Delay stage, which draws the delay of each packet.
 #[derive(Clone, Debug)]
 pub(crate) struct DelayStage {
     mean_nanos: u64,
     law: StageLaw,
 }
 
-/// How a delay is drawn; spans as numbers, converted once.
+/// Way of drawing a delay. Spans are numbers of nanoseconds, converted once.
 #[derive(Clone, Debug)]
 enum StageLaw {
     Constant,
-    /// The most frequent law, without a floor.
+    /// Normal jitter without floor and without correlation: the most frequent law, for which the stage needs no shared data.
     Normal {
         sd_nanos: f64,
     },
     Independent(Arc<Checked>),
-    /// In a box, as whatever is seldom: the links of a large mesh fill the cache.
+    /// Boxed, because few links have correlated delays and an unboxed chain would enlarge the delay stage of every link.
     Correlated(Box<Correlated>),
 }
 
 #[derive(Clone, Debug)]
 struct Correlated {
     checked: Arc<Checked>,
-    /// The Gaussian chain: its latest value, and when that was; `None` before the first packet.
+    /// Latest value of the Gaussian chain and its instant, or `None` before the first packet.
     chain: Option<(f64, Instant)>,
 }
 
@@ -257,12 +259,12 @@ impl DelayStage {
         Self { mean_nanos: u64::try_from(delay.mean.as_nanos()).unwrap_or(u64::MAX), law }
     }
 
-    /// Whether a delay depends on those before.
+    /// Returns whether a delay depends on earlier delays.
     pub(crate) const fn remembers(&self) -> bool {
         matches!(self.law, StageLaw::Correlated(_))
     }
 
-    /// New laws for later packets. Correlated delays go on from where they are.
+    /// Sets the delay of later packets. A chain of correlated delays continues from its present value.
     pub(crate) fn reconfigure(&mut self, delay: &Delay) {
         let before = core::mem::replace(self, Self::new(delay));
         if let (StageLaw::Correlated(before), StageLaw::Correlated(now)) = (before.law, &mut self.law) {
@@ -270,23 +272,24 @@ impl DelayStage {
         }
     }
 
-    /// Whether a delay needs a random word.
+    /// Returns whether drawing a delay needs a random word.
     pub(crate) const fn is_random(&self) -> bool {
         !matches!(self.law, StageLaw::Constant)
     }
 
-    /// The delay \[ns\] of one packet, if there is jitter from `word`, the first of its words for jitter. Rounded to the nearest nanosecond.
+    /// Returns the delay of one packet \[ns\], rounded to the nearest nanosecond. If there is jitter, `word` is the packet's first random word for jitter.
     #[inline]
     pub(crate) fn draw_nanos(&mut self, now: Instant, word: u64, packet: PacketDraws) -> u64 {
         self.draw_nanos_for(Purpose::Jitter, now, word, packet)
     }
 
-    /// A delay drawn from the words for another purpose.
+    /// Returns a delay \[ns\] like [`draw_nanos`](Self::draw_nanos), drawn from the packet's random words for `purpose`.
     #[inline]
     pub(crate) fn draw_nanos_for(&mut self, purpose: Purpose, now: Instant, word: u64, packet: PacketDraws) -> u64 {
         match &self.law {
             StageLaw::Constant => self.mean_nanos,
             StageLaw::Normal { sd_nanos } => {
+                // Nearly all normal numbers follow from the first word alone. Only numbers outside the core need further words.
                 let normal = in_the_core(word).unwrap_or_else(|| {
                     let mut more = packet.more(purpose);
                     outside_the_core(word, || more.next_word())
@@ -298,6 +301,7 @@ impl DelayStage {
         }
     }
 
+    /// Returns a delay \[ns\] of the laws that are not drawn inline.
     #[inline(never)]
     fn draw_by_law(&mut self, purpose: Purpose, now: Instant, word: u64, packet: PacketDraws) -> u64 {
         let mut more = packet.more(purpose);
@@ -308,6 +312,7 @@ impl DelayStage {
                 let Correlated { checked, chain } = &mut **correlated;
                 let fresh = standard_normal(word, || more.next_word());
                 let z = chain.map_or(fresh, |(before, at)| {
+                    // The law of z stays standard normal, because φ² and the square of the fresh share add up to one.
                     let phi = match checked.memory {
                         Memory::None => 0.0,
                         Memory::PerPacket(phi) => phi,
@@ -322,7 +327,7 @@ impl DelayStage {
     }
 }
 
-/// Correlated delays of many links, each of which keeps its own chain.
+/// Law of correlated delays, for many links each of which keeps its own chain.
 #[derive(Clone, Debug)]
 pub(crate) struct CorrelatedDelays {
     marginal: Marginal,
@@ -330,7 +335,7 @@ pub(crate) struct CorrelatedDelays {
     fresh_share: f64,
 }
 
-/// The law of each of them alone.
+/// Law of a single delay.
 #[derive(Clone, Debug)]
 enum Marginal {
     Gamma(GammaLaw),
@@ -338,7 +343,7 @@ enum Marginal {
 }
 
 impl CorrelatedDelays {
-    /// Those of a delay, if it is correlated from packet to packet.
+    /// Returns the law of `delay` if its delays are correlated from packet to packet, and `None` otherwise.
     pub(crate) fn new(delay: &Delay) -> Option<Self> {
         let checked = delay.jitter.as_ref()?;
         let Memory::PerPacket(phi) = checked.memory else { return None };
@@ -346,7 +351,7 @@ impl CorrelatedDelays {
         Some(Self { marginal, phi, fresh_share: fresh_share(phi) })
     }
 
-    /// The delay \[ns\] of a packet. `chain` is the latest value of its link's chain, NaN before the first packet.
+    /// Returns the delay of a packet \[ns\]. `chain` is the latest value of its link's chain, or NaN before the first packet; the call replaces the value.
     #[inline(always)]
     pub(crate) fn draw_nanos(&self, chain: &mut f64, word: u64, packet: PacketDraws) -> u64 {
         let fresh = in_the_core(word).unwrap_or_else(|| {
@@ -360,7 +365,7 @@ impl CorrelatedDelays {
         })
     }
 
-    /// What tells most of them for several links at once, if their law does.
+    /// Returns the cubics that give most delays of several links at once, or `None` if the law has no cubics.
     pub(crate) fn cubics(&self) -> Option<GammaCubics> {
         match &self.marginal {
             Marginal::Gamma(law) => law.cubics(),
@@ -368,10 +373,11 @@ impl CorrelatedDelays {
         }
     }
 
-    /// The values of several chains after these, by the words of packets; NaN for a first packet, and for those few that take further words.
+    /// Returns the next values of several chains, given the packets' random words. A value is NaN for a first packet, and for the few packets that need
+    /// further random words.
     #[inline(always)]
     pub(crate) fn following<const N: usize>(&self, chains: &[f64; N], words: &[u64; N]) -> [f64; N] {
-        // Loops, not `map`, which is a call that no wide registers reach.
+        // A loop instead of `map`: the compiler does not inline `map` of an array here, and a call prevents vector instructions.
         let mut following = [0.0; N];
         for (following, (before, word)) in following.iter_mut().zip(chains.iter().zip(words)) {
             *following = self.phi * before + self.fresh_share * in_the_core_or_nan(*word);
@@ -380,30 +386,31 @@ impl CorrelatedDelays {
     }
 }
 
-/// What a fresh number adds to a chain of variance one.
+/// Returns √(1 − φ²), the factor of a fresh normal number in a chain of variance one.
 fn fresh_share(phi: f64) -> f64 {
     libm::sqrt((1.0 - phi) * (1.0 + phi))
 }
 
+/// Returns a span in nanoseconds.
 #[expect(clippy::cast_precision_loss, reason = "a span enters a random law as a real number")]
 fn nanos(span: Duration) -> f64 {
     span.as_nanos() as f64
 }
 
-/// 2^51.
+/// 2^51, the bound below which [`with_room`] is exact.
 const SMALL: f64 = 2_251_799_813_685_248.0;
 
-/// The nearest whole number, of two the even one; saturates beyond 2^63.
+/// Returns the nearest whole number, and of two equally near numbers the even number. Saturates beyond 2^63.
 ///
-/// Adding 1.5·2^52 leaves no room for a fraction, and the whole number in the lower bits: below 2^51 that is `rint` in an addition and a subtraction, where
-/// `libm`'s is a call, which added a quarter to a tick of ten peers over links with jitter.
+/// Adding 1.5·2^52 leaves no bits for a fraction, so that the sum is rounded and its lower bits hold the whole number. Below 2^51 the result is that of
+/// `rint`, without the call to `libm`.
 #[inline]
 #[expect(clippy::cast_possible_truncation, reason = "saturates")]
 fn nearest(number: f64) -> i64 {
     if number.abs() < SMALL { with_room(number) } else { libm::rint(number) as i64 }
 }
 
-/// [`nearest`] of a number smaller than [`SMALL`].
+/// Returns [`nearest`] of a number whose magnitude is below [`SMALL`].
 #[inline(always)]
 #[expect(clippy::cast_possible_wrap, reason = "a difference of bits that may be negative")]
 fn with_room(number: f64) -> i64 {
@@ -411,14 +418,14 @@ fn with_room(number: f64) -> i64 {
     (number + ROOM).to_bits().wrapping_sub(ROOM.to_bits()) as i64
 }
 
-/// A delay as a whole number of nanoseconds: laws are not below their floor.
+/// Returns a delay as a whole number of nanoseconds. The delay is not negative, because no law is below its floor.
 #[inline]
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates beyond 584 years")]
 fn count(nanos: f64) -> u64 {
     if nanos < SMALL { with_room(nanos).cast_unsigned() } else { libm::rint(nanos) as u64 }
 }
 
-/// The parameters of the delay and of its jitter.
+/// Parameters of the delay and of its jitter.
 pub(crate) const KEYS: [Key; 2] = [
     usual("delay", Form::Duration, "\"0s\"", "One-way propagation delay; the mean if there is jitter"),
     optional("jitter", JITTER, "Standard deviation of the delay, with a normal law, or a table that also names law, floor and memory"),
@@ -434,7 +441,7 @@ static JITTER_TABLE: Table = Table::of(&[&[
 const LAWS: [(&str, &str); 8] = words(&Distribution::CHOICES);
 
 impl Distribution {
-    /// The words of files for laws that need no file.
+    /// Names of the laws that need no file, each with its value and its description.
     pub const CHOICES: Choices<Self, 8> = [
         ("normal", Self::Normal, "Gaussian, cut off at the floor"),
         ("uniform", Self::Uniform, "equally likely between two ends"),
@@ -452,7 +459,7 @@ static LAW_FILE: Table = Table::of(&[&[
 ]]);
 
 impl Delay {
-    /// The mean and the jitter in words.
+    /// Returns the mean and the jitter in words.
     pub(crate) fn words(&self) -> String {
         let mean = Span(self.mean());
         let Some(Jitter { sd, distribution, floor, correlation }) = self.jitter() else { return mean.to_string() };
@@ -485,7 +492,7 @@ mod tests {
         }
     }
 
-    /// Delays \[ms\] of packets so far apart.
+    /// Returns delays \[ms\] of `count` packets that are `gap` apart.
     fn draws(delay: &Delay, count: u64, gap: Duration) -> Vec<f64> {
         let stream = Stream::new(1, b"delay");
         let mut stage = DelayStage::new(delay);
@@ -497,7 +504,7 @@ mod tests {
         (0..count).map(|number| draw(stream.packet(number))).collect()
     }
 
-    /// The largest distance between the empirical distribution and that of the delay's law (Kolmogorov).
+    /// Returns the largest distance between the empirical distribution and the distribution of the delay's law (Kolmogorov).
     fn kolmogorov(delay: &Delay, mut sample: Vec<f64>) -> f64 {
         sample.sort_by(f64::total_cmp);
         let n = sample.len() as f64;
@@ -544,7 +551,7 @@ mod tests {
                     Correlation::None | Correlation::InTime(_) => delay.law().unwrap().correlation(0.9),
                 };
                 assert!((covariance / variance - expected).abs() < 4.5 * 3.0 * 0.0014, "{distribution:?} {correlation:?} {}", covariance / variance);
-                // Every 50th is independent of the others but for 0.9^50 = 0.5 %: n = 2000.
+                // Every 50th delay is independent of the others except for a correlation of 0.9^50 = 0.5 %: n = 2000.
                 let thinned: Vec<f64> = sample.into_iter().step_by(50).collect();
                 assert!(kolmogorov(&delay, thinned) < 1.9495 / 2000_f64.sqrt(), "{distribution:?} {correlation:?}");
             }

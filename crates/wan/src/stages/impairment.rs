@@ -1,7 +1,7 @@
-//! What an impairment that describes itself says: its parameters, its words, its figures, and the stage that carries it out.
+//! Trait of impairments that describe themselves: parameters, words, figures, and the stage that carries the impairment out.
 //!
-//! Such an impairment is one file and one line in [the list](super::list). Readers of files, `--set`, live changes, schemas, `explain`, configured figures and the
-//! analysis take everything from this trait.
+//! An impairment of this kind is one file and one line in [the list](super::list). Readers of files, `--set`, live changes, schemas, `explain`, configured
+//! figures and the analysis take everything from this trait.
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -14,12 +14,12 @@ use crate::packet::PacketInfo;
 use crate::parameters::Key;
 use crate::random::Stream;
 
-/// An impairment: its configuration, checked when it was made.
+/// Configuration of an impairment, checked when the configuration was made.
 pub(crate) trait Impairment: Clone + PartialEq + Debug {
-    /// The stage, with what it remembers.
+    /// Stage that carries the impairment out, with its state.
     type Stage: ImpairmentStage<Config = Self>;
 
-    /// Its key in a table of link keys, with its default, `"none"`, and its form: a table of parameters, or `"none"`.
+    /// Key of the impairment in a table of link keys, with the default `"none"` and the form: a table of parameters, or `"none"`.
     const KEY: Key;
 
     /// Makes the configuration from the values of its parameters.
@@ -29,76 +29,78 @@ pub(crate) trait Impairment: Clone + PartialEq + Debug {
     /// [`Refusal`] if the values make no sense together.
     fn of(values: &Values) -> Result<Self, Refusal>;
 
-    /// The impairment in words, with its numbers, as one stage of a line.
+    /// Returns the impairment in words with its numbers, as one stage of a line.
     fn words(&self) -> String;
 
-    /// What it adds to the delay of a packet in the long run.
+    /// Returns mean and variance of the delay that the impairment adds to a packet in the long run.
     fn extra_delay(&self) -> ExtraDelay;
 }
 
-/// The stage of an impairment. Whatever it draws has an address: the number of an event, never that of a call.
+/// Stage of an impairment. Random numbers of a stage are addressed by the number of an event and never by the number of a call, so that results do not depend
+/// on how often the stage is asked.
 pub(crate) trait ImpairmentStage: Clone + Debug {
-    /// Its configuration.
+    /// Configuration of the impairment.
     type Config;
 
-    /// The stage with a configuration that holds from `now` on, or with none. `before` is the stage that was there, which may stay without a
-    /// configuration, so that no number is drawn twice. `code` is that of its random numbers, for [`Purpose::Listed`](crate::random::Purpose::Listed).
+    /// Returns the stage for the configuration `config`, which holds from `now` on, or for no configuration. `before` is the previous stage. A stage may stay
+    /// although it has no configuration, so that no random number is drawn twice when a configuration comes back. `code` is the code of the impairment's
+    /// random numbers, for [`Purpose::Listed`](crate::random::Purpose::Listed).
     fn reconfigured(before: Option<Self>, now: Instant, config: Option<&Self::Config>, draws: Stream, code: u8) -> Option<Self>;
 
-    /// Whether a packet that is offered `now` is lost. It counts as [`DropCause::Loss`](crate::DropCause::Loss).
+    /// Returns whether a packet offered `now` is lost. The loss counts as [`DropCause::Loss`](crate::DropCause::Loss).
     fn loses(&mut self, _now: Instant, _packet: PacketInfo) -> bool {
         false
     }
 
-    /// How much later a packet arrives that begins to propagate `now` \[ns\]. `now` never goes back.
+    /// Returns the additional delay \[ns\] of a packet that begins to propagate `now`. `now` never decreases from call to call.
     fn delay_nanos(&mut self, _now: Instant, _packet: PacketInfo) -> u64 {
         0
     }
 }
 
-/// The mean and the variance of an addition to the delay.
+/// Mean and variance of an addition to the delay.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct ExtraDelay {
-    /// The mean \[s\].
+    /// Mean \[s\].
     pub mean: f64,
-    /// The variance \[s²\].
+    /// Variance \[s²\].
     pub variance: f64,
 }
 
-/// Why the values of parameters are refused.
+/// Reason for which values of parameters are refused.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Refusal {
-    /// The parameter to blame.
+    /// Name of the refused parameter.
     pub key: &'static str,
-    /// The fault, and what was expected.
+    /// Description of the fault and of the expected value.
     pub message: String,
 }
 
-/// The value of a parameter, as its form says.
+/// Value of a parameter, of the kind that the parameter's form names.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum ParameterValue {
-    /// Of [`Form::Duration`](crate::parameters::Form::Duration) and [`Form::PositiveDuration`](crate::parameters::Form::PositiveDuration).
+    /// Value of [`Form::Duration`](crate::parameters::Form::Duration) and [`Form::PositiveDuration`](crate::parameters::Form::PositiveDuration).
     Duration(Duration),
-    /// Of [`Form::Rate`](crate::parameters::Form::Rate).
+    /// Value of [`Form::Rate`](crate::parameters::Form::Rate).
     Rate(Rate),
-    /// Of [`Form::Size`](crate::parameters::Form::Size).
+    /// Value of [`Form::Size`](crate::parameters::Form::Size).
     Size(Bytes),
-    /// Of [`Form::Probability`](crate::parameters::Form::Probability).
+    /// Value of [`Form::Probability`](crate::parameters::Form::Probability).
     Probability(Probability),
-    /// Of [`Form::Number`](crate::parameters::Form::Number).
+    /// Value of [`Form::Number`](crate::parameters::Form::Number).
     Number(f64),
-    /// Of [`Form::Integer`](crate::parameters::Form::Integer).
+    /// Value of [`Form::Integer`](crate::parameters::Form::Integer).
     Integer(u64),
-    /// Of [`Form::Boolean`](crate::parameters::Form::Boolean).
+    /// Value of [`Form::Boolean`](crate::parameters::Form::Boolean).
     Boolean(bool),
-    /// Of [`Form::Words`](crate::parameters::Form::Words).
+    /// Value of [`Form::Words`](crate::parameters::Form::Words).
     Word(&'static str),
 }
 
 macro_rules! values_of_forms {
     ($($form:ident: $type:ty,)*) => {$(
         impl TryFrom<ParameterValue> for $type {
-            /// The value, which is of another form.
+            /// The refused value, which is of another form.
             type Error = ParameterValue;
 
             fn try_from(value: ParameterValue) -> Result<Self, ParameterValue> {
@@ -118,23 +120,23 @@ values_of_forms! {
     Word: &'static str,
 }
 
-/// The values of parameters by key, defaults included. A parameter without a default that is not given has none.
+/// Values of parameters by key, defaults included. A parameter that has no default and is not given has no entry.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Values(pub Vec<(&'static str, ParameterValue)>);
 
 impl Values {
-    /// The value of a parameter.
+    /// Returns the value of the parameter `key`, or `None` if the parameter has no entry.
     #[must_use]
     pub fn get(&self, key: &str) -> Option<ParameterValue> {
         self.0.iter().find(|(name, _)| *name == key).map(|(_, value)| *value)
     }
 
-    /// A duration; zero if it is not given.
+    /// Returns the duration `key`, or zero if `key` is not given or is no duration.
     pub(crate) fn duration(&self, key: &str) -> Duration {
         if let Some(ParameterValue::Duration(value)) = self.get(key) { value } else { Duration::ZERO }
     }
 
-    /// A number; zero if it is not given.
+    /// Returns the number `key`, or zero if `key` is not given or is no number.
     pub(crate) fn number(&self, key: &str) -> f64 {
         if let Some(ParameterValue::Number(value)) = self.get(key) { value } else { 0.0 }
     }

@@ -1,7 +1,7 @@
-//! The impairments that describe themselves. One line adds one: `code => field: module::Type`.
+//! List of the impairments that describe themselves. One line adds an impairment: `code => field: module::Type`.
 //!
-//! A code is part of the address of each random number, and so of every recorded result: it never changes and is never used twice, and it is even and at
-//! least 14, so that no other purpose shares its words.
+//! A code is part of the address of each random number, and so of every recorded result. A code therefore never changes and is never used twice. A code is
+//! even and at least 14, so that no other purpose shares its random words.
 
 use alloc::boxed::Box;
 use alloc::string::String;
@@ -17,20 +17,20 @@ use crate::random::Stream;
 
 macro_rules! impairments {
     ($($code:literal => $field:ident: $type:path,)*) => {
-        /// The impairments of a link that describe themselves; by default none.
+        /// Impairments of a link that describe themselves. By default no impairment is configured.
         #[derive(Clone, PartialEq, Default)]
         pub struct Impairments {
             $($field: Option<$type>,)*
         }
 
         impl Impairments {
-            /// The keys of all impairments, in the order in which packets meet them.
+            /// Keys of all impairments, in the order in which packets pass the impairments.
             pub const KEYS: &[Key] = &[$(<$type as Impairment>::KEY,)*];
 
-            /// The codes of their random numbers.
+            /// Codes of the impairments' random numbers, in the order of [`KEYS`](Self::KEYS).
             pub(crate) const CODES: &[u8] = &[$($code,)*];
 
-            /// Sets the impairment of that key, or takes it away. Another key is not looked at.
+            /// Sets the impairment with the key `key`, or removes the impairment if `values` is `None`. A key that no impairment has is ignored.
             ///
             /// # Errors
             ///
@@ -43,24 +43,25 @@ macro_rules! impairments {
                 Ok(())
             }
 
-            /// Each impairment that is configured, in words with its numbers.
+            /// Returns each configured impairment in words with its numbers.
             #[must_use]
             pub fn words(&self) -> Vec<String> {
                 let all: &[Option<String>] = &[$(self.$field.as_ref().map(Impairment::words),)*];
                 all.iter().flatten().cloned().collect()
             }
 
-            /// The addition to the delay in the long run; `None` if there is no impairment.
+            /// Returns the addition to the delay in the long run, summed over all configured impairments, or `None` if no impairment is configured.
             #[must_use]
             pub fn extra_delay(&self) -> Option<ExtraDelay> {
                 let all: &[Option<ExtraDelay>] = &[$(self.$field.as_ref().map(Impairment::extra_delay),)*];
+                // Impairments draw independent random numbers, so their variances add up like their means.
                 let sum = |one: ExtraDelay, other: ExtraDelay| ExtraDelay { mean: one.mean + other.mean, variance: one.variance + other.variance };
                 all.iter().flatten().copied().reduce(sum)
             }
         }
 
         impl fmt::Debug for Impairments {
-            /// Only those that are configured: the text of a link does not change when the list grows.
+            /// Shows only configured impairments, so that the text of a link does not change when the list grows.
             fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 let mut shown = f.debug_struct("Impairments");
                 $(if let Some(config) = &self.$field {
@@ -70,7 +71,7 @@ macro_rules! impairments {
             }
         }
 
-        /// The stages of the impairments that are configured.
+        /// Stages of the configured impairments.
         #[derive(Clone, Debug, Default)]
         pub(crate) struct ImpairmentStages {
             $($field: Option<<$type as Impairment>::Stage>,)*
@@ -78,7 +79,7 @@ macro_rules! impairments {
 
         #[allow(unused_variables, unused_mut, clippy::unused_self, clippy::needless_pass_by_ref_mut, reason = "the list may be empty")]
         impl ImpairmentStages {
-            /// The stages with another configuration from `now` on; `None` if there is none.
+            /// Returns the stages with the configuration `config` from `now` on, or `None` if there were no stages and `config` is empty.
             pub(crate) fn reconfigured(before: Option<Box<Self>>, now: Instant, config: &Impairments, draws: Stream) -> Option<Box<Self>> {
                 if before.is_none() && *config == Impairments::default() {
                     return None;
@@ -88,14 +89,15 @@ macro_rules! impairments {
                 Some(stages)
             }
 
-            /// Whether one of them loses the packet. Each is asked, so that none depends on another.
+            /// Returns whether any impairment loses the packet. Every impairment is asked even after a loss, so that the state of a stage does not depend on
+            /// other stages.
             pub(crate) fn loses(&mut self, now: Instant, packet: PacketInfo) -> bool {
                 let mut lost = false;
                 $(lost |= self.$field.as_mut().is_some_and(|stage| stage.loses(now, packet));)*
                 lost
             }
 
-            /// How much later the packet arrives by all of them \[ns\].
+            /// Returns the sum of the impairments' additional delays of a packet \[ns\].
             pub(crate) fn delay_nanos(&mut self, now: Instant, packet: PacketInfo) -> u64 {
                 let mut nanos = 0_u64;
                 $(nanos = nanos.saturating_add(self.$field.as_mut().map_or(0, |stage| stage.delay_nanos(now, packet)));)*

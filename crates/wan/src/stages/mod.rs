@@ -1,6 +1,6 @@
-//! The stages of a link: in each file one impairment, its parameters with their checks, and the stage that keeps what the impairment remembers.
+//! Stages of a link. Each file holds one impairment: its parameters with their checks, and the stage that keeps the impairment's state.
 //!
-//! [`config`] lists them.
+//! [`config`] lists the stages in the order in which packets pass them.
 
 pub(crate) mod config;
 pub(crate) mod corruption;

@@ -1,7 +1,7 @@
-//! Links whose condition changes by chance: a chain of states in continuous time, each with a whole configuration.
+//! Modulation: links whose configuration changes by chance. A chain of states in continuous time selects one of several whole configurations.
 //!
-//! A Wi-Fi cell that is busy or not, a phone that changes cells, a route that flaps. The chain's path is a function of (seed, name of the modulator), so
-//! links that name the same modulator change at the same instants without knowing of each other.
+//! Examples are a Wi-Fi cell that is busy or not, a phone that changes cells, and a route that flaps. The chain's path is a function of the seed and the name
+//! of the modulator, so that links with the same modulator change at the same instants without sharing state.
 
 use alloc::string::String;
 use alloc::sync::Arc;
@@ -16,57 +16,57 @@ use crate::parameters::{Form, Table, WEIGHT, number, optional, required};
 use crate::random::{Purpose, Stream, unit};
 use crate::stages::config::LinkConfig;
 
-/// A chain of states in continuous time: how long each lasts, and which comes next. It begins in state 0 at the begin of time.
+/// Chain of states in continuous time: the lengths of stays and the order of states. The chain begins in state 0 at the begin of time.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Modulator {
     name: String,
     states: Arc<[ModulatorState]>,
 }
 
-/// One state of a modulator.
+/// State of a modulator.
 #[derive(Clone, PartialEq, Debug)]
 pub struct ModulatorState {
-    /// How long it lasts; `None`: for ever.
+    /// Law of the length of a stay. `None` means that the state lasts for ever.
     pub sojourn: Option<Sojourn>,
-    /// How likely each state comes next, in proportion; its own must be 0.
+    /// Weights of the next states, indexed by state. A weight is finite and not negative; the weight of the state itself is 0.
     pub next: Vec<f64>,
 }
 
-/// Why a modulator is refused. States count from 0.
+/// Reason for which a modulator is refused. States count from 0.
 #[derive(Clone, PartialEq, Debug)]
 pub enum ModulatorError {
-    /// There is no state.
+    /// The modulator has no state.
     NoStates,
-    /// A state names more or fewer states than there are.
+    /// A state has more or fewer weights than the modulator has states.
     Size {
-        /// Which state.
+        /// Index of the state.
         state: usize,
-        /// How many it names.
+        /// Number of weights of the state.
         found: usize,
-        /// How many there are.
+        /// Number of states of the modulator.
         expected: usize,
     },
-    /// A likelihood or a rate is negative or no number, or a state follows itself.
+    /// A weight or a rate is negative or not finite, or a state follows itself.
     Weight {
-        /// Which state.
+        /// Index of the state.
         state: usize,
-        /// Which would follow.
+        /// Index of the state that would follow.
         next: usize,
-        /// How likely.
+        /// Refused weight or rate.
         value: f64,
     },
-    /// A state ends and nothing follows, or its time is no time.
+    /// A state ends and no state follows, or the law of its length is not sound.
     Ends {
-        /// Which state.
+        /// Index of the state.
         state: usize,
     },
-    /// The configurations have their stages in different orders.
+    /// The configurations have different orders of stages.
     Layouts,
-    /// There are more or fewer configurations than states.
+    /// The number of configurations differs from the number of states.
     Configs {
-        /// How many configurations.
+        /// Number of configurations.
         configs: usize,
-        /// How many states.
+        /// Number of states.
         states: usize,
     },
 }
@@ -94,11 +94,11 @@ impl fmt::Display for ModulatorError {
 impl core::error::Error for ModulatorError {}
 
 impl Modulator {
-    /// A chain with these states.
+    /// Returns a chain with the given states.
     ///
     /// # Errors
     ///
-    /// [`ModulatorError`] if a state has no way on or a value is none.
+    /// [`ModulatorError`] if a state ends and no state follows, or a weight or a length is refused.
     pub fn new(name: &str, states: Vec<ModulatorState>) -> Result<Self, ModulatorError> {
         if states.is_empty() {
             return Err(ModulatorError::NoStates);
@@ -119,12 +119,12 @@ impl Modulator {
         Ok(Self { name: name.into(), states: states.into() })
     }
 
-    /// A Markov chain by its rates of going from each state (row) to each other (column) [1/s]; what stands on the diagonal is not looked at. A state whose
-    /// rates are all zero lasts for ever.
+    /// Returns a Markov chain with the rates of going from each state (row) to each other state (column) \[1/s\]. Numbers on the diagonal are ignored. A
+    /// state whose rates are all zero lasts for ever.
     ///
     /// # Errors
     ///
-    /// [`ModulatorError`] if the matrix is not square or a rate is none.
+    /// [`ModulatorError`] if the matrix is not square, or a rate is negative or not finite.
     pub fn from_rates(name: &str, rates: &[Vec<f64>]) -> Result<Self, ModulatorError> {
         let state = |(place, row): (usize, &Vec<f64>)| {
             let next: Vec<f64> = row.iter().enumerate().map(|(next, rate)| if next == place { 0.0 } else { *rate }).collect();
@@ -139,20 +139,20 @@ impl Modulator {
         Self::new(name, rates.iter().enumerate().map(state).collect())
     }
 
-    /// Its name: with the seed, the address of its path.
+    /// Returns the name, which is with the seed the address of the path's random numbers.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Its states.
+    /// Returns the states.
     #[must_use]
     pub fn states(&self) -> &[ModulatorState] {
         &self.states
     }
 }
 
-/// A link whose configuration follows a modulator.
+/// Configurations of a link that follows a modulator.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Modulated {
     modulator: Modulator,
@@ -160,12 +160,13 @@ pub struct Modulated {
 }
 
 impl Modulated {
-    /// A link that has the n-th configuration while the modulator is in its n-th state. A change of state is a live change: what propagates keeps its
-    /// delay, a packet that is being sent keeps the bits already sent.
+    /// Returns a link that has the n-th configuration while the modulator is in its n-th state. A change of state is a live change: packets in propagation
+    /// keep their delay, and a packet on the line keeps the bits already sent.
     ///
     /// # Errors
     ///
-    /// [`ModulatorError::Configs`] if there is not one configuration for each state, [`ModulatorError::Layouts`] if they differ in the order of their stages.
+    /// [`ModulatorError::Configs`] if the number of configurations is not the number of states, [`ModulatorError::Layouts`] if the configurations have
+    /// different orders of stages.
     pub fn new(modulator: Modulator, configs: Vec<LinkConfig>) -> Result<Self, ModulatorError> {
         if configs.len() != modulator.states.len() {
             return Err(ModulatorError::Configs { configs: configs.len(), states: modulator.states.len() });
@@ -176,31 +177,34 @@ impl Modulated {
         Ok(Self { modulator, configs: configs.into() })
     }
 
-    /// The modulator.
+    /// Returns the modulator.
     #[must_use]
     pub const fn modulator(&self) -> &Modulator {
         &self.modulator
     }
 
-    /// The configurations, one a state.
+    /// Returns the configurations, indexed by state.
     #[must_use]
     pub fn configs(&self) -> &[LinkConfig] {
         &self.configs
     }
 }
 
-/// The path of a modulator as one link sees it.
+/// Path of a modulator as one link follows it.
 #[derive(Clone, Debug)]
 pub(crate) struct ModulationStage {
     modulated: Modulated,
     draws: Stream,
+    /// Index of the present state.
     state: usize,
+    /// Number of changes so far, which is the address of the present stay's random numbers.
     changes: u64,
+    /// End of the present state, or the end of time if the state lasts for ever.
     until: Instant,
 }
 
 impl ModulationStage {
-    /// The path from the begin of time, brought to `now`.
+    /// Returns the path at `now`, after all changes since the begin of time.
     pub(crate) fn new(seed: u64, modulated: Modulated, now: Instant) -> Self {
         let draws = Stream::new(seed, alloc::format!("modulator {}", modulated.modulator.name).as_bytes());
         let mut stage = Self { modulated, draws, state: 0, changes: 0, until: Instant::ZERO };
@@ -211,17 +215,17 @@ impl ModulationStage {
         stage
     }
 
-    /// When the state changes; `None` if never.
+    /// Returns the instant of the next change, or `None` if the state lasts for ever.
     pub(crate) fn next_change(&self) -> Option<Instant> {
         (self.until < Instant::MAX).then_some(self.until)
     }
 
-    /// Goes to the next state.
+    /// Moves the path to the next state.
     pub(crate) fn change(&mut self) {
         let weights = &self.modulated.modulator.states[self.state].next;
         let total: f64 = weights.iter().sum();
         let mut left = unit(self.draws.packet(self.changes).first(Purpose::Modulation)) * total;
-        // Rounding may leave a rest behind the last state that can follow.
+        // Subtracting may leave a remainder by rounding, so that no state is chosen. The last state with a weight is chosen then.
         let last = weights.iter().rposition(|weight| *weight > 0.0).unwrap_or(self.state);
         let next = weights.iter().position(|weight| {
             left -= weight;
@@ -232,19 +236,21 @@ impl ModulationStage {
         self.until = self.end_of_state(self.until);
     }
 
-    /// The configuration of the present state.
+    /// Returns the configuration of the present state.
     pub(crate) fn config(&self) -> &LinkConfig {
         &self.modulated.configs[self.state]
     }
 
+    /// Returns the end of the present state, which begins at `begin`.
     fn end_of_state(&self, begin: Instant) -> Instant {
         let Some(sojourn) = self.modulated.modulator.states[self.state].sojourn else { return Instant::MAX };
+        // The first word at this address chooses the state after this stay, so the length takes the following words.
         let mut more = self.draws.packet(self.changes).more(Purpose::Modulation);
         begin.saturating_add(sojourn.draw(|| more.next_word()))
     }
 }
 
-/// The parameters of a modulator.
+/// Parameters of a modulator.
 pub static MODULATOR: Table = Table::of(&[&[
     required("name", Form::Text, "What links call it, without space or dot").expecting("a name that links refer to"),
     required("states", Form::List(&Form::Table(&MODULATOR_STATE)), "Its states; the first is the one in the beginning")
@@ -276,8 +282,8 @@ mod tests {
         path
     }
 
-    /// Three states with rates; the stationary law of this generator is (9, 4.5, 2)/15.5. Over 2000 s with a few hundred changes a second in all, fractions of time
-    /// are known to about 1/√(changes) = 0.2 %.
+    /// Three states with rates, whose generator has the stationary law (9, 4.5, 2)/15.5. In 2000 s there are a few hundred changes a second, so that
+    /// fractions of time are known to about 1/√(changes) = 0.2 %.
     #[test]
     fn time_in_each_state_is_the_stationary_law() {
         let rates = [vec![0.0, 50.0, 0.0], vec![60.0, 0.0, 40.0], vec![90.0, 0.0, 0.0]];

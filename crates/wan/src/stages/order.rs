@@ -1,23 +1,24 @@
-//! Whether a packet may overtake another.
+//! Order policy of a link: whether a packet may overtake another packet.
 
 use crate::parameters::{Choices, Form, Key, usual, words};
 use cohaptic_units::Instant;
 
-/// The order policy of a link. It is the last stage: it sees arrival instants and may only put them off.
+/// Order policy of a link. The policy is applied last: the stage sees arrival instants and can only postpone them.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Order {
-    /// A packet with a shorter delay overtakes. The marginal law of the delay is the configured one.
+    /// A packet with a shorter delay overtakes. The marginal law of the delay is the configured law.
     #[default]
     AllowReordering,
-    /// No packet arrives before one that was sent before it: Dₙ = max(aₙ + dₙ, Dₙ₋₁). Packets that must wait arrive later than the configured law says.
+    /// No packet arrives before an earlier packet: Dₙ = max(aₙ + dₙ, Dₙ₋₁). Packets that must wait arrive later than the configured law says.
     InOrder,
 }
 
-/// The stage: the policy and the latest arrival so far.
+/// Stage that applies the policy, with the latest arrival so far.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct OrderStage {
     policy: Order,
-    /// Known even while reordering is allowed, so that a live change to `in-order` holds for the packets already on the way.
+    /// Latest arrival so far. Tracked even while reordering is allowed, so that after a live change to `in-order` no packet overtakes the packets already on
+    /// the way.
     latest: Instant,
 }
 
@@ -30,7 +31,7 @@ impl OrderStage {
         self.policy = policy;
     }
 
-    /// The arrival that the policy allows for one that is wanted.
+    /// Returns the arrival that the policy allows for a packet that would arrive at `wanted`.
     #[inline]
     pub(crate) fn arrival(&mut self, wanted: Instant) -> Instant {
         self.latest = self.latest.max(wanted);
@@ -41,13 +42,13 @@ impl OrderStage {
     }
 }
 
-/// The parameter of the order of packets.
+/// Parameter of the order of packets.
 pub(crate) const KEYS: [Key; 1] =
     [usual("order", Form::Words(&ORDERS), "\"allow-reordering\"", "Whether a packet with a shorter delay overtakes those before it")];
 const ORDERS: [(&str, &str); 2] = words(&Order::CHOICES);
 
 impl Order {
-    /// The words of files.
+    /// Names of the policies in files, each with its value and its description.
     pub const CHOICES: Choices<Self, 2> = [
         ("allow-reordering", Self::AllowReordering, "a packet with a shorter delay overtakes"),
         ("in-order", Self::InOrder, "a packet with a shorter delay waits for those before it"),

@@ -1,4 +1,4 @@
-//! Outages: spans during which a link takes no packet. Scheduled, random, or when nobody uses it.
+//! Outages: spans during which a link takes no packet. Outages are scheduled, random, or begin when the link is idle.
 
 use alloc::format;
 use alloc::string::String;
@@ -15,64 +15,64 @@ use crate::laws::sojourn::Sojourn;
 use crate::parameters::{Form, Key, Table, optional, required, usual};
 use crate::random::{Purpose, Stream};
 
-/// One outage: packets offered at `from` or later, but before `to`, are dropped.
+/// One outage. Packets offered at `from` or later, but before `to`, are dropped.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Outage {
-    /// The first instant at which the link is down.
+    /// First instant at which the link is down.
     pub from: Instant,
-    /// The first instant at which it is up again.
+    /// First instant at which the link is up again.
     pub to: Instant,
 }
 
-/// When a link is down: whenever one of the three says so.
+/// Outages of a link. The link is down whenever a scheduled, a random or an idle outage covers the instant.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Outages {
-    /// In order of time, none empty and none overlapping another.
+    /// Scheduled outages in the order of time. No outage is empty, and no two overlap.
     scheduled: Vec<Outage>,
     random: Option<RandomOutages>,
     idle: Option<IdleOutages>,
 }
 
-/// A link that fails and is repaired, again and again. It begins up.
+/// Random failures and repairs in turn. The link begins up.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct RandomOutages {
-    /// How long it is up.
+    /// Law of the spans during which the link is up.
     pub up: Sojourn,
-    /// How long it is down.
+    /// Law of the spans during which the link is down.
     pub down: Sojourn,
 }
 
-/// A link that goes down when nothing was sent for a while (a dial-up line, a sleeping radio), and comes up again after another while.
+/// Outages of a link that goes down when nothing was sent for a while (a dial-up line, a sleeping radio), and comes up again after another while.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct IdleOutages {
-    /// How long nothing must be sent. What an outage drops does not count as sent.
+    /// Time without a packet after which the link goes down. A packet that an outage drops does not count as sent.
     pub after: Duration,
-    /// How long it is down then. Nothing being sent, it goes down again `after` that.
+    /// Length of each outage. If nothing is sent after an outage, the link goes down again `after` its end.
     pub down: Duration,
 }
 
-/// Why a list of outages is refused. The index counts from zero in the order given.
+/// Reason for which outages are refused. The index counts from zero in the order given.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum OutagesError {
-    /// The outage ends before it begins, or when it begins.
+    /// The outage ends before it begins, or at the instant at which it begins.
     Empty {
-        /// Which outage.
+        /// Index of the outage.
         index: usize,
-        /// When it begins.
+        /// Begin of the outage.
         from: Instant,
-        /// When it ends.
+        /// End of the outage.
         to: Instant,
     },
-    /// The outage begins before the one listed before it has ended.
+    /// The outage begins before the previous outage in the list has ended.
     Overlap {
-        /// Which outage.
+        /// Index of the outage.
         index: usize,
-        /// When it begins.
+        /// Begin of the outage.
         from: Instant,
-        /// When the previous one ends.
+        /// End of the previous outage.
         ended: Instant,
     },
-    /// A span that never ends, or has no law.
+    /// A span of zero length, or a law whose longest span is below its shortest span.
     NoTime,
 }
 
@@ -91,7 +91,7 @@ impl fmt::Display for OutagesError {
 impl core::error::Error for OutagesError {}
 
 impl Outages {
-    /// Checks the list.
+    /// Returns scheduled outages, after checking that `outages` are not empty and in the order of time.
     ///
     /// # Errors
     ///
@@ -110,7 +110,7 @@ impl Outages {
         Ok(Self { scheduled: outages, ..Self::default() })
     }
 
-    /// With random failures.
+    /// Returns these outages with random failures in addition.
     ///
     /// # Errors
     ///
@@ -120,7 +120,7 @@ impl Outages {
         if sound { Ok(Self { random: Some(random), ..self }) } else { Err(OutagesError::NoTime) }
     }
 
-    /// With outages when idle.
+    /// Returns these outages with outages of an idle link in addition.
     ///
     /// # Errors
     ///
@@ -129,58 +129,60 @@ impl Outages {
         if idle.after.is_zero() || idle.down.is_zero() { Err(OutagesError::NoTime) } else { Ok(Self { idle: Some(idle), ..self }) }
     }
 
-    /// The random failures.
+    /// Returns the random failures, if there are any.
     #[must_use]
     pub const fn random(&self) -> Option<RandomOutages> {
         self.random
     }
 
-    /// The outages when idle.
+    /// Returns the outages of an idle link, if there are any.
     #[must_use]
     pub const fn idle(&self) -> Option<IdleOutages> {
         self.idle
     }
 
-    /// Whether there is none.
+    /// Returns whether the link is never down.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.scheduled.is_empty() && self.random.is_none() && self.idle.is_none()
     }
 
-    /// Whether a scheduled outage covers `now`. Down at the first instant of an outage, up at its end.
+    /// Returns whether a scheduled outage covers `now`. The link is down at the first instant of an outage, and up at its end.
     #[must_use]
     #[inline]
     pub fn scheduled_at(&self, now: Instant) -> bool {
+        // Outages are ordered and do not overlap, so only the first outage that ends after `now` can cover `now`.
         let next = self.scheduled.partition_point(|outage| outage.to <= now);
         self.scheduled.get(next).is_some_and(|outage| outage.from <= now)
     }
 
-    /// The scheduled outages in order of time.
+    /// Returns the scheduled outages in the order of time.
     #[must_use]
     pub fn scheduled(&self) -> &[Outage] {
         &self.scheduled
     }
 }
 
-/// The stage: whether the link is up.
+/// Stage that says whether the link is up.
 #[derive(Clone, Debug)]
 pub(crate) struct OutageStage {
     outages: Outages,
-    /// The span of random failures that the link is in: even ones are up.
+    /// Index of the present span of random failures. The link is up during spans with an even index. The index is also the address of the span's random
+    /// numbers.
     span: u64,
     span_ends: Instant,
-    /// When something was last taken, or the begin of time.
+    /// Instant of the last packet that the link took, or the instant at which outages of the idle link were configured.
     last_taken: Instant,
 }
 
 impl OutageStage {
-    /// The stage from the begin of time; `None` if the link is never down.
+    /// Returns the stage at the begin of time, or `None` if the link is never down.
     pub(crate) fn new(outages: Outages, draws: Stream) -> Option<Self> {
         Self::reconfigured(None, Instant::ZERO, outages, draws)
     }
 
-    /// The stage with new outages. A link that fails at random stays in the span that it is in; one that begins to do so begins up, and one that begins to
-    /// go down when idle was used just now.
+    /// Returns the stage with the outages `outages` from `now` on, or `None` if there was no stage and there are no outages. A link that fails at random
+    /// keeps its present span. A link that had no random failures begins up. A link that had no idle outages counts as used `now`.
     pub(crate) fn reconfigured(before: Option<Self>, now: Instant, outages: Outages, draws: Stream) -> Option<Self> {
         if before.is_none() && outages.is_empty() {
             return None;
@@ -191,7 +193,7 @@ impl OutageStage {
             stage.last_taken = now;
         }
         if let (None, Some(random)) = (stage.outages.random, outages.random) {
-            // No span is drawn twice: one that had begun before is not begun again.
+            // A link that failed at random before continues with the next even index, so that no span is drawn twice and the link begins up.
             if stage.span_ends < Instant::MAX {
                 stage.span += 2 - stage.span % 2;
             }
@@ -201,7 +203,7 @@ impl OutageStage {
         Some(stage)
     }
 
-    /// Whether the link is down for a packet that is offered `now`.
+    /// Returns whether the link is down for a packet offered `now`, which is not before earlier calls' `now`. A packet that finds the link up counts as sent.
     pub(crate) fn is_down(&mut self, now: Instant, draws: Stream) -> bool {
         let mut down = self.outages.scheduled_at(now);
         if let Some(random) = self.outages.random {
@@ -209,6 +211,7 @@ impl OutageStage {
                 self.span += 1;
                 let law = if self.span.is_multiple_of(2) { random.up } else { random.down };
                 self.span_ends = self.span_ends.saturating_add(drawn(law, draws, self.span));
+                // The sum saturates at the end of time. Without this exit a packet at the end of time would draw spans for ever.
                 if self.span_ends == Instant::MAX {
                     break;
                 }
@@ -216,6 +219,7 @@ impl OutageStage {
             down |= self.span % 2 == 1;
         }
         if let Some(IdleOutages { after, down: length }) = self.outages.idle {
+            // An idle link is up for `after` and down for `length`, again and again, since the last packet that the link took.
             let cycle = after.saturating_add(length).as_nanos();
             let idle = now.saturating_duration_since(self.last_taken).as_nanos();
             down |= idle % cycle >= after.as_nanos();
@@ -227,14 +231,15 @@ impl OutageStage {
     }
 }
 
+/// Returns a length drawn from `law` with the random numbers of the span `span`.
 fn drawn(law: Sojourn, draws: Stream, span: u64) -> Duration {
     let mut draws = draws.packet(span).draws(Purpose::Outage);
     law.draw(|| draws.next_word())
 }
 
-/// The parameter of outages.
+/// Parameter of outages.
 pub(crate) const KEYS: [Key; 1] = [usual("outage", OUTAGE, "[]", "When the link is down: a list of spans, or a table")];
-/// A span of time.
+/// Parameters of a span of time.
 pub(crate) static SPAN: Table = Table::of(&[&[
     required("from", Form::Duration, "When it begins, from the beginning of the scene").expecting("a time such as \"1s\""),
     required("to", Form::Duration, "When it ends, from the beginning of the scene").expecting("a time such as \"2s\""),
@@ -254,7 +259,7 @@ static IDLE_OUTAGE: Table = Table::of(&[&[
 ]]);
 
 impl Outages {
-    /// The kinds of outages in words; `None` if there are none.
+    /// Returns the kinds of outages in words, or `None` if the link is never down.
     pub(crate) fn words(&self) -> Option<String> {
         let mut kinds = Vec::new();
         if !self.scheduled.is_empty() {
@@ -287,7 +292,8 @@ mod tests {
         assert!(matches!(Outages::new(vec![outage(10, 20), outage(15, 30)]), Err(OutagesError::Overlap { index: 1, .. })));
     }
 
-    /// Up for 30 ms and down for 10 ms on the average, seen every 0.1 ms for 1000 s: a quarter down. Over about 25 000 cycles the fraction has a relative
+    /// The link is up for 30 ms and down for 10 ms on average, and is observed every 0.1 ms for 1000 s: it is down for a quarter of the time. Over about 25
+    /// 000 cycles the fraction has a relative
     /// standard error of √(1/25 000)·√2·0.75 (both spans exponential): 0.0017 of 0.25.
     #[test]
     fn random_failures_take_their_share() {
@@ -307,7 +313,8 @@ mod tests {
         let draws = Stream::new(0, b"");
         let mut stage = OutageStage::new(outages, draws).unwrap();
         let down: Vec<u64> = [0, 9, 18, 28, 32, 33, 44, 63, 67].into_iter().filter(|t| stage.is_down(Instant::from_nanos(*t), draws)).collect();
-        // Taken at 0, 9 and 18; down from 28 to 33, when it is taken again; down from 43 to 48, up to 58, down to 63, taken.
+        // The link takes packets at 0, 9 and 18. It is down from 28 to 33, and takes the packet at 33. It is then down from 43 to 48, up to 58, down to 63,
+        // and takes the packet at 63.
         assert_eq!(down, [28, 32, 44]);
     }
 

@@ -1,4 +1,4 @@
-//! A recorded path: its delay and its loss over time.
+//! Path trace: recorded delay and loss of a path over time.
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -9,25 +9,25 @@ use crate::delay_table::{self, Attoseconds, DelayRow, DelayTableError};
 use crate::parameters::{Choices, Form, Key, Table, required, usual, words};
 use cohaptic_units::{Instant, Probability};
 
-/// Delay and loss over time, as measured: a [table of delays](crate::delay_table), perhaps with a column `loss`.
+/// Recorded delay and loss over time: a [table of delays](crate::delay_table), optionally with a column `loss`.
 ///
-/// Between two rows the delay is that of the earlier one, or on the line between them; the loss is always that of the earlier one. Before the first row the
-/// first holds. After the last row it holds for ever, or the recording begins anew.
+/// Between two rows, the delay is the delay of the earlier row or is interpolated linearly, and the loss is the loss of the earlier row. Before the first row
+/// the first row holds. After the last row the last row holds for ever, or the recording begins anew.
 #[derive(Clone, PartialEq, Debug)]
 pub struct PathTrace {
     rows: Arc<[Row]>,
     between: Between,
-    /// Whether it begins anew at its last row, whose own values then count for nothing.
+    /// Whether the recording begins anew at the instant of its last row, whose delay and loss then never hold.
     repeats: bool,
 }
 
-/// What holds between two rows.
+/// Delay between two rows.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Between {
-    /// The earlier one.
+    /// Delay of the earlier row.
     #[default]
     Steps,
-    /// The delay on the line between both.
+    /// Linear interpolation between the delays of both rows.
     Lines,
 }
 
@@ -38,23 +38,23 @@ struct Row {
     loss: Probability,
 }
 
-/// Why a recording is refused. Lines count from 1.
+/// Reason for which a recording is refused. Lines count from 1.
 #[derive(Clone, PartialEq, Debug)]
 pub enum PathTraceError {
-    /// The text is no table of delays.
+    /// The text is not a table of delays.
     Table(DelayTableError),
-    /// A number is not one that it can be.
+    /// A number is out of range.
     Value {
-        /// Which line.
+        /// Number of the line.
         line: usize,
-        /// Which column, by name.
+        /// Name of the column.
         column: &'static str,
-        /// What was expected.
+        /// Description of the expected value.
         expected: &'static str,
     },
-    /// There is no row.
+    /// The table has no row.
     Empty,
-    /// It cannot be repeated, because it takes no time.
+    /// A repeating recording has no length.
     NoLength,
 }
 
@@ -72,12 +72,12 @@ impl fmt::Display for PathTraceError {
 impl core::error::Error for PathTraceError {}
 
 impl PathTrace {
-    /// Reads a table of delays, as [`delay_table`] describes it, with times and delays from 0 to 9·10⁹ s. A column `loss` may hold the probability of loss from each
-    /// row on. While the row of a lost packet holds, everything is lost. Of rows with equal times the last one holds.
+    /// Reads a table of delays, as [`delay_table`] describes it, with times and delays from 0 to 9·10⁹ s. A column `loss` may hold the probability of loss
+    /// from each row on. While the row of a lost packet holds, every packet is lost. Of rows with equal times the last row holds.
     ///
     /// # Errors
     ///
-    /// [`PathTraceError`] with the line. Never panics.
+    /// [`PathTraceError`] with the line. No text makes this function panic.
     pub fn parse(text: &str, between: Between, repeats: bool) -> Result<Self, PathTraceError> {
         let mut rows: Vec<Row> = Vec::new();
         for table_row in delay_table::read(text).map_err(PathTraceError::Table)? {
@@ -90,17 +90,17 @@ impl PathTrace {
         }
     }
 
-    /// The instant of the first row.
+    /// Returns the instant of the first row.
     #[must_use]
     pub fn first(&self) -> Instant {
         self.rows.first().map_or(Instant::ZERO, |first| first.at)
     }
 
-    /// The same recording with all times counted from its first row, as for times since 1970.
+    /// Returns the recording with all times counted from its first row, for recordings with times since 1970.
     ///
     /// # Errors
     ///
-    /// [`PathTraceError::NoLength`] if it repeats and has one row.
+    /// [`PathTraceError::NoLength`] if the recording repeats and has one row.
     pub fn from_first(self) -> Result<Self, PathTraceError> {
         let first = self.first();
         let rows: Arc<[Row]> =
@@ -108,14 +108,16 @@ impl PathTrace {
         if self.repeats && rows.len() < 2 { Err(PathTraceError::NoLength) } else { Ok(Self { rows, ..self }) }
     }
 
-    /// The delay \[ns\] and the loss at an instant.
+    /// Returns the delay \[ns\] and the probability of loss at `now`.
     pub(crate) fn at(&self, now: Instant) -> (u64, Probability) {
         let end = self.rows.last().map_or(Instant::ZERO, |last| last.at);
         let now = if self.repeats { Instant::from_nanos(now.as_nanos() % end.as_nanos()) } else { now };
         let next = self.rows.partition_point(|row| row.at <= now);
+        // A checked recording has at least one row. Before the first row `next` is 0, and the first row holds.
         let row = self.rows[next.saturating_sub(1)];
         let delay = match self.rows.get(next) {
             Some(after) if self.between == Between::Lines && next > 0 => {
+                // `whole` is above zero: `after` is the first row later than `now`, and `row` is not later than `now`.
                 let (passed, whole) = (now.as_nanos() - row.at.as_nanos(), after.at.as_nanos() - row.at.as_nanos());
                 let (from, to) = (i128::from(row.delay_nanos), i128::from(after.delay_nanos));
                 let change = (to - from) * i128::from(passed) / i128::from(whole);
@@ -126,40 +128,42 @@ impl PathTrace {
         (delay, row.loss)
     }
 
-    /// After how long it begins anew; `None` if its last row holds for ever.
+    /// Returns the time after which the recording begins anew, or `None` if the last row holds for ever.
     #[must_use]
     pub fn period(&self) -> Option<Duration> {
         self.rows.last().filter(|_| self.repeats).map(|last| Duration::from_nanos(last.at.as_nanos()))
     }
 
-    /// The delay and the loss of the last row.
+    /// Returns the delay and the loss of the last row.
     #[must_use]
     pub fn last(&self) -> (Duration, Probability) {
         self.rows.last().map_or((Duration::ZERO, Probability::ZERO), |row| (Duration::from_nanos(row.delay_nanos), row.loss))
     }
 
-    /// This recording without chance: rows that do not lose everything lose nothing.
+    /// Returns the recording without chance: a probability of loss below one becomes zero.
     #[must_use]
     pub fn without_chance(&self) -> Self {
         let certain = |row: &Row| Row { loss: if row.loss == Probability::ONE { row.loss } else { Probability::ZERO }, ..*row };
         Self { rows: self.rows.iter().map(certain).collect(), ..self.clone() }
     }
 
-    /// The least delay of all rows.
+    /// Returns the least delay of all rows.
     #[must_use]
     pub fn least(&self) -> Duration {
         Duration::from_nanos(self.rows.iter().map(|row| row.delay_nanos).min().unwrap_or(0))
     }
 }
 
-/// The longest time and delay of a recording \[ns\].
+/// Longest time and delay of a recording \[ns\].
 const MOST: u64 = 9_000_000_000_000_000_000;
 
+/// Returns a row of the recording for a row of the table. `above` is the previous row of the recording.
 fn row(row: &DelayRow, above: Option<&Row>) -> Result<Row, PathTraceError> {
     let refused = |column, expected| PathTraceError::Value { line: row.line, column, expected };
     let nanos = |column, time: Attoseconds| time.nanos().filter(|nanos| *nanos <= MOST).ok_or_else(|| refused(column, "a time from 0 to 9e9 s"));
     let at = Instant::from_nanos(nanos("t", row.sent)?);
     let Some(delay) = row.delay else {
+        // The row is a lost packet, which has no delay of its own. The delay of the row above stays, so that `Lines` can interpolate.
         return Ok(Row { at, delay_nanos: above.map_or(0, |above| above.delay_nanos), loss: Probability::ONE });
     };
     let loss = match row.loss.as_str() {
@@ -169,7 +173,7 @@ fn row(row: &DelayRow, above: Option<&Row>) -> Result<Row, PathTraceError> {
     Ok(Row { at, delay_nanos: nanos("delay", delay)?, loss })
 }
 
-/// The parameter of recorded lines and paths.
+/// Parameter of recorded lines and paths.
 pub(crate) const KEYS: [Key; 1] = [usual(
     "trace",
     Form::AnyOf(const { &[Form::File, Form::Table(&TRACE)] }),
@@ -191,7 +195,7 @@ const START: [(&str, &str); 2] = [("zero", "the start of the run"), ("first", "t
 const BETWEEN: [(&str, &str); 2] = words(&Between::CHOICES);
 
 impl Between {
-    /// The words of files.
+    /// Names of the ways in files, each with its value and its description.
     pub const CHOICES: Choices<Self, 2> = [("steps", Self::Steps, "the earlier row"), ("lines", Self::Lines, "a delay on the line between both")];
 }
 
@@ -232,7 +236,8 @@ mod tests {
         assert_eq!(delays(Between::Lines, true), expected);
     }
 
-    /// A recording is read like measurements are: byte order mark, units, columns in any order and more of them, equal times, and lost packets as programs write them.
+    /// A recording may have everything that measurements have: a byte order mark, units, columns in any order, further columns, equal times, and lost packets
+    /// in each notation.
     #[test]
     fn what_is_measured_is_replayed() {
         let plain = |text| PathTrace::parse(text, Between::Steps, false).unwrap();
@@ -243,7 +248,7 @@ mod tests {
             assert_eq!(at(&plain(measured), ms), at(&expected, ms), "{ms}");
         }
         assert_eq!(at(&expected, 35), (30_000_000, Probability::ONE));
-        // On the line to and from an instant with two rows, too.
+        // Interpolation also works before and after an instant with two rows.
         let lines = PathTrace::parse("sent,arrived\n0,0.02\n1,1.04\n1,1.01\n2,2.01\n", Between::Lines, false).unwrap();
         assert_eq!([500, 999, 1000, 1500].map(|ms| at(&lines, ms).0 / 100_000), [300, 399, 100, 100]);
     }

@@ -1,4 +1,4 @@
-//! Packets that are put out of order on purpose.
+//! Reordering: packets that are put out of order on purpose.
 
 use alloc::collections::VecDeque;
 use alloc::format;
@@ -15,64 +15,67 @@ use crate::laws::chance::{Chance, ChanceStage};
 use crate::packet::Carried;
 use crate::parameters::{Form, Key, MOST_OF_32_BITS, Table, optional, usual};
 
-/// Which packets leave their place, and how.
+/// Choice of packets that leave their place in the order, and the kind of displacement.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Reorder {
-    /// Which packets.
+    /// Chance that a packet leaves its place.
     pub packets: Chance,
-    /// What happens to them.
+    /// Displacement of a chosen packet.
     pub how: Displacement,
 }
 
-/// How a packet leaves its place.
+/// Displacement of a packet that leaves its place.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Displacement {
-    /// It jumps ahead: it takes no delay at all and overtakes the packets under way (netem's reordering). Only every `gap`-th packet may; 1: any.
+    /// The packet jumps ahead: it has no delay and overtakes the packets under way (netem's reordering). A packet may jump only if at least `gap` − 1
+    /// packets came since the last jump; with 1, any packet may.
     Jump {
-        /// How many packets there are from one that may jump to the next.
+        /// Least distance from a jump to the next jump, in packets.
         gap: NonZeroU32,
     },
-    /// It is held back until this number of later packets has passed it; 1 swaps two neighbours. If they do not come, it goes on after `at_most`.
+    /// The packet is held until a number of later packets has passed it. With 1, two neighbours change places. If too few packets pass, the packet continues
+    /// after `at_most`.
     Behind {
-        /// How many pass it.
+        /// Number of packets that pass the held packet.
         packets: NonZeroU32,
-        /// How long it is held at most.
+        /// Longest time for which the packet is held.
         at_most: Duration,
     },
-    /// The time that it takes in addition to its delay.
+    /// The packet takes a time in addition to its delay.
     Later {
-        /// How much.
+        /// Additional time.
         by: Duration,
     },
 }
 
-/// What the stage says about a packet.
+/// Decision of the stage about a packet.
 #[derive(Debug)]
 pub(crate) enum Placed<T> {
-    /// It goes on with its delay.
+    /// The packet continues with its delay.
     InOrder(Carried<T>),
-    /// It takes no delay.
+    /// The packet continues without delay.
     Jumps(Carried<T>),
-    /// The additional time that it takes.
+    /// The packet continues with its delay and the additional time.
     Late(Carried<T>, Duration),
-    /// It is held back.
+    /// The stage holds the packet.
     Held,
 }
 
-/// The stage and what it holds back.
+/// Stage with the packets that it holds.
 #[derive(Clone, Debug)]
 pub(crate) struct ReorderStage<T> {
     config: Option<Reorder>,
     packets: Option<ChanceStage>,
-    /// Packets since the last one that jumped.
+    /// Number of packets since the last packet that left its place.
     since_jump: u32,
-    /// In the order of being held; deadlines may be in another order after a live change.
+    /// Held packets in the order in which they came. After a live change their deadlines may be in another order.
     held: VecDeque<Held<T>>,
 }
 
 #[derive(Clone, Debug)]
 struct Held<T> {
     packet: Carried<T>,
+    /// Number of packets that must still pass; at least 1 while the packet is held.
     passes: u32,
     deadline: Instant,
 }
@@ -82,23 +85,25 @@ impl<T> ReorderStage<T> {
         Self { config: None, packets: None, since_jump: 0, held: VecDeque::new() }
     }
 
+    /// Sets the configuration that holds for later packets. Held packets stay, and a correlated choice continues from the previous packet.
     pub(crate) fn configure(&mut self, config: Option<Reorder>) {
         self.packets = config.and_then(|config| ChanceStage::reconfigured(self.packets, config.packets));
         self.config = config;
     }
 
-    /// Places a packet. Those that were waiting for it to pass are in `released`, behind it.
+    /// Places a packet. Held packets that waited for it to pass are appended to `released`, and follow it.
     pub(crate) fn place(&mut self, now: Instant, packet: Carried<T>, word: impl FnOnce() -> u64, released: &mut Vec<Carried<T>>) -> Placed<T> {
         let Some(config) = self.config else {
             self.pass(released);
             return Placed::InOrder(packet);
         };
-        // As in netem, a packet that may not jump draws nothing, and the correlation is between those that may.
+        // As in netem, a packet that may not jump draws no number, and the correlation is between packets that may jump.
         let may = match config.how {
             Displacement::Jump { gap } => self.since_jump >= gap.get() - 1,
             Displacement::Behind { .. } | Displacement::Later { .. } => true,
         };
         let leaves = may && self.packets.as_mut().is_some_and(|packets| packets.happens(word()));
+        // A held packet has not passed anything yet, so the function returns before counting it as passing.
         self.since_jump = if leaves { 0 } else { self.since_jump.saturating_add(1) };
         if leaves && let Displacement::Behind { packets, at_most } = config.how {
             self.held.push_back(Held { packet, passes: packets.get(), deadline: now.saturating_add(at_most) });
@@ -113,38 +118,40 @@ impl<T> ReorderStage<T> {
         }
     }
 
-    /// Nobody leaves his place, and so nobody is held back.
+    /// Returns whether no packet leaves its place, because the stage has no configuration.
     pub(crate) const fn is_idle(&self) -> bool {
         self.config.is_none()
     }
 
-    /// When a packet is released although nobody has passed it.
+    /// Returns the earliest deadline of a held packet, or `None` if no packet is held.
     pub(crate) fn next_at(&self) -> Option<Instant> {
-        // Asked at every packet, and nearly always for nothing.
+        // The function is called at every packet, and the stage is nearly always empty.
         if self.held.is_empty() { None } else { self.held.iter().map(|held| held.deadline).min() }
     }
 
-    /// The packets whose deadline has come.
+    /// Appends the packets whose deadline has come to `released`.
     pub(crate) fn release(&mut self, now: Instant, released: &mut VecDeque<Carried<T>>) {
         self.take(|held| held.deadline <= now, |packet| released.push_back(packet));
     }
 
-    /// Everything that is held, in order.
+    /// Returns all held packets in order.
     pub(crate) fn dismantle(&mut self) -> impl Iterator<Item = Carried<T>> + use<T> {
         core::mem::take(&mut self.held).into_iter().map(|held| held.packet)
     }
 
-    /// One packet has passed those that are held.
+    /// Counts a packet that has passed all held packets, and releases held packets that enough packets have passed.
     fn pass(&mut self, released: &mut Vec<Carried<T>>) {
         if self.held.is_empty() {
             return;
         }
         for held in &mut self.held {
+            // At least 1 here: a count that reaches 0 is taken out below, and a packet is held with at least 1.
             held.passes -= 1;
         }
         self.take(|held| held.passes == 0, |packet| released.push(packet));
     }
 
+    /// Moves the held packets that `which` selects to `to`, in order.
     fn take(&mut self, which: impl Fn(&Held<T>) -> bool, mut to: impl FnMut(Carried<T>)) {
         let mut place = 0;
         while place < self.held.len() {
@@ -159,7 +166,7 @@ impl<T> ReorderStage<T> {
     }
 }
 
-/// The parameter of reordering on purpose.
+/// Parameter of reordering on purpose.
 pub(crate) const KEYS: [Key; 1] =
     [usual("reorder", REORDER, "0", "Probability that a packet jumps ahead of those before it, or a table that says how packets leave their place")];
 const REORDER: Form = Form::AnyOf(&[Form::Probability, Form::Table(&REORDER_TABLE)]);
@@ -176,7 +183,7 @@ static REORDER_TABLE: Table = Table::of(&[
 ]);
 
 impl Reorder {
-    /// The displacement in words.
+    /// Returns the displacement in words.
     pub(crate) fn words(&self) -> String {
         let packets = self.packets.words();
         match self.how {

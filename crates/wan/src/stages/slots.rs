@@ -1,4 +1,4 @@
-//! Slots: a line that sends only now and then, and then all that has gathered (Wi-Fi aggregation, a modem's grants; netem's `slot`).
+//! Slots: a line that sends only at some instants, and then all packets that have gathered (Wi-Fi aggregation, a modem's grants; netem's `slot`).
 
 use alloc::collections::VecDeque;
 use alloc::format;
@@ -18,39 +18,39 @@ use crate::random::{Purpose, Stream, unit};
 use crate::stages::delay::JITTER;
 use crate::stages::delay::{Delay, DelayStage};
 
-/// When slots open and what they take.
+/// Instants at which slots open, and the number of packets and bytes that leave in a slot.
 ///
-/// A packet that finds a slot coming waits for it; one that finds none opens the next one, a gap after its own instant. When a slot's share is used up,
-/// the next one opens a gap later.
+/// A packet that is offered before the next slot opens waits for that slot. A packet that finds no coming slot opens the next slot, a gap after its own
+/// instant. When a slot's packets or bytes are used up, the next slot opens a gap later.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Slots {
     gap: SlotGap,
-    /// How many packets leave in a slot; `None`: any number.
+    /// Number of packets that leave in a slot. `None` sets no limit.
     pub packets: Option<NonZeroU64>,
-    /// How many bytes leave in a slot, the packet that exceeds them included; `None`: any number.
+    /// Number of bytes that leave in a slot, including the whole packet that exceeds the number. `None` sets no limit.
     pub bytes: Option<NonZeroU64>,
 }
 
-/// How long it is from one slot to the next.
+/// Law of the gap from one slot to the next.
 #[derive(Clone, PartialEq, Debug)]
 pub enum SlotGap {
-    /// Uniform between two spans.
+    /// Gap that is uniform between two spans.
     Between {
-        /// The shortest.
+        /// Shortest gap.
         min: Duration,
-        /// The longest, not below the shortest.
+        /// Longest gap, not below the shortest gap.
         max: Duration,
     },
-    /// Drawn as a delay is: correlation is that of one gap with the next.
+    /// Gap drawn from the law of a delay. A correlation is the correlation of a gap with the next gap.
     Drawn(Delay),
 }
 
-/// The longest gap is shorter than the shortest.
+/// Error: the longest gap is shorter than the shortest gap.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct SlotsError {
-    /// The shortest.
+    /// Shortest gap that was asked for.
     pub min: Duration,
-    /// The longest.
+    /// Longest gap that was asked for.
     pub max: Duration,
 }
 
@@ -64,7 +64,7 @@ impl fmt::Display for SlotsError {
 impl core::error::Error for SlotsError {}
 
 impl Slots {
-    /// Slots whose gaps are uniform between two spans, and that take anything.
+    /// Returns slots with gaps that are uniform between two spans, and without a limit on packets and bytes.
     ///
     /// # Errors
     ///
@@ -76,29 +76,29 @@ impl Slots {
         Ok(Self { gap: SlotGap::Between { min, max }, packets: None, bytes: None })
     }
 
-    /// Slots whose gaps have the law of a delay, and that take anything.
+    /// Returns slots with gaps that have the law of a delay, and without a limit on packets and bytes.
     #[must_use]
     pub const fn drawn(gap: Delay) -> Self {
         Self { gap: SlotGap::Drawn(gap), packets: None, bytes: None }
     }
 
-    /// The gap from one slot to the next.
+    /// Returns the law of the gap from one slot to the next.
     #[must_use]
     pub const fn gap(&self) -> &SlotGap {
         &self.gap
     }
 }
 
-/// The stage and what waits for a slot.
+/// Stage with the packets that wait for a slot.
 #[derive(Clone, Debug)]
 pub(crate) struct SlotStage<T> {
     config: Slots,
-    /// Draws the gaps that have a law.
+    /// Stage that draws the gaps of [`SlotGap::Drawn`]. `None` for uniform gaps.
     law: Option<DelayStage>,
     waiting: VecDeque<Carried<T>>,
-    /// The slot that comes, or the last one.
+    /// Instant of the next slot, or of the last slot if no slot is coming.
     opens: Instant,
-    /// How many slots there were: the address of their draws.
+    /// Number of slots opened so far, which is the address of the next slot's random numbers.
     count: u64,
     packets_left: u64,
     bytes_left: u64,
@@ -113,7 +113,7 @@ impl<T> SlotStage<T> {
         Self { config, law, waiting: VecDeque::new(), opens: Instant::ZERO, count: 0, packets_left: 0, bytes_left: 0 }
     }
 
-    /// New gaps and shares from the next slot on. Correlated gaps go on from where they are.
+    /// Sets the configuration that holds from the next slot on. A chain of correlated gaps continues from its present state.
     pub(crate) fn reconfigure(&mut self, config: Slots) {
         self.law = match (self.law.take(), &config.gap) {
             (_, SlotGap::Between { .. }) => None,
@@ -128,29 +128,32 @@ impl<T> SlotStage<T> {
 
     /// Takes a packet, which leaves with a slot.
     pub(crate) fn offer(&mut self, now: Instant, packet: Carried<T>, draws: Stream) {
+        // A waiting packet implies a coming slot. Without a waiting packet, the last slot may lie in the past or be used up.
         if self.waiting.is_empty() && (self.count == 0 || self.opens < now || self.is_used_up()) {
             self.open_next(now, draws);
         }
         self.waiting.push_back(packet);
     }
 
-    /// When the slot opens for which something waits.
+    /// Returns the instant of the slot for which packets wait, or `None` if no packet waits.
     pub(crate) fn next_at(&self) -> Option<Instant> {
         (!self.waiting.is_empty()).then_some(self.opens)
     }
 
-    /// What leaves with the slot that opens `now`.
+    /// Appends the packets that leave with the slot that opens `now` to `released`.
     pub(crate) fn release(&mut self, now: Instant, draws: Stream, released: &mut VecDeque<Carried<T>>) {
         while !self.is_used_up() {
             let Some(packet) = self.waiting.pop_front() else { return };
             self.packets_left -= 1;
+            // An empty packet counts as a byte.
             self.bytes_left = self.bytes_left.saturating_sub(packet.info.size.get().max(1));
             released.push_back(packet);
         }
+        // The slot is used up: packets that still wait leave with the next slot.
         self.open_next(now, draws);
     }
 
-    /// Everything that waits, in order.
+    /// Returns all waiting packets in order.
     pub(crate) fn dismantle(self) -> impl Iterator<Item = Carried<T>> {
         self.waiting.into_iter()
     }
@@ -159,6 +162,7 @@ impl<T> SlotStage<T> {
         self.packets_left == 0 || self.bytes_left == 0
     }
 
+    /// Sets the next slot, a drawn gap after `now`.
     fn open_next(&mut self, now: Instant, draws: Stream) {
         let draws = draws.packet(self.count);
         let word = draws.first(Purpose::Slot);
@@ -183,7 +187,7 @@ impl<T> SlotStage<T> {
     }
 }
 
-/// The parameter of slots.
+/// Parameter of slots.
 pub(crate) const KEYS: [Key; 1] = [usual(
     "slots",
     Form::AnyOf(const { &[Form::Table(&SLOTS), NONE] }),
@@ -201,7 +205,7 @@ static SLOTS: Table = Table::of(&[&[
 ]]);
 
 impl Slots {
-    /// The slots in words.
+    /// Returns the slots in words.
     pub(crate) fn words(&self) -> String {
         let gap = match self.gap() {
             SlotGap::Between { min, max } if min == max => format!("every {}", Span(*min)),
@@ -254,7 +258,7 @@ mod tests {
     fn a_slot_takes_its_share() {
         let two = Slots { packets: NonZeroU64::new(2), ..every(10) };
         assert_eq!(run(two, &[0, 1, 2, 3, 4]), [(0, 10), (1, 10), (2, 20), (3, 20), (4, 30)]);
-        // 40 bytes are exceeded by the second packet of 40, which still leaves; then nothing is left.
+        // The second packet of 40 bytes exceeds the 41 bytes of the slot and still leaves. The slot is then used up.
         let bytes = Slots { bytes: NonZeroU64::new(41), ..every(10) };
         assert_eq!(run(bytes, &[0, 1, 2]), [(0, 10), (1, 10), (2, 20)]);
     }
@@ -271,7 +275,8 @@ mod tests {
         assert!(Slots::new(Duration::from_nanos(2), Duration::from_nanos(1)).is_err());
     }
 
-    /// Gaps of 400 ± 50 ns, normal: of 2000 the mean is known to 50/√2000 = 1.12 ns and the deviation to 50/√4000 = 0.79 ns; 4.5 of them.
+    /// Gaps are normal with 400 ± 50 ns. Of 2000 gaps the mean has a standard error of 50/√2000 = 1.12 ns and the deviation one of 50/√4000 = 0.79 ns; the
+    /// bound is 4.5 of them.
     #[test]
     fn gaps_have_the_law_of_a_delay() {
         let law = crate::stages::delay::Jitter::new(Duration::from_nanos(50), crate::laws::delay::Distribution::Normal);

@@ -1,11 +1,11 @@
-//! Spikes of delay, as a radio link has at a handover: now and then all packets are late, and the delay decays.
+//! Spikes of delay, as at a handover of a radio link: at random instants all packets become late, and the additional delay decays.
 //!
-//! Spikes begin at the instants s of a Poisson process of `rate`. A packet that begins to propagate at t is late by the sum of all spikes that have begun,
-//! Σ `height`·exp(−(t − s)/`decay`) over s ≤ t: shot noise with an exponential pulse. By Campbell's theorem (N. R. Campbell, Proc. Cambridge Phil. Soc. 15,
-//! 1909) its mean in the long run is `rate`·`height`·`decay`, and its variance `rate`·`height`²·`decay`/2. The process begins without spikes, so that the mean
-//! is smaller by a factor of 1 − exp(−t/`decay`) at first.
+//! Spikes begin at the instants s of a Poisson process of `rate`. A packet that begins to propagate at t is late by the sum of all spikes that have begun, Σ
+//! `height`·exp(−(t − s)/`decay`) over s ≤ t: shot noise with an exponential pulse. By Campbell's theorem (N. R. Campbell, Proc. Cambridge Phil. Soc. 15,
+//! 1909) the sum has the long-run mean `rate`·`height`·`decay` and the long-run variance `rate`·`height`²·`decay`/2. The process begins without spikes, so
+//! that the mean at t is smaller by a factor of 1 − exp(−t/`decay`).
 //!
-//! The instants are a function of the link's random numbers, whatever the packets are: the n-th gap has the draws of "packet" n.
+//! The instants depend on the link's random numbers and not on the packets: the n-th gap has the random numbers of "packet" n.
 
 use alloc::format;
 use alloc::string::{String, ToString as _};
@@ -20,18 +20,18 @@ use crate::parameters::{Form, Key, NONE, Quantity, Table, number, required, usua
 use crate::random::{Purpose, Stream};
 use crate::stages::impairment::{ExtraDelay, Impairment, ImpairmentStage, Refusal, Values};
 
-/// Spikes of delay at random instants.
+/// Configuration of spikes of delay at random instants.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Spike {
-    /// How many begin in a second on average \[1/s\]; not negative, at most [`MOST`].
+    /// Mean number of spikes that begin in a second \[1/s\]; from 0 to [`MOST`].
     rate: f64,
-    /// The delay that each adds when it begins.
+    /// Delay that each spike adds when it begins.
     height: Duration,
-    /// The time in which it falls to 1/e; above zero.
+    /// Time in which a spike falls to 1/e; above zero.
     decay: Duration,
 }
 
-/// The highest rate \[1/s\]: each spike is an event that is computed.
+/// Highest rate \[1/s\]. The rate is bounded because the stage computes every spike.
 const MOST: f64 = 1e6;
 
 static PARAMETERS: Table = Table::of(&[&[
@@ -53,7 +53,7 @@ impl Impairment for Spike {
     fn of(values: &Values) -> Result<Self, Refusal> {
         let (rate, height, decay) = (values.number("rate"), values.duration("height"), values.duration("decay"));
         let refuse = |key, message: String| Err(Refusal { key, message });
-        // No NaN passes the comparison.
+        // A range contains no NaN, so that NaN is refused as well.
         if !(0.0..=MOST).contains(&rate) {
             return refuse("rate", format!("{rate} is out of range: expected at most {MOST} spikes a second"));
         }
@@ -73,18 +73,18 @@ impl Impairment for Spike {
     }
 }
 
-/// The spikes that have begun, and when the next one begins.
+/// Stage with the sum of the spikes that have begun, and the instant of the next spike.
 #[derive(Clone, Debug)]
 pub(crate) struct SpikeStage {
     draws: Stream,
     code: u8,
-    /// `None`: there are no spikes at present.
+    /// Present configuration. `None` while the link has no spikes.
     config: Option<Spike>,
-    /// How many gaps were drawn.
+    /// Number of gaps drawn so far, which is the address of the next gap's random numbers.
     drawn: u64,
-    /// When the next spike begins; the end of time if none does.
+    /// Instant at which the next spike begins, or the end of time if no spike will begin.
     next: Instant,
-    /// The sum of all spikes \[ns\] at the latest event, which is a spike or a change of the configuration.
+    /// Sum of all spikes \[ns\] at the instant `at` of the latest event, which is a spike or a change of the configuration.
     level: f64,
     at: Instant,
 }
@@ -92,14 +92,15 @@ pub(crate) struct SpikeStage {
 impl ImpairmentStage for SpikeStage {
     type Config = Spike;
 
-    /// Spikes that have begun go on from their present level with the new decay. With another rate the next gap is drawn anew, as an exponential law allows.
-    /// Without a configuration nothing is late any more.
+    /// Spikes that have begun continue from their present level with the new decay. If the rate changes, the next gap is drawn anew, which keeps the law
+    /// because exponential gaps have no memory. Without a configuration no packet is late.
     fn reconfigured(before: Option<Self>, now: Instant, config: Option<&Spike>, draws: Stream, code: u8) -> Option<Self> {
         if before.is_none() && config.is_none() {
             return None;
         }
         let beginning = Self { draws, code, config: None, drawn: 0, next: Instant::MAX, level: 0.0, at: now };
         let mut stage = before.unwrap_or(beginning);
+        // Spikes due until `now` still have the height and the decay of the old configuration.
         stage.pass(now);
         (stage.level, stage.at) = (stage.level_at(now), now);
         let rate = |config: Option<&Spike>| config.map_or(0.0, |config| config.rate);
@@ -124,7 +125,8 @@ impl ImpairmentStage for SpikeStage {
 }
 
 impl SpikeStage {
-    /// Lets the spikes begin that are due. The level is computed at their instants alone, so that it does not depend on when packets ask.
+    /// Begins all spikes that are due at `now`. The level is computed at the instants of spikes only, so that rounding does not depend on the instants of
+    /// packets.
     fn pass(&mut self, now: Instant) {
         while self.next <= now && self.next < Instant::MAX {
             let height = self.config.as_ref().map_or(0.0, |config| nanos(config.height));
@@ -134,13 +136,13 @@ impl SpikeStage {
         }
     }
 
-    /// The sum of the spikes that have begun \[ns\] at an instant that is not before the latest event.
+    /// Returns the sum of the spikes that have begun \[ns\] at the instant `now`, which is not before the latest event.
     fn level_at(&self, now: Instant) -> f64 {
         let Some(config) = &self.config else { return 0.0 };
         self.level * libm::exp(-nanos(now.saturating_duration_since(self.at)) / nanos(config.decay))
     }
 
-    /// Draws the gap from `next` to the spike after it.
+    /// Draws the gap from the spike at `next` to the following spike, and moves `next` to that spike.
     fn draw_next(&mut self) {
         let rate = self.config.as_ref().map_or(0.0, |config| config.rate);
         if rate == 0.0 {
@@ -155,6 +157,7 @@ impl SpikeStage {
     }
 }
 
+/// Returns a span in nanoseconds.
 #[expect(clippy::cast_precision_loss, reason = "a span enters a random law as a real number")]
 fn nanos(span: Duration) -> f64 {
     span.as_nanos() as f64
@@ -194,7 +197,7 @@ mod tests {
         LinkConfig { delay: Delay::constant(20 * MS), order, listed, ..LinkConfig::default() }
     }
 
-    /// What becomes of packets of which one is sent a millisecond, in the order in which they arrive.
+    /// Returns the events of packets sent once per millisecond, in the order of arrival.
     fn events(model: impl Into<LinkModel>, packets: u64) -> Vec<PacketEvent<u64>> {
         let mut link = Link::new(3, &LinkName::between("a", "b"), model);
         for number in 0..packets {
@@ -206,14 +209,14 @@ mod tests {
         core::iter::from_fn(|| link.poll_event()).collect()
     }
 
-    /// The numbers of the packets and their arrivals.
+    /// Returns the numbers of the packets and their arrivals.
     fn arrivals(model: impl Into<LinkModel>, packets: u64) -> Vec<(u64, Instant)> {
         events(model, packets).into_iter().map(|event| (event.payload, event.record.at)).collect()
     }
 
-    /// Campbell's theorem with λ = 2/s, h = 1 s, d = 0.5 s: mean 1 s, variance 0.5 s². Over T = 200 000 s, seen every 50 ms, the mean has the variance 2σ²d/T, a
-    /// standard error of 1.6 ms, and the second moment about the true mean d(κ₄ + 2σ⁴)/T with κ₄ = λh⁴d/4 = 0.25, one of 1.4·10⁻³ s²; the sampling adds less than
-    /// a hundredth to both. The beginning without spikes takes d/T off the mean, 2.5 µs.
+    /// Campbell's theorem with λ = 2/s, h = 1 s, d = 0.5 s: mean 1 s, variance 0.5 s². The level is observed every 50 ms over T = 200 000 s. The mean has the
+    /// variance 2σ²d/T and so a standard error of 1.6 ms. The second moment about the true mean has the variance d(κ₄ + 2σ⁴)/T with κ₄ = λh⁴d/4 = 0.25 and so
+    /// a standard error of 1.4·10⁻³ s². The sampling adds less than a hundredth to both. The beginning without spikes lowers the mean by d/T, 2.5 µs.
     #[test]
     fn the_mean_and_the_variance_are_those_of_campbells_theorem() {
         let mut stage = stage(2.0, 1000 * MS, 500 * MS, 1);
@@ -230,7 +233,7 @@ mod tests {
         assert!((squares / f64::from(seen) - 0.5).abs() < 4.5 * 0.0014, "{}", squares / f64::from(seen));
     }
 
-    /// The sum over the instants of the process, which are those of gaps with the draws of their numbers, many of them within one decay.
+    /// The delay equals the sum over the instants of the process, which follow from gaps drawn with their numbers. Many instants lie within one decay.
     #[test]
     fn overlapping_spikes_add_up() {
         let draws = Stream::new(5, b"spike");
@@ -249,7 +252,7 @@ mod tests {
             let now = millis * MS;
             let expected: f64 = begins.iter().filter(|at| **at <= now).map(|at| 1e7 * libm::exp(-nanos(now - *at) / 3e8)).sum();
             let found = late(&mut stage, u64::from(millis)) as f64;
-            // Rounded to a nanosecond; the sum of at most 80 terms has relative errors of 1e-14.
+            // The delay is rounded to a nanosecond. The sum of at most 80 terms has relative errors of 1e-14.
             assert!((found - expected).abs() <= 0.5 + 1e-13 * expected, "{millis} ms: {found} and {expected}");
         }
     }
@@ -269,15 +272,16 @@ mod tests {
         assert_eq!([0, 1_000_000, 1 << 43].map(|millis| late(&mut never, millis)), [0; 3]);
         let plain = LinkConfig { delay: Delay::constant(20 * MS), ..LinkConfig::default() };
         assert_eq!(arrivals(config(0.0, 80 * MS, 200 * MS, Order::default()), 100), arrivals(plain, 100));
-        // About once in three years: the level at the end of a century is that of the latest spike, or nothing.
+        // One spike begins in about three years: at the end of a century the level is that of the latest spike, which is zero after rounding.
         let mut rare = stage(1e-8, 80 * MS, 200 * MS, 1);
         assert_eq!(late(&mut rare, 100 * 365 * 86_400_000), 0);
         assert!(rare.drawn > 1);
-        // The end of time is no event.
+        // The end of time, which stands for "no spike", begins no spike.
         assert_eq!(rare.delay_nanos(Instant::MAX, PacketInfo::default()), 0);
     }
 
-    /// A spike of 50 ms that falls to 1/e in 10 ms falls by more than a millisecond in each of the first ms: later packets overtake, unless they may not.
+    /// A spike of 50 ms that falls to 1/e in 10 ms falls by more than a millisecond in each of its first milliseconds, so that later packets overtake unless
+    /// the order is kept.
     #[test]
     fn packets_overtake_in_the_fall_of_a_spike_unless_the_order_is_kept() {
         let numbers = |order| arrivals(config(5.0, 50 * MS, 10 * MS, order), 2000).into_iter().map(|(number, _)| number).collect::<Vec<_>>();
@@ -302,14 +306,14 @@ mod tests {
             |stage, millis: u64, config: Option<&Spike>| SpikeStage::reconfigured(stage, Instant::from_nanos(millis * 1_000_000), config, draws, 14);
         let mut first = stage(4.0, 80 * MS, 200 * MS, 7);
         let level = late(&mut first, 5000);
-        // Another decay: the level of now, and then its own way down; the next spike stays.
+        // Another decay: the present level falls with the new decay, and the next spike stays.
         let mut slower = change(Some(first.clone()), 5000, Some(&spike(4.0, 80 * MS, 900 * MS))).unwrap();
         assert_eq!((late(&mut slower, 5000), slower.next, slower.drawn), (level, first.next, first.drawn));
-        // Another rate: a new gap from now on.
+        // Another rate: a new gap is drawn from now on.
         let mut rarer = change(Some(first.clone()), 5000, Some(&spike(0.5, 80 * MS, 200 * MS))).unwrap();
         assert_eq!((late(&mut rarer, 5000), rarer.drawn), (level, first.drawn + 1));
         assert!(rarer.next != first.next && rarer.next > Instant::from_nanos(5_000_000_000));
-        // Taken away, nothing is late; back again, the spikes are new ones.
+        // Without spikes no packet is late. When spikes come back, they are new spikes.
         let mut gone = change(Some(first.clone()), 5000, None).unwrap();
         assert_eq!((late(&mut gone, 5001), gone.next), (0, Instant::MAX));
         let mut back = change(Some(gone), 6000, Some(&spike(4.0, 80 * MS, 200 * MS))).unwrap();

@@ -10,13 +10,13 @@
 //!   isolated loss (4)
 //! ```
 //!
-//! Each packet moves the chain and is lost if the *new* state is 3 or 4.
+//! Each packet moves the chain. The packet is lost if the *new* state is 3 or 4.
 
 use core::fmt;
 
 use cohaptic_units::Probability;
 
-/// The parameters of the chain.
+/// Parameters of the chain: `pij` is the probability that a packet moves the chain from state i to state j.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct FourState {
     p13: Probability,
@@ -26,24 +26,24 @@ pub struct FourState {
     p14: Probability,
 }
 
-/// Why a four-state model is refused.
+/// Reason for which a four-state model is refused.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum FourStateError {
-    /// The gap would be left with more than certainty.
+    /// The probabilities of leaving the gap exceed 1 together.
     Gap {
-        /// To the burst.
+        /// Probability of moving to the burst.
         p13: Probability,
-        /// To an isolated loss.
+        /// Probability of moving to an isolated loss.
         p14: Probability,
     },
-    /// The burst's loss would be left with more than certainty.
+    /// The probabilities of leaving a loss within a burst exceed 1 together.
     Burst {
-        /// To the gap.
+        /// Probability of moving to the gap.
         p31: Probability,
-        /// To a packet received within the burst.
+        /// Probability of moving to a packet received within the burst.
         p32: Probability,
     },
-    /// Parameters of the second kind that no chain has.
+    /// No chain has these [`Bursts`]. The text says why.
     Bursts(&'static str),
 }
 
@@ -59,22 +59,22 @@ impl fmt::Display for FourStateError {
 
 impl core::error::Error for FourStateError {}
 
-/// The four-state model by quantities that can be observed: the parameters of Salsano et al., which tc calls GI.
+/// Four-state model given by observable quantities: the parameters of Salsano et al., which tc calls GI.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Bursts {
-    /// The mean fraction lost.
+    /// Mean fraction of packets lost.
     pub loss: f64,
-    /// The mean length of a burst \[packet\].
+    /// Mean length of a burst \[packet\], at least 1.
     pub length: f64,
-    /// The fraction lost within a burst.
+    /// Fraction of packets lost within a burst.
     pub density: f64,
-    /// The fraction of packets lost outside of bursts, of those outside.
+    /// Fraction of packets lost outside of bursts, relative to the packets outside of bursts.
     pub isolated: f64,
-    /// The mean number of packets received in a row within a burst.
+    /// Mean number of packets received in a row within a burst, at least 1.
     pub good_run: f64,
 }
 
-/// Where the chain is.
+/// State of the chain.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum State {
     Gap,
@@ -84,11 +84,11 @@ pub(crate) enum State {
 }
 
 impl FourState {
-    /// Checks the parameters; tc's defaults are p31 = 1 − p13, p32 = 0, p23 = 1, p14 = 0.
+    /// Returns a chain with checked parameters. The defaults of tc are p31 = 1 − p13, p32 = 0, p23 = 1, p14 = 0.
     ///
     /// # Errors
     ///
-    /// [`FourStateError`] if the ways out of a state are more than certain.
+    /// [`FourStateError`] if the probabilities of leaving a state exceed 1 together.
     pub fn new(p13: Probability, p31: Probability, p32: Probability, p23: Probability, p14: Probability) -> Result<Self, FourStateError> {
         if p13.get() + p14.get() > 1.0 {
             return Err(FourStateError::Gap { p13, p14 });
@@ -99,14 +99,15 @@ impl FourState {
         Ok(Self { p13, p31, p32, p23, p14 })
     }
 
-    /// The chain with those bursts: p31 = 1/(ρB), p23 = 1/G, p32 = (1−ρ)/(ρG), p14 = I/(1−I), p13 = (P−I)/(B(1−I)(ρ−P)).
+    /// Returns the chain with the given bursts: p31 = 1/(ρB), p23 = 1/G, p32 = (1−ρ)/(ρG), p14 = I/(1−I), p13 = (P−I)/(B(1−I)(ρ−P)).
     ///
     /// # Errors
     ///
-    /// [`FourStateError`] if no chain has them.
+    /// [`FourStateError`] if no chain has such bursts.
     pub fn from_bursts(bursts: Bursts) -> Result<Self, FourStateError> {
         let Bursts { loss, length, density, isolated, good_run } = bursts;
         let unit = 0.0..1.0;
+        // NaN fails every comparison, so that NaN is refused here.
         let within = (unit.contains(&loss) && unit.contains(&isolated) && density > 0.0 && density <= 1.0 && length >= 1.0 && good_run >= 1.0)
             && isolated <= loss
             && loss < density;
@@ -126,8 +127,8 @@ impl FourState {
         )
     }
 
-    /// The probability that a packet moves the chain from one state (row) to another (column); a packet that moves it to the third or fourth is lost. In
-    /// order: the gap, received within a burst, lost within a burst, lost for itself (states 1 to 4).
+    /// Returns the probability that a packet moves the chain from a state (row) to a state (column). A packet that moves the chain to the third or fourth
+    /// state is lost. The states are, in order: gap, received within a burst, lost within a burst, isolated loss (states 1 to 4).
     #[must_use]
     pub fn transitions(&self) -> [[f64; 4]; 4] {
         let [p13, p31, p32, p23, p14] = [self.p13, self.p31, self.p32, self.p23, self.p14].map(Probability::get);
@@ -139,18 +140,22 @@ impl FourState {
         ]
     }
 
-    /// The long-run fraction of packets in each state, 1 to 4. Starting in the gap, a chain that can never leave a state stays there.
+    /// Returns the long-run fraction of packets in each state, 1 to 4, for a chain that starts in the gap. A chain that reaches a state without exit stays
+    /// there.
     #[must_use]
     pub fn stationary(&self) -> [f64; 4] {
         let [p13, p31, p32, p23, p14] = [self.p13, self.p31, self.p32, self.p23, self.p14].map(Probability::get);
+        // The chain never reaches a burst, and moves between the gap and isolated losses only.
         if p13 == 0.0 {
             let gap = 1.0 / (1.0 + p14);
             return [gap, 0.0, 0.0, gap * p14];
         }
+        // The chain cannot leave the state "received within a burst" once it is there.
         if p32 > 0.0 && p23 == 0.0 {
             return [0.0, 1.0, 0.0, 0.0];
         }
         let received = if p32 == 0.0 { 0.0 } else { p32 / p23 };
+        // The chain never returns from the burst to the gap.
         if p31 == 0.0 {
             let lost = 1.0 / (1.0 + received);
             return [0.0, lost * received, lost, 0.0];
@@ -160,13 +165,14 @@ impl FourState {
         [gap, gap * ratio * received, gap * ratio, gap * p14]
     }
 
-    /// The long-run fraction of packets lost.
+    /// Returns the long-run fraction of packets lost.
     #[must_use]
     pub fn mean_loss(&self) -> f64 {
         let [_, _, lost, isolated] = self.stationary();
         lost + isolated
     }
 
+    /// Returns a state drawn from the stationary law. `unit` is uniform on [0, 1).
     pub(crate) fn initial_state(&self, unit: f64) -> State {
         let [gap, received, lost, _] = self.stationary();
         if unit < gap {
@@ -180,8 +186,9 @@ impl FourState {
         }
     }
 
-    /// Moves the chain by one packet and says whether that packet is lost.
+    /// Moves the chain by one packet, and returns whether that packet is lost. `unit` is uniform on [0, 1).
     pub(crate) fn loses(&self, state: &mut State, unit: f64) -> bool {
+        // One uniform number selects among at most three ways: [0, first), [first, first + second), and the rest.
         let pick = |first: Probability, to_first, second: Probability, to_second, otherwise| {
             if unit < first.get() {
                 to_first
@@ -206,8 +213,8 @@ mod tests {
     use super::*;
     use crate::random::{Purpose, Stream};
 
-    /// The loss of 10⁶ packets against the stationary law, for three chains. Losses in runs of B packets have about B times the variance of
-    /// independent ones: the standard error is below √(0.25·20/10⁶) = 0.0023.
+    /// Compares the loss of 10⁶ packets with the stationary law, for three chains. Losses in runs of B packets have about B times the variance of independent
+    /// losses: the standard error is below √(0.25·20/10⁶) = 0.0023.
     #[test]
     fn the_fraction_lost_is_the_stationary_one() {
         let p = |value| Probability::new(value).unwrap();

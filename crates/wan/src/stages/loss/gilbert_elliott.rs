@@ -8,24 +8,24 @@
 //!             r
 //! ```
 //!
-//! Each packet draws a transition and then its loss, with the probability of the state *before* the transition, as the Linux kernel does.
+//! Each packet draws a transition and then its loss. As in the Linux kernel, the probability of loss is that of the state *before* the transition.
 
 use cohaptic_units::Probability;
 
-/// The parameters of the chain.
+/// Parameters of the chain.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct GilbertElliott {
-    /// The probability of going from good to bad, per packet.
+    /// Probability of going from good to bad, per packet.
     pub p: Probability,
-    /// The probability of going from bad to good, per packet. The mean stay in the bad state is 1/r packets.
+    /// Probability of going from bad to good, per packet. The mean stay in the bad state is 1/r packets.
     pub r: Probability,
-    /// The probability that a packet gets through in the bad state; 0 by custom: everything is lost there.
+    /// Probability that a packet gets through in the bad state. The usual value is 0: every packet is lost.
     pub h: Probability,
-    /// The probability that a packet gets through in the good state; 1 by custom: nothing is lost there.
+    /// Probability that a packet gets through in the good state. The usual value is 1: no packet is lost.
     pub k: Probability,
 }
 
-/// Where the chain is.
+/// State of the chain.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum State {
     Good,
@@ -33,16 +33,18 @@ pub(crate) enum State {
 }
 
 impl GilbertElliott {
-    /// The long-run fraction of packets lost, ((1−k)·r + (1−h)·p) / (p + r); `None` if p = r = 0, where the chain never moves.
+    /// Returns the long-run fraction of packets lost, ((1−k)·r + (1−h)·p) / (p + r), or `None` if p = r = 0, where the chain never moves.
     #[must_use]
     pub fn mean_loss(&self) -> Option<f64> {
         let [p, r, h, k] = [self.p, self.r, self.h, self.k].map(Probability::get);
         (p + r > 0.0).then(|| ((1.0 - k) * r + (1.0 - h) * p) / (p + r))
     }
 
-    /// The autocorrelation of the loss indicator at lag `n` packets, `None` where it has no meaning (nothing or everything is lost, p = r = 0).
+    /// Returns the autocorrelation of the loss indicator at lag `lag` packets, or `None` if losses do not vary (no packet or every packet is lost) or p = r =
+    /// 0.
     ///
-    /// (1−h − (1−k))²·πB·πG / (ℓ(1−ℓ)) · (1−p−r)ⁿ with the stationary πB = p/(p+r), πG = r/(p+r) and the mean loss ℓ.
+    /// With the stationary πB = p/(p+r), πG = r/(p+r) and the mean loss ℓ the value at lag n is (1−h − (1−k))²·πB·πG / (ℓ(1−ℓ)) · (1−p−r)ⁿ. At lag 0 the
+    /// formula gives less than 1 if a state loses only some of its packets.
     #[must_use]
     pub fn autocorrelation(&self, lag: u32) -> Option<f64> {
         let [p, r, h, k] = [self.p, self.r, self.h, self.k].map(Probability::get);
@@ -52,14 +54,15 @@ impl GilbertElliott {
         Some(spread * spread * stationary / (mean * (1.0 - mean)) * libm::pow(1.0 - p - r, f64::from(lag)))
     }
 
-    /// A state drawn from the stationary law; good if the chain never moves.
+    /// Returns a state drawn from the stationary law with the random word `bits`, or good if the chain never moves.
     pub(crate) fn stationary_state(&self, bits: u64) -> State {
         let (p, r) = (self.p.get(), self.r.get());
         let bad = if p + r > 0.0 { Probability::new(p / (p + r)).unwrap_or(Probability::ZERO) } else { Probability::ZERO };
         if bad.happens(bits) { State::Bad } else { State::Good }
     }
 
-    /// Moves the chain by one packet and says whether that packet is lost. Mostly that is certain in both states, and the word for it not drawn.
+    /// Moves the chain by one packet, and returns whether that packet is lost. Mostly the loss is certain in both states; the word for the loss is then not
+    /// drawn.
     #[inline(always)]
     pub(crate) fn loses(&self, state: &mut State, transition: u64, loss: impl FnOnce() -> u64) -> bool {
         let before = *state;

@@ -1,26 +1,26 @@
-//! The Gilbert–Elliott model in continuous time: how long a burst lasts does not depend on how many packets are sent.
+//! Gilbert–Elliott model in continuous time: the length of a burst does not depend on the number of packets sent.
 //!
-//! The link is good and bad in turn, for exponential times. A packet sees the state at its instant: over a gap Δ the chain goes to the bad state with
-//! πB + (1−πB)·e^(−(α+β)Δ) from the bad one, and πB·(1−e^(−(α+β)Δ)) from the good one, where α and β are the rates of leaving good and bad and
-//! πB = α/(α+β). So the law at the packets is exact for any gaps.
+//! The link is good and bad in turn, for exponential times. A packet meets the state at its instant. Over a gap Δ the chain goes to the bad state with
+//! probability πB + (1−πB)·e^(−(α+β)Δ) from the bad state, and πB·(1−e^(−(α+β)Δ)) from the good state, where α and β are the rates of leaving good and bad
+//! and πB = α/(α+β). The law at the packets is therefore exact for any gaps.
 
 use core::fmt;
 use core::time::Duration;
 
 use cohaptic_units::{Instant, Probability};
 
-/// The parameters of the chain.
+/// Parameters of the chain.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct GilbertElliottInTime {
     good: Duration,
     bad: Duration,
-    /// The probability that a packet gets through while the link is bad; 0 by custom.
+    /// Probability that a packet gets through while the link is bad. The usual value is 0.
     pub h: Probability,
-    /// The probability that a packet gets through while the link is good; 1 by custom.
+    /// Probability that a packet gets through while the link is good. The usual value is 1.
     pub k: Probability,
 }
 
-/// A time in a state is zero.
+/// Error: the mean time in a state is zero.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct NoTime;
 
@@ -32,7 +32,7 @@ impl fmt::Display for NoTime {
 
 impl core::error::Error for NoTime {}
 
-/// Where the chain was, and when.
+/// State of the chain at the latest packet, and the packet's instant.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Seen {
     bad: bool,
@@ -40,11 +40,11 @@ pub(crate) struct Seen {
 }
 
 impl GilbertElliottInTime {
-    /// A link that is good and bad for exponential times of these means.
+    /// Returns a link that is good and bad for exponential times with the means `good` and `bad`.
     ///
     /// # Errors
     ///
-    /// [`NoTime`] if one of them is zero.
+    /// [`NoTime`] if a mean is zero.
     pub fn new(good: Duration, bad: Duration, h: Probability, k: Probability) -> Result<Self, NoTime> {
         if good.is_zero() || bad.is_zero() {
             return Err(NoTime);
@@ -52,27 +52,28 @@ impl GilbertElliottInTime {
         Ok(Self { good, bad, h, k })
     }
 
-    /// The mean times in the good and the bad state.
+    /// Returns the mean times in the good and in the bad state.
     #[must_use]
     pub const fn mean_times(&self) -> (Duration, Duration) {
         (self.good, self.bad)
     }
 
-    /// The fraction of the time that the link is bad, πB.
+    /// Returns the fraction of time during which the link is bad, πB.
     #[must_use]
     pub fn bad_fraction(&self) -> f64 {
         let (good, bad) = (self.good.as_secs_f64(), self.bad.as_secs_f64());
         bad / (good + bad)
     }
 
-    /// The long-run fraction of packets lost, whatever their spacing.
+    /// Returns the long-run fraction of packets lost, whatever the spacing of packets.
     #[must_use]
     pub fn mean_loss(&self) -> f64 {
         let bad = self.bad_fraction();
         (1.0 - self.k.get()) * (1.0 - bad) + (1.0 - self.h.get()) * bad
     }
 
-    /// Moves the chain to a packet's instant and says whether the packet is lost. `seen` is `None` before the first.
+    /// Moves the chain to a packet's instant, and returns whether the packet is lost. `seen` is `None` before the first packet. `transition` and `loss` are
+    /// random words.
     pub(crate) fn loses(&self, seen: &mut Option<Seen>, now: Instant, transition: u64, loss: u64) -> bool {
         let stationary = self.bad_fraction();
         let bad = match *seen {
@@ -80,10 +81,12 @@ impl GilbertElliottInTime {
             Some(before) => {
                 let gap = now.saturating_duration_since(before.at).as_secs_f64();
                 let rate = 1.0 / self.good.as_secs_f64() + 1.0 / self.bad.as_secs_f64();
+                // `expm1` keeps the precision of 1 − e^(−x) for gaps much shorter than the times in the states.
                 let memory = libm::exp(-rate * gap);
                 if before.bad { stationary + (1.0 - stationary) * memory } else { stationary * -libm::expm1(-rate * gap) }
             }
         };
+        // Rounding can lead a little outside of 0 to 1, which `Probability` refuses.
         let bad = Probability::new(bad.clamp(0.0, 1.0)).unwrap_or_default().happens(transition);
         *seen = Some(Seen { bad, at: now });
         let gets_through = if bad { self.h } else { self.k };
@@ -96,9 +99,9 @@ mod tests {
     use super::*;
     use crate::random::{Purpose, Stream};
 
-    /// Bursts of 40 ms on the average after 160 ms without: a fifth is lost, and a burst lasts 40 ms whether packets come every millisecond or every 8.
-    /// Of about 10 000 bursts the mean length has a standard error of 0.4 ms; seen at a spacing of s it is s/(1 − e^(−s/40 ms)·(…)): the law of the
-    /// sampled chain, P(bad stays bad) = 0.2 + 0.8·e^(−s/32 ms), gives a mean run of s/(1 − that).
+    /// Bursts of 40 ms on average come after 160 ms without loss: a fifth is lost, and a burst lasts 40 ms whether packets come every millisecond or every 8
+    /// ms. In the chain sampled at a spacing of s, P(bad stays bad) = 0.2 + 0.8·e^(−s/32 ms), so that the mean run of losses lasts s/(1 − P). The relative
+    /// standard error of the mean run is below 1/√(number of bursts).
     #[test]
     fn a_burst_lasts_as_long_at_any_packet_rate() {
         let millis = Duration::from_millis;

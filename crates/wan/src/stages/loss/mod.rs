@@ -1,4 +1,4 @@
-//! Which packets are lost.
+//! Loss: models of lost packets, and the stage that decides about each packet.
 
 mod four_state;
 mod gilbert_elliott;
@@ -25,28 +25,28 @@ pub use pattern::{Counts, Pattern, PatternError};
 use crate::laws::chance::{Chance, ChanceStage};
 use crate::random::{PacketDraws, Purpose, unit};
 
-/// A loss model.
+/// Model of loss.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub enum Loss {
-    /// Nothing is lost, and no random number is drawn.
+    /// No packet is lost, and no random number is drawn.
     #[default]
     None,
-    /// Every packet is lost with the same probability, whatever happened to the others.
+    /// Every packet is lost with the same probability, independently of other packets.
     Independent(Probability),
-    /// A packet is more likely lost if the one before was; mean and autocorrelation are exactly those asked for.
+    /// A packet is lost more likely if the previous packet was lost. Mean and autocorrelation of losses are exactly the configured ones.
     Correlated(Chance),
     /// Losses come in bursts: a Markov chain of a good and a bad state.
     GilbertElliott(GilbertElliott),
-    /// The chain of a good and a bad state in continuous time: bursts have a mean length in seconds, not in packets.
+    /// Losses come in bursts with a mean length in seconds, not in packets: a chain of a good and a bad state in continuous time.
     GilbertElliottInTime(GilbertElliottInTime),
-    /// Bursts with packets received within, and losses between them.
+    /// Losses come in bursts that include received packets, and single packets are lost between bursts.
     FourState(FourState),
-    /// Chosen packets or chosen spans of time; nothing is drawn.
+    /// Losses are chosen packets or chosen spans of time. No random number is drawn.
     Pattern(Pattern),
 }
 
 impl Loss {
-    /// The long-run fraction of packets lost, `None` where it depends on the start or on when packets are sent.
+    /// Returns the long-run fraction of packets lost, or `None` if the fraction depends on the start or on the instants of packets.
     #[must_use]
     pub fn mean(&self) -> Option<f64> {
         match self {
@@ -60,10 +60,11 @@ impl Loss {
         }
     }
 
-    /// The mean number of packets lost one after another, `None` where there is no simple law: losses with other causes between, or chosen ones.
+    /// Returns the mean number of packets lost in a row, or `None` if the number has no simple law: for losses with other causes in between, and for chosen
+    /// losses.
     ///
-    /// 1/(1−p) for independent losses, 1/((1−ρ)(1−p)) for correlated ones, 1/r for a Gilbert–Elliott chain that loses all in the bad state and nothing in the
-    /// good one.
+    /// The number is 1/(1−p) for independent losses, 1/((1−ρ)(1−p)) for correlated losses, and 1/r for a Gilbert–Elliott chain that loses every packet in the
+    /// bad state and no packet in the good state.
     #[must_use]
     pub fn mean_run(&self) -> Option<f64> {
         let run = match self {
@@ -75,7 +76,7 @@ impl Loss {
         (run.is_finite() && self.mean().is_some_and(|mean| mean > 0.0)).then_some(run)
     }
 
-    /// The autocorrelation of losses `lag` packets apart, `None` where there is no simple law or nothing varies.
+    /// Returns the autocorrelation of losses `lag` packets apart, or `None` if there is no simple law or losses do not vary.
     #[must_use]
     pub fn autocorrelation(&self, lag: u32) -> Option<f64> {
         self.mean().filter(|mean| *mean > 0.0 && *mean < 1.0)?;
@@ -87,22 +88,22 @@ impl Loss {
         }
     }
 
-    /// Whether random numbers are drawn for it.
+    /// Returns whether the model draws random numbers.
     #[must_use]
     pub const fn is_random(&self) -> bool {
         !matches!(self, Self::None | Self::Pattern(_))
     }
 }
 
-/// The loss stage of one link: the model and what it remembers.
+/// Loss stage of one link: the model with its state.
 #[derive(Clone, Debug)]
 pub(crate) enum LossStage {
     Independent(Probability),
-    /// In a box, as whatever is seldom: the links of a large mesh fill the cache.
+    /// Boxed, because few links configure a model with state and an unboxed model would enlarge the loss stage of every link.
     WithMemory(Box<Remembering>),
 }
 
-/// A model that looks at more than a packet's own word.
+/// Models whose decision depends on more than the packet's first random word.
 #[derive(Clone, Debug)]
 pub(crate) enum Remembering {
     Correlated(Option<ChanceStage>),
@@ -113,12 +114,12 @@ pub(crate) enum Remembering {
 }
 
 impl LossStage {
-    /// The stage for a model; `None` if nothing is ever lost. `initial` is the random word for the state in which a chain begins.
+    /// Returns the stage for a model, or `None` if the model loses nothing. `initial` is the random word that selects the initial state of a chain.
     pub(crate) fn new(loss: Loss, initial: u64) -> Option<Self> {
         Self::reconfigured(None, loss, initial)
     }
 
-    /// The stage with a new model; a chain of the same kind stays in the state it is in.
+    /// Returns the stage with the model `loss`. A chain stays in its state if the previous model is of the same kind.
     pub(crate) fn reconfigured(before: Option<Self>, loss: Loss, initial: u64) -> Option<Self> {
         let before = match before {
             Some(Self::WithMemory(before)) => Some(*before),
@@ -140,7 +141,7 @@ impl LossStage {
         Some(Self::WithMemory(Box::new(stage)))
     }
 
-    /// Whether a packet is lost. `word` is the first of its words for loss.
+    /// Returns whether the packet `number` is lost. `word` is the packet's first random word for loss.
     #[inline]
     pub(crate) fn loses(&mut self, now: Instant, number: u64, word: u64, packet: PacketDraws) -> bool {
         match self {
@@ -162,7 +163,7 @@ impl Remembering {
     }
 }
 
-/// The parameters of losses.
+/// Parameters of losses.
 pub(crate) const KEYS: [Key; 2] = [
     usual("loss", LOSS, "0", "Probability that a packet is lost, or a model of bursts, or chosen packets"),
     usual("mark-instead-of-loss", Form::Boolean, "false", "What would be lost is marked instead (ECN)"),
@@ -207,7 +208,7 @@ static BURSTS: Table = Table::of(&[&[
 ]]);
 
 impl Loss {
-    /// The model in words; `None` if there is none.
+    /// Returns the model in words, or `None` if the model loses nothing.
     pub(crate) fn words(&self) -> Option<String> {
         let mean = self.mean().map_or_else(String::new, |mean| format!(", {} on average", percent(mean)));
         Some(match self {

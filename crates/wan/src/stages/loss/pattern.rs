@@ -1,4 +1,4 @@
-//! Losses that are chosen, not drawn: these packets, or whatever is sent in these spans (KauNet's data-driven and time-driven patterns).
+//! Pattern of chosen losses: the packets with given numbers, or all packets sent in given spans (KauNet's data-driven and time-driven patterns).
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -8,7 +8,7 @@ use core::time::Duration;
 
 use cohaptic_units::Instant;
 
-/// Spans of packet numbers or of nanoseconds, perhaps again and again.
+/// Spans of packet numbers or of nanoseconds, optionally repeated.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Pattern {
     spans: Arc<[Range<u64>]>,
@@ -16,7 +16,7 @@ pub struct Pattern {
     counts: Counts,
 }
 
-/// What a pattern counts.
+/// Unit in which a pattern counts.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Counts {
     /// Packets offered to the link, from 0.
@@ -25,24 +25,24 @@ pub enum Counts {
     Nanoseconds,
 }
 
-/// Why a pattern is refused.
+/// Reason for which a pattern is refused.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum PatternError {
-    /// A span ends before it begins, or when it begins.
+    /// A span ends before it begins, or at its begin.
     Empty {
-        /// Which, from 0.
+        /// Index of the span, from 0.
         index: usize,
     },
-    /// A span begins before the one listed before it has ended.
+    /// A span begins before the previous span in the list has ended.
     Order {
-        /// Which, from 0.
+        /// Index of the span, from 0.
         index: usize,
     },
-    /// A span ends after the period.
+    /// A span ends after the period, or the period is zero.
     Period {
-        /// The period.
+        /// Period, in the unit of the pattern.
         period: u64,
-        /// The end of the last span.
+        /// End of the last span, in the unit of the pattern.
         end: u64,
     },
 }
@@ -62,7 +62,7 @@ impl fmt::Display for PatternError {
 impl core::error::Error for PatternError {}
 
 impl Pattern {
-    /// These packets, counted from 0, and again after every `every` packets.
+    /// Returns a pattern of the packets with the given numbers, counted from 0. The pattern repeats after `every` packets, if `every` is given.
     ///
     /// # Errors
     ///
@@ -71,7 +71,8 @@ impl Pattern {
         Self::new(packets, every, Counts::Packets)
     }
 
-    /// Whatever is offered in these spans (from the first instant on, before the last), and again after every `every`.
+    /// Returns a pattern of all packets offered in the given spans, whose start is included and whose end is not. The pattern repeats after `every`, if
+    /// `every` is given.
     ///
     /// # Errors
     ///
@@ -98,19 +99,19 @@ impl Pattern {
         Ok(Self { spans: spans.into(), period, counts })
     }
 
-    /// What it counts.
+    /// Returns the unit of the pattern.
     #[must_use]
     pub const fn counts(&self) -> Counts {
         self.counts
     }
 
-    /// After how many of what it counts it begins anew; `None` if never.
+    /// Returns the period in the unit of the pattern, or `None` if the pattern does not repeat.
     #[must_use]
     pub const fn period(&self) -> Option<u64> {
         self.period
     }
 
-    /// The fraction lost in the long run; `None` without a period, where it tends to nothing.
+    /// Returns the long-run fraction of the unit that the pattern covers, or `None` for a pattern without a period, whose fraction tends to zero.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "a fraction")]
     pub fn mean_loss(&self) -> Option<f64> {
@@ -118,11 +119,12 @@ impl Pattern {
         self.period.map(|period| lost as f64 / period as f64)
     }
 
-    /// The longest run of what it counts that it covers without a gap; `None` if it covers everything from some place on.
+    /// Returns the longest run that the pattern covers without a gap, in the unit of the pattern, or `None` if the pattern covers everything from some place
+    /// on.
     #[must_use]
     pub fn longest_run(&self) -> Option<u64> {
         let once = self.spans.iter().cloned();
-        // Two periods one after the other have every run that goes from one into the next.
+        // Two successive periods contain every run that continues from a period into the next.
         let again = self.period.into_iter().flat_map(|period| self.spans.iter().map(move |span| span.start + period..span.end + period));
         let (mut longest, mut run, mut end) = (0, 0, None);
         for span in once.chain(again) {
@@ -134,7 +136,7 @@ impl Pattern {
         (!covers_all).then_some(longest)
     }
 
-    /// Whether it covers that packet at that instant.
+    /// Returns whether the pattern covers the packet `number` offered at `now`. A pattern looks at one of both only, depending on its unit.
     #[must_use]
     pub fn covers(&self, number: u64, now: Instant) -> bool {
         let counted = match self.counts {
@@ -142,6 +144,7 @@ impl Pattern {
             Counts::Nanoseconds => now.as_nanos(),
         };
         let place = self.period.map_or(counted, |period| counted % period);
+        // Spans are ordered and do not overlap, so only the first span that ends after `place` can cover `place`.
         let next = self.spans.partition_point(|span| span.end <= place);
         self.spans.get(next).is_some_and(|span| span.start <= place)
     }

@@ -1,12 +1,12 @@
-//! The bottleneck: a first-in-first-out queue before a serialiser.
+//! Bottleneck: a first-in-first-out queue before a serialiser.
 //!
 //! ```text
 //! offered ──► [ waiting … ] ──► serialiser, 8·(size on the line)/R per packet ──► propagation
 //!             limit counts these    the packet in service is not counted
 //! ```
 //!
-//! What leaves in any window t is at most R·t plus one packet, because the service time is rounded up. A departure at an instant makes room for
-//! a packet that is offered at the same instant. A change of rate in the middle of a packet integrates the bits: bits already on the wire stay sent.
+//! At most R·t plus one packet leaves in any window t, because the service time is rounded up. A departure at an instant makes room for a packet that is
+//! offered at the same instant. If the rate changes while a packet is sent, the bits already sent stay sent, and only the remaining bits take the new rate.
 
 use super::limit::words_of_limit;
 use alloc::collections::VecDeque;
@@ -27,50 +27,50 @@ use crate::fates::fate::DropCause;
 use crate::packet::{Carried, Exit, Output, Outputs};
 use crate::parameters::{Form, Key, NONE, Table, UNLIMITED, optional, required, usual};
 
-/// A serialiser and the queue before it.
+/// Configuration of a serialiser and the queue before it.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Bottleneck {
-    /// How fast it sends.
+    /// Speed of the serialiser.
     pub service: Service,
-    /// What a packet costs on the line.
+    /// Bytes that a packet takes on the line beyond its own bytes.
     pub framing: Framing,
-    /// How much may wait; `None`: no limit.
+    /// Limit of the queue. `None` sets no limit.
     pub limit: Option<QueueLimit>,
-    /// Which packets are dropped.
+    /// Choice of dropped packets.
     pub discipline: Discipline,
 }
 
-/// How fast a line sends.
+/// Speed of a line.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Service {
-    /// Always at this rate.
+    /// Constant rate.
     Rate(Rate),
-    /// At the instants of a recording.
+    /// Opportunities to send at the instants of a recording.
     Recorded(DeliveryTrace),
 }
 
-/// Which packets of a queue are dropped. The limit holds with all of them.
+/// Choice of dropped packets of a queue. Every discipline also keeps the limit of the queue.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub enum Discipline {
-    /// The newest, when the queue is full.
+    /// Drops the newest packet when the queue is full.
     #[default]
     TailDrop,
-    /// The oldest that wait, when the queue is full, until the newest fits.
+    /// Drops the oldest waiting packets when the queue is full, until the newest packet fits.
     HeadDrop,
-    /// Some of the newest, before the queue is full.
+    /// Drops some of the newest packets before the queue is full.
     Red(Red),
-    /// Some of the oldest, when they have waited too long for too long.
+    /// Drops some of the oldest packets after waits have exceeded a target for an interval.
     CoDel(CoDel),
 }
 
 impl Bottleneck {
-    /// A line of that rate with an unlimited queue.
+    /// Returns a line of the given rate with an unlimited queue.
     #[must_use]
     pub fn at_rate(rate: Rate) -> Self {
         Self { service: Service::Rate(rate), framing: Framing::default(), limit: None, discipline: Discipline::default() }
     }
 
-    /// How long a mean packet is on the line \[s\]: the unit of the decay of RED's average.
+    /// Returns the time of RED's mean packet on the line \[s\], which is the unit of the decay of RED's average.
     pub(crate) fn time_of_mean_packet(&self, red: &Red) -> f64 {
         match &self.service {
             Service::Rate(rate) => rate.serialisation_time(self.framing.on_the_line(red.mean_packet())).as_secs_f64(),
@@ -80,50 +80,51 @@ impl Bottleneck {
     }
 }
 
-/// A span for which the line was idle, in mean packets, each of which takes that long \[s\].
+/// Returns an idle span of the line as a number of mean packets, each of which takes `mean_packet` \[s\]. Returns zero if a mean packet takes no time.
 pub(crate) fn idle_packets(idle: Duration, mean_packet: f64) -> f64 {
     if mean_packet > 0.0 { idle.as_secs_f64() / mean_packet } else { 0.0 }
 }
 
-/// A part of a packet, in 10⁻⁹ bit: see [`Rate::transmission_time`].
+/// Returns `bytes` in 10⁻⁹ bit, the unit of [`Rate::transmission_time`].
 pub(crate) fn giga_bits(bytes: Bytes) -> u128 {
     u128::from(bytes.get()) * 8_000_000_000
 }
 
-/// The stage: the packets that wait, and the one on the line.
+/// Stage with the waiting packets and the packet on the line.
 #[derive(Clone, Debug)]
 pub(crate) struct BottleneckStage<T> {
     config: Bottleneck,
+    /// Waiting packets, the oldest first, each with the instant at which it was offered.
     waiting: VecDeque<(Instant, Carried<T>)>,
-    /// Wider than [`Bytes`], whose sum would saturate and then count wrongly.
+    /// Bytes of the waiting packets, framing not counted. Wider than [`Bytes`], whose sum would saturate and then be wrong after a departure.
     waiting_bytes: u128,
-    /// What the waiting packets take on the line, in 10⁻⁹ bit.
+    /// Bits that the waiting packets take on the line, in 10⁻⁹ bit.
     waiting_bits: u128,
     in_service: Option<InService<T>>,
-    /// Since when the line has had nothing to send.
+    /// Instant since which the line is idle, or, with RED, up to which idle time has been counted. Meaningless while a packet is on the line.
     idle_since: Instant,
-    /// The time on the line of a packet of that size: a division of 128 bits.
+    /// Size of the latest packet that found the line idle, with its time on the line. Cached, because the time is a division of 128 bits.
     latest_service: Option<(Bytes, Duration)>,
     red: RedState,
     codel: CoDelState,
 }
 
-/// The packet on the line.
+/// Packet on the line.
 #[derive(Clone, Debug)]
 pub(crate) struct InService<T> {
     pub(crate) packet: Carried<T>,
-    /// Since when the rest of the packet is sent at the present rate.
+    /// Instant since which the remaining bits are sent at the present rate.
     pub(crate) since: Instant,
-    /// What was left then, in 10⁻⁹ bit.
+    /// Bits that remained at `since`, in 10⁻⁹ bit.
     pub(crate) left: u128,
-    /// When something happens to it next: it has left, or some of it may leave.
+    /// Instant of the next event: the departure of the packet, or, on a recorded line, the next opportunity to send.
     pub(crate) next: Instant,
-    /// How many opportunities there are then, on a recorded line.
+    /// Number of opportunities at `next`. Used only on a recorded line.
     pub(crate) opportunities: u64,
 }
 
 impl<T> BottleneckStage<T> {
-    /// An idle line.
+    /// Returns an idle line.
     pub(crate) fn new(config: Bottleneck) -> Self {
         Self {
             config,
@@ -138,7 +139,8 @@ impl<T> BottleneckStage<T> {
         }
     }
 
-    /// With a packet on the line, others that have waited since then, the instant since when the line was idle, and what disciplines remember.
+    /// Returns a line with a packet in service, waiting packets with the instants at which they were offered, the instant since which the line is idle, and
+    /// the state of the disciplines.
     pub(crate) fn resumed(
         config: Bottleneck,
         in_service: Option<InService<T>>,
@@ -151,7 +153,8 @@ impl<T> BottleneckStage<T> {
         stage
     }
 
-    /// When a packet of that size leaves that is offered `now` and finds nothing before it: no discipline but RED, which draws, does anything to such a packet.
+    /// Returns the departure of a packet of `size` that is offered `now` to an idle line, or `None` if the line is busy, is recorded, or has the discipline
+    /// RED, which draws random numbers even for an idle line. No other discipline affects a packet that finds an idle line.
     #[inline]
     pub(crate) fn departure_if_idle(&mut self, now: Instant, size: Bytes) -> Option<Instant> {
         let Service::Rate(rate) = &self.config.service else { return None };
@@ -169,14 +172,15 @@ impl<T> BottleneckStage<T> {
         Some(now.saturating_add(service))
     }
 
-    /// A packet has left at that instant that was [told](BottleneckStage::departure_if_idle), and nothing came behind it. What CoDel remembers of an empty queue stays
-    /// as it is.
+    /// Records that a packet left at the instant returned by [`departure_if_idle`](BottleneckStage::departure_if_idle), and that no packet followed. CoDel's
+    /// memory of an empty queue stays unchanged.
     #[inline]
     pub(crate) fn is_idle_from(&mut self, departure: Instant) {
         self.idle_since = departure;
     }
 
-    /// Takes a packet: it is sent, waits, or comes out dropped, perhaps others in its stead. `word` is its random word for queues.
+    /// Takes a packet, which is then sent, waits, or is dropped into `outputs`; other packets may be dropped in its place. `word` gives the packet's random
+    /// word for queues.
     pub(crate) fn offer(&mut self, now: Instant, mut packet: Carried<T>, word: impl FnOnce() -> u64, outputs: &mut Outputs<T>) {
         if let Discipline::Red(red) = self.config.discipline {
             match self.red_verdict(&red, now, packet.info.ecn_capable, word()) {
@@ -185,11 +189,13 @@ impl<T> BottleneckStage<T> {
                 red::Verdict::Drop => return drop(outputs, now, DropCause::Red, packet),
             }
         }
+        // An idle line implies an empty queue, so no limit applies.
         if self.in_service.is_none() {
             self.serve(now, now, packet, outputs);
             return;
         }
         let size = packet.info.size;
+        // The newest packet is dropped if dropping every waiting packet does not make room for it.
         while !self.admits(now, size) {
             let head = if self.config.discipline == Discipline::HeadDrop { self.take_head() } else { None };
             match head {
@@ -202,12 +208,13 @@ impl<T> BottleneckStage<T> {
         self.waiting.push_back((now, packet));
     }
 
-    /// When [`BottleneckStage::release`] must be called next.
+    /// Returns the instant at which [`BottleneckStage::release`] must be called next, or `None` if the line is idle.
     pub(crate) fn next_at(&self) -> Option<Instant> {
         self.in_service.as_ref().map(|service| service.next)
     }
 
-    /// The packets that leave the line `now`, which is the instant announced, and those that are dropped.
+    /// Appends the packets that leave the line `now` to `released`, and dropped packets to `outputs`. `now` is the instant returned by
+    /// [`next_at`](Self::next_at).
     pub(crate) fn release(&mut self, now: Instant, released: &mut VecDeque<Carried<T>>, outputs: &mut Outputs<T>) {
         let Some(service) = self.in_service.take() else { return };
         match &self.config.service {
@@ -216,6 +223,7 @@ impl<T> BottleneckStage<T> {
                 self.serve_next(now, outputs);
             }
             Service::Recorded(trace) => {
+                // The opportunities of this instant are shared by as many packets as fit. A budget that is left when the queue is empty is lost.
                 let mut budget = giga_bits(trace.bytes()).saturating_mul(service.opportunities.into());
                 self.in_service = Some(service);
                 while let Some(service) = &mut self.in_service {
@@ -235,12 +243,13 @@ impl<T> BottleneckStage<T> {
         }
     }
 
-    /// Changes rate, framing, limit and discipline. A packet that waits keeps its place even beyond a smaller limit; the one on the line keeps the bits already
-    /// sent.
+    /// Changes rate, framing, limit and discipline. A waiting packet keeps its place even if a smaller limit is exceeded. The packet on the line keeps the
+    /// bits already sent.
     pub(crate) fn reconfigure(&mut self, now: Instant, config: Bottleneck) {
         if let (Some(service), Service::Rate(rate)) = (&mut self.in_service, &self.config.service) {
             service.left = service.left.saturating_sub(rate.bits_sent(now.saturating_duration_since(service.since)));
         }
+        // A new kind of discipline begins without memory. New parameters of the same kind keep the memory.
         if core::mem::discriminant(&self.config.discipline) != core::mem::discriminant(&config.discipline) {
             (self.red, self.codel) = (RedState::default(), CoDelState::default());
         }
@@ -249,26 +258,29 @@ impl<T> BottleneckStage<T> {
         self.announce(now);
     }
 
-    /// Everything that waits or is on the line, in order: what a link gives up with its bottleneck.
+    /// Returns the packet on the line and all waiting packets, in order, when a link loses its bottleneck.
     pub(crate) fn dismantle(self) -> impl Iterator<Item = Carried<T>> {
         self.in_service.into_iter().map(|service| service.packet).chain(self.waiting.into_iter().map(|(_, packet)| packet))
     }
 
+    /// Returns the bits that all waiting packets take on the line, in 10⁻⁹ bit.
     fn bits_of_waiting(&self) -> u128 {
         self.waiting.iter().map(|(_, packet)| self.on_the_line(packet)).sum()
     }
 
+    /// Returns the bits that a packet takes on the line, in 10⁻⁹ bit.
     fn on_the_line(&self, packet: &Carried<T>) -> u128 {
         giga_bits(self.config.framing.on_the_line(packet.info.size))
     }
 
+    /// Returns whether the limit admits another packet of `size`.
     fn admits(&self, now: Instant, size: Bytes) -> bool {
         let Some(limit) = self.config.limit else { return true };
         let time = if matches!(limit, QueueLimit::Time(_)) { self.time_to_send_all(now) } else { Duration::ZERO };
         limit.admits(Waiting { packets: self.waiting.len() as u64, bytes: self.waiting_bytes, time }, size)
     }
 
-    /// When the line will have sent all that it has: how long the newest packet would wait.
+    /// Returns the time after which the line will have sent all its packets, which is the wait of the newest packet.
     fn time_to_send_all(&self, now: Instant) -> Duration {
         let Some(service) = &self.in_service else { return Duration::ZERO };
         match &self.config.service {
@@ -284,14 +296,16 @@ impl<T> BottleneckStage<T> {
         }
     }
 
+    /// Returns RED's verdict about an offered packet.
     fn red_verdict(&mut self, red: &Red, now: Instant, ecn_capable: bool, word: u64) -> red::Verdict {
         let idle = if self.in_service.is_none() { now.saturating_duration_since(self.idle_since) } else { Duration::ZERO };
-        // Time that was idle counts once.
+        // A packet that RED drops leaves the line idle. Moving `idle_since` keeps the next packet from counting the same idle time again.
         self.idle_since = now;
         let idle_packets = idle_packets(idle, self.config.time_of_mean_packet(red));
         self.red.verdict(red, self.waiting_bytes, idle_packets, ecn_capable, word)
     }
 
+    /// Removes the oldest waiting packet, and returns it with the instant at which it was offered.
     fn take_head(&mut self) -> Option<(Instant, Carried<T>)> {
         let (since, packet) = self.waiting.pop_front()?;
         self.waiting_bytes -= u128::from(packet.info.size.get());
@@ -299,6 +313,7 @@ impl<T> BottleneckStage<T> {
         Some((since, packet))
     }
 
+    /// Begins to send the oldest waiting packet, or marks the line idle if no packet waits.
     fn serve_next(&mut self, now: Instant, outputs: &mut Outputs<T>) {
         match self.take_head() {
             Some((since, packet)) => self.serve(now, since, packet, outputs),
@@ -309,7 +324,7 @@ impl<T> BottleneckStage<T> {
         }
     }
 
-    /// Begins to send a packet that has waited since then, or what comes after it if an active queue drops it.
+    /// Begins to send a packet that has waited since `since`. If CoDel drops the packet, the next waiting packet takes its place.
     fn serve(&mut self, now: Instant, mut since: Instant, mut packet: Carried<T>, outputs: &mut Outputs<T>) {
         if let Discipline::CoDel(codel) = self.config.discipline {
             loop {
@@ -337,7 +352,7 @@ impl<T> BottleneckStage<T> {
         self.announce(now);
     }
 
-    /// Says when the packet on the line leaves, from `now` on.
+    /// Sets the next event of the packet on the line, whose remaining bits are those at `now`.
     fn announce(&mut self, now: Instant) {
         let Some(service) = &mut self.in_service else { return };
         service.since = now;
@@ -348,11 +363,12 @@ impl<T> BottleneckStage<T> {
     }
 }
 
+/// Appends a dropped packet to `outputs`.
 fn drop<T>(outputs: &mut Outputs<T>, now: Instant, cause: DropCause, packet: Carried<T>) {
     outputs.push(Output { packet, exit: Exit::Dropped(now, cause) });
 }
 
-/// The parameters of the line and of the queue before it.
+/// Parameters of the line and of the queue before it.
 pub(crate) const KEYS: [Key; 4] = [
     usual("rate", Form::AnyOf(&[Form::Rate, UNLIMITED]), "\"unlimited\"", "How fast packets are sent, in bits per second"),
     optional("queue", Form::Table(&QUEUE), "How much may wait for the line, and which packets are dropped. Needs rate or a recorded line"),
@@ -375,7 +391,7 @@ static DISCIPLINE: Table = Table::of(&[&[
 ]]);
 
 impl Bottleneck {
-    /// The queue and the line in words.
+    /// Returns the queue and the line in words.
     pub(crate) fn words(&self) -> String {
         let discipline = match self.discipline {
             Discipline::TailDrop => String::new(),
@@ -396,7 +412,7 @@ mod tests {
     use super::*;
     use crate::packet::{Marks, Packet};
 
-    /// 64 bytes take 512 µs.
+    /// Returns a line of 1 Mbit/s, on which 64 bytes take 512 µs.
     fn megabit(limit: Option<QueueLimit>, discipline: Discipline) -> BottleneckStage<char> {
         BottleneckStage::new(Bottleneck { limit, discipline, ..Bottleneck::at_rate(Rate::bits_per_sec(1_000_000).unwrap()) })
     }
@@ -405,7 +421,7 @@ mod tests {
         Instant::from_nanos(t * 1_000)
     }
 
-    /// Offers a packet and gives what was dropped.
+    /// Offers a packet, and returns the dropped packets.
     fn offer(stage: &mut BottleneckStage<char>, now: u64, size: u64, item: char) -> Vec<char> {
         let info = Bytes::new(size).into();
         let packet = Packet::new(0, info, Marks::default(), item);
@@ -414,7 +430,7 @@ mod tests {
         outputs.into_iter().map(|output| output.packet.item).collect()
     }
 
-    /// All that leaves up to `until`, with the microsecond at which it does.
+    /// Returns the packets that leave up to `until`, each with the microsecond of its departure.
     fn leaves(stage: &mut BottleneckStage<char>, until: u64) -> Vec<(char, u64)> {
         let mut left = Vec::new();
         while let Some(at) = stage.next_at().filter(|at| *at <= micros(until)) {
@@ -451,7 +467,7 @@ mod tests {
         assert_eq!(dropped, ['c']);
     }
 
-    /// Each of the packets ahead takes 512 µs: with 1 ms at most, the third waits 1024 − 100 µs, the fourth would wait 1436.
+    /// Each packet ahead takes 512 µs. With a limit of 1 ms the third packet waits 1024 − 100 µs, and the fourth packet would wait 1436 µs.
     #[test]
     fn a_limit_in_time_counts_what_is_ahead() {
         let mut stage = megabit(Some(QueueLimit::Time(Duration::from_millis(1))), Discipline::TailDrop);
@@ -464,12 +480,13 @@ mod tests {
     fn a_change_of_rate_keeps_the_bits_already_sent() {
         let mut stage = megabit(None, Discipline::TailDrop);
         offer(&mut stage, 0, 64, 'a');
-        // Half of the packet is sent at 1 Mbit/s; the other 256 bits take 128 µs at 2 Mbit/s.
+        // Half of the packet is sent at 1 Mbit/s. The other 256 bits take 128 µs at 2 Mbit/s.
         stage.reconfigure(micros(256), Bottleneck::at_rate(Rate::bits_per_sec(2_000_000).unwrap()));
         assert_eq!(leaves(&mut stage, 9_999), [('a', 384)]);
     }
 
-    /// 100 bytes at 1, 2 and 2 ms, then again: 150 bytes need two opportunities, two packets of 40 share the rest.
+    /// Opportunities for 100 bytes come at 1, 2 and 2 ms, and then again. A packet of 150 bytes needs two opportunities, and two packets of 40 bytes share
+    /// the rest.
     #[test]
     fn a_recorded_line_shares_its_opportunities() {
         let trace = DeliveryTrace::parse("1\n2\n2\n", Bytes::new(100)).unwrap();
@@ -478,7 +495,7 @@ mod tests {
             offer(&mut stage, 0, size, item);
         }
         assert_eq!(leaves(&mut stage, 9_999), [('a', 2000), ('b', 2000), ('c', 2000), ('d', 3000)]);
-        // What is not used is lost: at 5 ms there are 100 bytes, not more.
+        // Unused bytes are lost: at 5 ms no more than 100 bytes may leave.
         offer(&mut stage, 4_500, 100, 'e');
         offer(&mut stage, 4_500, 100, 'f');
         assert_eq!(leaves(&mut stage, 9_999), [('e', 5000), ('f', 6000)]);

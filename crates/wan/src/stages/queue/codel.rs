@@ -1,70 +1,75 @@
 //! CoDel, controlled delay (Nichols, Jacobson, McGregor & Iyengar, RFC 8289, 2018).
 //!
-//! A packet that leaves the queue after more than `target` while all others of the last `interval` did too is dropped, and then one more after
-//! interval/√2, interval/√3, …, until one waits less.
+//! A packet that leaves the queue after more than `target` is dropped if all other packets of the last `interval` waited longer as well. Further packets are
+//! then dropped at distances of interval/√1, interval/√2, interval/√3, …, until a packet waits less.
 
 use core::time::Duration;
 
 use crate::parameters::{Form, Table, usual};
 use cohaptic_units::{Bytes, Instant};
 
-/// The parameters of CoDel.
+/// Parameters of CoDel.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct CoDel {
-    /// The wait that is always acceptable; 5 ms by custom.
+    /// Wait that is always acceptable, usually 5 ms.
     pub target: Duration,
-    /// How long it must be exceeded; 100 ms by custom, about the longest round trip.
+    /// Time for which waits must exceed the target before a packet is dropped, usually 100 ms, about the longest round trip.
     pub interval: Duration,
-    /// With at most this number of bytes waiting nothing is dropped: one packet of the largest size.
+    /// Number of waiting bytes up to which no packet is dropped: one packet of the largest size.
     pub mtu: Bytes,
-    /// Whether a capable packet is marked where another is dropped.
+    /// Whether a packet that supports ECN is marked instead of dropped.
     pub ecn: bool,
 }
 
 impl Default for CoDel {
-    /// 5 ms, 100 ms, 1500 bytes, no ECN.
+    /// Returns a target of 5 ms, an interval of 100 ms, an MTU of 1500 bytes, and no ECN.
     fn default() -> Self {
         Self { target: Duration::from_millis(5), interval: Duration::from_millis(100), mtu: Bytes::new(1500), ecn: false }
     }
 }
 
-/// The control law's memory.
+/// Memory of the control law. Fields have the names of RFC 8289.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) struct CoDelState {
-    /// When the wait will have been above the target for an interval; `None` while it is below.
+    /// Instant at which waits will have exceeded the target for an interval, or `None` while waits are below the target.
     first_above: Option<Instant>,
+    /// Whether packets are being dropped by the control law.
     dropping: bool,
+    /// Instant from which the next packet is dropped.
     drop_next: Instant,
+    /// Number of packets dropped in this state of dropping, which sets the distance of drops.
     count: u64,
+    /// Value of `count` at the begin of the latest state of dropping.
     last_count: u64,
-    /// What was dropped just now.
+    /// Drop at the present instant, if the previous call dropped a packet.
     dropped: Dropped,
 }
 
-/// Whether the packet before was dropped at this instant, and at which line of the pseudocode.
+/// Kind of drop of the previous packet at this instant: the line of the pseudocode at which the packet was dropped.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 enum Dropped {
     #[default]
+    /// The previous packet was not dropped.
     Not,
-    /// The first one: the next packet is sent, whatever it waited.
+    /// First drop of a state of dropping. The next packet is sent, whatever its wait.
     Entering,
-    /// One of those that follow.
+    /// Further drop of a state of dropping.
     Again,
 }
 
-/// What CoDel says to a packet that leaves the queue.
+/// Verdict of CoDel about a packet that leaves the queue.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Verdict {
     Send,
-    /// Send it marked, whatever comes.
+    /// Send the packet marked.
     Mark,
-    /// Drop it, and ask about the next one.
+    /// Drop the packet, and ask about the next packet.
     Drop,
 }
 
 impl CoDelState {
-    /// Decides about the packet that leaves the queue `now` after so long; `left_bytes` wait behind it. After [`Verdict::Drop`] it is asked about the next
-    /// packet at once. Follows the pseudocode of RFC 8289, section 5, one packet a call.
+    /// Decides about the packet that leaves the queue `now` after waiting for `sojourn`, while `left_bytes` wait after it. After [`Verdict::Drop`] the caller
+    /// asks about the next packet at the same instant. Follows the pseudocode of RFC 8289, section 5, with one packet per call.
     pub(crate) fn verdict(&mut self, codel: &CoDel, now: Instant, sojourn: Duration, left_bytes: u128, ecn_capable: bool) -> Verdict {
         let ok_to_drop = self.should_drop(codel, now, sojourn, left_bytes);
         match core::mem::take(&mut self.dropped) {
@@ -93,7 +98,7 @@ impl CoDelState {
             return Verdict::Send;
         }
         self.dropping = true;
-        // A queue that grew again soon after it was controlled is dropped from at the rate that controlled it.
+        // A queue that grew again soon after it was controlled continues with the rate of drops that controlled it.
         let since = self.count - self.last_count;
         let recently = now.saturating_duration_since(self.drop_next) < codel.interval.saturating_mul(16);
         self.count = if since > 1 && recently { since } else { 1 };
@@ -106,13 +111,14 @@ impl CoDelState {
         Verdict::Drop
     }
 
-    /// The queue has run empty.
+    /// Records that the queue has run empty, which ends a state of dropping.
     pub(crate) const fn empty(&mut self) {
         self.first_above = None;
         self.dropping = false;
         self.dropped = Dropped::Not;
     }
 
+    /// Returns whether waits have exceeded the target for an interval, and tracks since when they exceed it.
     fn should_drop(&mut self, codel: &CoDel, now: Instant, sojourn: Duration, left_bytes: u128) -> bool {
         if sojourn < codel.target || left_bytes <= u128::from(codel.mtu.get()) {
             self.first_above = None;
@@ -128,13 +134,13 @@ impl CoDelState {
     }
 }
 
-/// When the next packet is dropped: t + interval/√count.
+/// Returns the instant of the next drop, t + interval/√count.
 #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a time of some milliseconds")]
 fn control_law(t: Instant, interval: Duration, count: u64) -> Instant {
     t.saturating_add(Duration::from_nanos(libm::rint(interval.as_nanos() as f64 / libm::sqrt(count as f64)) as u64))
 }
 
-/// The parameters of the discipline.
+/// Parameters of the discipline.
 pub(crate) static CODEL: Table = Table::of(&[&[
     usual("target", Form::PositiveDuration, "\"5ms\"", "How long packets may wait"),
     usual("interval", Form::PositiveDuration, "\"100ms\"", "For how long they may wait longer"),
@@ -150,13 +156,13 @@ mod tests {
         Instant::from_nanos(t * 1_000_000)
     }
 
-    /// A queue whose packets always wait 20 ms, seen every millisecond: the first drop comes an interval after the first wait above the target, the
-    /// next ones interval/√1, /√2, /√3 … after each other, rounded up to the next packet.
+    /// The packets of a queue always wait 20 ms, and one leaves every millisecond. The first drop comes an interval after the first wait above the target.
+    /// The next drops follow at distances of interval/√1, /√2, /√3 …, rounded up to the next packet.
     #[test]
     fn drops_follow_the_control_law() {
         let (codel, mut state) = (CoDel::default(), CoDelState::default());
         let mut ask = |t| state.verdict(&codel, millis(t), Duration::from_millis(20), 100_000, false);
-        // After a drop the packet behind it is asked about at the same instant.
+        // After a drop, CoDel is asked about the next packet at the same instant.
         let dropped: Vec<u64> = (0..600).filter(|t| ask(*t) == Verdict::Drop && ask(*t) == Verdict::Send).collect();
         let mut expected = vec![100];
         let mut next = 100.0;

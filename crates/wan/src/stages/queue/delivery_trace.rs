@@ -1,4 +1,5 @@
-//! A line whose capacity was recorded: instants at which it can deliver a fixed number of bytes (the format of mahimahi; Netravali et al., USENIX ATC 2015).
+//! Delivery trace: a line whose capacity was recorded as instants at which it can deliver a fixed number of bytes (the format of mahimahi; Netravali et al.,
+//! USENIX ATC 2015).
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -6,41 +7,42 @@ use core::fmt;
 
 use cohaptic_units::{Bytes, Instant};
 
-/// Opportunities to deliver. At each, up to [`DeliveryTrace::bytes`] leave: of one packet or of several, and a packet may need several. Unused bytes are
-/// lost. A packet that is offered at the very instant of an opportunity waits for the next.
+/// Opportunities to deliver. At each opportunity up to [`DeliveryTrace::bytes`] leave, of one packet or of several; a large packet needs several
+/// opportunities. Unused bytes are lost. A packet that is offered at the very instant of an opportunity waits for the next one.
 ///
-/// The recording repeats for ever: after its last line it begins anew, with its end as the new zero.
+/// The recording repeats for ever: after its last line the recording begins anew, with its end as the new zero.
 ///
-/// A capacity recorded under full load says little about a light one (Winstein et al. saturate the link to record it): a haptic flow is a light load.
+/// A capacity recorded under full load says little about a light load such as a haptic flow (Winstein et al. saturate the link to record its capacity).
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct DeliveryTrace {
-    /// Nanoseconds from the begin of a round, ascending; equal ones are several opportunities at once.
+    /// Opportunities \[ns\] from the begin of a round, ascending. Equal entries are several opportunities at one instant. The last entry is the length of a
+    /// round.
     opportunities: Arc<[u64]>,
     bytes: Bytes,
 }
 
-/// Why a recording is refused. Lines count from 1.
+/// Reason for which a recording is refused. Lines count from 1.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum DeliveryTraceError {
-    /// A line is no whole number of milliseconds.
+    /// A line is not a whole number of milliseconds, or is too large for an instant.
     Number {
-        /// Which line.
+        /// Number of the line.
         line: usize,
     },
-    /// A line lies before the one above it.
+    /// A line has an earlier time than the line above it.
     Order {
-        /// Which line.
+        /// Number of the line.
         line: usize,
-        /// What it says \[ms\].
+        /// Time on the line \[ms\].
         found: u64,
-        /// What the line above says \[ms\].
+        /// Time on the line above \[ms\].
         before: u64,
     },
     /// The recording has no length, so that it cannot be repeated.
     NoLength,
-    /// There is no line.
+    /// The recording has no line.
     Empty,
-    /// No byte could ever leave.
+    /// An opportunity has no bytes, so that no packet could ever leave.
     NoBytes,
 }
 
@@ -58,15 +60,15 @@ impl fmt::Display for DeliveryTraceError {
 
 impl core::error::Error for DeliveryTraceError {}
 
-/// The bytes that mahimahi lets leave at each opportunity. (Its manual says 1500; a tunnel's header makes it 1504.)
+/// Number of bytes that mahimahi lets leave at each opportunity. (The manual of mahimahi says 1500; a tunnel's header makes it 1504.)
 pub const MAHIMAHI_BYTES: Bytes = Bytes::new(1504);
 
 impl DeliveryTrace {
-    /// Reads mahimahi's format: a whole number of milliseconds on each line, not descending.
+    /// Reads mahimahi's format: a whole number of milliseconds on each line, not descending. Blank lines are skipped.
     ///
     /// # Errors
     ///
-    /// [`DeliveryTraceError`] with the line. Never panics.
+    /// [`DeliveryTraceError`] with the line. No text makes this function panic.
     pub fn parse(text: &str, bytes: Bytes) -> Result<Self, DeliveryTraceError> {
         let mut opportunities = Vec::new();
         let mut before = 0;
@@ -82,7 +84,7 @@ impl DeliveryTrace {
         Self::new(opportunities, bytes)
     }
 
-    /// Opportunities at these nanoseconds of each round, in order.
+    /// Returns a recording with the given opportunities \[ns\] in each round, in order.
     fn new(opportunities: Vec<u64>, bytes: Bytes) -> Result<Self, DeliveryTraceError> {
         match opportunities.last() {
             None => Err(DeliveryTraceError::Empty),
@@ -92,26 +94,26 @@ impl DeliveryTrace {
         }
     }
 
-    /// What may leave at each opportunity.
+    /// Returns the number of bytes that may leave at each opportunity.
     #[must_use]
     pub const fn bytes(&self) -> Bytes {
         self.bytes
     }
 
-    /// After how long it begins anew.
+    /// Returns the time after which the recording begins anew.
     #[must_use]
     pub fn period(&self) -> core::time::Duration {
         core::time::Duration::from_nanos(self.opportunities.last().copied().unwrap_or(0))
     }
 
-    /// The mean rate [bit/s].
+    /// Returns the mean rate \[bit/s\].
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "a mean")]
     pub fn mean_rate(&self) -> f64 {
         self.opportunities.len() as f64 * 8.0 * self.bytes.get() as f64 / (self.opportunities.last().copied().unwrap_or(1) as f64 / 1e9)
     }
 
-    /// The first opportunity after `now` and how many there are at that instant; `None` beyond the end of time.
+    /// Returns the instant of the first opportunity after `now`, and the number of opportunities at that instant, or `None` beyond the end of time.
     pub(crate) fn next_after(&self, now: Instant) -> Option<(Instant, u64)> {
         let first = self.first_after(now)?;
         let at = self.instant(first)?;
@@ -119,19 +121,21 @@ impl DeliveryTrace {
         Some((at, count as u64))
     }
 
-    /// When the n-th opportunity after `now` is, n from 1; `None` beyond the end of time.
+    /// Returns the instant of the n-th opportunity after `now`, with n from 1, or `None` beyond the end of time.
     pub(crate) fn nth_after(&self, now: Instant, n: u64) -> Option<Instant> {
         self.instant(self.first_after(now)?.checked_add(n.checked_sub(1)?)?)
     }
 
-    /// Opportunities are counted on over all rounds.
+    /// Returns the index of the first opportunity after `now`. Indices continue over all rounds.
     fn first_after(&self, now: Instant) -> Option<u64> {
+        // The last opportunity, the period, is above zero: `new` refuses a recording without length.
         let period = self.opportunities.last()?;
         let (round, place) = (now.as_nanos() / period, now.as_nanos() % period);
         let within = self.opportunities.partition_point(|opportunity| *opportunity <= place);
         round.checked_mul(self.opportunities.len() as u64)?.checked_add(within as u64)
     }
 
+    /// Returns the instant of the opportunity with the index `index` over all rounds, or `None` beyond the end of time.
     fn instant(&self, index: u64) -> Option<Instant> {
         let count = self.opportunities.len() as u64;
         let within = self.opportunities[usize::try_from(index % count).ok()?];

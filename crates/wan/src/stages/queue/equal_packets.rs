@@ -1,7 +1,7 @@
-//! A queue of packets of one size that drops the newest, as numbers: when each packet leaves, and whether there is room for it.
+//! Queue of packets of one size that drops the newest packet, without keeping packets: the departure of each packet, and whether there is room for it.
 //!
-//! A packet leaves at D(n) = max(a(n), D(n−1)) + S, where a is when it is offered and S its time on the line (Lindley 1952). Packets of one size leave S
-//! after each other as long as the line is busy, so the latest departure says how many wait: no packet needs to be kept.
+//! A packet leaves at D(n) = max(a(n), D(n−1)) + S, where a is the instant at which it is offered and S its time on the line (Lindley 1952). Packets of one
+//! size leave at distances of S as long as the line is busy, so that the latest departure tells the number of waiting packets.
 
 use core::time::Duration;
 
@@ -10,34 +10,35 @@ use cohaptic_units::{Bytes, Instant, Rate};
 use super::bottleneck::giga_bits;
 use super::{Bottleneck, Discipline, QueueLimit, Service};
 
-/// The queue and the line of packets of one size \[ns\].
+/// Queue and line for packets of one size \[ns\].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct EqualPackets {
-    /// The time of a packet on the line.
+    /// Time of a packet on the line \[ns\].
     service: u64,
-    /// A packet that finds more than this to be sent is dropped.
+    /// Most work \[ns\] that an admitted packet may find. A packet that finds more is dropped.
     most: u64,
 }
 
 impl EqualPackets {
-    /// The queue for packets of that size; `None` if departures depend on more than the latest one.
+    /// Returns the queue for packets of `size`, or `None` if departures depend on more than the latest departure.
     pub(crate) fn new(bottleneck: &Bottleneck, size: Bytes) -> Option<Self> {
         let Bottleneck { service: Service::Rate(rate), framing, limit, discipline: Discipline::TailDrop } = bottleneck else { return None };
         let line = Line { rate: *rate, bits: giga_bits(framing.on_the_line(size)) };
         let service = line.service();
         let most = match *limit {
             None => return Some(Self { service, most: u64::MAX }),
-            // n packets inside are more than (n − 1)·S of work and at most n·S. Another is admitted if n − 1 < limit.
+            // With n packets inside, the remaining work is more than (n − 1)·S and at most n·S. Another packet is admitted if n − 1 < limit.
             Some(QueueLimit::Packets(packets)) => service.saturating_mul(packets),
-            // It is admitted if the n − 1 that wait and itself fit.
+            // Another packet is admitted if the n − 1 waiting packets and the packet itself fit.
             Some(QueueLimit::Bytes(bytes)) => bytes.get().checked_div(size.get()).map_or(u64::MAX, |packets| service.saturating_mul(packets)),
             Some(QueueLimit::Time(wait)) => line.most_work(wait),
         };
-        // Departures beyond the end of time are all at the end, and say nothing about how many wait.
+        // Departures beyond the end of time all saturate at the end, and no longer tell the number of waiting packets.
         (service == 0 || most < END).then_some(Self { service, most })
     }
 
-    /// When a packet leaves that is offered `now`, if there is room for it. `departure` is that of the packet before, then its own.
+    /// Returns the departure of a packet that is offered `now`, or `None` if there is no room for the packet. `departure` is the departure of the previous
+    /// packet, and becomes that of this packet.
     #[inline(always)]
     pub(crate) fn offer(&self, now: Instant, departure: &mut Instant) -> Option<Instant> {
         let work = departure.as_nanos().saturating_sub(now.as_nanos());
@@ -49,10 +50,10 @@ impl EqualPackets {
     }
 }
 
-/// Half of the time that an instant counts \[ns\].
+/// Half of the time that an instant can count \[ns\].
 const END: u64 = u64::MAX / 2;
 
-/// A rate, and what a packet takes of it in 10⁻⁹ bit.
+/// Rate of a line, and the bits of a packet on the line in 10⁻⁹ bit.
 #[derive(Clone, Copy)]
 struct Line {
     rate: Rate,
@@ -60,14 +61,16 @@ struct Line {
 }
 
 impl Line {
-    /// The time of a packet on the line \[ns\].
+    /// Returns the time of a packet on the line \[ns\].
     fn service(self) -> u64 {
         nanos(self.rate.transmission_time(self.bits))
     }
 
-    /// The most work \[ns\] that a packet may find whose turn is to come within `wait`: that turn is later the more work there is.
+    /// Returns the most work \[ns\] that a packet may find so that its turn comes within `wait`. More work never makes a turn earlier, so that bisection
+    /// finds the bound.
     fn most_work(self, wait: Duration) -> u64 {
         let (mut holds, mut fails) = (0, self.service().max(1));
+        // Doubles the bracket until `fails` is too much work; `holds` always is not.
         while self.turn(fails) <= wait {
             (holds, fails) = (fails, fails.saturating_mul(2));
             if fails >= END {
@@ -81,13 +84,15 @@ impl Line {
         holds
     }
 
-    /// How long a packet waits for its turn that finds that much work: the times on the line are rounded up to nanoseconds each, their bits are not.
+    /// Returns the wait of a packet that finds `work` \[ns\] before it. `work` is a sum of times that are each rounded up to nanoseconds. The wait is computed
+    /// from the sum of the bits and rounded once, as the stage that keeps packets does.
     fn turn(self, work: u64) -> Duration {
         let service = self.service();
-        // A packet without a time on the line leaves no work behind, so nothing waits for it.
+        // A packet that takes no time on the line leaves no work, so that no packet waits for it.
         if service == 0 || work == 0 {
             return Duration::ZERO;
         }
+        // `inside` packets wait. The packet on the line has been sent for `since`, and `first` of its bits remain.
         let inside = work.div_ceil(service) - 1;
         let since = (inside + 1) * service - work;
         let first = self.bits.saturating_sub(self.rate.bits_sent(Duration::from_nanos(since)));
@@ -95,7 +100,7 @@ impl Line {
     }
 }
 
-/// A span \[ns\], or the longest.
+/// Returns a span in nanoseconds, or the largest number if the span is longer.
 pub(crate) fn nanos(span: Duration) -> u64 {
     u64::try_from(span.as_nanos()).unwrap_or(u64::MAX)
 }
@@ -112,7 +117,7 @@ mod tests {
     use crate::stages::queue::limit::strategies::limits;
     use crate::stages::queue::{BottleneckStage, Framing};
 
-    /// What becomes of each packet by the stage that keeps packets: when it leaves, or that it is dropped.
+    /// Returns the departure of each packet by the stage that keeps packets, or `None` for a dropped packet.
     fn by_stage(bottleneck: &Bottleneck, size: Bytes, offered: &[Instant]) -> Vec<Option<Instant>> {
         let mut stage = BottleneckStage::new(bottleneck.clone());
         let mut fates = alloc::vec![None; offered.len()];
@@ -133,7 +138,7 @@ mod tests {
         fates
     }
 
-    /// A limit of no time and packets of no bits: the line is free at once, and nothing is dropped.
+    /// With a limit of zero time and packets without bits the line is free at once, and no packet is dropped.
     #[test]
     fn packets_of_no_bits_never_wait() {
         let rate = Rate::bits_per_sec(8_000_000).unwrap();
@@ -148,8 +153,8 @@ mod tests {
     }
 
     proptest! {
-        /// Departures and drops are those of the stage that keeps packets, with gaps from none to longer than the queue, at rates whose time on the line
-        /// is rounded or not.
+        /// Departures and drops equal those of the stage that keeps packets. Gaps range from zero to longer than the queue, and rates include times on the
+        /// line that are rounded and times that are not.
         #[test]
         fn departures_and_drops_are_those_of_the_queue(
             limit in limits(3_000_000),

@@ -1,30 +1,30 @@
-//! What a packet costs on the line beyond its own bytes.
+//! Framing: bytes that a packet takes on the line beyond its own bytes.
 
 use crate::parameters::{Form, Table, required, usual};
 use alloc::format;
 use alloc::string::String;
 use cohaptic_units::Bytes;
 
-/// How a packet is framed on the line. The default adds nothing.
+/// Framing of packets on the line. The default adds nothing.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Framing {
-    /// Bytes added to every packet, such as 28 for IPv4 and UDP; taken away if negative, down to nothing.
+    /// Bytes added to every packet, such as 28 for IPv4 and UDP. A negative number is subtracted, down to an empty packet.
     pub overhead: i32,
-    /// Whether the line carries cells of a fixed size.
+    /// Cells of a fixed size that the line carries. `None` means that packets are sent whole.
     pub cells: Option<Cells>,
 }
 
-/// Cells of a fixed size, the last one filled up: 48 bytes and 5 more for ATM.
+/// Cells of a fixed size, the last cell of a packet padded. A cell of ATM carries 48 bytes and adds 5.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Cells {
-    /// What a cell carries \[byte\], at least 1.
+    /// Payload of a cell \[byte\], at least 1.
     pub payload: core::num::NonZeroU32,
-    /// What it adds \[byte\].
+    /// Overhead of a cell \[byte\].
     pub overhead: u32,
 }
 
 impl Framing {
-    /// The bytes that a packet takes on the line.
+    /// Returns the number of bytes that a packet of `size` takes on the line.
     #[must_use]
     pub fn on_the_line(&self, size: Bytes) -> Bytes {
         let packet = size.get().saturating_add_signed(self.overhead.into());
@@ -38,16 +38,16 @@ impl Framing {
     }
 }
 
-/// The packets of a link in cells.
+/// Parameters of cells.
 pub(crate) static CELLS: Table = Table::of(&[&[
     required("payload", Form::Size, "What a cell carries").expecting("what a cell carries, a size such as \"48B\""),
     usual("overhead", Form::Size, "\"0B\"", "What a cell costs beyond that"),
 ]]);
-/// A size that may be negative.
+/// Form of a size that may be negative.
 pub(crate) const SIGNED_SIZE: Form = Form::Like(&["28B", "-14B"]);
 
 impl Framing {
-    /// The cost of a packet beyond its size in words, behind a comma; empty if there is none.
+    /// Returns the framing in words after a comma, or an empty text if the framing adds nothing.
     pub(crate) fn words(self) -> String {
         let overhead = if self.overhead == 0 { String::new() } else { format!(", {:+} bytes a packet", self.overhead) };
         let cells = self.cells.map_or_else(String::new, |cells| format!(", in cells of {}+{} bytes", cells.payload, cells.overhead));
@@ -59,7 +59,7 @@ impl Framing {
 mod tests {
     use super::*;
 
-    /// 53 bytes a cell: 64 bytes and 28 of overhead fill two cells of 48; 4 more begin a third.
+    /// Cells have 53 bytes. 64 bytes and 28 bytes of overhead fill two cells of 48; 4 more bytes overflow into a third cell.
     #[test]
     fn the_last_cell_is_filled_up() {
         let atm = Framing { overhead: 28, cells: Some(Cells { payload: 48.try_into().unwrap(), overhead: 5 }) };

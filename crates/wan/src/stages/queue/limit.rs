@@ -1,4 +1,4 @@
-//! How much may wait.
+//! Limit of a queue.
 
 use alloc::string::String;
 use alloc::string::ToString as _;
@@ -8,29 +8,29 @@ use core::time::Duration;
 use crate::parameters::Form;
 use cohaptic_units::Bytes;
 
-/// The size that may wait in a queue. A packet being sent does not count.
+/// Limit of the packets that wait in a queue. A packet on the line does not count.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum QueueLimit {
-    /// At most this number of packets waits; with 0, a packet that finds the line busy is dropped.
+    /// Largest number of waiting packets. With 0, a packet that finds the line busy is dropped.
     Packets(u64),
-    /// The packets that wait hold at most this number of bytes together, framing not counted.
+    /// Largest number of bytes of all waiting packets, framing not counted.
     Bytes(Bytes),
-    /// No packet waits longer than this: one whose turn would come later, at the present rate, is dropped.
+    /// Longest wait. A packet whose turn would come later at the present rate is dropped.
     Time(Duration),
 }
 
-/// What waits, as a limit sees it.
+/// State of a queue, as far as a limit depends on it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Waiting {
     pub(crate) packets: u64,
-    /// Wider than [`Bytes`], whose sum would saturate and then count wrongly.
+    /// Bytes of the waiting packets. Wider than [`Bytes`], whose sum would saturate and then be wrong after a departure.
     pub(crate) bytes: u128,
-    /// How long the newest packet would wait for its turn.
+    /// Time after which the turn of another packet would come.
     pub(crate) time: Duration,
 }
 
 impl QueueLimit {
-    /// Whether another packet of that size may wait too.
+    /// Returns whether another packet of `size` may wait too.
     pub(crate) fn admits(self, waiting: Waiting, size: Bytes) -> bool {
         match self {
             Self::Packets(limit) => waiting.packets < limit,
@@ -40,10 +40,10 @@ impl QueueLimit {
     }
 }
 
-/// How much may wait.
+/// Form of a limit in files.
 pub(crate) const LIMIT: Form = Form::Like(&["100 packets", "64kB", "50ms", "unlimited"]);
 
-/// A limit in words.
+/// Returns a limit in words.
 pub(super) fn words_of_limit(limit: Option<QueueLimit>) -> String {
     match limit {
         None => "unlimited".into(),
@@ -59,7 +59,7 @@ pub(crate) mod strategies {
 
     use super::*;
 
-    /// Any limit, or none: of some packets, some bytes, or a wait below that \[ns\].
+    /// Returns any limit, or none: a number of packets, a number of bytes, or a time below `wait` \[ns\].
     pub(crate) fn limits(wait: u64) -> impl Strategy<Value = Option<QueueLimit>> {
         prop_oneof![
             Just(None),

@@ -1,4 +1,4 @@
-//! What a link is offered: under a load that it carries with ease, no packet waits, and a queue need not be simulated.
+//! Load of a link. Under a load that a link carries easily no packet waits, and its queue need not be simulated.
 
 use core::time::Duration;
 
@@ -7,17 +7,18 @@ use cohaptic_units::Bytes;
 use super::bottleneck::giga_bits;
 use super::{Bottleneck, Discipline, Service, TokenBucket};
 
-/// Packets of one size that are offered to a link, of which no two come closer together than that. The program that offers them knows it; debug assertions check it.
+/// Packets of one size that are offered to a link at distances of at least `gap`. The program that offers the packets promises both; debug assertions check
+/// the promise.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Load {
-    /// The size of each packet.
+    /// Size of each packet.
     pub size: Bytes,
-    /// The least time between two of them; zero if nothing is known.
+    /// Least time between two packets; zero if unknown.
     pub gap: Duration,
 }
 
 impl Load {
-    /// Packets of that size, of which several may come at once.
+    /// Returns a load of packets of `size`, several of which may be offered at once.
     #[must_use]
     pub const fn of(size: Bytes) -> Self {
         Self { size, gap: Duration::ZERO }
@@ -25,11 +26,11 @@ impl Load {
 }
 
 impl Bottleneck {
-    /// How long each packet of the load is on the line, if each has left before the next one comes: then none waits, and no discipline and no limit ever does anything.
-    /// `None` if one may wait.
+    /// Returns the time of each packet of the load on the line, if each packet leaves before the next one is offered. No packet then waits, and no discipline
+    /// and no limit has any effect. Returns `None` if a packet may wait.
     pub(crate) fn time_without_wait(&self, load: Load) -> Option<Duration> {
         let Self { service: Service::Rate(rate), framing, limit: _, discipline } = self else { return None };
-        // With nothing waiting the average of RED is zero, which is not below a threshold of zero.
+        // Without waiting packets the average of RED is zero, which is not below a threshold of zero: RED then may drop packets.
         if matches!(discipline, Discipline::Red(red) if red.min() == Bytes::ZERO) {
             return None;
         }
@@ -39,7 +40,8 @@ impl Bottleneck {
 }
 
 impl TokenBucket {
-    /// Whether each packet of the load finds the bucket full enough: what it takes comes back before the next one. The bucket begins full.
+    /// Returns whether each packet of the load finds enough tokens, because the tokens that a packet takes come back before the next packet. The bucket
+    /// begins full.
     pub(crate) fn lets_all_pass(&self, load: Load) -> bool {
         let needed = giga_bits(self.framing.on_the_line(load.size));
         let buckets = [Some((self.rate, self.burst)), self.peak.map(|peak| (peak.rate, peak.burst))];
@@ -54,7 +56,7 @@ mod tests {
     use super::*;
     use crate::stages::queue::{CoDel, Framing, Peak, QueueLimit, Red};
 
-    /// 64 bytes take 512 µs at 1 Mbit/s.
+    /// Returns a load of 64 bytes, which take 512 µs at 1 Mbit/s.
     fn load(micros: u64) -> Load {
         Load { size: Bytes::new(64), gap: Duration::from_micros(micros) }
     }

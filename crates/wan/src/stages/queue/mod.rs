@@ -1,4 +1,4 @@
-//! Where packets wait: the bottleneck with its queue, and the token bucket.
+//! Stages in which packets queue: the bottleneck, and the token bucket.
 
 pub(crate) mod bottleneck;
 mod codel;

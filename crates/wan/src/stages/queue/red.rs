@@ -4,8 +4,8 @@ use crate::parameters::{FRACTION, Form, Table, number, required, usual};
 use cohaptic_units::{Bytes, Probability};
 use core::fmt;
 
-/// The parameters of RED. The average queue decides about a packet that is offered: below `min` it passes, above `max` it is dropped, and in between it is
-/// dropped with a probability that rises from nothing to `max_probability`, spread evenly over the packets.
+/// Parameters of RED. The average queue decides about a packet that is offered: below `min` the packet passes, from `max` on the packet is dropped, and in
+/// between the packet is dropped with a probability that rises from zero to `max_probability`, with drops spread evenly over the packets.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Red {
     min: Bytes,
@@ -16,19 +16,19 @@ pub struct Red {
     ecn: bool,
 }
 
-/// Why parameters of RED are refused.
+/// Reason for which parameters of RED are refused.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum RedError {
-    /// The thresholds are not in order.
+    /// The lower threshold is not below the upper threshold.
     Thresholds {
-        /// The lower one.
+        /// Lower threshold.
         min: Bytes,
-        /// The upper one.
+        /// Upper threshold.
         max: Bytes,
     },
-    /// The average would never move, or would overshoot.
+    /// The weight is not in (0, 1], so that the average would never move or would overshoot.
     Weight(f64),
-    /// A mean packet of no bytes.
+    /// The mean packet has no bytes.
     MeanPacket,
 }
 
@@ -45,8 +45,9 @@ impl fmt::Display for RedError {
 impl core::error::Error for RedError {}
 
 impl Red {
-    /// Checks the parameters. `weight`: of the newest queue length in the average, 0.002 by custom. `mean_packet`: how fast the average decays while
-    /// the line is idle, by (1−weight)^m with m mean packets' time. `ecn`: a capable packet is marked where another is dropped, up to `max`.
+    /// Returns checked parameters. `weight` is the weight of the newest queue length in the average, usually 0.002. `mean_packet` sets the decay of the
+    /// average while the line is idle: a factor of (1−weight)^m in the time of m mean packets. With `ecn`, a packet that supports ECN is marked instead of
+    /// dropped while the average is below `max`.
     ///
     /// # Errors
     ///
@@ -64,24 +65,24 @@ impl Red {
         Ok(Self { min, max, max_probability, weight, mean_packet, ecn })
     }
 
-    /// The average queue below which nothing is dropped.
+    /// Returns the average queue below which no packet is dropped.
     pub(crate) const fn min(&self) -> Bytes {
         self.min
     }
 
-    /// Whether it marks packets.
+    /// Returns whether packets that support ECN are marked.
     pub(crate) const fn ecn(&self) -> bool {
         self.ecn
     }
 
-    /// The mean packet, whose time on the line is the unit of the decay while idle.
+    /// Returns the size of the mean packet, whose time on the line is the unit of the decay while the line is idle.
     #[must_use]
     pub const fn mean_packet(&self) -> Bytes {
         self.mean_packet
     }
 }
 
-/// What RED says to a packet.
+/// Verdict of RED about an offered packet.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Verdict {
     Pass,
@@ -89,16 +90,18 @@ pub(crate) enum Verdict {
     Drop,
 }
 
-/// The average and the count since the last packet hit.
+/// State of RED.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct RedState {
+    /// Average of the waiting bytes.
     average: f64,
-    /// Packets that passed between the thresholds since one was hit.
+    /// Number of packets that passed between the thresholds since the last packet that was dropped or marked.
     count: f64,
 }
 
 impl RedState {
-    /// Decides about a packet that finds `queued` bytes waiting, after the line was idle for the time of `idle_packets` mean packets.
+    /// Decides about a packet that finds `queued` bytes waiting, after the line was idle for the time of `idle_packets` mean packets. `word` is the packet's
+    /// random word for queues.
     pub(crate) fn verdict(&mut self, red: &Red, queued: u128, idle_packets: f64, ecn_capable: bool, word: u64) -> Verdict {
         #[expect(clippy::cast_precision_loss, reason = "an average")]
         let queued = queued as f64;
@@ -115,7 +118,7 @@ impl RedState {
             return Verdict::Drop;
         }
         let base = red.max_probability.get() * (self.average - min) / (max - min);
-        // The gap between hits is then uniform on 1 … 1/base (the paper's method 2).
+        // With this correction the gap between hits is uniform on 1 … 1/base (the paper's method 2).
         let left = 1.0 - self.count * base;
         let hit = if left > base { base / left } else { 1.0 };
         if !Probability::new(hit).unwrap_or(Probability::ONE).happens(word) {
@@ -127,7 +130,7 @@ impl RedState {
     }
 }
 
-/// The parameters of the discipline.
+/// Parameters of the discipline.
 pub(crate) static RED: Table = Table::of(&[&[
     required("min", Form::Size, "The average queue at which dropping begins")
         .expecting("the average queue at which dropping begins, a size such as \"5kB\""),
@@ -148,8 +151,8 @@ mod tests {
         Red::new(Bytes::new(1000), Bytes::new(3000), Probability::new(0.1).unwrap(), 1.0, Bytes::new(100), ecn).unwrap()
     }
 
-    /// Half way between the thresholds 1/20 is the base probability: gaps between hits are uniform on 1 … 20, whose mean is 10.5. Of 20 000 packets
-    /// about 1905 are hit; the standard error of the mean gap is √(399/12/1905) = 0.132.
+    /// Half way between the thresholds the base probability is 1/20: gaps between hits are uniform on 1 … 20, with mean 10.5. Of 20 000 packets about 1905
+    /// are hit. The standard error of the mean gap is √(399/12/1905) = 0.132.
     #[test]
     fn gaps_between_hits_are_uniform() {
         let mut state = RedState::default();
@@ -175,7 +178,7 @@ mod tests {
     fn an_average_forgets_while_the_line_is_idle() {
         let slow = Red::new(Bytes::new(1000), Bytes::new(3000), Probability::ONE, 0.5, Bytes::new(100), false).unwrap();
         let mut state = RedState { average: 4000.0, count: 0.0 };
-        // After two mean packets' time 1000 is left of the average, and half of it when nothing waits.
+        // In the time of two mean packets the average decays to 1000, and the empty queue then halves it.
         assert_eq!(state.verdict(&slow, 0, 2.0, false, 0), Verdict::Pass);
         assert!((state.average - 500.0).abs() < 1e-9);
     }

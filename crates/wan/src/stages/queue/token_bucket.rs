@@ -1,9 +1,9 @@
-//! The token bucket: a mean rate with bursts (the filter of `tc-tbf`).
+//! Token bucket: a mean rate with bursts (the filter of `tc-tbf`).
 //!
-//! A bucket of B bytes fills at the rate R. The first packet that waits leaves as soon as the bucket holds its size, and takes as much away. So for
-//! any departures i … k: sᵢ + … + sₖ ≤ B + R·(tₖ − tᵢ). With a peak bucket the same holds for the peak rate and its own, smaller size.
+//! A bucket of B bytes fills at the rate R. The oldest waiting packet leaves as soon as the bucket holds its size, and takes its size from the bucket. For
+//! any departures i … k therefore sᵢ + … + sₖ ≤ B + R·(tₖ − tᵢ). With a peak bucket the same holds for the peak rate and its own, smaller size.
 //!
-//! Unlike a serialiser, a bucket lets a packet pass at once while it has credit: it limits how much, not how fast.
+//! Unlike a serialiser, a bucket lets a packet pass at once while it has credit: it limits the amount of a burst, not its speed.
 
 use super::limit::words_of_limit;
 use alloc::collections::VecDeque;
@@ -21,82 +21,89 @@ use crate::fates::fate::DropCause;
 use crate::packet::{Carried, Exit, Output, Outputs};
 use crate::parameters::{Form, Key, NONE, Table, optional, required, usual};
 
-/// A token bucket and the queue before it.
+/// Configuration of a token bucket and the queue before it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct TokenBucket {
-    /// How fast the bucket fills.
+    /// Rate at which the bucket fills.
     pub rate: Rate,
-    /// What it holds; it begins full. A packet that takes more can never leave and is dropped.
+    /// Size of the bucket, which begins full. A packet that takes more can never leave and is dropped.
     pub burst: Bytes,
-    /// A second bucket that limits how fast a burst leaves.
+    /// Second bucket, which limits the speed of a burst.
     pub peak: Option<Peak>,
-    /// What a packet takes from the bucket.
+    /// Bytes that a packet takes from the bucket beyond its own bytes.
     pub framing: Framing,
-    /// How much may wait; `None`: no limit.
+    /// Limit of the queue. `None` sets no limit.
     pub limit: Option<QueueLimit>,
 }
 
-/// The bucket of the peak rate.
+/// Bucket of the peak rate.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Peak {
-    /// How fast it fills.
+    /// Rate at which the bucket fills.
     pub rate: Rate,
-    /// What it holds: at least one packet of the largest size.
+    /// Size of the bucket: at least one packet of the largest size.
     pub burst: Bytes,
 }
 
-/// A bucket: 10⁻⁹ bits that are in it since an instant.
+/// State of a bucket. Amounts are in 10⁻⁹ bit.
 #[derive(Clone, Copy, Debug)]
 struct Bucket {
+    /// Rate at which tokens come.
     rate: Rate,
+    /// Most tokens that the bucket holds.
     size: u128,
+    /// Tokens in the bucket at `since`; at most `size`.
     tokens: u128,
     since: Instant,
 }
 
 impl Bucket {
+    /// Returns a bucket that is full at `now`.
     fn full(now: Instant, rate: Rate, burst: Bytes) -> Self {
         let size = giga_bits(burst);
         Self { rate, size, tokens: size, since: now }
     }
 
+    /// Adds the tokens that came until `now`.
     fn fill(&mut self, now: Instant) {
         let came = self.rate.bits_sent(now.saturating_duration_since(self.since));
         self.tokens = self.tokens.saturating_add(came).min(self.size);
         self.since = self.since.max(now);
     }
 
-    /// When it will hold that much, seen from the last fill.
+    /// Returns the instant from which the bucket holds `needed` tokens, if no packet takes tokens before. `needed` is at most the bucket's size.
     fn holds_at(&self, needed: u128) -> Instant {
         self.since.saturating_add(self.rate.transmission_time(needed.saturating_sub(self.tokens)))
     }
 }
 
-/// The stage.
+/// Stage with the buckets and the waiting packets.
 #[derive(Clone, Debug)]
 pub(crate) struct TokenBucketStage<T> {
     config: TokenBucket,
     mean: Bucket,
     peak: Option<Bucket>,
     waiting: VecDeque<Carried<T>>,
+    /// Bytes of the waiting packets, framing not counted. Wider than [`Bytes`], whose sum would saturate.
     waiting_bytes: u128,
 }
 
 impl<T> TokenBucketStage<T> {
-    /// Full buckets.
+    /// Returns a stage with full buckets.
     pub(crate) fn new(now: Instant, config: TokenBucket) -> Self {
         let mean = Bucket::full(now, config.rate, config.burst);
         let peak = config.peak.map(|peak| Bucket::full(now, peak.rate, peak.burst));
         Self { config, mean, peak, waiting: VecDeque::new(), waiting_bytes: 0 }
     }
 
-    /// Takes a packet. It comes back if it may leave at once.
+    /// Takes a packet. Returns the packet if it may leave at once; otherwise the packet waits, or is dropped into `outputs`.
     pub(crate) fn offer(&mut self, now: Instant, packet: Carried<T>, outputs: &mut Outputs<T>) -> Option<Carried<T>> {
         let needed = self.needed(&packet);
         if needed > self.largest() {
             outputs.push(Output { packet, exit: Exit::Dropped(now, DropCause::Mtu) });
             return None;
         }
+        // Packets leave in order, so a packet may leave at once only if no packet waits.
         if self.waiting.is_empty() {
             self.fill(now);
             if self.pay(needed) {
@@ -113,27 +120,28 @@ impl<T> TokenBucketStage<T> {
         None
     }
 
-    /// When the first packet that waits may leave.
+    /// Returns the instant at which the oldest waiting packet may leave, or `None` if no packet waits.
     pub(crate) fn next_at(&self) -> Option<Instant> {
         let needed = self.needed(self.waiting.front()?);
         let mean = self.mean.holds_at(needed);
         Some(self.peak.map_or(mean, |peak| mean.max(peak.holds_at(needed))))
     }
 
-    /// The packet that leaves `now`, which is the instant announced.
+    /// Returns the packet that leaves `now`, which is the instant returned by [`next_at`](Self::next_at).
     pub(crate) fn release(&mut self, now: Instant) -> Option<Carried<T>> {
         self.fill(now);
         let packet = self.waiting.pop_front()?;
         self.waiting_bytes -= u128::from(packet.info.size.get());
         let paid = self.pay(self.needed(&packet));
-        // Past the end of time nothing can be announced: what would leave then leaves at the end.
+        // No instant lies beyond the end of time, so a packet that would leave later leaves at the end, perhaps without enough tokens.
         debug_assert!(paid || now == Instant::MAX, "what waits fits into the buckets, and is released when they hold it");
         Some(packet)
     }
 
-    /// Changes rates, sizes and limit. Tokens that came until now stay, as far as the new buckets hold them; a new peak bucket is full. What waits and is
-    /// now too large for them could never leave: it is dropped.
+    /// Changes rates, sizes and limit. Tokens that came until `now` stay, up to the size of the new bucket; a new peak bucket is full. A waiting packet that
+    /// is too large for the new buckets could never leave and is dropped.
     pub(crate) fn reconfigure(&mut self, now: Instant, config: TokenBucket, outputs: &mut Outputs<T>) {
+        // Tokens that came before the change came at the old rates.
         self.fill(now);
         let change = |old: Bucket, rate, burst| {
             let size = giga_bits(burst);
@@ -156,20 +164,22 @@ impl<T> TokenBucketStage<T> {
         }
     }
 
-    /// Everything that waits, in order.
+    /// Returns all waiting packets in order.
     pub(crate) fn dismantle(self) -> impl Iterator<Item = Carried<T>> {
         self.waiting.into_iter()
     }
 
-    /// What the largest packet takes that may ever leave.
+    /// Returns the tokens of the largest packet that can ever leave.
     fn largest(&self) -> u128 {
         self.peak.map_or(self.mean.size, |peak| peak.size.min(self.mean.size))
     }
 
+    /// Returns the tokens that a packet takes.
     fn needed(&self, packet: &Carried<T>) -> u128 {
         giga_bits(self.config.framing.on_the_line(packet.info.size))
     }
 
+    /// Adds the tokens that came until `now` to both buckets.
     fn fill(&mut self, now: Instant) {
         self.mean.fill(now);
         if let Some(peak) = &mut self.peak {
@@ -177,7 +187,7 @@ impl<T> TokenBucketStage<T> {
         }
     }
 
-    /// Takes the tokens if they are there.
+    /// Takes `needed` tokens from both buckets and returns true, or returns false if a bucket holds too few.
     fn pay(&mut self, needed: u128) -> bool {
         let there = self.mean.tokens >= needed && self.peak.is_none_or(|peak| peak.tokens >= needed);
         if there {
@@ -189,6 +199,7 @@ impl<T> TokenBucketStage<T> {
         there
     }
 
+    /// Returns whether the limit admits another packet of `size`.
     fn admits(&self, now: Instant, size: Bytes) -> bool {
         let Some(limit) = self.config.limit else { return true };
         let time = match limit {
@@ -198,10 +209,12 @@ impl<T> TokenBucketStage<T> {
         limit.admits(Waiting { packets: self.waiting.len() as u64, bytes: self.waiting_bytes, time }, size)
     }
 
-    /// When another packet of that size would leave, at the present rates: that is the turn of one that takes no time to leave.
+    /// Returns the instant at which another packet of `size` would leave at the present rates. A packet needs no time to leave a bucket, so that this is also
+    /// the packet's turn.
     fn turn_of(&self, size: Bytes) -> Instant {
         let (mut mean, mut peak) = (self.mean, self.peak);
         let mut turn = mean.since;
+        // Copies of the buckets replay the departures of all waiting packets, and then of the new packet.
         for size in self.waiting.iter().map(|packet| packet.info.size).chain([size]) {
             let needed = giga_bits(self.config.framing.on_the_line(size));
             turn = mean.holds_at(needed).max(peak.map_or(Instant::ZERO, |peak| peak.holds_at(needed)));
@@ -214,7 +227,7 @@ impl<T> TokenBucketStage<T> {
     }
 }
 
-/// The parameter of the bucket.
+/// Parameter of the bucket.
 pub(crate) const KEYS: [Key; 1] =
     [usual("token-bucket", Form::AnyOf(const { &[Form::Table(&TOKEN_BUCKET), NONE] }), "\"none\"", "How much may leave in bursts")];
 static TOKEN_BUCKET: Table = Table::of(&[&[
@@ -230,7 +243,7 @@ static PEAK: Table = Table::of(&[&[
 ]]);
 
 impl TokenBucket {
-    /// The bucket in words.
+    /// Returns the bucket in words.
     pub(crate) fn words(&self) -> String {
         let peak = self.peak.map_or_else(String::new, |peak| format!(", peak {} in bursts of {}", peak.rate, peak.burst));
         let framing = self.framing.words();
@@ -243,7 +256,7 @@ mod tests {
     use super::*;
     use crate::packet::{Marks, Packet};
 
-    /// A byte a microsecond, 100 at once.
+    /// Returns a bucket of 100 bytes that fills by a byte per microsecond.
     fn bucket(peak: Option<Peak>) -> TokenBucketStage<char> {
         let rate = Rate::bits_per_sec(8_000_000).unwrap();
         TokenBucketStage::new(Instant::ZERO, TokenBucket { rate, burst: Bytes::new(100), peak, framing: Framing::default(), limit: None })
@@ -253,7 +266,7 @@ mod tests {
         Instant::from_nanos(t * 1_000)
     }
 
-    /// Offers packets of 40 bytes at these microseconds; when they leave, and how many never do.
+    /// Offers packets of `size` bytes at the microseconds `offers`. Returns the microseconds of their departures, and the number of dropped packets.
     fn departures(mut stage: TokenBucketStage<char>, offers: &[u64], size: u64) -> (Vec<u64>, usize) {
         let (mut left, mut outputs) = (Vec::new(), Vec::new());
         let mut pass = |stage: &mut TokenBucketStage<char>, until: Instant| {
@@ -276,7 +289,7 @@ mod tests {
 
     #[test]
     fn credit_passes_at_once_and_the_rest_at_the_rate() {
-        // 100 bytes of credit: two packets at once, the third when 20 more have come.
+        // The credit of 100 bytes lets two packets leave at once. The third leaves when 20 more bytes have come.
         assert_eq!(departures(bucket(None), &[0, 0, 0, 0, 500], 40), (vec![0, 0, 20, 60, 500], 0));
     }
 
@@ -286,8 +299,8 @@ mod tests {
         assert_eq!(departures(bucket(Some(peak)), &[0, 0, 0], 40), (vec![0, 20, 40], 0));
     }
 
-    /// 100 bytes of credit for two packets; the third leaves at 20 µs, the fourth at 60, a fifth would at 100. Behind a peak of a byte in 2 µs they leave at
-    /// 0, 80, 160 …, though the mean bucket would let them go sooner.
+    /// The credit of 100 bytes lets two packets leave at once. The third packet leaves at 20 µs, the fourth at 60 µs, and a fifth would leave at 100 µs. With
+    /// a peak of a byte in 2 µs packets leave at 0, 80, 160 …, though the mean bucket would let them leave sooner.
     #[test]
     fn no_packet_waits_longer_than_a_limit_in_time() {
         let limit = |micros| Some(QueueLimit::Time(Duration::from_micros(micros)));
