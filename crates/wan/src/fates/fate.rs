@@ -1,38 +1,38 @@
-//! What becomes of a packet. Everything that can happen has a name, and every name a counter.
+//! Fate of a packet. Every possible fate has a name, and every end has a counter.
 
 use cohaptic_units::Instant;
 
-/// Why a packet was dropped.
+/// Cause of a drop.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub enum DropCause {
-    /// A predicate of the program took it.
+    /// A predicate of the program dropped the packet.
     Filter,
-    /// It was larger than the link takes, or than a token bucket ever holds.
+    /// The packet was larger than the link takes, or than a token bucket can ever hold.
     Mtu,
     /// The link was down when the packet was offered.
     Outage,
-    /// The loss model took it.
+    /// The loss model dropped the packet.
     Loss,
-    /// As many packets as the link may hold were under way.
+    /// The link already held as many packets as its limit allows.
     Limit,
     /// The queue before the serialiser, or before the token bucket, was full.
     QueueFull,
-    /// Random early detection took it, before the queue was full.
+    /// Random early detection dropped the packet before the queue was full.
     Red,
-    /// Controlled delay took it, because packets had waited too long for too long.
+    /// Controlled delay dropped the packet, because waits had exceeded the target for an interval.
     CoDel,
-    /// Its bits were damaged, and the receiver's checksum found it.
+    /// Bits of the packet were flipped, and the receiver's checksum detected the damage.
     Checksum,
     /// The log that the link replays has ended.
     EndOfLog,
 }
 
 impl DropCause {
-    /// Every cause, in the order of the stages.
+    /// All causes in the order of the stages, indexed by the cause's number.
     pub const ALL: [Self; 10] =
         [Self::Filter, Self::Mtu, Self::Outage, Self::Loss, Self::Limit, Self::QueueFull, Self::Red, Self::CoDel, Self::Checksum, Self::EndOfLog];
 
-    /// The name in records and JSON: `queue-full`.
+    /// Returns the name in records and JSON, such as `queue-full`.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -49,31 +49,31 @@ impl DropCause {
         }
     }
 
-    /// The cause of that name; `None` if there is none.
+    /// Returns the cause with the given name, or `None` if no cause has the name.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|cause| cause.name() == name)
     }
 
-    /// Its place in [`DropCause::ALL`].
+    /// Returns the index of the cause in [`DropCause::ALL`].
     pub(crate) const fn index(self) -> usize {
         self as usize
     }
 }
 
-/// What became of a packet.
+/// Fate of a packet.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub enum Fate {
-    /// It came out of the far end at this instant.
+    /// The packet left the far end of the link at this instant.
     Delivered(Instant),
-    /// It did not, for this reason.
+    /// The packet was dropped for this cause.
     Dropped(DropCause),
-    /// A copy of it was made. This is not its end: the packet and its copy each go on to one of the others.
+    /// The packet was copied. Not final: packet and copy each get a later fate, `Delivered` or `Dropped`.
     Duplicated,
 }
 
 impl Fate {
-    /// The name in records: `delivered`, `duplicated`, or that of the cause.
+    /// Returns the name in records: `delivered`, `duplicated`, or the name of the cause.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -83,7 +83,7 @@ impl Fate {
         }
     }
 
-    /// Whether the packet is out of the link with this: delivered or dropped.
+    /// Returns whether the fate is final, which means that the packet has left the link: delivered or dropped.
     #[must_use]
     pub const fn is_end(self) -> bool {
         match self {

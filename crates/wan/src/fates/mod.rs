@@ -1,4 +1,4 @@
-//! The ends of packets: their names, their records, their counters, and logs of them.
+//! Fates of packets: their names, records, counters, and logs.
 
 pub(crate) mod fate;
 pub(crate) mod log;

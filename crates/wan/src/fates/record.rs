@@ -1,4 +1,4 @@
-//! One record of what became of a packet.
+//! Records and events of packets.
 
 use core::ops::Deref;
 
@@ -7,34 +7,35 @@ use cohaptic_units::{Bytes, Instant};
 use super::fate::Fate;
 use crate::packet::damage::Damage;
 
-/// What became of one packet, or of one copy of it: the row of a fate log.
+/// Record of the fate of one packet or of one copy: the row of a fate log.
 ///
-/// `L` says where: [`Path`](crate::Path) in a network, nothing where there is but one link.
+/// `L` is the place: [`Path`](crate::Path) in a network, and nothing if there is only one link.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct PacketRecord<L = ()> {
-    /// From which node to which.
+    /// Path of the packet, from node to node.
     pub path: L,
-    /// The number of the packet on its link or path, from 0; a copy has that of its packet.
+    /// Number of the packet on its link or path, from 0. A copy has the number of its packet.
     pub sequence: u64,
-    /// 0: the packet itself. Copies that a link made are counted from 1. In a network a copy that its uplink made differs in the lowest bit, one that its link
-    /// made in the second, one that its downlink made in the third. With [`Fate::Duplicated`] it is the number of the new copy.
+    /// Number of the copy. 0 is the packet itself, and copies that a link made are counted from 1. In a network, a copy made by the uplink differs from its
+    /// packet in the lowest bit, a copy made by the link in the second bit, and a copy made by the downlink in the third bit. With [`Fate::Duplicated`] the
+    /// number is that of the new copy.
     pub copy: u8,
-    /// When the packet was handed to the link, or to the network.
+    /// Instant at which the packet was offered to the link, or to the network.
     pub offered: Instant,
-    /// When it arrived or was dropped, or when the copy was made.
+    /// Instant of the arrival or of the drop, or, with [`Fate::Duplicated`], of the copy.
     pub at: Instant,
-    /// The size of the packet.
+    /// Size of the packet.
     pub size: Bytes,
-    /// What became of it.
+    /// Fate of the packet.
     pub fate: Fate,
-    /// Whether an active queue marked it: congestion experienced.
+    /// Whether the packet was marked with congestion experienced.
     pub marked: bool,
-    /// Whether bits were flipped.
+    /// Whether bits of the packet were flipped.
     pub damaged: bool,
 }
 
 impl<L> PacketRecord<L> {
-    /// The record without the path: a row of the fate log of that path.
+    /// Returns the record without the path: a row of the fate log of that path.
     #[must_use]
     pub fn without_path(self) -> PacketRecord {
         let Self { path: _, sequence, copy, offered, at, size, fate, marked, damaged } = self;
@@ -42,14 +43,14 @@ impl<L> PacketRecord<L> {
     }
 }
 
-/// What became of one packet, or that a copy of it was made: its record, of which it [has the fields](Deref), with what it carries.
+/// Fate of one packet, or the copying of a packet: the record, whose [fields are those of the event](Deref), with the payload.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct PacketEvent<P, L = ()> {
-    /// What became of it.
+    /// Record of the fate.
     pub record: PacketRecord<L>,
-    /// What it carries, as it was offered: see `damage`.
+    /// Payload of the packet as it was offered, before `damage`.
     pub payload: P,
-    /// The bits that were flipped. [`Damage::apply`] flips them.
+    /// Flipped bits. [`Damage::apply`] flips the bits of a payload.
     pub damage: Option<Damage>,
 }
 

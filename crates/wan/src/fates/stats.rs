@@ -1,4 +1,4 @@
-//! Counters of one link.
+//! Counters of a link.
 
 use core::time::Duration;
 
@@ -6,30 +6,31 @@ use cohaptic_units::Instant;
 
 use crate::fates::fate::DropCause;
 
-/// What one link did so far. At every instant `offered + duplicated = delivered + dropped + in flight`.
+/// Counters of a link. At every instant `offered + duplicated = delivered + dropped + in flight`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct LinkStats {
     pub(crate) flow: Flow,
     pub(crate) seldom: Seldom,
 }
 
-/// The counts of every packet. Apart, so that the links of a large mesh touch little memory.
+/// Counters that every packet changes. Separate from the other counters, so that the links of a large mesh touch little memory.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) struct Flow {
     pub(crate) offered: u64,
     pub(crate) delivered: u64,
+    /// Sum of the delays of delivered packets \[ns\]. Wider than 64 bits, so that the sum of long runs does not overflow.
     pub(crate) delay_nanos: u128,
 }
 
 impl Flow {
-    /// Counts a packet that comes out of the far end after it has entered at `entered`.
+    /// Counts a packet that was offered at `entered` and leaves the far end at `at`.
     #[inline(always)]
     pub(crate) fn deliver(&mut self, entered: Instant, at: Instant) {
         self.delivered += 1;
         self.delay_nanos += u128::from(at.as_nanos() - entered.as_nanos());
     }
 
-    /// [`Flow::deliver`], if it comes out by `until`.
+    /// Counts a packet like [`Flow::deliver`] if the packet leaves the far end at or before `until`.
     #[inline(always)]
     pub(crate) fn deliver_by(&mut self, until: Instant, entered: Instant, at: Instant) {
         if at <= until {
@@ -37,24 +38,25 @@ impl Flow {
         }
     }
 
-    /// Takes back that such a packet came out.
+    /// Takes back the count of a packet that [`Flow::deliver`] counted with the same instants.
     pub(crate) fn forget(&mut self, entered: Instant, at: Instant) {
         self.delivered -= 1;
         self.delay_nanos -= u128::from(at.as_nanos() - entered.as_nanos());
     }
 }
 
-/// The counts of some packets.
+/// Counters that only some packets change.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) struct Seldom {
     pub(crate) duplicated: u64,
     pub(crate) marked: u64,
     pub(crate) damaged: u64,
+    /// Dropped packets, indexed by [`DropCause::index`].
     pub(crate) dropped: [u64; DropCause::ALL.len()],
 }
 
 impl Seldom {
-    /// Takes back that a packet was dropped for that cause, or that it was marked.
+    /// Takes back the count of a packet dropped for the cause `dropped`, or, with `None`, the count of a marked packet.
     pub(crate) const fn take_back(&mut self, dropped: Option<DropCause>) {
         match dropped {
             Some(cause) => self.dropped[cause.index()] -= 1,
@@ -64,7 +66,8 @@ impl Seldom {
 }
 
 impl LinkStats {
-    /// What was counted elsewhere: packets offered, delivered, and dropped for a cause; the delays of those delivered in all \[ns\].
+    /// Returns counters that were counted elsewhere: offered packets, delivered packets, the sum of the delays of delivered packets \[ns\], and dropped
+    /// packets per cause. Equal causes are added.
     #[must_use]
     pub fn counted(offered: u64, delivered: u64, delay_nanos: u128, dropped: impl IntoIterator<Item = (DropCause, u64)>) -> Self {
         let mut stats = Self { flow: Flow { offered, delivered, delay_nanos }, seldom: Seldom::default() };
@@ -74,7 +77,7 @@ impl LinkStats {
         stats
     }
 
-    /// Adds what a number of links did that each have these counters.
+    /// Adds the counters of `links` links, each of which has the counters `each`.
     pub fn add(&mut self, each: &Self, links: u64) {
         let Self { flow, seldom } = self;
         flow.offered += each.flow.offered * links;
@@ -88,56 +91,57 @@ impl LinkStats {
         }
     }
 
-    /// Packets handed to the link.
+    /// Returns the number of packets offered to the link.
     #[must_use]
     pub const fn offered(&self) -> u64 {
         self.flow.offered
     }
 
-    /// Extra copies that the link made.
+    /// Returns the number of copies that the link made.
     #[must_use]
     pub const fn duplicated(&self) -> u64 {
         self.seldom.duplicated
     }
 
-    /// Packets that came out of the far end, copies included.
+    /// Returns the number of packets that left the far end, copies included.
     #[must_use]
     pub const fn delivered(&self) -> u64 {
         self.flow.delivered
     }
 
-    /// Packets, copies included, that left the stages of this link with a mark (congestion experienced); in a network without those that a line before had marked.
+    /// Returns the number of packets, copies included, that left the stages of this link with a mark (congestion experienced). In a network, packets that an
+    /// earlier line had marked are not counted.
     #[must_use]
     pub const fn marked(&self) -> u64 {
         self.seldom.marked
     }
 
-    /// Packets, copies included, that left the stages of this link with flipped bits, whether or not the receiver's checksum discards them; in a network without
-    /// those that a line before had damaged. Damaged packets that a later stage dropped are not counted.
+    /// Returns the number of packets, copies included, that left the stages of this link with flipped bits, whether or not the receiver's checksum discards
+    /// them. In a network, packets that an earlier line had damaged are not counted, nor are damaged packets that a later stage dropped.
     #[must_use]
     pub const fn damaged(&self) -> u64 {
         self.seldom.damaged
     }
 
-    /// Packets dropped for this reason.
+    /// Returns the number of packets dropped for the cause `cause`.
     #[must_use]
     pub const fn dropped(&self, cause: DropCause) -> u64 {
         self.seldom.dropped[cause.index()]
     }
 
-    /// Packets dropped for any reason.
+    /// Returns the number of packets dropped for any cause.
     #[must_use]
     pub fn dropped_in_all(&self) -> u64 {
         self.seldom.dropped.iter().sum()
     }
 
-    /// Packets inside the link: waiting, being serialised or propagating.
+    /// Returns the number of packets inside the link: waiting, on the line, or propagating.
     #[must_use]
     pub fn in_flight(&self) -> u64 {
         self.offered() + self.duplicated() - self.delivered() - self.dropped_in_all()
     }
 
-    /// The mean time a delivered packet spent in the link, rounded down to a nanosecond; `None` before the first delivery.
+    /// Returns the mean time of a delivered packet in the link, rounded down to a nanosecond, or `None` before the first delivery.
     #[must_use]
     pub fn mean_delay(&self) -> Option<Duration> {
         let mean = self.flow.delay_nanos.checked_div(u128::from(self.flow.delivered))?;

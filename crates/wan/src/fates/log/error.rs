@@ -1,4 +1,4 @@
-//! Why a fate log is refused.
+//! Reasons for which a fate log is refused.
 
 use alloc::string::String;
 use core::fmt;
@@ -8,100 +8,100 @@ use cohaptic_units::Instant;
 use super::row::FateRow;
 use crate::fates::fate::DropCause;
 
-/// Why a text or a list of records is no complete fate log. Lines are counted from 1, the header being line 1.
+/// Reason for which a text or a list of records is not a complete fate log. Lines are counted from 1, and the header is line 1.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum FateLogError {
     /// The first line is not the header.
     Header {
-        /// The first line.
+        /// Text of the first line.
         found: String,
     },
     /// A row does not have eight cells.
     Cells {
-        /// The line.
+        /// Number of the line.
         line: u64,
-        /// How many cells it has.
+        /// Number of cells of the row.
         found: usize,
     },
     /// A cell cannot be read.
     Cell {
-        /// The line.
+        /// Number of the line.
         line: u64,
-        /// The name of the column.
+        /// Name of the column.
         column: &'static str,
-        /// What stands there.
+        /// Text of the cell.
         found: String,
-        /// What would have been right.
+        /// Description of the expected text.
         expected: &'static str,
     },
-    /// The fate has no such name.
+    /// No fate has the name in a cell.
     UnknownFate {
-        /// The line.
+        /// Number of the line.
         line: u64,
-        /// What stands there.
+        /// Text of the cell.
         found: String,
     },
-    /// A packet has no row, though a later one has.
+    /// A packet has no row, but a later packet has one.
     Missing {
-        /// The packet without a row.
+        /// Number of the packet without a row.
         sequence: u64,
-        /// Where a later one stands.
+        /// Line of the later packet.
         line: u64,
-        /// Its number.
+        /// Number of the later packet.
         later: u64,
     },
-    /// A packet was offered before the one before it.
+    /// A packet was offered before the previous packet.
     OfferedBefore {
-        /// The line.
+        /// Line of the packet.
         line: u64,
-        /// When the packet was offered.
+        /// Instant at which the packet was offered.
         offered: Instant,
-        /// The line of the packet before it.
+        /// Line of the previous packet.
         earlier_line: u64,
-        /// When that one was offered.
+        /// Instant at which the previous packet was offered.
         earlier: Instant,
     },
-    /// Something happened to a packet before it was offered, or its arrival has two instants.
+    /// A fate of a packet lies before the packet was offered, or an arrival has two different instants.
     ImpossibleTime {
-        /// The line.
+        /// Number of the line.
         line: u64,
-        /// When the packet was offered.
+        /// Instant at which the packet was offered.
         offered: Instant,
-        /// When this is said to have happened.
+        /// Instant of the row.
         at: Instant,
     },
-    /// Two rows of a packet differ in when it was offered or in its size.
+    /// Two rows of a packet have different instants of offering or different sizes.
     Contradiction {
-        /// The packet.
+        /// Number of the packet.
         sequence: u64,
-        /// One line.
+        /// Line of the row that differs.
         line: u64,
-        /// The other.
+        /// Line of the packet's first row.
         other_line: u64,
     },
-    /// A packet or copy ends twice.
+    /// A packet or copy has two ends.
     TwoEnds {
-        /// The packet.
+        /// Number of the packet.
         sequence: u64,
-        /// The copy; 0 is the packet itself.
+        /// Number of the copy; 0 is the packet itself.
         copy: u8,
-        /// The line of an end too many.
+        /// Line of the surplus end.
         line: u64,
     },
-    /// A packet or copy never ends.
+    /// A packet or copy has no end.
     NoEnd {
-        /// The packet.
+        /// Number of the packet.
         sequence: u64,
-        /// The copy; 0 is the packet itself.
+        /// Number of the copy; 0 is the packet itself.
         copy: u64,
     },
-    /// There are more copies than were made.
+    /// A packet has more copies than `duplicated` rows.
     CopyFromNowhere {
-        /// The packet.
+        /// Number of the packet.
         sequence: u64,
-        /// Copies with an end, the packet itself not counted.
+        /// Number of copies with an end, without the packet itself.
         copies: u64,
-        /// Rows that say a copy was made.
+        /// Number of `duplicated` rows.
         made: u64,
     },
 }
@@ -141,7 +141,7 @@ impl fmt::Display for FateLogError {
 
 impl core::error::Error for FateLogError {}
 
-/// All that the column `fate` may hold.
+/// Names that the column `fate` may hold, for messages.
 struct FateNames;
 
 impl fmt::Display for FateNames {

@@ -1,17 +1,17 @@
-//! The rows of a fate log.
+//! Rows of a fate log.
 
 use core::fmt;
 
 use crate::fates::record::PacketRecord;
 
-/// A record as a line of a fate log, without the newline: `2,0,2000000,64,27000000,delivered,1,0`.
+/// Record as a line of a fate log, without the newline: `2,0,2000000,64,27000000,delivered,1,0`.
 ///
-/// The column `at_ns` is [`PacketRecord::at`]. A reader takes it for the instant of [`Fate::Delivered`](crate::Fate::Delivered) too, which it is.
+/// The column `at_ns` is [`PacketRecord::at`]. A reader also takes this instant for [`Fate::Delivered`](crate::Fate::Delivered), which has the same instant.
 #[derive(Clone, Copy, Debug)]
 pub struct FateRow(pub PacketRecord);
 
 impl FateRow {
-    /// The first line of a fate log.
+    /// First line of a fate log.
     pub const HEADER: &'static str = "sequence,copy,offered_ns,size,at_ns,fate,marked,damaged";
     pub(super) const COLUMNS: [&'static str; 8] = ["sequence", "copy", "offered_ns", "size", "at_ns", "fate", "marked", "damaged"];
 }

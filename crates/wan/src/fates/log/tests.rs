@@ -85,7 +85,7 @@ fn what_cannot_have_happened_is_refused() {
     assert!(matches!(FateLog::new([twice]), Err(FateLogError::ImpossibleTime { line: 2, .. })));
 }
 
-/// The rows of one packet offered `offered` ns after the start: itself and up to two copies.
+/// Returns the rows of one packet offered `offered` \[ns\] after the start: the packet itself and up to two copies.
 fn packet(sequence: u64, offered: u64, size: u64, ends: &[(u64, u8, bool, bool)]) -> Vec<PacketRecord> {
     let at = |span: u64| Instant::from_nanos(offered.saturating_add(span));
     let row = |copy, at, fate, marked, damaged| PacketRecord {
@@ -126,7 +126,7 @@ proptest! {
     fn a_log_comes_back_exactly_from_its_text(records in logs(), turn in 0..40_usize) {
         let log = FateLog::new(records.iter().copied()).unwrap();
         prop_assert_eq!(&FateLog::parse(&log.to_text()).unwrap(), &log);
-        // The order of the rows does not matter.
+        // The order of the rows must not matter.
         let mut turned = records;
         let by = turn % turned.len().max(1);
         turned.rotate_left(by);

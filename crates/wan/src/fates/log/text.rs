@@ -1,4 +1,4 @@
-//! Reads the text of a fate log.
+//! Reader of the text of a fate log.
 
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
@@ -12,10 +12,10 @@ use super::row::FateRow;
 use crate::fates::fate::{DropCause, Fate};
 use crate::fates::record::PacketRecord;
 
-/// A record and the line on which it stood.
+/// Record with the number of its line.
 pub(super) type Numbered = (u64, PacketRecord);
 
-/// Reads a fate log line by line, for files whose text does not fit into memory beside the log.
+/// Reader of a fate log line by line, for files whose text does not fit into memory together with the log.
 ///
 /// ```
 /// use cohaptic_wan::{FateLogReader, FateRow};
@@ -28,33 +28,33 @@ pub(super) type Numbered = (u64, PacketRecord);
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct FateLogReader {
-    /// Lines read so far.
+    /// Number of lines read so far, the header included.
     lines: u64,
     rows: Vec<Numbered>,
 }
 
 impl FateLogReader {
-    /// Reads the next line, without its line break: the header first.
+    /// Reads the next line, without its line break. The first line is the header.
     ///
     /// # Errors
     ///
-    /// [`FateLogError`] with the line, the column and what was expected.
+    /// [`FateLogError`] with the line, the column and the expected text.
     pub fn line(&mut self, line: &str) -> Result<(), FateLogError> {
         self.lines += 1;
         if self.lines > 1 {
             self.rows.push((self.lines, record(self.lines, line)?));
             return Ok(());
         }
-        // A byte order mark is what some spreadsheets begin a file with.
+        // Some spreadsheets begin a file with a byte order mark.
         let header = line.strip_prefix('\u{feff}').unwrap_or(line);
         if header == FateRow::HEADER { Ok(()) } else { Err(FateLogError::Header { found: header.to_string() }) }
     }
 
-    /// Checks the log after its last line.
+    /// Checks the log after its last line, and returns it.
     ///
     /// # Errors
     ///
-    /// [`FateLogError`] if there was no line, or as [`FateLog::new`].
+    /// [`FateLogError`] if no line was read, or if [`FateLog::new`] would refuse the records.
     pub fn finish(self) -> Result<FateLog, FateLogError> {
         if self.lines == 0 {
             return Err(FateLogError::Header { found: String::new() });
@@ -63,16 +63,19 @@ impl FateLogReader {
     }
 }
 
+/// Returns the record of a row, or the first error of the row.
 fn record(line: u64, row: &str) -> Result<PacketRecord, FateLogError> {
     let mut cells = [""; FateRow::COLUMNS.len()];
     let found = row.split(',').count();
     if found != cells.len() {
         return Err(FateLogError::Cells { line, found });
     }
+    // The number of cells was compared with the number of columns above, so every cell is filled.
     for (cell, text) in cells.iter_mut().zip(row.split(',')) {
         *cell = text;
     }
     let row = Row { line, cells };
+    // Numbers of columns are those of [`FateRow::COLUMNS`]. `at` is read first, because the fate `delivered` needs it.
     let at = Instant::from_nanos(row.number(4)?);
     Ok(PacketRecord {
         path: (),
@@ -87,23 +90,27 @@ fn record(line: u64, row: &str) -> Result<PacketRecord, FateLogError> {
     })
 }
 
+/// Cells of a row, indexed by column.
 struct Row<'a> {
     line: u64,
     cells: [&'a str; FateRow::COLUMNS.len()],
 }
 
 impl Row<'_> {
+    /// Reads a whole number.
     fn number(&self, column: usize) -> Result<u64, FateLogError> {
         self.read(column, "a whole number from 0 to 2^64 - 1")
     }
 
+    /// Reads a number of the type `T`. `expected` describes the number for the error.
     fn read<T: FromStr>(&self, column: usize, expected: &'static str) -> Result<T, FateLogError> {
         let text = self.cells[column];
-        // Rust reads "+1" too, which no writer of this format writes.
+        // Rust also parses "+1", which no writer of this format writes.
         let plain = text.bytes().all(|byte| byte.is_ascii_digit());
         text.parse().ok().filter(|_| plain).ok_or_else(|| self.refused(column, expected))
     }
 
+    /// Reads a flag, 0 or 1.
     fn flag(&self, column: usize) -> Result<bool, FateLogError> {
         match self.cells[column] {
             "0" => Ok(false),
@@ -112,6 +119,7 @@ impl Row<'_> {
         }
     }
 
+    /// Reads a fate by its name. A delivery has the instant `at`.
     fn fate(&self, column: usize, at: Instant) -> Result<Fate, FateLogError> {
         let name = self.cells[column];
         if let Some(cause) = DropCause::from_name(name) {
@@ -123,6 +131,7 @@ impl Row<'_> {
             .ok_or_else(|| FateLogError::UnknownFate { line: self.line, found: name.to_string() })
     }
 
+    /// Returns the error for a cell that is refused.
     fn refused(&self, column: usize, expected: &'static str) -> FateLogError {
         FateLogError::Cell { line: self.line, column: FateRow::COLUMNS[column], found: self.cells[column].to_string(), expected }
     }
