@@ -1,4 +1,4 @@
-//! Events that happen to a packet with a probability, each alone or in runs.
+//! Events that happen to packets with a probability, independently or in runs.
 
 use crate::parameters::{CORRELATION, Form, Key, Table, number, optional, usual};
 use alloc::format;
@@ -6,7 +6,7 @@ use alloc::string::String;
 use cohaptic_units::Probability;
 use core::fmt;
 
-/// A yes or no for every packet: the probability of yes, and how much it depends on the answer before.
+/// Chance of an event for every packet: the probability of yes, and the correlation of the answer with the previous packet's answer.
 ///
 /// The answers are a chain of two states, DAR(1) (Jacobs & Lewis 1978): P(yes | yes) = p + ρ(1−p), P(yes | no) = p(1−ρ). The mean is exactly p, the
 /// autocorrelation at lag k exactly ρᵏ, and the mean run of yes 1/((1−ρ)(1−p)). With ρ = 0 the answers are independent.
@@ -16,14 +16,14 @@ pub struct Chance {
     correlation: f64,
 }
 
-/// Why a chance is refused.
+/// Error: events of this probability cannot have this correlation.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ChanceError {
-    /// The probability.
+    /// Probability of the events.
     pub probability: Probability,
-    /// The correlation asked for.
+    /// Correlation that was asked for.
     pub correlation: f64,
-    /// The least that such events can have.
+    /// Least correlation of events with this probability.
     pub least: f64,
 }
 
@@ -40,13 +40,13 @@ impl fmt::Display for ChanceError {
 impl core::error::Error for ChanceError {}
 
 impl Chance {
-    /// Each packet for itself.
+    /// Returns a chance whose answers are independent.
     #[must_use]
     pub const fn independent(probability: Probability) -> Self {
         Self { probability, correlation: 0.0 }
     }
 
-    /// Answers with that autocorrelation at lag one.
+    /// Returns a chance whose answers have the autocorrelation `correlation` at lag one.
     ///
     /// # Errors
     ///
@@ -63,43 +63,45 @@ impl Chance {
         }
     }
 
-    /// How often the answer is yes in the long run.
+    /// Returns the long-run fraction of yes.
     #[must_use]
     pub const fn probability(self) -> Probability {
         self.probability
     }
 
-    /// The autocorrelation of the answers at lag one.
+    /// Returns the autocorrelation of the answers at lag one.
     #[must_use]
     pub const fn correlation(self) -> f64 {
         self.correlation
     }
 
-    /// Whether the answer is always no.
+    /// Returns whether the answer is always no.
     #[must_use]
     pub fn is_never(self) -> bool {
         self.probability == Probability::ZERO
     }
 }
 
-/// The chance and the answer before.
+/// Stage that answers for each packet, with the previous answer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ChanceStage {
     chance: Chance,
+    /// Answer for the previous packet, or `None` before the first packet.
     before: Option<bool>,
 }
 
 impl ChanceStage {
-    /// `None` if the answer is always no.
+    /// Returns the stage at the begin, or `None` if the answer is always no.
     pub(crate) fn new(chance: Chance) -> Option<Self> {
         (!chance.is_never()).then_some(Self { chance, before: None })
     }
 
-    /// The stage for a new chance, which goes on from the answer before.
+    /// Returns the stage for the chance `chance`, which continues from the previous answer, or `None` if the answer is always no.
     pub(crate) fn reconfigured(before: Option<Self>, chance: Chance) -> Option<Self> {
         Some(Self { before: before.and_then(|stage| stage.before), ..Self::new(chance)? })
     }
 
+    /// Answers for the next packet, given the packet's random word.
     pub(crate) fn happens(&mut self, word: u64) -> bool {
         let (p, rho) = (self.chance.probability.get(), self.chance.correlation);
         let yes = match self.before {
@@ -108,33 +110,33 @@ impl ChanceStage {
             Some(true) => p + rho * (1.0 - p),
             Some(false) => p * (1.0 - rho),
         };
-        // Rounding may lead a hair outside.
+        // Rounding can lead slightly outside of 0 to 1, which `Probability` refuses.
         let happens = Probability::new(yes.clamp(0.0, 1.0)).unwrap_or_default().happens(word);
         self.before = Some(happens);
         happens
     }
 }
 
-/// The parameter of copies.
+/// Parameter of copies.
 pub(crate) const KEYS: [Key; 1] = [usual("duplicate", CHANCE, "0", "Probability that a packet is sent twice")];
-/// An event that happens to packets with a probability.
+/// Form of an event that happens to packets with a probability.
 pub(crate) const CHANCE: Form = Form::AnyOf(&[Form::Probability, Form::Table(&CHANCE_TABLE)]);
 static CHANCE_TABLE: Table = Table::of(&[&CHANCES]);
-/// The keys of a chance in a table that has others too.
+/// Keys of a chance, for tables that have further keys.
 pub(crate) const CHANCES: [Key; 2] = [
     optional("probability", Form::Probability, "The fraction of packets that it happens to"),
     usual("correlation", number(CORRELATION), "0", "Correlation of what happens to a packet with what happened to the one before"),
 ];
 
 impl Chance {
-    /// How often it happens: `1%`, or with the correlation from one packet to the next.
+    /// Returns the probability in words, such as `1%`, with the correlation if there is one.
     pub(crate) fn words(self) -> String {
         let often = percent(self.probability.get());
         if self.correlation == 0.0 { often } else { format!("{often} (correlation {})", self.correlation) }
     }
 }
 
-/// A fraction as a percentage, to six places.
+/// Returns a fraction as a percentage, rounded to six places.
 pub(crate) fn percent(fraction: f64) -> String {
     format!("{}%", libm::round(fraction * 1e8) / 1e6)
 }
@@ -154,8 +156,9 @@ mod tests {
         (0..count).map(|n| stage.happens(stream.packet(n).first(Purpose::Loss))).collect()
     }
 
-    /// Mean and autocorrelations of 10⁶ answers with p = 0.05, ρ = 0.5, against their laws. The standard error of the mean is √(p(1−p)/n·(1+ρ)/(1−ρ)) =
-    /// 0.00038, those of the autocorrelations are below 0.004 (Bartlett, and twice that for the skew of rare events); 4.5 of them, once in 150 000.
+    /// Compares mean and autocorrelations of 10⁶ answers with p = 0.05, ρ = 0.5 with their laws. The standard error of the mean is √(p(1−p)/n·(1+ρ)/(1−ρ)) =
+    /// 0.00038, those of the autocorrelations are below 0.004 (Bartlett, doubled for the skew of rare events). 4.5 standard errors are exceeded once in 150
+    /// 000.
     #[test]
     fn mean_and_autocorrelation_are_those_asked_for() {
         let n = 1_000_000;
@@ -171,7 +174,7 @@ mod tests {
         }
     }
 
-    /// Half yes, correlation −1: yes and no in turn.
+    /// With probability ½ and correlation −1, yes and no alternate.
     #[test]
     fn the_most_negative_correlation_alternates() {
         let yes = answers(Chance::correlated(p(0.5), -1.0).unwrap(), 100);

@@ -1,4 +1,4 @@
-//! The laws of chance that stages draw by.
+//! Laws of chance from which stages draw.
 
 pub(crate) mod chance;
 pub mod delay;

@@ -1,4 +1,4 @@
-//! How long something stays as it is.
+//! Sojourn times: laws of the length of a stay.
 
 use alloc::format;
 use alloc::string::String;
@@ -8,21 +8,22 @@ use core::time::Duration;
 use crate::parameters::{Form, Table, optional, required};
 use crate::random::unit;
 
-/// The law of a span of time.
+/// Law of a span of time.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Sojourn {
-    /// Always as long.
+    /// Constant span.
     Fixed(Duration),
-    /// Exponential with that mean: without memory.
+    /// Exponential law with this mean, which has no memory.
     Exponential(Duration),
-    /// Uniform between two spans.
+    /// Uniform law between the shortest and the longest span.
     Uniform(Duration, Duration),
-    /// The sum of this number of exponential stages (at least 1), with this mean of the sum: the more stages, the steadier.
+    /// Sum of a number of exponential stages (at least 1), given the mean of the sum and the number of stages. The relative deviation falls with the number
+    /// of stages.
     Erlang(Duration, u32),
 }
 
 impl Sojourn {
-    /// The mean span.
+    /// Returns the mean span.
     #[must_use]
     pub fn mean(&self) -> Duration {
         match *self {
@@ -31,7 +32,7 @@ impl Sojourn {
         }
     }
 
-    /// Whether it can be drawn and comes to an end: the mean is above zero, and the bounds are in order.
+    /// Returns whether spans can be drawn and take time: the mean is above zero, the bounds are in order, and there is at least one stage.
     #[must_use]
     pub fn is_sound(&self) -> bool {
         let in_order = match *self {
@@ -42,11 +43,11 @@ impl Sojourn {
         in_order && !self.mean().is_zero()
     }
 
-    /// A span, at least a nanosecond.
+    /// Returns a drawn span of at least a nanosecond. `word` gives uniform random words, one per exponential or uniform number.
     pub(crate) fn draw(&self, mut word: impl FnMut() -> u64) -> Duration {
         #[expect(clippy::cast_precision_loss, reason = "a span enters a random law as a real number")]
         let nanos = |span: Duration| span.as_nanos() as f64;
-        // 1 − u lies in (0, 1]: its logarithm is finite.
+        // 1 − u lies in (0, 1], so its logarithm is finite.
         let mut exponential = || -libm::log(1.0 - unit(word()));
         let drawn = match *self {
             Self::Fixed(span) => return span.max(Duration::from_nanos(1)),
@@ -54,12 +55,13 @@ impl Sojourn {
             Self::Uniform(from, to) => nanos(from) + (nanos(to) - nanos(from)) * unit(word()),
             Self::Erlang(mean, stages) => nanos(mean) / f64::from(stages) * (0..stages).map(|_| exponential()).sum::<f64>(),
         };
+        // A span of zero would let chains of states change endlessly at one instant.
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative; saturates beyond 584 years")]
         Duration::from_nanos((libm::rint(drawn) as u64).max(1))
     }
 }
 
-/// How long something lasts.
+/// Form of a sojourn time.
 pub(crate) const SOJOURN: Form = Form::AnyOf(&[Form::Duration, Form::Table(&SOJOURN_TABLE)]);
 static SOJOURN_TABLE: Table = Table::of(&[&[
     optional("exponential", Form::Duration, "By chance without memory, with this mean; a plain duration means the same"),
@@ -73,7 +75,7 @@ static ERLANG: Table = Table::of(&[&[
 ]]);
 
 impl Sojourn {
-    /// The law and the mean in words.
+    /// Returns the law and the mean in words.
     pub(crate) fn words(self) -> String {
         let law = match self {
             Self::Fixed(_) => "always",
@@ -90,7 +92,8 @@ mod tests {
     use super::*;
     use crate::random::{Purpose, Stream};
 
-    /// Mean and deviation of 100 000 draws of each law: the standard error of the mean is σ/√n, that of the deviation below 1.5·σ/√n (kurtosis ≤ 9).
+    /// Compares mean and deviation of 100 000 draws with each law. The standard error of the mean is σ/√n, and that of the deviation is below 1.5·σ/√n
+    /// (kurtosis ≤ 9).
     #[test]
     fn draws_have_the_mean_and_the_deviation_of_their_law() {
         let ms = Duration::from_millis;

@@ -1,4 +1,4 @@
-//! The correlation of delays made from correlated Gaussians, and back.
+//! Correlation of delays made from correlated Gaussian numbers, and the inverse.
 
 use alloc::vec::Vec;
 
@@ -8,19 +8,20 @@ use super::standard::Standard;
 use super::tail::Tail;
 use super::{Empirical, Law, LawError, pareto_normal};
 
-/// ρ(φ) of a law.
+/// Function ρ(φ) of a law.
 enum Transfer {
-    /// ρ = φ: a normal law that is not cut, or a law whose delays do not vary, of which a correlation says nothing.
+    /// ρ = φ: a normal law that is not cut, or a law whose delays do not vary and so have no correlation.
     Identity,
     /// ρ = 6/π·asin(φ/2) (Pearson 1907).
     Uniform,
     /// ρ = (e^(φσ²) − 1)/(e^(σ²) − 1).
     LogNormal { variance: f64 },
-    /// By Hermite coefficients.
+    /// Function given by Hermite coefficients.
     Series(Series),
 }
 
 impl Transfer {
+    /// Returns ρ.
     fn at(&self, phi: f64) -> f64 {
         match self {
             Self::Identity => phi,
@@ -30,7 +31,7 @@ impl Transfer {
         }
     }
 
-    /// φ, for a ρ that the law can have. ρ(φ) increases, since g does: its derivative is E[g′(X)·g′(Y)] (Price 1958).
+    /// Returns φ for a ρ that the law can have. ρ(φ) increases, since g increases: its derivative is E[g′(X)·g′(Y)] (Price 1958).
     fn inverse(&self, rho: f64) -> f64 {
         match self {
             Self::Identity => rho,
@@ -41,39 +42,42 @@ impl Transfer {
     }
 }
 
-/// A normal law is cut with a probability of 10⁻²³ at most: nothing is seen of it.
+/// Cut \[standard deviations\] below which a normal law counts as uncut. A draw falls below this cut with a probability of at most 10⁻²³.
 const UNCUT: f64 = -10.0;
-/// More knots than this are thinned out before their kinks are integrated between.
+/// Largest number of knots between whose kinks an empirical law is integrated. If there are more knots, only some are used.
 const MOST_KNOTS: usize = 4096;
 
 impl Law {
-    /// The correlation of two delays `at_normal(x)` and `at_normal(y)` of standard normals x and y with correlation φ; φ is believed to lie in [−1, 1].
+    /// Returns the correlation of two delays `at_normal(x)` and `at_normal(y)` of standard normals x and y with correlation `phi`. A `phi` outside of [−1, 1]
+    /// counts as the nearer end.
     ///
-    /// Closed forms for the normal, uniform and lognormal laws; otherwise Hermite coefficients, computed anew at each call, which takes milliseconds.
-    /// The error is below 10⁻⁹ for smooth laws (10⁻⁷ if the deviation is above ten times the mean), 10⁻⁵ for cut ones, tables and empirical ones; for
-    /// empirical ones of more than 4096 values, which are thinned out, 10⁻³. A constant has ρ = φ.
+    /// The normal, uniform and lognormal laws have closed forms. Other laws use Hermite coefficients, computed anew at each call, which takes milliseconds.
+    /// The error is below 10⁻⁹ for smooth laws (10⁻⁷ if the deviation is above ten times the mean), 10⁻⁵ for cut laws, tables and empirical laws, and 10⁻³
+    /// for empirical laws of more than 4096 values, only some of which are used. A constant has ρ = φ.
     #[must_use]
     pub fn correlation(&self, phi: f64) -> f64 {
         self.transfer().at(phi.clamp(-1.0, 1.0))
     }
 
-    /// φ, the correlation of the standard normals whose delays have correlation ρ: the inverse of [`correlation`](Self::correlation).
+    /// Returns φ, the correlation of the standard normals whose delays have the correlation `rho`: the inverse of [`correlation`](Self::correlation).
     ///
     /// # Errors
     ///
-    /// [`LawError::NotACorrelation`] if ρ is not in [−1, 1], [`LawError::TooNegative`] if two variables with this law cannot have it.
+    /// [`LawError::NotACorrelation`] if `rho` is not in [−1, 1], [`LawError::TooNegative`] if two variables with this law cannot have the correlation.
     pub fn gaussian_correlation(&self, rho: f64) -> Result<f64, LawError> {
         if !(-1.0..=1.0).contains(&rho) {
             return Err(LawError::NotACorrelation { found: rho });
         }
         let transfer = self.transfer();
         let least = transfer.at(-1.0);
+        // The least correlation itself is accepted in spite of rounding.
         if rho < least - 1e-12 {
             return Err(LawError::TooNegative { asked: rho, least });
         }
         Ok(transfer.inverse(rho).clamp(-1.0, 1.0))
     }
 
+    /// Returns the function ρ(φ) of this law.
     fn transfer(&self) -> Transfer {
         let cut = self.cut();
         if self.fit.delivered.sd == 0.0 {
@@ -96,11 +100,12 @@ impl Law {
         }
     }
 
-    /// The floor as a number of the standard law.
+    /// Returns the floor as a number of the standard law.
     fn cut(&self) -> f64 {
         (self.asked.floor - self.fit.origin) / self.fit.scale
     }
 
+    /// Returns the function of a law that is smooth except at the standard normal numbers `breaks`, in ascending order.
     fn series(&self, breaks: impl Iterator<Item = f64>) -> Transfer {
         let (cut, scale) = (self.cut(), self.fit.scale);
         let mean = (self.fit.delivered.mean - self.fit.origin) / scale;
@@ -108,7 +113,7 @@ impl Law {
         Transfer::Series(Series::of_function(|z| (self.fit.standard.at_normal(z).max(cut) - mean) / sd, breaks))
     }
 
-    /// Where the delays of a table jump, and by how many standard deviations.
+    /// Returns the jumps of a table's delays: the standard normal number of each jump, and its height \[standard deviations\].
     fn jumps(&self, cut: f64) -> Vec<(f64, f64)> {
         let Standard::Table(table) = &self.fit.standard else { return Vec::new() };
         let unit = self.fit.scale / self.fit.delivered.sd;
@@ -124,7 +129,7 @@ impl Law {
     }
 }
 
-/// The standard normal numbers of the inner knots, or of equally many between them.
+/// Returns the standard normal numbers of the inner knots, or of every n-th knot if there are more than [`MOST_KNOTS`].
 fn knots(values: &Empirical) -> Vec<f64> {
     let cells = values.knots().len() - 1;
     let stride = cells.div_ceil(MOST_KNOTS);

@@ -1,4 +1,4 @@
-//! Mean and standard deviation of a law cut at a floor: of max(X, c), where X has mean 0, standard deviation 1 and no least value.
+//! Mean and standard deviation of a law cut at a floor: moments of max(X, c), where X has mean 0, standard deviation 1 and no least value.
 
 use super::special::normal;
 
@@ -10,13 +10,14 @@ pub(super) struct Moments {
 }
 
 impl Moments {
-    /// Those of a law that is not cut.
+    /// Moments of a law that is not cut.
     pub(super) const STANDARD: Self = Self { mean: 0.0, sd: 1.0 };
 }
 
-/// The normal law, for c ≤ 0. With P = Φ(c) and d = φ(c): E = d + c·P and E² = c²·P + c·d + 1 − P.
+/// Returns the moments of the cut normal law, for c ≤ 0. With P = Φ(c) and d = φ(c): E = d + c·P and E² = c²·P + c·d + 1 − P.
 pub(super) fn normal(cut: f64) -> Moments {
     let (probability, density) = (normal::below(cut), normal::density(cut));
+    // Far below the mean nothing is cut. The products below would be NaN for c = −∞.
     if probability == 0.0 {
         return Moments::STANDARD;
     }
@@ -24,7 +25,7 @@ pub(super) fn normal(cut: f64) -> Moments {
     Moments { mean, sd: libm::sqrt(1.0 + (cut * (cut * probability + density) - probability - mean * mean)) }
 }
 
-/// The Laplace law, for c ≤ 0. In units of its scale 1/√2 and with t = −c·√2: E = e^(−t)/2 and E² = 2 − (1 + t)·e^(−t).
+/// Returns the moments of the cut Laplace law, for c ≤ 0. In units of its scale 1/√2 and with t = −c·√2: E = e^(−t)/2 and E² = 2 − (1 + t)·e^(−t).
 pub(super) fn laplace(cut: f64) -> Moments {
     let t = -cut * core::f64::consts::SQRT_2;
     let lost = libm::exp(-t);

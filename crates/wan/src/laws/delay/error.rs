@@ -1,68 +1,68 @@
-//! Why a law is refused.
+//! Reasons for which a law is refused.
 
 use core::fmt;
 
 use cohaptic_units::print::SixDigits;
 
-/// Why a law, or a correlation of one, is refused. Numbers are in the caller's unit.
+/// Reason for which a law, or a correlation of a law, is refused. Numbers are in the caller's unit.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum LawError {
-    /// NaN or an infinity.
+    /// A number is NaN or infinite.
     NotFinite {
-        /// Which number.
+        /// Name of the number.
         quantity: &'static str,
-        /// What it was.
+        /// Refused number.
         found: f64,
     },
-    /// A standard deviation below zero.
+    /// The standard deviation is below zero.
     NegativeDeviation {
-        /// What it was.
+        /// Refused standard deviation.
         sd: f64,
     },
-    /// No delay can be below the floor, so the mean cannot.
+    /// The mean is below the floor, which no delay can be.
     FloorAboveMean {
-        /// The mean asked for.
+        /// Mean that was asked for.
         mean: f64,
-        /// The floor, zero unless another was given.
+        /// Floor, zero unless another floor was given.
         floor: f64,
     },
-    /// A law with a least value (uniform, Pareto, empirical) would begin below the floor, where it could not be kept.
+    /// A law with a least value (uniform, Pareto, empirical) would begin below the floor, and cannot be cut there.
     ReachesBelowFloor {
-        /// The name of the law.
+        /// Name of the law.
         law: &'static str,
-        /// The mean asked for.
+        /// Mean that was asked for.
         mean: f64,
-        /// The standard deviation asked for.
+        /// Standard deviation that was asked for.
         sd: f64,
-        /// Where the law would begin.
+        /// Least value that the law would have.
         least: f64,
-        /// The floor, zero unless another was given.
+        /// Floor, zero unless another floor was given.
         floor: f64,
-        /// The largest standard deviation with which this law stays above the floor.
+        /// Largest standard deviation with which this law stays above the floor.
         largest_sd: f64,
     },
-    /// A law on the half-line above the floor whose deviation is too large for its mean: nearly every draw would be the floor, and no run would be
-    /// long enough to meet the mean.
+    /// The deviation of a law that begins at the floor is too large for its mean. Nearly every draw would be the floor, and no run would be long enough to
+    /// reach the mean.
     TooVaried {
-        /// The name of the law.
+        /// Name of the law.
         law: &'static str,
-        /// Mean less floor.
+        /// Mean minus floor.
         above_floor: f64,
-        /// The standard deviation asked for.
+        /// Standard deviation that was asked for.
         sd: f64,
-        /// The largest one: [`MAX_VARIATION`](super::MAX_VARIATION) times the mean above the floor.
+        /// Largest standard deviation: [`MAX_VARIATION`](super::MAX_VARIATION) times the mean above the floor.
         largest_sd: f64,
     },
-    /// A correlation is a number from −1 to 1.
+    /// The correlation is not a number from −1 to 1.
     NotACorrelation {
-        /// What it was.
+        /// Refused correlation.
         found: f64,
     },
-    /// Two variables with this law cannot be so negatively correlated: unless the law is symmetric, the least correlation is above −1.
+    /// Two variables with this law cannot be so negatively correlated. Unless the law is symmetric, its least correlation is above −1.
     TooNegative {
-        /// The correlation asked for.
+        /// Correlation that was asked for.
         asked: f64,
-        /// The least that this law allows, between a delay at z and one at −z.
+        /// Least correlation of this law, between a delay at z and a delay at −z.
         least: f64,
     },
 }

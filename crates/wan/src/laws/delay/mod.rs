@@ -1,16 +1,16 @@
-//! The probability laws of a delay.
+//! Probability laws of a delay.
 //!
-//! A [`Law`] is a [`Distribution`] with a mean, a standard deviation and a floor, checked. It is a pure function: of a uniform word
-//! ([`Law::draw`]), of a probability ([`Law::quantile`]), of a delay ([`Law::cdf`]), or of a standard normal number ([`Law::at_normal`]), which makes
-//! delays correlated in time with exactly this marginal law (a Gaussian copula): with z(n) = φ·z(n − 1) + √(1 − φ²)·ε(n), the delays `at_normal(z(n))`
-//! have lag-one correlation ρ if φ is [`Law::gaussian_correlation`] of ρ.
+//! A [`Law`] is a checked [`Distribution`] with a mean, a standard deviation and a floor. A law is a pure function of a uniform word ([`Law::draw`]), of a
+//! probability ([`Law::quantile`]), of a delay ([`Law::cdf`]), or of a standard normal number ([`Law::at_normal`]). The last function makes delays that are
+//! correlated in time and have exactly this marginal law (a Gaussian copula): with z(n) = φ·z(n − 1) + √(1 − φ²)·ε(n), the delays `at_normal(z(n))` have the
+//! lag-one correlation ρ if φ is [`Law::gaussian_correlation`] of ρ.
 //!
-//! Numbers are `f64` in whatever unit the caller counts delays.
+//! Numbers are `f64` in the unit in which the caller counts delays.
 //!
 //! # What happens at the floor
 //!
-//! No delay is below the floor, which is zero unless another is given. Mean µ and standard deviation σ are those asked for, exactly, except where a
-//! law is *cut*; then [`Law::mean`] and [`Law::sd`] tell those delivered.
+//! No delay is below the floor, which is zero unless another floor is given. Mean µ and standard deviation σ are exactly the given ones, except for a law
+//! that is *cut*; [`Law::mean`] and [`Law::sd`] then return the moments of the delays that are drawn.
 //!
 //! | law | a delay is | at the floor f |
 //! | --- | --- | --- |
@@ -20,11 +20,11 @@
 //! | table | µ + σ·entry/8192, each entry with the same probability, as in netem | cut; the table's own moments are delivered |
 //! | uniform | µ ± √3·σ | refused if σ > (µ − f)/√3 |
 //! | Pareto | µ + σ·(X − 3/2)/√(3/4), X = (1 − u)^(−1/3) | refused if σ > √3·(µ − f) |
-//! | empirical | the given values, shifted and stretched to µ and σ | refused if the least one falls below f |
+//! | empirical | the given values, shifted and stretched to µ and σ | refused if the least value falls below f |
 //! | lognormal, gamma, Weibull | f + X, X > 0 with mean µ − f | begins there; refused if σ > 100·(µ − f) |
 //!
-//! A law with a least value has a form that a cut would spoil (a uniform law would get a spike), so it is refused with the largest deviation possible;
-//! a law without one is always cut somewhere. A standard deviation of zero is a constant.
+//! A cut would spoil the form of a law with a least value (a uniform law would get a spike), so such a law is refused, and the error tells the largest
+//! possible deviation. A law without a least value is always cut. With a standard deviation of zero every delay is the mean.
 //!
 //! # Accuracy
 //!
@@ -56,7 +56,7 @@ mod standard;
 mod tail;
 
 impl Distribution {
-    /// The law in a word.
+    /// Returns the name of the law.
     pub(crate) fn words(&self) -> &'static str {
         match self {
             Self::Normal => "normal",
@@ -88,7 +88,7 @@ use gamma_map::GammaMap;
 use standard::Standard;
 use tail::Tail;
 
-/// The form of a law. The table of the [module](self) says what each is and what it does at the floor.
+/// Form of a law. The table of the [module](self) defines each form and its delays at the floor.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub enum Distribution {
     /// Normal, cut at the floor.
@@ -96,9 +96,9 @@ pub enum Distribution {
     Normal,
     /// Uniform over µ ± √3·σ.
     Uniform,
-    /// Pareto of tail index 3, as in netem's table, but exact: its standard deviation is the one asked for and its tail has no end.
+    /// Pareto of tail index 3, as in netem's table, but exact: its standard deviation is the given one, and its tail has no end.
     Pareto,
-    /// netem's ¼ normal and ¾ Pareto, exact, cut at the floor.
+    /// Mixture of ¼ normal and ¾ Pareto of netem, exact, cut at the floor.
     ParetoNormal,
     /// Lognormal from the floor.
     LogNormal,
@@ -108,37 +108,38 @@ pub enum Distribution {
     Weibull,
     /// Laplace, cut at the floor.
     Laplace,
-    /// Values, shifted and stretched to the mean and the deviation asked for.
+    /// Given values, shifted and stretched to the given mean and deviation.
     Empirical(Arc<Empirical>),
-    /// A `.dist` file as netem uses it: σ·entry/8192 around the mean, cut at the floor. What this delivers depends on the table.
+    /// Entries of a `.dist` file as netem uses them: σ·entry/8192 around the mean, cut at the floor. Mean and deviation of the delays depend on the table.
     Table(Arc<DistTable>),
 }
 
-/// The largest standard deviation of a lognormal, gamma or Weibull law, in units of its mean above the floor.
+/// Largest standard deviation of a lognormal, gamma or Weibull law, in units of its mean above the floor.
 pub const MAX_VARIATION: f64 = 100.0;
 
-/// Standard normal numbers count up to this size; Φ(−37.5) = 4.6·10⁻³⁰⁸ is a normal `f64`.
+/// Largest size of standard normal numbers; Φ(−37.5) = 4.6·10⁻³⁰⁸ is still a normal `f64`.
 const LARGEST_NORMAL: f64 = 37.5;
 
-/// A law of delays: never below its floor, never infinite.
+/// Law of delays, never below its floor and never infinite.
 ///
-/// Cloning is cheap. Making a gamma law takes about 0.1 ms and 13 kB, so links with the same law should share clones of it.
+/// Cloning a law is cheap. A gamma law has 13 kB of tables that take time to compute, so links with the same law should share clones.
 #[derive(Clone, Debug)]
 pub struct Law {
     distribution: Distribution,
     asked: Asked,
     fit: Fit,
+    /// Least delay of all draws.
     least: f64,
 }
 
-/// Equal if asked for with the same words: distribution, mean, deviation and floor.
+/// Two laws are equal if distribution, mean, deviation and floor are equal.
 impl PartialEq for Law {
     fn eq(&self, other: &Self) -> bool {
         (&self.distribution, self.asked) == (&other.distribution, other.asked)
     }
 }
 
-/// A gamma law, for delays that follow each other without a question which law they have.
+/// Gamma law without the choice between forms, for loops over many delays of one law.
 #[derive(Clone, Debug)]
 pub(crate) struct GammaLaw {
     map: Arc<GammaMap>,
@@ -148,23 +149,23 @@ pub(crate) struct GammaLaw {
 }
 
 impl GammaLaw {
-    /// [`Law::at_normal`], to the bit.
+    /// Returns the delay of [`Law::at_normal`], equal in every bit.
     #[inline(always)]
     pub(crate) fn at_normal(&self, z: f64) -> f64 {
         let delay = self.origin + self.scale * self.map.at_normal(z);
-        // An instruction each, which `f64::max` and `f64::min` are not; a NaN is the floor here as there.
+        // Each comparison is one instruction, which `f64::max` and `f64::min` are not. NaN becomes the floor in both ways.
         let delay = if delay > self.floor { delay } else { self.floor };
         if delay < f64::MAX { delay } else { f64::MAX }
     }
 
-    /// Its delays in whole numbers, for several at once, if they come so.
+    /// Returns the cubics that give most delays in whole nanoseconds for several numbers at once, or `None` if the law has none.
     pub(crate) fn cubics(&self) -> Option<GammaCubics> {
         GammaCubics::new(self)
     }
 }
 
 impl Law {
-    /// The law with that mean and standard deviation; `floor` is zero if not given.
+    /// Returns the law with the given mean, standard deviation and floor. The floor is zero if not given.
     ///
     /// # Errors
     ///
@@ -186,26 +187,28 @@ impl Law {
         let asked = Asked { mean, sd, floor };
         let fit = fit(distribution, asked)?;
         let mut law = Self { distribution: distribution.clone(), asked, fit, least: floor };
+        // `at_normal` does not use `least`, so the law can compute its own least delay.
         law.least = law.at_normal(-LARGEST_NORMAL);
         Ok(law)
     }
 
-    /// F⁻¹(Φ(z)), accurate in both tails: the delay of a standard normal number. Increases with z, but for the last digits.
+    /// Returns F⁻¹(Φ(z)), the delay of a standard normal number, accurate in both tails. The delay increases with z, except in its last digits.
     #[must_use]
     #[inline]
     pub fn at_normal(&self, z: f64) -> f64 {
         self.delay(self.fit.standard.at_normal(z.clamp(-LARGEST_NORMAL, LARGEST_NORMAL)))
     }
 
-    /// One independent draw from a uniform word. `more` gives further uniform words, of which the normal, lognormal and gamma laws need some in 1.2 %
-    /// of the draws and the others none.
+    /// Returns one independent draw for a uniform word. `more` gives further uniform words. The normal, lognormal and gamma laws need further words in 1.2 %
+    /// of the draws, and the other laws need none.
     #[must_use]
     #[inline]
     pub fn draw(&self, word: u64, more: impl FnMut() -> u64) -> f64 {
         self.delay(self.fit.standard.draw(word, more))
     }
 
-    /// The least delay that is exceeded with probability at most 1 − p. Finite: p counts as at least 2·10⁻³⁰⁸, and so does 1 − p. A NaN gives a NaN.
+    /// Returns the least delay that is exceeded with probability at most 1 − p. The delay is finite, because p and 1 − p count as at least 2·10⁻³⁰⁸. Returns
+    /// NaN for NaN.
     #[must_use]
     pub fn quantile(&self, p: f64) -> f64 {
         if p.is_nan() {
@@ -217,61 +220,64 @@ impl Law {
         })
     }
 
-    /// The probability of a delay of at most x.
+    /// Returns the probability of a delay of at most x.
     #[must_use]
     pub fn cdf(&self, x: f64) -> f64 {
         self.tails(x).0
     }
 
-    /// The probability of a delay above x: 1 − cdf, accurate also where it is small.
+    /// Returns the probability of a delay above x: 1 − cdf, accurate also where it is small.
     #[must_use]
     pub fn survival(&self, x: f64) -> f64 {
         self.tails(x).1
     }
 
-    /// The mean of the delays drawn: the one asked for unless the law is cut at the floor or is a table.
+    /// Returns the mean of the delays drawn, which is the given mean unless the law is cut at the floor or is a table.
     #[must_use]
     pub const fn mean(&self) -> f64 {
         self.fit.delivered.mean
     }
 
-    /// The standard deviation of the delays drawn: the one asked for unless the law is cut at the floor or is a table.
+    /// Returns the standard deviation of the delays drawn, which is the given deviation unless the law is cut at the floor or is a table.
     #[must_use]
     pub const fn sd(&self) -> f64 {
         self.fit.delivered.sd
     }
 
-    /// No delay is below this: the floor, or the law's own least value, which for a law without one is that at z = −37.5.
+    /// Returns the least delay: the floor, or the law's own least value. The least value of a law without one is the delay at z = −37.5.
     #[must_use]
     pub const fn least(&self) -> f64 {
         self.least
     }
 
-    /// The form of the law.
+    /// Returns the form of the law.
     #[must_use]
     pub const fn distribution(&self) -> &Distribution {
         &self.distribution
     }
 
-    /// The law as a gamma law, if it is one.
+    /// Returns the law as a gamma law, or `None` if the law has another form.
     pub(crate) fn as_gamma(&self) -> Option<GammaLaw> {
         let Standard::Gamma(map) = &self.fit.standard else { return None };
         Some(GammaLaw { map: Arc::clone(map), origin: self.fit.origin, scale: self.fit.scale, floor: self.asked.floor })
     }
 
+    /// Returns the delay at a place of the law.
     fn at(&self, place: Tail) -> f64 {
         self.delay(self.fit.standard.at(place))
     }
 
-    /// The delay of a number of the standard law.
+    /// Returns the delay of a number of the standard law.
     #[inline]
     fn delay(&self, x: f64) -> f64 {
         (self.fit.origin + self.fit.scale * x).max(self.asked.floor).min(f64::MAX)
     }
 
+    /// Returns the probabilities of at most x and of more than x, each accurate where it is small.
     fn tails(&self, x: f64) -> (f64, f64) {
         if x < self.asked.floor {
             (0.0, 1.0)
+        // A constant has the scale zero, by which the distance cannot be divided.
         } else if self.fit.scale == 0.0 {
             self.fit.standard.tails(x - self.fit.origin)
         } else {

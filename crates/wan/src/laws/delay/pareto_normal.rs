@@ -1,28 +1,28 @@
-//! netem's mixture of a normal and a Pareto law: Q(u) = Φ⁻¹(u)/4 + (1 − u)^(−1/3), both of the same u.
+//! Mixture of a normal and a Pareto law as in netem: Q(u) = Φ⁻¹(u)/4 + (1 − u)^(−1/3), both terms of the same u.
 //!
-//! `paretonormal.dist` adds ¼ of a normal number to ¾ of netem's Pareto number, which is 4/3·((1 − u)^(−1/3) − 3/2). The table scales the sum as if it
-//! had standard deviation 1; here the true one is used.
+//! `paretonormal.dist` adds ¼ of a normal number to ¾ of netem's Pareto number, which is 4/3·((1 − u)^(−1/3) − 3/2). The table scales the sum as if its
+//! standard deviation were 1; this module uses the true deviation.
 
 use super::cut::Moments;
 use super::special::{normal, quadrature, root};
 
-/// E of (1 − U)^(−1/3) = ∫ q^(−1/3) dq, and of Φ⁻¹(U)/4.
+/// Mean of Q: the mean of (1 − U)^(−1/3), which is ∫ q^(−1/3) dq, plus the mean of Φ⁻¹(U)/4, which is zero.
 pub(super) const MEAN: f64 = 1.5;
 
-/// The standard deviation, √(1/16 + 3/4 + ½·E[Z·X]), where E[Z·X] = ∫ z·Φ(−z)^(−1/3)·φ(z) dz = 0.587470748478335… (40 digits of mpmath).
+/// Standard deviation of Q, √(1/16 + 3/4 + ½·E[Z·X]), where E[Z·X] = ∫ z·Φ(−z)^(−1/3)·φ(z) dz = 0.587470748478335… (40 digits of mpmath).
 pub(super) const SD: f64 = 1.051_777_245_541_644;
 
-/// Q(Φ(z)), with the probability above z.
+/// Returns Q(Φ(z)). `above` is the probability above z.
 pub(super) fn at(z: f64, above: f64) -> f64 {
     0.25 * z + 1.0 / libm::cbrt(above)
 }
 
-/// z with Q(Φ(z)) = x, between −38 and 38.
+/// Returns z with Q(Φ(z)) = x, between −38 and 37.
 pub(super) fn normal_of(x: f64) -> f64 {
     root::increasing(|z| at(z, normal::below(-z)) - x, -38.0, 37.0)
 }
 
-/// Moments of max((Q − MEAN)/SD, c), for c ≤ 0: the uncut ones, and what the cut adds below z with Q = c.
+/// Returns the moments of max((Q − MEAN)/SD, c) for c ≤ 0: the moments without a cut, plus the part that the cut adds below the z with Q = c.
 pub(super) fn cut_moments(cut: f64) -> Moments {
     let end = normal_of(MEAN + SD * cut);
     let begin = -38.0;

@@ -1,4 +1,4 @@
-//! The laws before they are shifted and stretched.
+//! Standard laws: the laws before they are shifted and stretched.
 
 use alloc::sync::Arc;
 
@@ -8,39 +8,39 @@ use super::tail::Tail;
 use super::{DistTable, Empirical, pareto_normal};
 use crate::laws::normal::standard_normal;
 
-/// A law with its form alone; a delay is origin + scale·X.
+/// Law of a number X with a form only. A delay is origin + scale·X.
 #[derive(Clone, Debug)]
 pub(super) enum Standard {
-    /// Zero.
+    /// Constant zero.
     Constant,
     Normal,
-    /// On [−√3, √3].
+    /// Uniform on [−√3, √3].
     Uniform,
-    /// From 1, tail index 3.
+    /// Pareto from 1 on, with tail index 3.
     Pareto,
-    /// See [`pareto_normal`].
+    /// Mixture of [`pareto_normal`].
     ParetoNormal,
-    /// Of mean 0 and standard deviation 1.
+    /// Laplace of mean 0 and standard deviation 1.
     Laplace,
-    /// e^(σ·z).
+    /// Lognormal, e^(σ·z).
     LogNormal {
         sigma: f64,
     },
-    /// Of scale 1.
+    /// Gamma of scale 1.
     Gamma(Arc<GammaMap>),
-    /// Of scale 1: e^t, where e is exponential.
+    /// Weibull of scale 1: e^t, where e is exponential and t is the inverse shape.
     Weibull {
         inverse_shape: f64,
     },
     Empirical(Arc<Empirical>),
-    /// The entries as they stand.
+    /// Entries of a table, unchanged.
     Table(Arc<DistTable>),
 }
 
 const SQRT_3: f64 = 1.732_050_807_568_877_2;
 
 impl Standard {
-    /// F⁻¹(Φ(z)).
+    /// Returns F⁻¹(Φ(z)).
     #[inline]
     pub(super) fn at_normal(&self, z: f64) -> f64 {
         match self {
@@ -54,7 +54,7 @@ impl Standard {
         }
     }
 
-    /// F⁻¹ at a place.
+    /// Returns F⁻¹ at a place of the law.
     pub(super) fn at(&self, place: Tail) -> f64 {
         match self {
             Self::Constant => 0.0,
@@ -77,7 +77,7 @@ impl Standard {
         }
     }
 
-    /// One draw. Where a normal number is the quickest way there, it is made by the ziggurat, which seldom asks for more words.
+    /// Returns one draw. Forms that are computed from a normal number draw it by the ziggurat, which rarely needs words from `more`.
     #[inline]
     pub(super) fn draw(&self, word: u64, more: impl FnMut() -> u64) -> f64 {
         match self {
@@ -94,7 +94,7 @@ impl Standard {
         }
     }
 
-    /// The probabilities of at most x and of more, each accurate where it is small.
+    /// Returns the probabilities of at most x and of more than x, each accurate where it is small.
     pub(super) fn tails(&self, x: f64) -> (f64, f64) {
         let of_normal = |z: f64| (normal::below(z), normal::below(-z));
         match self {

@@ -1,35 +1,36 @@
-//! A place in a law: the probability on its shorter side, so that both tails are resolved.
+//! Place in a law: the probability on its shorter side, so that both tails are resolved.
 
 use super::special::normal;
 
-/// A place in a law, by the probability of what lies below it or above it. The smaller of the two, so that neither tail is cut by rounding.
+/// Place in a law, given by the smaller of the probabilities below and above it, so that rounding cuts neither tail.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Tail {
-    /// At most ½ lies below.
+    /// Probability below the place, at most ½.
     Below(f64),
-    /// At most ½ lies above.
+    /// Probability above the place, at most ½.
     Above(f64),
 }
 
 impl Tail {
-    /// The place of a standard normal number: Φ(z).
+    /// Returns the place of a standard normal number: Φ(z).
     pub(super) fn of_normal(z: f64) -> Self {
         if z < 0.0 { Self::Below(normal::below(z)) } else { Self::Above(normal::below(-z)) }
     }
 
-    /// The place of a probability; `p` is believed to lie in (0, 1).
+    /// Returns the place of the probability `p`, which must lie in (0, 1).
     pub(super) fn of_probability(p: f64) -> Self {
         // For p ≥ ½ the difference is exact.
         if p < 0.5 { Self::Below(p) } else { Self::Above(1.0 - p) }
     }
 
-    /// The place of a uniform word: the top bit is the side, the others are (k + ½)·2⁻⁶⁴ from the end. So the ends of a law are resolved to 3·10⁻²⁰.
+    /// Returns the place of a uniform word. The top bit is the side, and the other bits are (k + ½)·2⁻⁶⁴ from the end, so that the ends of a law are resolved
+    /// to 3·10⁻²⁰.
     #[inline]
     pub(super) fn of_word(word: u64) -> Self {
         if word >> 63 == 0 { Self::Below(from_the_end(word)) } else { Self::Above(from_the_end(!word)) }
     }
 
-    /// The standard normal number of this place.
+    /// Returns the standard normal number of this place.
     pub(super) fn normal(self) -> f64 {
         match self {
             Self::Below(p) => normal::inverse_below(p),
@@ -37,7 +38,7 @@ impl Tail {
         }
     }
 
-    /// The probability above.
+    /// Returns the probability above this place.
     pub(super) fn above(self) -> f64 {
         match self {
             Self::Below(p) => 1.0 - p,
@@ -45,7 +46,7 @@ impl Tail {
         }
     }
 
-    /// ln of the probability above, accurate also where that is nearly 1.
+    /// Returns the logarithm of the probability above this place, accurate also where the probability is nearly 1.
     pub(super) fn log_above(self) -> f64 {
         match self {
             Self::Below(p) => libm::log1p(-p),
@@ -54,6 +55,7 @@ impl Tail {
     }
 }
 
+/// Returns (word + ½)·2⁻⁶⁴, a probability below ½. `word` is below 2^63.
 #[inline]
 #[expect(clippy::cast_precision_loss, reason = "a word below 2^63, rounded to 53 bits, is a probability to 16 digits")]
 fn from_the_end(word: u64) -> f64 {

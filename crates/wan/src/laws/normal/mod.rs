@@ -1,29 +1,28 @@
 //! Standard normal numbers by the ziggurat method (Marsaglia & Tsang 2000).
 //!
-//! The density exp(−x²/2) is covered with 256 layers of equal area. A layer and a point in it take one word; in 98.8 % of the cases the point lies
-//! under the density for certain. Only `libm` is called, so a draw is the same on every platform. (Inverting the distribution function, by Wichura's
-//! AS 241, made a packet with jitter 20 % slower.)
+//! The density exp(−x²/2) is covered with 256 layers of equal area. One random word chooses a layer and a point in the layer; in 98.8 % of the cases the
+//! point certainly lies under the density. Only `libm` is called, so that a draw is the same on every platform.
 
 mod tables;
 
 use crate::random::unit;
 use tables::{F, R, X};
 
-/// The standard normal number of a uniform word. It takes no more words than that one, or seldom a few.
+/// Returns a standard normal number for a uniform word. `more` gives further uniform words, which are rarely needed.
 #[must_use]
 #[inline]
 pub fn standard_normal(word: u64, more: impl FnMut() -> u64) -> f64 {
     in_the_core(word).unwrap_or_else(|| outside_the_core(word, more))
 }
 
-/// The standard normal number of a uniform word, in the 98.8 % of the cases in which it takes no more than that one.
+/// Returns a standard normal number for a uniform word, or `None` in the 1.2 % of cases in which further words are needed.
 #[inline(always)]
 pub(crate) fn in_the_core(word: u64) -> Option<f64> {
     let (layer, size) = point(word);
     (size < X[layer + 1]).then(|| signed(word, size))
 }
 
-/// [`in_the_core`], NaN in the other cases: of positive numbers the larger one has the larger bits.
+/// Returns the number of [`in_the_core`], or NaN instead of `None`. Two positive numbers compare like their bits, so that the comparison needs no branch.
 #[inline(always)]
 pub(crate) fn in_the_core_or_nan(word: u64) -> f64 {
     let (layer, size) = point(word);
@@ -31,20 +30,21 @@ pub(crate) fn in_the_core_or_nan(word: u64) -> f64 {
     f64::from_bits(signed(word, size).to_bits() | is_outside.cast_unsigned())
 }
 
-/// The layer, and how far to the right in it. They and the sign are different bits of the word.
+/// Returns the layer, and the distance of the point from zero. Layer, distance and sign come from different bits of the word.
 #[inline]
 fn point(word: u64) -> (usize, f64) {
     let layer = usize::from(word.to_le_bytes()[0]);
     (layer, unit(word) * X[layer])
 }
 
-/// Without a branch, which a processor would get wrong every second time: that took 14 % off a packet on a link with jitter.
+/// Returns `size` with the sign that the word chooses. The sign is random, so that a branch on it could not be predicted; the bit is moved instead.
 #[inline]
 fn signed(word: u64, size: f64) -> f64 {
     f64::from_bits(size.to_bits() | (word & 0x100) << 55)
 }
 
-/// The first point lies in a wedge or in the tail: goes on with more words until one lies under the density.
+/// Returns a standard normal number for a word whose point is not certainly under the density, but in a wedge or in the tail. Draws further points from
+/// `more` until a point lies under the density.
 #[cold]
 pub(crate) fn outside_the_core(mut word: u64, mut more: impl FnMut() -> u64) -> f64 {
     loop {
@@ -52,6 +52,7 @@ pub(crate) fn outside_the_core(mut word: u64, mut more: impl FnMut() -> u64) -> 
         if size < X[layer + 1] {
             return signed(word, size);
         }
+        // The lowest layer has no wedge: outside of its core lies the tail.
         if layer == 0 {
             return signed(word, tail(&mut more));
         }
@@ -63,10 +64,10 @@ pub(crate) fn outside_the_core(mut word: u64, mut more: impl FnMut() -> u64) -> 
     }
 }
 
-/// A draw from the tail beyond R, by Marsaglia (1964).
+/// Returns a number from the tail beyond R, by Marsaglia (1964).
 fn tail(more: &mut impl FnMut() -> u64) -> f64 {
     loop {
-        // 1 − u lies in (0, 1]: its logarithm is finite.
+        // 1 − u lies in (0, 1], so its logarithm is finite.
         let beyond = -libm::log(1.0 - unit(more())) / R;
         let height = -libm::log(1.0 - unit(more()));
         if 2.0 * height > beyond * beyond {
@@ -86,7 +87,7 @@ mod tests {
         standard_normal(packet.first(Purpose::Jitter), || more.next_word())
     }
 
-    /// Every layer has the same area, that of the lowest with its tail: R·F(R) + √(π/2)·erfc(R/√2). Tables of 16 digits are consistent to 1e-14.
+    /// Every layer has the same area as the lowest layer with its tail: R·F(R) + √(π/2)·erfc(R/√2). Tables of 16 digits are consistent to 1e-14.
     #[test]
     fn all_layers_have_one_area() {
         let density = |x: f64| libm::exp(-0.5 * x * x);
@@ -99,8 +100,8 @@ mod tests {
         }
     }
 
-    /// Moments of 2·10⁶ draws: the standard errors of mean, variance, skewness and kurtosis are √(1/n), √(2/n), √(15/n) and √(96/n) for Σz^k/n with
-    /// k = 1, 2, 3, 4; 4.5 of them are exceeded by chance once in 150 000.
+    /// Compares moments of 2·10⁶ draws with the normal law. The standard errors of Σz^k/n for k = 1, 2, 3, 4 are √(1/n), √(2/n), √(15/n) and √(96/n); 4.5 of
+    /// them are exceeded by chance once in 150 000.
     #[test]
     fn moments_are_those_of_the_normal_law() {
         let stream = Stream::new(3, b"normal");
@@ -119,7 +120,8 @@ mod tests {
         }
     }
 
-    /// Of 2·10⁶ draws about 2·10⁶·erfc(3.8/√2) = 289.4 lie beyond 3.8, all of them from the tail; Poisson, 4.5 standard deviations of 17.
+    /// Of 2·10⁶ draws about 2·10⁶·erfc(3.8/√2) = 289.4 lie beyond 3.8, all of them from the tail. The number is Poisson, with a bound of 4.5 standard
+    /// deviations of 17.
     #[test]
     fn the_tail_has_its_share() {
         let stream = Stream::new(4, b"normal");
@@ -127,7 +129,7 @@ mod tests {
         assert!((213..=366).contains(&beyond), "{beyond}");
     }
 
-    /// A draw is part of every recorded result with jitter: if this fails, the change breaks them.
+    /// Every recorded result with jitter contains draws. If this test fails, the change breaks recorded results.
     #[test]
     fn draws_never_change() {
         let stream = Stream::new(1, b"left->right");

@@ -1,10 +1,10 @@
-//! The layers of the ziggurat for exp(−x²/2), 256 of equal area V, from the recurrence of Marsaglia & Tsang (2000):
-//! X[1] = R, X[i+1] = √(−2·ln(V/X[i] + F[i])), F[i] = exp(−X[i]²/2). The tests compute them again.
+//! Layers of the ziggurat for exp(−x²/2): 256 layers of equal area V, from the recurrence of Marsaglia & Tsang (2000): X[1] = R, X[i+1] = √(−2·ln(V/X[i] +
+//! F[i])), F[i] = exp(−X[i]²/2). Unit tests check the tables.
 
-/// Where the tail begins.
+/// Begin of the tail.
 pub(super) const R: f64 = 3.654_152_885_361_009;
 
-/// The right edge of each layer; that of layer 0 is V/F(R), as if its tail were a part of the rectangle.
+/// Right edge of each layer, indexed by layer. The edge of layer 0 is V/F(R), as if the tail were a part of its rectangle.
 #[rustfmt::skip]
 pub(super) const X: [f64; 257] = [
     3.910_757_959_524_916_7, 3.654_152_885_361_009, 3.449_278_298_561_431, 3.320_244_733_839_825, 3.224_575_052_047_801,
@@ -61,7 +61,7 @@ pub(super) const X: [f64; 257] = [
     0.215_241_895_984_871_56, 0.0,
 ];
 
-/// exp(−x²/2) at each edge.
+/// Density exp(−x²/2) at each edge, indexed by layer.
 #[rustfmt::skip]
 pub(super) const F: [f64; 257] = [
     0.000_477_467_764_609_386_2, 0.001_260_285_930_498_598, 0.002_609_072_746_102_164, 0.004_037_972_593_363_037_4, 0.005_522_403_299_251_011,
