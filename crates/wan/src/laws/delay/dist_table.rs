@@ -1,9 +1,9 @@
 //! Tables of quantiles in the format of netem's `.dist` files.
 //!
-//! A `.dist` file lists N integers, 8192·F⁻¹(i/N) of a law with mean 0 and standard deviation 1, where `#` begins a comment. netem draws one entry at
-//! random, each with the same probability, and delays by mean + sd·entry/8192. [`Distribution::Table`](super::Distribution::Table) does exactly this;
-//! an entry's size is limited to 32767, which is 4 standard deviations. For a law that interpolates between the entries, make an
-//! [`Empirical`](super::Empirical) of them.
+//! A `.dist` file lists N integers, 8192·F⁻¹(i/N) of a law with mean 0 and standard deviation 1, where `#` begins a comment. netem draws an entry at random,
+//! each with the same probability, and delays by mean + sd·entry/8192. [`Distribution::Table`](super::Distribution::Table) does exactly the same. An entry's
+//! size is limited to 32767, which is 4 standard deviations. For a law that interpolates between the entries, make an [`Empirical`](super::Empirical) from
+//! the entries.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -11,41 +11,41 @@ use core::fmt;
 
 use super::tail::Tail;
 
-/// The entries of a `.dist` file, sorted. One of them stands for `entry/8192` standard deviations.
+/// Sorted entries of a `.dist` file. An entry stands for `entry/8192` standard deviations.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct DistTable {
     entries: Vec<i16>,
 }
 
-/// Why a text is no table. Lines and columns count from 1, columns in characters.
+/// Reason for which a text is not a table. Lines and columns count from 1, columns in characters.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum DistTableError {
-    /// A word that is no integer.
+    /// A word is not an integer.
     NotAnInteger {
-        /// The line of the word.
+        /// Line of the word.
         line: usize,
-        /// The column of its first character.
+        /// Column of the word's first character.
         column: usize,
-        /// The word, or its first 24 characters.
+        /// Word, or its first 24 characters.
         word: Box<str>,
     },
-    /// An integer that an entry cannot hold.
+    /// An integer is outside of the range of an entry.
     OutOfRange {
-        /// The line of the word.
+        /// Line of the word.
         line: usize,
-        /// The column of its first character.
+        /// Column of the word's first character.
         column: usize,
-        /// The word, or its first 24 characters.
+        /// Word, or its first 24 characters.
         word: Box<str>,
     },
-    /// An entry too many.
+    /// The file has more than [`DistTable::MOST`] entries.
     TooMany {
-        /// The line of the entry.
+        /// Line of the first surplus entry.
         line: usize,
-        /// The column of its first character.
+        /// Column of the entry's first character.
         column: usize,
     },
-    /// No entries.
+    /// The file has no entry.
     Empty,
 }
 
@@ -69,48 +69,48 @@ impl fmt::Display for DistTableError {
 impl core::error::Error for DistTableError {}
 
 impl DistTable {
-    /// The most entries that `tc` accepts.
+    /// Largest number of entries that `tc` accepts.
     pub const MOST: usize = 16_384;
-    /// An entry of this size is one standard deviation.
+    /// Entry of one standard deviation.
     pub const ONE_DEVIATION: f64 = 8192.0;
 
-    /// Reads a `.dist` file: integers as C's `strtol` reads them in base 0, separated by white space; `#` begins a comment up to the end of the line.
+    /// Reads a `.dist` file: integers as C's `strtol` reads them in base 0, separated by white space. `#` begins a comment up to the end of the line.
     ///
     /// # Errors
     ///
-    /// [`DistTableError`], with the place of the first word that is wrong.
+    /// [`DistTableError`] with the place of the first wrong word.
     pub fn parse(text: &str) -> Result<Self, DistTableError> {
         let mut entries = entries(text)?;
         entries.sort_unstable();
         Ok(Self { entries })
     }
 
-    /// The entries, sorted. There is at least one.
+    /// Returns the entries in ascending order. There is at least one.
     #[must_use]
     pub fn entries(&self) -> &[i16] {
         &self.entries
     }
 
-    /// The entry of a place: each has the same share of the probability.
+    /// Returns the entry at a place of the law. Every entry has the same share of the probability.
     pub(super) fn at(&self, place: Tail) -> f64 {
         let count = self.entries.len();
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "neither negative nor above 16384; a NaN becomes 0")]
         let index = match place {
             Tail::Below(p) => ((p * real(count)) as usize).min(count - 1),
-            // The entry of 1 − q, counted from above.
+            // Entry of the probability 1 − q, counted from above.
             Tail::Above(q) => count - (libm::ceil(q * real(count)) as usize).clamp(1, count),
         };
         f64::from(self.entries[index])
     }
 
-    /// The probabilities of at most x, and of more.
+    /// Returns the probabilities of at most x and of more than x.
     pub(super) fn tails(&self, x: f64) -> (f64, f64) {
         let count = self.entries.len();
         let below = self.entries.partition_point(|&entry| f64::from(entry) <= x);
         (real(below) / real(count), real(count - below) / real(count))
     }
 
-    /// The mean and the standard deviation of max(entry, cut).
+    /// Returns the mean and the standard deviation of max(entry, cut).
     pub(super) fn moments(&self, cut: f64) -> (f64, f64) {
         let count = real(self.entries.len());
         let values = || self.entries.iter().map(|&entry| f64::from(entry).max(cut));
@@ -119,7 +119,7 @@ impl DistTable {
     }
 }
 
-/// Writes the entries as a `.dist` file, eight a line.
+/// Writes the entries as a `.dist` file, eight per line.
 impl fmt::Display for DistTable {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         for line in self.entries.chunks(8) {
@@ -132,7 +132,7 @@ impl fmt::Display for DistTable {
     }
 }
 
-/// The entries of a `.dist` file in the order of the file: at least one.
+/// Reads the entries of a `.dist` file, in the order of the file. Returns at least one entry.
 pub(crate) fn entries(text: &str) -> Result<Vec<i16>, DistTableError> {
     let mut entries = Vec::new();
     for (number, content) in text.lines().enumerate() {
@@ -153,16 +153,16 @@ pub(crate) fn entries(text: &str) -> Result<Vec<i16>, DistTableError> {
     if entries.is_empty() { Err(DistTableError::Empty) } else { Ok(entries) }
 }
 
-/// The words of a line, each with its column.
+/// Returns the words of a line, each with its column.
 fn words(line: &str) -> impl Iterator<Item = (usize, &str)> {
     line.split_whitespace().map(move |word| {
-        // Both are slices of one string.
+        // Both are slices of one string, so the difference of their addresses is an offset in bytes.
         let start = word.as_ptr().addr() - line.as_ptr().addr();
         (line[..start].chars().count() + 1, word)
     })
 }
 
-/// `strtol` in base 0, of the whole word. Numbers beyond an `i64` are given as its ends.
+/// Returns the whole word as `strtol` in base 0 reads it, or `None` if the word is not an integer. Numbers outside of an `i64` saturate.
 fn integer(word: &str) -> Option<i64> {
     let (negative, digits) = match word.strip_prefix('-') {
         Some(digits) => (true, digits),

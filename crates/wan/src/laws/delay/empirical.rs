@@ -1,15 +1,15 @@
-//! A law given by values: measured delays, or quantiles.
+//! Empirical law: a law given by measured delays, or by quantiles.
 
 use alloc::vec::Vec;
 use core::fmt;
 
 use super::tail::Tail;
 
-/// A law given by its quantiles at 0, 1/(n − 1), …, 1, with linear interpolation between them.
+/// Law given by its quantiles at 0, 1/(n − 1), …, 1, with linear interpolation between them.
 ///
-/// Made of a sample this is the piecewise linear quantile function through its order statistics (Hyndman & Fan 1996, definition 7). [`mean`](Self::mean)
-/// and [`sd`](Self::sd) are those of this interpolated law: a [`Law`](super::Law) with exactly them has the values as they are, any other is shifted
-/// and stretched.
+/// For a sample the law is the piecewise linear quantile function through the order statistics (Hyndman & Fan 1996, definition 7). [`mean`](Self::mean) and
+/// [`sd`](Self::sd) are moments of the interpolated law. A [`Law`](super::Law) with exactly these moments has the values unchanged; a law with other moments
+/// has the values shifted and stretched.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Empirical {
     knots: Vec<f64>,
@@ -17,24 +17,24 @@ pub struct Empirical {
     sd: f64,
 }
 
-/// Why values are no law.
+/// Reason for which values are not a law.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum EmpiricalError {
-    /// Fewer than two values, or more than [`Empirical::MOST`].
+    /// There are fewer than two values, or more than [`Empirical::MOST`].
     Count {
-        /// How many.
+        /// Number of values.
         found: usize,
     },
-    /// NaN, an infinity, or a number whose square is none.
+    /// A value is NaN or infinite, or its square could overflow.
     NotANumber {
-        /// Which one, from zero.
+        /// Index of the value, from zero.
         index: usize,
-        /// What it was.
+        /// Refused value.
         found: f64,
     },
-    /// All values are equal: there is nothing to stretch to a deviation.
+    /// All values are equal, so that they cannot be stretched to a deviation.
     Constant {
-        /// The value.
+        /// Common value.
         value: f64,
     },
 }
@@ -54,14 +54,14 @@ impl fmt::Display for EmpiricalError {
 impl core::error::Error for EmpiricalError {}
 
 impl Empirical {
-    /// The most values that are accepted.
+    /// Largest number of values.
     pub const MOST: usize = 1 << 20;
 
-    /// The law through these values, in any order: delays, or quantiles at equal steps of probability.
+    /// Returns the law through the given values, in any order: delays, or quantiles at equal steps of probability.
     ///
     /// # Errors
     ///
-    /// [`EmpiricalError`] if there are too few or too many of them, one is not a number, or all are equal.
+    /// [`EmpiricalError`] if there are too few or too many values, a value is not a number, or all values are equal.
     pub fn new(mut values: Vec<f64>) -> Result<Self, EmpiricalError> {
         if !(2..=Self::MOST).contains(&values.len()) {
             return Err(EmpiricalError::Count { found: values.len() });
@@ -77,26 +77,27 @@ impl Empirical {
         Ok(Self { knots: values, mean, sd })
     }
 
-    /// The mean of the interpolated law.
+    /// Returns the mean of the interpolated law.
     #[must_use]
     pub const fn mean(&self) -> f64 {
         self.mean
     }
 
-    /// The standard deviation of the interpolated law.
+    /// Returns the standard deviation of the interpolated law.
     #[must_use]
     pub const fn sd(&self) -> f64 {
         self.sd
     }
 
-    /// The values, sorted.
+    /// Returns the values in ascending order.
     #[must_use]
     pub fn knots(&self) -> &[f64] {
         &self.knots
     }
 
+    /// Returns the interpolated value at a place of the law.
     pub(super) fn at(&self, place: Tail) -> f64 {
-        // Counted from the nearer end.
+        // Cells are counted from the end whose probability is given, so that both tails keep their digits.
         let last = self.knots.len() - 1;
         match place {
             Tail::Below(p) => {
@@ -110,19 +111,20 @@ impl Empirical {
         }
     }
 
-    /// The probabilities of at most x, and of more.
+    /// Returns the probabilities of at most x and of more than x.
     pub(super) fn tails(&self, x: f64) -> (f64, f64) {
         let upper = self.knots.partition_point(|&knot| knot <= x);
         let last = self.knots.len() - 1;
         let (Some(&left), Some(&right)) = (upper.checked_sub(1).and_then(|i| self.knots.get(i)), self.knots.get(upper)) else {
             return if upper == 0 { (0.0, 1.0) } else { (1.0, 0.0) };
         };
+        // `left` is at most x and `right` is above x, so the difference is above zero.
         let part = (x - left) / (right - left);
         ((real(upper - 1) + part) / real(last), (real(last - upper) + (1.0 - part)) / real(last))
     }
 }
 
-/// The cell of `cells` equal ones in which a probability lies, and how far in it.
+/// Returns the cell of `cells` equal cells in which the probability `p` lies, and the position in the cell from 0 to 1.
 fn split(p: f64, cells: usize) -> (usize, f64) {
     let position = p * real(cells);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a position is neither negative nor above 2^20; a NaN becomes 0")]
@@ -130,7 +132,8 @@ fn split(p: f64, cells: usize) -> (usize, f64) {
     (cell, position - real(cell))
 }
 
-/// Mean and standard deviation of the law uniform between neighbours: each cell has (a + b)/2 and (a² + ab + b²)/3.
+/// Returns mean and standard deviation of the law that is uniform between neighbouring knots: each cell has the mean (a + b)/2 and the mean square (a² + ab +
+/// b²)/3.
 fn moments(knots: &[f64]) -> (f64, f64) {
     let cells = real(knots.len() - 1);
     // Differences from a value in the middle keep the digits of narrow laws.

@@ -1,4 +1,4 @@
-//! From the mean and deviation asked for to the parameters of a law.
+//! Fit of a law: the parameters of a law for a given mean, deviation and floor.
 
 use alloc::sync::Arc;
 
@@ -10,7 +10,7 @@ use super::special::root;
 use super::standard::Standard;
 use super::{DistTable, Distribution, MAX_VARIATION, pareto_normal};
 
-/// A law as it is drawn: max(floor, origin + scale·X), and the moments of that.
+/// Law as it is drawn, max(floor, origin + scale·X), and the moments of the draws.
 #[derive(Clone, Debug)]
 pub(super) struct Fit {
     pub(super) standard: Standard,
@@ -19,7 +19,7 @@ pub(super) struct Fit {
     pub(super) delivered: Moments,
 }
 
-/// The moments asked for. `sd` is above zero, `mean` at or above `floor`, and all are finite.
+/// Moments and floor that were asked for. `sd` is not negative, `mean` is at or above `floor`, and all are finite.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Asked {
     pub(super) mean: f64,
@@ -27,10 +27,11 @@ pub(super) struct Asked {
     pub(super) floor: f64,
 }
 
-/// The variance of the Pareto law of tail index 3 on [1, ∞) is 3/4, its mean 3/2.
+/// Standard deviation of the Pareto law of tail index 3 on [1, ∞), whose variance is 3/4 and whose mean is 3/2.
 const PARETO_SD: f64 = 0.866_025_403_784_438_6;
 const PARETO_MEAN: f64 = 1.5;
 
+/// Returns the law of the form `distribution` with the moments and the floor of `asked`.
 pub(super) fn fit(distribution: &Distribution, asked: Asked) -> Result<Fit, LawError> {
     if asked.sd == 0.0 {
         return Ok(Fit { standard: Standard::Constant, origin: asked.mean, scale: 0.0, delivered: Moments { mean: asked.mean, sd: 0.0 } });
@@ -63,16 +64,17 @@ pub(super) fn fit(distribution: &Distribution, asked: Asked) -> Result<Fit, LawE
     }
 }
 
-/// From this shape on, mean 10⁹ deviations above the floor, the gamma law differs from the normal one by less than an `f64` of its mean resolves.
+/// Shape from which a gamma law is drawn as a normal law. The mean is 10⁹ deviations above the floor, and the two laws differ by less than an `f64` of the
+/// mean resolves.
 const NORMAL_SHAPE: f64 = 1e18;
 
 impl Asked {
-    /// X of mean 0 and deviation 1 without a least value: cut at the floor.
+    /// Returns the fit of X with mean 0 and deviation 1 and without a least value, cut at the floor.
     fn cut(self, standard: Standard, moments: impl Fn(f64) -> Moments) -> Fit {
         self.standardised(standard, 0.0, 1.0, moments)
     }
 
-    /// X of that mean and deviation; `moments` are those of the standardised law cut.
+    /// Returns the fit of X with the given mean and deviation. `moments` returns the moments of the standardised law with a cut.
     fn standardised(self, standard: Standard, mean: f64, sd: f64, moments: impl Fn(f64) -> Moments) -> Fit {
         let scale = self.sd / sd;
         let cut = moments((self.floor - self.mean) / self.sd);
@@ -80,7 +82,7 @@ impl Asked {
         Fit { standard, origin: self.mean - scale * mean, scale, delivered }
     }
 
-    /// A table means what it says, whatever its own mean and deviation.
+    /// Returns the fit of a table. As in netem, entries are scaled without regard to the table's own mean and deviation.
     fn table(self, table: &Arc<DistTable>) -> Fit {
         let scale = self.sd / DistTable::ONE_DEVIATION;
         let (mean, sd) = table.moments((self.floor - self.mean) / scale);
@@ -88,20 +90,20 @@ impl Asked {
         Fit { standard: Standard::Table(Arc::clone(table)), origin: self.mean, scale, delivered }
     }
 
-    /// X of that mean and deviation with a least value, which must not fall below the floor.
+    /// Returns the fit of X with the given mean and deviation and a least value, which must not fall below the floor.
     fn bounded(self, law: &'static str, standard: Standard, mean: f64, sd: f64) -> Result<Fit, LawError> {
         let fit = self.standardised(standard, mean, sd, |_| Moments::STANDARD);
         let below_mean = (mean - fit.standard.at(super::tail::Tail::Below(0.0))) / sd;
         let Self { mean, sd, floor } = self;
         let least = mean - sd * below_mean;
-        // A law that begins at the floor but for rounding is meant to begin there.
+        // The tolerance accepts a law that begins at the floor except for rounding.
         if floor - least > 1e-12 * (mean.abs() + sd) {
             return Err(LawError::ReachesBelowFloor { law, mean, sd, least, floor, largest_sd: (mean - floor) / below_mean });
         }
         Ok(fit)
     }
 
-    /// (sd/(mean − floor))².
+    /// Returns (sd/(mean − floor))².
     fn squared_variation(self, law: &'static str) -> Result<f64, LawError> {
         let above_floor = self.mean - self.floor;
         let largest_sd = MAX_VARIATION * above_floor;
@@ -109,22 +111,22 @@ impl Asked {
             return Err(LawError::TooVaried { law, above_floor, sd: self.sd, largest_sd });
         }
         let variation = self.sd / above_floor;
-        // A square that would be zero is no variation that could be told from it.
+        // A square that underflows to zero would give an infinite shape. The least positive number stands for it.
         Ok((variation * variation).max(f64::MIN_POSITIVE))
     }
 
-    /// X from 0 of that mean, whose form already has the right ratio of deviation to mean.
+    /// Returns the fit of X ≥ 0 with the given mean, whose form already has the right ratio of deviation to mean.
     fn begin_at_the_floor(self, standard: Standard, mean: f64) -> Fit {
         let delivered = Moments { mean: self.mean, sd: self.sd };
         Fit { standard, origin: self.floor, scale: (self.mean - self.floor) / mean, delivered }
     }
 }
 
-/// 1/k of the Weibull law whose standard deviation is `variation` times its mean: 1 + CV² = Γ(1 + 2/k)/Γ(1 + 1/k)². The right side increases with
-/// 1/k from 1 without bound, so there is exactly one. For 0 < variation ≤ 100.
+/// Returns 1/k of the Weibull law whose standard deviation is `variation` times its mean, for 0 < variation ≤ 100: 1 + CV² = Γ(1 + 2/k)/Γ(1 + 1/k)². The
+/// right side increases with 1/k from 1 without bound, so that there is exactly one solution.
 fn inverse_weibull_shape(variation: f64) -> f64 {
     let target = libm::log1p(variation * variation);
-    // ln of the right side is π²/6·t² for small t and below 2·ln 2·t for large: the root lies between half of one and the sum of both.
+    // The logarithm of the right side is π²/6·t² for small t and below 2·ln 2·t for large t. The bracket of the root holds both estimates.
     let small = variation * libm::sqrt(6.0) / core::f64::consts::PI;
     root::increasing(|t| log_gamma_ratio(t) - target, 0.1 * small, 2.0 * small + target + 1.0)
 }

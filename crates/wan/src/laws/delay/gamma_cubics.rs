@@ -1,7 +1,7 @@
 //! Delays of a gamma law in whole nanoseconds, as a function of a standard normal number, by four terms of its series.
 //!
-//! A delay is rounded. So four terms tell it wherever they lie further from the half between two whole numbers than they may be wrong; for the few numbers
-//! next to a half the whole series does.
+//! A delay is rounded. Four terms therefore suffice wherever the delay is further from the half between two whole numbers than the error of four terms. For
+//! the few delays next to a half, the caller computes the whole series.
 
 use alloc::boxed::Box;
 use alloc::vec;
@@ -9,34 +9,37 @@ use alloc::vec;
 use super::GammaLaw;
 use super::gamma_map::{DENSITY, RANGE, TERMS};
 
-/// How far four terms may be from the whole series \[ns\]: one delay in five hundred lies so close to a half.
+/// Largest error of four terms \[ns\], compared with the whole series. One delay in five hundred is so close to a half.
 const MARGIN: f64 = 1.0 / 1024.0;
-/// How far the sums of a cell may be from the law, relative to it: the series of neighbouring cells differ, and all are rounded.
+/// Largest relative error of a cell's sum, compared with the law: series of neighbouring cells differ, and all sums are rounded.
 const ROUNDING: f64 = 1e-12;
-/// Numbers of this size and smaller have four terms, or nothing has: others are drawn once in 400 times.
+/// Size up to which every number must have four terms; otherwise the law has no cubics. Larger numbers are drawn once in 400 times.
 const NEEDED: f64 = 3.0;
+/// Number of cells. A power of two, because a cell's number is taken from the lower bits of a sum.
 const CELLS: usize = 2048;
-/// From here on there is no room for a fraction, for numbers of either sign.
+/// 1.5·2^52. A number of either sign that is added to it leaves no bits for a fraction.
 const ROOM: f64 = 6_755_399_441_055_744.0;
 
-/// The delays \[ns\] of a law.
+/// Delays \[ns\] of a law by four terms.
 #[derive(Clone, Debug)]
 pub(crate) struct GammaCubics {
+    /// Four terms per cell, in ascending order of powers, or NaN where four terms are not accurate enough.
     cells: Box<[[f64; 4]; CELLS]>,
-    /// Cells per unit of z.
+    /// Number of cells per unit of z.
     density: f64,
 }
 
 impl GammaCubics {
-    /// No delay, which may be one that takes longer.
+    /// Mark of a delay that four terms do not give.
     pub(crate) const UNKNOWN: u64 = u64::MAX;
 
-    /// `None` if most delays of the law do not follow from four terms: they are too long, or vary too much.
+    /// Returns the cubics of a law, or `None` if most delays of the law do not follow from four terms, because the delays are too long or vary too much.
+    /// Takes the widest cells that are accurate enough.
     pub(super) fn new(law: &GammaLaw) -> Option<Self> {
         [1, 2, 4, 8, 16].into_iter().find_map(|parts| Self::of_parts(law, parts))
     }
 
-    /// With that number of cells in place of one.
+    /// Returns the cubics with `parts` cells in place of each cell of the map.
     fn of_parts(law: &GammaLaw, parts: u32) -> Option<Self> {
         let whole = f64::from(parts);
         let mut cells = vec![[f64::NAN; 4]; CELLS];
@@ -53,12 +56,13 @@ impl GammaCubics {
         Some(Self { cells: cells.into_boxed_slice().try_into().ok()?, density: whole * DENSITY })
     }
 
-    /// The delays of several numbers, [`GammaCubics::UNKNOWN`] for those few that take longer, and for a NaN.
+    /// Returns the delays of several numbers, or [`GammaCubics::UNKNOWN`] for the few delays that need the whole series, and for NaN.
     #[inline(always)]
     pub(crate) fn nanos<const N: usize>(&self, z: &[f64; N]) -> [u64; N] {
         let (mut places, mut offsets) = ([0; N], [0.0; N]);
         for ((place, offset), z) in places.iter_mut().zip(&mut offsets).zip(z) {
             let position = z * self.density + (RANGE * self.density - 0.5);
+            // The lower bits of `nearest` are the number of the cell, and the remainder is the offset from the cell's centre.
             let nearest = position + ROOM;
             let has_cell = z.abs() < RANGE - 1.0 / DENSITY;
             *offset = if has_cell { position - (nearest - ROOM) } else { f64::NAN };
@@ -69,6 +73,7 @@ impl GammaCubics {
             #[expect(clippy::cast_possible_truncation, reason = "the lower bits are the number of the cell")]
             let [a, b, c, d] = self.cells[*place as usize % CELLS];
             let delay = (a + b * t) + (c + d * t) * (t * t);
+            // A delay within the margin of a half could be rounded the other way by the whole series. NaN is unknown, because its comparison fails.
             let nearest = delay + ROOM;
             let is_known = (delay - (nearest - ROOM)).abs() < 0.5 - MARGIN;
             *nanos = if is_known { nearest.to_bits().wrapping_sub(ROOM.to_bits()) } else { Self::UNKNOWN };
@@ -77,8 +82,9 @@ impl GammaCubics {
     }
 }
 
-/// Four terms around a point of a cell, in units of a width, if they are good enough within half a unit.
+/// Returns four terms around a point of a cell, in units of a width, or `None` if their error can exceed [`MARGIN`] within half a unit.
 fn cubic(law: &GammaLaw, mut terms: [f64; TERMS], (at, width): (f64, f64)) -> Option<[f64; 4]> {
+    // Shifts the polynomial to the point `at` by repeated Horner steps.
     for first in 0..TERMS {
         for term in (first..TERMS - 1).rev() {
             terms[term] += at * terms[term + 1];
@@ -90,6 +96,7 @@ fn cubic(law: &GammaLaw, mut terms: [f64; TERMS], (at, width): (f64, f64)) -> Op
         unit *= width;
     }
     terms[0] += law.origin;
+    // |t| is at most ½, so that term k contributes at most |term|/2^k.
     let most = |terms: &[f64], mut share: f64| {
         terms.iter().fold(0.0, |sum, term| {
             share *= 0.5;
@@ -98,6 +105,7 @@ fn cubic(law: &GammaLaw, mut terms: [f64; TERMS], (at, width): (f64, f64)) -> Op
     };
     let (varies, left_out) = (most(&terms[1..], 1.0), most(&terms[4..], 0.125));
     let (least, largest) = (terms[0] - varies, terms[0] + varies);
+    // A delay below the floor would have to be raised, and above 10^15 ns the sum leaves too few bits for the margin.
     let is_good = left_out + ROUNDING * largest <= MARGIN && least >= law.floor && largest < 1e15;
     is_good.then(|| [terms[0], terms[1], terms[2], terms[3]])
 }
@@ -112,7 +120,8 @@ mod tests {
         Law::new(&Distribution::Gamma, mean, sd, Some(floor)).unwrap().as_gamma().unwrap()
     }
 
-    /// Of many numbers, at the edges of cells, and where no cell is. The first laws have the least cells, the others errors that come close to the margin.
+    /// Compares delays of many numbers, at the edges of cells, and where no cell is. The first laws have the fewest cells, and the others have errors close
+    /// to the margin.
     #[test]
     fn delays_are_those_of_the_whole_series() {
         let edges = (-1024..=1024).map(|edge| f64::from(edge) / 128.0).flat_map(|edge| [edge.next_down(), edge, edge.next_up()]);

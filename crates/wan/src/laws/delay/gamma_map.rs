@@ -1,8 +1,8 @@
-//! The gamma law as a function of a standard normal number, x(z) = P⁻¹(a, Φ(z)), quickly.
+//! Fast map from a standard normal number to a gamma number, x(z) = P⁻¹(a, Φ(z)).
 //!
-//! x(z) is smooth, and its Taylor series at any point follows from one exact inverse: x′ = x·v and v′ = v·(−z + (x − a)·v), where
-//! v = φ(z)/(x^a·e^(−x)/Γ(a)) (the idea is Steinbrecher & Shaw's, *Quantile mechanics*, 2008). A cell of width 1/8 has eleven derivatives. A cell whose
-//! next two terms could be seen (small shapes, where x(z) falls off like a power of Φ) has none, nor has |z| ≥ 8: there the exact inverse answers.
+//! x(z) is smooth, and its Taylor series at any point follows from one exact inverse: x′ = x·v and v′ = v·(−z + (x − a)·v), where v = φ(z)/(x^a·e^(−x)/Γ(a))
+//! (the idea is Steinbrecher & Shaw's, *Quantile mechanics*, 2008). A cell of width 1/8 has eleven derivatives. A cell has no series if its next two terms
+//! would be visible (small shapes, where x(z) falls off like a power of Φ). In such a cell, and for |z| ≥ 8, the exact inverse is computed.
 
 use alloc::boxed::Box;
 
@@ -10,31 +10,34 @@ use super::LARGEST_NORMAL;
 use super::special::{gamma, gamma_inverse, normal};
 use super::tail::Tail;
 
-/// Cells lie in (−RANGE, RANGE).
+/// Half of the range of z: cells cover (−RANGE, RANGE).
 pub(super) const RANGE: f64 = 8.0;
-/// Cells per unit of z.
+/// Number of cells per unit of z.
 pub(super) const DENSITY: f64 = 8.0;
+/// Number of cells, 2·RANGE·DENSITY.
 const CELLS: u32 = 128;
+/// Number of Taylor coefficients of a cell.
 pub(super) const TERMS: usize = 12;
-/// Terms computed but not kept: they say how good the kept ones are.
+/// Number of terms that are computed only to bound the error of the others.
 const WITNESSES: usize = 2;
-/// What the terms left out may add, relative to x.
+/// Largest sum of the omitted terms, relative to x.
 const TOLERANCE: f64 = 1e-14;
 
-/// x(z) of one shape.
+/// Map x(z) of one shape.
 #[derive(Clone, Debug)]
 pub(super) struct GammaMap {
     shape: f64,
     cells: Box<[Cell; CELLS as usize]>,
 }
 
-/// Taylor coefficients in units of half a cell, NaN where they would not do: terms k, k + 4 and k + 8 lie together for k from 0 to 3, so that three sums are one
-/// of registers. It took a third of the instructions off a delay.
+/// Taylor coefficients in units of half a cell, or NaN where the series is not accurate enough. Array k, for k from 0 to 3, holds the terms k, k + 4 and
+/// k + 8, so that vector instructions add three sums at once.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 struct Cell([[f64; 4]; 4]);
 
 impl GammaMap {
+    /// Returns the map of one shape, after computing the series of every cell.
     pub(super) fn new(shape: f64) -> Self {
         let centre = |cell: u32| (f64::from(cell) + 0.5) / DENSITY - RANGE;
         let mut cells = Box::new([Cell::NONE; CELLS as usize]);
@@ -51,6 +54,7 @@ impl GammaMap {
     }
 
     #[inline(always)]
+    /// Returns x(z). NaN and numbers outside of the range of cells take the exact inverse.
     pub(super) fn at_normal(&self, z: f64) -> f64 {
         let position = (z + RANGE) * DENSITY;
         #[expect(clippy::cast_possible_truncation, reason = "saturates, to cells that are refused below")]
@@ -66,11 +70,12 @@ impl GammaMap {
         self.exactly(z)
     }
 
-    /// The terms of each cell, NaN where they would not do, and where it begins.
+    /// Returns the terms of each cell, which are NaN where the series is not accurate enough, and the cell's left edge.
     pub(super) fn series(&self) -> impl Iterator<Item = ([f64; TERMS], f64)> {
         self.cells.iter().zip(0..).map(|(cell, number)| (cell.terms(), f64::from(number) / DENSITY - RANGE))
     }
 
+    /// Returns x(z) by the exact inverse.
     #[cold]
     #[inline(never)]
     fn exactly(&self, z: f64) -> f64 {
@@ -80,17 +85,20 @@ impl GammaMap {
 }
 
 impl Cell {
+    /// Cell without a series.
     const NONE: Self = Self([[f64::NAN; 4]; 4]);
 
+    /// Returns a cell with the given terms, which are in ascending order of powers.
     fn new(terms: &[f64; TERMS]) -> Self {
         Self(core::array::from_fn(|k| [terms[k], terms[k + 4], terms[k + 8], 0.0]))
     }
 
+    /// Returns the terms in ascending order of powers.
     fn terms(&self) -> [f64; TERMS] {
         core::array::from_fn(|term| self.0[term % 4][term / 4])
     }
 
-    /// Σ terms·tᵏ, in pairs and pairs of pairs: half the latency of Horner's rule.
+    /// Returns Σ terms·tᵏ for t from −1 to 1, added in pairs and pairs of pairs, which has half the latency of Horner's rule.
     #[inline(always)]
     fn sum(&self, t: f64) -> f64 {
         let Self([first, second, third, fourth]) = self;
@@ -101,7 +109,7 @@ impl Cell {
     }
 }
 
-/// The series at `z`, if it is good enough.
+/// Returns the terms of the series at `z`, or `None` if the series is not accurate enough.
 fn taylor(a: f64, z: f64) -> Option<[f64; TERMS]> {
     const ALL: usize = TERMS + WITNESSES;
     let half = 0.5 / DENSITY;
@@ -113,6 +121,7 @@ fn taylor(a: f64, z: f64) -> Option<[f64; TERMS]> {
     let mut excess = x;
     excess[0] = first - a;
     let product = |left: &[f64; ALL], right: &[f64; ALL], n: usize| (0..=n).map(|i| left[i] * right[n - i]).sum::<f64>();
+    // Coefficient n + 1 of x and of v follows from the coefficients up to n of the right sides of their differential equations.
     let mut order = 0.0;
     for n in 0..ALL - 1 {
         order += 1.0;
@@ -129,6 +138,6 @@ fn taylor(a: f64, z: f64) -> Option<[f64; TERMS]> {
     let mut terms = [0.0; TERMS];
     terms.copy_from_slice(&x[..TERMS]);
     let witnesses: f64 = x[TERMS..].iter().map(|term| term.abs()).sum();
-    // A NaN is no witness.
+    // NaN fails the comparison, so that a series with NaN is refused.
     (witnesses <= TOLERANCE * Cell::new(&terms).sum(-1.0)).then_some(terms)
 }

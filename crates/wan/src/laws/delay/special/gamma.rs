@@ -1,22 +1,25 @@
-//! The regularised incomplete gamma functions P(a, x) and Q(a, x) = 1 − P(a, x), each accurate where it is small.
+//! Regularised incomplete gamma functions P(a, x) and Q(a, x) = 1 − P(a, x), each accurate where it is small.
 //!
-//! Power series (DLMF 8.7.1) below the mean, the continued fraction (DLMF 8.9.2) above it, Temme's uniform expansion (DLMF 8.12.3–8.12.4) near the
-//! mean of large shapes. Relative errors were below 10⁻¹³ in every comparison with mpmath; see the tests.
+//! The power series (DLMF 8.7.1) is used below the mean, the continued fraction (DLMF 8.9.2) above the mean, and Temme's uniform expansion (DLMF
+//! 8.12.3–8.12.4) near the mean of large shapes. Relative errors were below 10⁻¹³ in every comparison with mpmath; see the tests.
 
 use core::f64::consts::PI;
 
 use super::log_gamma::log_gamma_1p;
 use super::temme;
 
-/// P, Q and x·dP/dx = x^a·e^(−x)/Γ(a) at one point.
+/// Values of P, Q and x·dP/dx = x^a·e^(−x)/Γ(a) at one point.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::laws::delay) struct Gamma {
+    /// P(a, x).
     pub(in crate::laws::delay) below: f64,
+    /// Q(a, x).
     pub(in crate::laws::delay) above: f64,
+    /// x·dP/dx.
     pub(in crate::laws::delay) slope: f64,
 }
 
-/// For a > 0 and finite x ≥ 0.
+/// Returns P, Q and the slope for a > 0 and finite x ≥ 0.
 pub(in crate::laws::delay) fn incomplete(a: f64, x: f64) -> Gamma {
     if x <= 0.0 {
         return Gamma { below: 0.0, above: 1.0, slope: 0.0 };
@@ -33,6 +36,7 @@ pub(in crate::laws::delay) fn incomplete(a: f64, x: f64) -> Gamma {
         return if eta < 0.0 { Gamma { below: near, above: far, slope } } else { Gamma { below: far, above: near, slope } };
     }
     if x < a + 1.0 {
+        // For a small shape P is close to 1, and 1 − P would lose the digits of Q.
         if a < 1.0 {
             return small_shape(a, x, slope);
         }
@@ -43,16 +47,16 @@ pub(in crate::laws::delay) fn incomplete(a: f64, x: f64) -> Gamma {
     Gamma { below: 1.0 - above, above, slope }
 }
 
-/// x^a·e^(−x)/Γ(a), with half_square = (x − a)/a − ln(x/a).
+/// Returns x^a·e^(−x)/Γ(a). `half_square` is (x − a)/a − ln(x/a).
 fn slope(a: f64, x: f64, half_square: f64) -> f64 {
     if a < 8.0 {
         return a * libm::exp(a * libm::log(x) - x - log_gamma_1p(a));
     }
-    // Γ(a) = √(2π/a)·(a/e)^a·e^s(a): the large parts of the exponent cancel on paper.
+    // Γ(a) = √(2π/a)·(a/e)^a·e^s(a): the large parts of the exponent cancel before anything is computed.
     libm::exp(-a * half_square - stirling(a)) * libm::sqrt(a / (2.0 * PI))
 }
 
-/// ln Γ(a) − (a − ½)·ln a + a − ½·ln 2π for a ≥ 8 (DLMF 5.11.1): Bernoulli numbers to B₁₈, error below 10⁻¹⁷.
+/// Returns ln Γ(a) − (a − ½)·ln a + a − ½·ln 2π for a ≥ 8 (DLMF 5.11.1), from Bernoulli numbers up to B₁₈, with an error below 10⁻¹⁷.
 fn stirling(a: f64) -> f64 {
     const TERMS: [f64; 9] = [
         1.0 / 12.0,
@@ -69,19 +73,19 @@ fn stirling(a: f64) -> f64 {
     inverse * TERMS.iter().rev().fold(0.0, |sum, term| sum * inverse * inverse + term)
 }
 
-/// ln(1 + y) − y for y > −1, without cancellation near zero: with r = y/(2 + y), ln(1 + y) = 2·artanh r, and y − 2r = y·r.
+/// Returns ln(1 + y) − y for y > −1, without cancellation near zero: with r = y/(2 + y), ln(1 + y) = 2·artanh r, and y − 2r = y·r.
 pub(in crate::laws::delay) fn log_1p_minus(y: f64) -> f64 {
     if y.abs() > 0.4 {
         return libm::log1p(y) - y;
     }
     let r = y / (2.0 + y);
     let square = r * r;
-    // |r| ≤ ¼: the first term left out is below 10⁻¹⁸ of the first.
+    // |r| ≤ ¼, so the first omitted term is below 10⁻¹⁸ of the first term.
     let odd = (0..14).rev().fold(0.0, |sum, k| sum * square + 1.0 / f64::from(2 * k + 3));
     2.0 * r * square * odd - y * r
 }
 
-/// Σ xⁿ/((a + 1)…(a + n)), DLMF 8.7.1.
+/// Returns Σ xⁿ/((a + 1)…(a + n)), DLMF 8.7.1.
 fn power_series(a: f64, x: f64) -> f64 {
     let (mut term, mut sum, mut n) = (1.0, 1.0, a);
     while term > sum * 1e-17 {
@@ -92,8 +96,8 @@ fn power_series(a: f64, x: f64) -> f64 {
     sum
 }
 
-/// For a < 1 and x < a + 1. With P = e^w·(1 + a·s), w = a·ln x − ln Γ(1 + a) and s = Σ (−x)ⁿ/(n!·(a + n)), Q needs no difference of near numbers even
-/// where a is small and P is close to 1.
+/// Returns P, Q and the slope for a < 1 and x < a + 1. With P = e^w·(1 + a·s), w = a·ln x − ln Γ(1 + a) and s = Σ (−x)ⁿ/(n!·(a + n)), Q needs no difference
+/// of close numbers even where a is small and P is close to 1.
 fn small_shape(a: f64, x: f64, slope: f64) -> Gamma {
     let (mut power, mut sum, mut n) = (1.0, 0.0, 0.0);
     loop {
@@ -111,7 +115,7 @@ fn small_shape(a: f64, x: f64, slope: f64) -> Gamma {
     Gamma { below: slope / a * power_series(a, x), above, slope }
 }
 
-/// Γ(a, x)·e^x/x^a by the continued fraction of DLMF 8.9.2, evaluated by Lentz's method (Thompson & Barnett 1986).
+/// Returns Γ(a, x)·e^x/x^a by the continued fraction of DLMF 8.9.2, evaluated by Lentz's method (Thompson & Barnett 1986).
 fn continued_fraction(a: f64, x: f64) -> f64 {
     const TINY: f64 = 1e-300;
     let mut b = x + 1.0 - a;
@@ -124,6 +128,7 @@ fn continued_fraction(a: f64, x: f64) -> f64 {
         let numerator = -i * (i - a);
         b += 2.0;
         d = numerator * d + b;
+        // Lentz's method replaces a zero denominator by a tiny number, which cancels in the next step.
         if d.abs() < TINY {
             d = TINY;
         }
@@ -134,7 +139,7 @@ fn continued_fraction(a: f64, x: f64) -> f64 {
         d = 1.0 / d;
         let factor = d * c;
         h *= factor;
-        // 10 000 steps are never needed: near the mean of a large shape Temme's expansion has answered.
+        // The bound is a safeguard: near the mean of a large shape, where convergence is slow, Temme's expansion is used instead.
         if (factor - 1.0).abs() < 2e-16 || i > 10_000.0 {
             return h;
         }

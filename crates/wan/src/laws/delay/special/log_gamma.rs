@@ -1,16 +1,17 @@
-//! ln Γ(1 + a), also for small a.
+//! Logarithm of Γ(1 + a), accurate also for small a.
 
-/// ln Γ(1 + a) for a > −1, with a relative error of some 10⁻¹⁶ where a is small, which `lgamma(1 + a)` loses when it rounds its argument.
+/// Returns ln Γ(1 + a) for a > −1. The relative error is about 10⁻¹⁶ also for small a, where `lgamma(1 + a)` loses digits by rounding its argument.
 pub(in crate::laws::delay) fn log_gamma_1p(a: f64) -> f64 {
     if a.abs() > 0.125 { libm::lgamma(1.0 + a) } else { -EULER * a + series(a, |_| 1.0) }
 }
 
-/// ln Γ(1 + 2t) − 2·ln Γ(1 + t) for t > 0: ln(1 + CV²) of a Weibull law of shape 1/t. The terms linear in t cancel in the series.
+/// Returns ln Γ(1 + 2t) − 2·ln Γ(1 + t) for t > 0, which is ln(1 + CV²) of a Weibull law of shape 1/t. The terms linear in t cancel in the series.
 pub(in crate::laws::delay) fn log_gamma_ratio(t: f64) -> f64 {
     if t > 0.125 { libm::lgamma(1.0 + 2.0 * t) - 2.0 * libm::lgamma(1.0 + t) } else { series(t, |two_to_k| two_to_k - 2.0) }
 }
 
-/// Σ ζ(k)·(−a)^k·f(2^k)/k over k ≥ 2 (DLMF 5.7.3). For |a| ≤ 1/8 and f(2^k) ≤ 2^k the first term left out is below 10⁻¹⁹ of the first.
+/// Returns Σ ζ(k)·(−a)^k·f(2^k)/k over k ≥ 2 (DLMF 5.7.3), where `factor` is f. For |a| ≤ 1/8 and f(2^k) ≤ 2^k the first omitted term is below 10⁻¹⁹ of the
+/// first term.
 fn series(a: f64, factor: impl Fn(f64) -> f64) -> f64 {
     let (mut power, mut two_to_k, mut k, mut sum) = (-a, 2.0, 1.0, 0.0);
     for zeta in ZETA {

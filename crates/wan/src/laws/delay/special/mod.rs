@@ -1,4 +1,4 @@
-//! The special functions that `libm` lacks, to the last digits of an `f64` and in both tails.
+//! Special functions that `libm` lacks, accurate to the last digits of an `f64` in both tails.
 
 pub(super) mod gamma;
 pub(super) mod gamma_inverse;

@@ -1,21 +1,21 @@
-//! The normal law: Φ from `erfc`, and its inverse.
+//! Normal law: Φ from `erfc`, and the inverse of Φ.
 
 use core::f64::consts::FRAC_1_SQRT_2;
 
 /// 1/√(2π).
 const DENSITY_AT_ZERO: f64 = 0.398_942_280_401_432_7;
 
-/// φ(z), the density.
+/// Returns the density φ(z).
 pub(in crate::laws::delay) fn density(z: f64) -> f64 {
     DENSITY_AT_ZERO * libm::exp(-0.5 * z * z)
 }
 
-/// Φ(z), the probability below. Its relative error grows like z²·2⁻⁵³, that of the argument squared in the exponent.
+/// Returns Φ(z), the probability below z. The relative error grows like z²·2⁻⁵³, the error of the squared argument in the exponent.
 pub(in crate::laws::delay) fn below(z: f64) -> f64 {
     0.5 * libm::erfc(-z * FRAC_1_SQRT_2)
 }
 
-/// Φ⁻¹(p) for 0 < p ≤ ½: Wichura, *Algorithm AS 241* (1988), PPND16, relative error about 10⁻¹⁶ as published. For p = 0 it is −∞.
+/// Returns Φ⁻¹(p) for 0 < p ≤ ½, and −∞ for p = 0: Wichura, *Algorithm AS 241* (1988), PPND16, relative error about 10⁻¹⁶ as published.
 pub(in crate::laws::delay) fn inverse_below(p: f64) -> f64 {
     let centred = p - 0.5;
     if centred >= -0.425 {
@@ -32,7 +32,7 @@ pub(in crate::laws::delay) fn inverse_below(p: f64) -> f64 {
     }
 }
 
-/// The quotient of two polynomials, each from the constant upwards.
+/// Returns the quotient of two polynomials, each given by its coefficients from the constant upwards.
 fn ratio(r: f64, [above, below]: &[[f64; 8]; 2]) -> f64 {
     let polynomial = |coefficients: &[f64; 8]| coefficients.iter().rev().fold(0.0, |sum, c| sum * r + c);
     polynomial(above) / polynomial(below)

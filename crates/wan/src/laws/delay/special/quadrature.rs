@@ -1,6 +1,6 @@
 //! Integration by Gauss–Legendre panels.
 
-/// The nodes in (0, 1) of the ten-point rule on [−1, 1], and their weights.
+/// Nodes in (0, 1) of the ten-point rule on [−1, 1], each with its weight. The rule is symmetric.
 const NODES: [(f64, f64); 5] = [
     (0.973_906_528_517_171_7, 0.066_671_344_308_688_14),
     (0.865_063_366_688_984_5, 0.149_451_349_150_580_6),
@@ -18,7 +18,7 @@ pub(in crate::laws::delay) fn panel(low: f64, high: f64, mut at: impl FnMut(f64,
     }
 }
 
-/// ∫ f from `low` to `high` in panels of width 1 at most.
+/// Returns ∫ f from `low` to `high`, in panels of width 1 at most.
 pub(in crate::laws::delay) fn integral(low: f64, high: f64, f: impl Fn(f64) -> f64) -> f64 {
     let panels = libm::ceil(high - low).max(1.0);
     let width = (high - low) / panels;

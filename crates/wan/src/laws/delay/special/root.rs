@@ -1,6 +1,7 @@
-//! The root of an increasing function.
+//! Root of an increasing function.
 
-/// Where `f` crosses zero in [low, high], to the last digit: the secant method with a bracket, which is bisected whenever it has not halved. If `f` has no zero inside, the end next to it.
+/// Returns the zero of `f` in [low, high] to the last digit, or the nearer end if `f` has no zero inside. The method is the secant method with a bracket; the
+/// bracket is bisected whenever a step has not halved it.
 pub(in crate::laws::delay) fn increasing(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     let (mut at_low, mut at_high) = (f(low), f(high));
     if at_low >= 0.0 {
@@ -24,13 +25,13 @@ pub(in crate::laws::delay) fn increasing(f: impl Fn(f64) -> f64, mut low: f64, m
         }
         if value < 0.0 {
             (low, at_low) = (next, value);
-            // Illinois (Dowell & Jarratt 1971): an end that stays has half its weight.
+            // Illinois (Dowell & Jarratt 1971): the value at an end that stays is halved, so that the next secant moves that end.
             at_high *= 0.5;
         } else {
             (high, at_high) = (next, value);
             at_low *= 0.5;
         }
-        // A step that has not halved the bracket is followed by one that does.
+        // After a step that has not halved the bracket, the next step bisects.
         bisect = high - low > 0.5 * width;
     }
     if -at_low < at_high { low } else { high }

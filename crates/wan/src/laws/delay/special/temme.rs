@@ -1,15 +1,15 @@
-//! The coefficients of Temme's uniform expansion of the incomplete gamma functions.
+//! Coefficients of Temme's uniform expansion of the incomplete gamma functions.
 //!
 //! DLMF 8.12.7–8.12.10: C_k(η) = Σ d(k, n)·ηⁿ with d(0, n) = (n + 2)·α(n + 2), d(0, 0) = −1/3,
 //! d(k, n) = (−1)^k·g(k)·d(0, n) + (n + 2)·d(k − 1, n + 2), where λ − 1 = Σ α(n)·ηⁿ inverts ½η² = λ − 1 − ln λ and g(k) are Stirling's
 //! coefficients. Computed in rational numbers; terms below 2·10⁻¹⁹·50^k are left out. For a ≥ 50 and |η| ≤ 1 the error of the sum was 2·10⁻¹⁷.
 
-/// Where the expansion is used: a at least this,
+/// Least shape a for which the expansion is used.
 pub(super) const LEAST_SHAPE: f64 = 50.0;
-/// and |η| at most this.
+/// Largest |η| for which the expansion is used.
 pub(super) const LARGEST_ETA: f64 = 1.0;
 
-/// Σ C_k(η)·a^(−k).
+/// Returns Σ C_k(η)·a^(−k).
 pub(super) fn sum(a: f64, eta: f64) -> f64 {
     let polynomial = |row: &&[f64]| row.iter().rev().fold(0.0, |sum, c| sum * eta + c);
     D.iter().rev().map(polynomial).fold(0.0, |sum, c| sum / a + c)

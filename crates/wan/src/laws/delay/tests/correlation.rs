@@ -27,7 +27,8 @@ fn correlations_agree_with_double_integrals() {
     }
 }
 
-/// A coin's correlation is 2/π·asin φ (Sheppard 1899), and a law uniform between two values has 6/π·asin(φ/2); neither is told its form.
+/// A coin has the correlation 2/π·asin φ (Sheppard 1899), and a law uniform between two values has 6/π·asin(φ/2). The laws are made as tables and values, so
+/// that no closed form is used.
 #[test]
 fn correlations_of_values_agree_with_closed_forms() {
     let coin = Law::new(&table("-8192 8192"), 24.0, 2.0, None).unwrap();
@@ -40,7 +41,7 @@ fn correlations_of_values_agree_with_closed_forms() {
     }
 }
 
-/// The series against the closed form for a law that has both: the empirical law of 4097 lognormal quantiles is nearly lognormal.
+/// Compares the series with the closed form for a law that has both: the empirical law of 4097 lognormal quantiles is nearly lognormal.
 #[test]
 fn a_large_sample_has_the_correlation_of_its_law() {
     let smooth = law("lognormal", 24.0, 2.0, 0.0);

@@ -1,4 +1,4 @@
-//! The laws against references, against themselves, and against chance.
+//! Tests of the laws against references, against each other, and against random draws.
 
 mod correlation;
 mod properties;
@@ -9,7 +9,7 @@ mod statistics;
 
 use super::*;
 
-/// The law of that name, as the reference names it.
+/// Returns the law with the name that the reference uses.
 fn law(name: &str, mean: f64, sd: f64, floor: f64) -> Law {
     let distribution = match name {
         "normal" => Distribution::Normal,
@@ -35,7 +35,7 @@ fn table(text: &str) -> Distribution {
     Distribution::Table(Arc::new(DistTable::parse(text).unwrap()))
 }
 
-/// One law of every kind and of every way to meet its floor.
+/// Returns one law of every form and of every behaviour at the floor.
 fn every_law() -> Vec<(&'static str, Law)> {
     [
         ("normal", 24.0, 2.0, 0.0),

@@ -19,7 +19,7 @@ fn distribution() -> impl Strategy<Value = Distribution> {
     ]
 }
 
-/// A size between 10⁻⁶ and 10⁹.
+/// Returns a size between 10⁻⁶ and 10⁹.
 fn size() -> impl Strategy<Value = f64> {
     (-6.0..9.0_f64).prop_map(libm::exp10)
 }
@@ -27,7 +27,7 @@ fn size() -> impl Strategy<Value = f64> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Whatever is accepted is monotone, finite and not below its floor, and is refused for a stated reason otherwise.
+    /// An accepted law is monotone, finite and not below its floor. Any other law is refused with a stated reason.
     #[test]
     fn every_law_is_monotone_finite_and_above_its_floor(
         distribution in distribution(), floor in size(), above in size(), sd in size(), mut zs in prop::collection::vec(-45.0..45.0_f64, 12),
@@ -44,7 +44,7 @@ proptest! {
         }
     }
 
-    /// Ends included.
+    /// The words include both ends of their range, and both words at its middle.
     #[test]
     fn draws_of_any_words_are_delays(distribution in distribution(), sd in size(), word: u64, more: u64) {
         let Ok(law) = Law::new(&distribution, 1e9, sd, Some(1.0)) else { return Ok(()) };

@@ -1,7 +1,7 @@
 use super::reference::{PLACES, QUANTILES};
 use super::*;
 
-/// Of a delay near the floor the digits of floor + X are those of the sum, so errors are relative to the delay.
+/// The digits of a delay near its floor are those of the sum floor + X, so errors are relative to the delay.
 #[test]
 fn quantiles_agree_with_the_reference_in_both_tails() {
     for case in QUANTILES {
@@ -23,7 +23,7 @@ fn quantiles_agree_with_the_reference_in_both_tails() {
     }
 }
 
-/// cdf and survival undo the quantiles; a relative error ε of a delay is one of ε·delay·density/probability there, which steep tails make large.
+/// cdf and survival invert the quantiles. A relative error ε of a delay becomes an error of ε·delay·density/probability, which is large in steep tails.
 #[test]
 fn the_distribution_function_inverts_the_quantiles() {
     for (name, law) in every_law() {
@@ -76,7 +76,7 @@ fn a_narrow_gamma_law_agrees_with_its_expansion() {
     }
 }
 
-/// The quick map and the exact inverse are two ways to one function.
+/// The fast map and the exact inverse compute the same function.
 #[test]
 fn the_quick_gamma_map_is_exact() {
     for variation in [0.001, 0.03, 0.14, 0.3, 1.0, 1.5, 3.0, 30.0, 100.0] {
@@ -84,13 +84,13 @@ fn the_quick_gamma_map_is_exact() {
         for i in -9000..9000 {
             let z = f64::from(i) * 0.000_987;
             let (quick, exact) = (law.at_normal(z), law.at(Tail::of_normal(z)));
-            // The exact inverse has the probability's last digits over the shape.
+            // The error of the exact inverse is that of the last digits of the probability, divided by the shape.
             assert!((quick - exact).abs() <= (1e-13 + 3e-14 * variation * variation) * exact, "{variation}, {z}: {quick} is not {exact}");
         }
     }
 }
 
-/// By a law that is asked which it is, and by one that is known: the same bits, at the edges of cells and beyond the last too.
+/// A law with a choice of form and a known gamma law give the same bits, also at the edges of cells and beyond the last cell.
 #[test]
 fn gamma_delays_are_those_of_their_law() {
     for (variation, floor) in [(0.08, 0.0), (0.3, 0.5), (1.0, 0.0), (3.0, 0.0)] {
@@ -106,7 +106,7 @@ fn gamma_delays_are_those_of_their_law() {
 #[test]
 fn the_mean_and_the_deviation_are_those_of_the_quantiles() {
     for (name, law) in every_law() {
-        // Panels of 1/256 in z; jumps and kinks inside one cost a part of its probability.
+        // Panels have a width of 1/256 in z. Jumps and kinks inside a panel add an error of a part of its probability.
         let integral = |f: &dyn Fn(f64) -> f64| {
             let mut sum = 0.0;
             for i in -13 * 256..24 * 256 {

@@ -1,4 +1,4 @@
-//! Values computed with mpmath 1.3 at 40 digits from the very `f64`s written here; each table says by which formula.
+//! Values computed with mpmath 1.3 at 40 digits from exactly the `f64`s written here. The comment of each table gives the formula.
 
 use crate::laws::delay::tail::Tail::{self, Above, Below};
 
@@ -105,18 +105,18 @@ pub(in crate::laws::delay) const GAMMA: &[(f64, f64, f64, f64)] = &[
     (1_000_000.0, 1_007_000.0, 0.999_999_999_998_566_3, 1.433_784_396_232_894_8e-12),
 ];
 
-/// A law and its quantiles.
+/// Law with its quantiles.
 #[derive(Debug)]
 pub(in crate::laws::delay) struct Case {
     pub(in crate::laws::delay) name: &'static str,
     pub(in crate::laws::delay) mean: f64,
     pub(in crate::laws::delay) sd: f64,
     pub(in crate::laws::delay) floor: f64,
-    /// At the places of [`PLACES`].
+    /// Quantiles at the places of [`PLACES`].
     pub(in crate::laws::delay) quantiles: [f64; 12],
 }
 
-/// Where the quantiles are compared.
+/// Probabilities at which quantiles are compared.
 pub(in crate::laws::delay) const PLACES: [Tail; 12] = [
     Below(1.0e-12),
     Below(1.0e-6),

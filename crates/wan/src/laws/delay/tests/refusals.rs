@@ -60,7 +60,7 @@ fn values_are_used_as_they_are_if_asked_for_with_their_own_moments() {
     assert_eq!([0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0].map(|p| law.quantile(p)).map(|x| libm::rint(x * 1e12) / 1e12), values);
 }
 
-/// What a table delivers is what it says: here the two entries at ±½ deviation.
+/// A table delivers its own moments: here two entries at ±½ deviation.
 #[test]
 fn a_table_reports_its_own_deviation() {
     let law = Law::new(&table("-4096 4096"), 24.0, 2.0, None).unwrap();

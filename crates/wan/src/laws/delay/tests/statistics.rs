@@ -5,7 +5,7 @@ use crate::random::{Purpose, Stream};
 /// is conservative.
 const KS: f64 = 2.2253;
 
-/// The largest distance between the empirical distribution and the law. At a jump of either, both are taken from the same side.
+/// Returns the largest distance between the empirical distribution and the law. At a jump of either, both are evaluated from the same side.
 fn kolmogorov(mut sample: Vec<f64>, law: &Law) -> f64 {
     sample.sort_by(f64::total_cmp);
     let n = sample.len() as f64;
@@ -20,7 +20,8 @@ fn kolmogorov(mut sample: Vec<f64>, law: &Law) -> f64 {
     largest
 }
 
-/// A table's steps are asked about where rounding could put them on either side, so the delays are taken halfway to the next entry.
+/// Returns the largest distance between the sample and the law. Rounding could move the steps of a table to either side, so a table is compared at places
+/// spread over all delays instead of at its steps.
 fn distance(sample: Vec<f64>, name: &str, law: &Law) -> f64 {
     if name != "table" {
         return kolmogorov(sample, law);
@@ -67,7 +68,7 @@ fn draws_have_the_moments() {
     }
 }
 
-/// E of ((delay − mean)/sd)^k.
+/// Returns E of ((delay − mean)/sd)^k.
 fn moment(law: &Law, k: i32) -> f64 {
     let mut sum = 0.0;
     for i in -13 * 32..20 * 32 {
@@ -79,7 +80,7 @@ fn moment(law: &Law, k: i32) -> f64 {
     sum
 }
 
-/// Delays of an AR(1) Gaussian: every 20th of them, correlated by 0.8²⁰ = 1 %, have the law, and neighbours have the correlation.
+/// Every 20th delay of a Gaussian AR(1), correlated by 0.8²⁰ = 1 %, has the law, and neighbouring delays have the correlation.
 ///
 /// The standard error of Σ x(n)·x(n + 1)/N with x standardised is √(Σ over lags of the covariance of the products/N); it is measured here from 64 blocks
 /// of the same run, so the bound is 5 of them (Student's t with 63 degrees of freedom: 5·10⁻⁶) and the model's own error of 10⁻⁵.
