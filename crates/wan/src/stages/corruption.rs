@@ -67,6 +67,7 @@ impl CorruptionStage {
     /// Returns the stage with the configuration `config`, or `None` without a configuration. Correlated damage continues from the previous packet.
     pub(crate) fn reconfigured(before: Option<Self>, config: Option<Corruption>) -> Option<Self> {
         let config = config?;
+        // Only a chance has state. A change between the two ways of choosing bits therefore begins without state.
         let before = before.and_then(|stage| stage.packets);
         let packets = match config.bits {
             Flips::Bits { packets, .. } => ChanceStage::reconfigured(before, packets),
@@ -105,6 +106,7 @@ fn some_of(count: u64, wanted: u32, packet: PacketDraws) -> Vec<u64> {
     let mut more = packet.more(Purpose::Corruption);
     let mut chosen = BTreeSet::new();
     for last in count.saturating_sub(wanted.into())..count {
+        // One word per chosen bit, whatever was chosen before.
         let candidate = below(last + 1, more.next_word());
         // `last` is above all numbers chosen in earlier rounds, so it is new.
         if !chosen.insert(candidate) {

@@ -106,7 +106,7 @@ pub enum DelayError {
     },
     /// The correlation time is zero.
     NoTime,
-    /// A span exceeds 292 years, or a deviation exceeds 146 years, which a signed number of nanoseconds cannot hold.
+    /// The mean exceeds 292 years, the longest span in signed nanoseconds, or the deviation exceeds half of that.
     TooLong,
 }
 
@@ -244,6 +244,7 @@ struct Correlated {
 
 impl DelayStage {
     pub(crate) fn new(delay: &Delay) -> Self {
+        // The cheapest way of drawing that fits is chosen once, not at each packet.
         let law = match &delay.jitter {
             None => StageLaw::Constant,
             Some(checked) => match (&checked.jitter, checked.memory) {
@@ -267,6 +268,7 @@ impl DelayStage {
     /// Sets the delay of later packets. A chain of correlated delays continues from its present value.
     pub(crate) fn reconfigure(&mut self, delay: &Delay) {
         let before = core::mem::replace(self, Self::new(delay));
+        // The chain is standard normal under every law, so that its value is valid for the new law too.
         if let (StageLaw::Correlated(before), StageLaw::Correlated(now)) = (before.law, &mut self.law) {
             now.chain = before.chain;
         }
@@ -347,6 +349,7 @@ impl CorrelatedDelays {
     pub(crate) fn new(delay: &Delay) -> Option<Self> {
         let checked = delay.jitter.as_ref()?;
         let Memory::PerPacket(phi) = checked.memory else { return None };
+        // A gamma law gets a form of its own, without the choice between laws at each packet.
         let marginal = checked.law.as_gamma().map_or_else(|| Marginal::Other(Arc::clone(checked)), Marginal::Gamma);
         Some(Self { marginal, phi, fresh_share: fresh_share(phi) })
     }

@@ -103,6 +103,7 @@ impl Modulator {
         if states.is_empty() {
             return Err(ModulatorError::NoStates);
         }
+        // A state that follows itself would end without a change, so that its own weight must be 0.
         for (place, state) in states.iter().enumerate() {
             if state.next.len() != states.len() {
                 return Err(ModulatorError::Size { state: place, found: state.next.len(), expected: states.len() });
@@ -128,6 +129,7 @@ impl Modulator {
     pub fn from_rates(name: &str, rates: &[Vec<f64>]) -> Result<Self, ModulatorError> {
         let state = |(place, row): (usize, &Vec<f64>)| {
             let next: Vec<f64> = row.iter().enumerate().map(|(next, rate)| if next == place { 0.0 } else { *rate }).collect();
+            // The time in a state is exponential with the sum of the rates, and the next state is chosen in proportion to the rates.
             let total: f64 = next.iter().sum();
             let sojourn = (total > 0.0 && total.is_finite()).then(|| {
                 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "positive; saturates at 584 years")]
@@ -171,6 +173,7 @@ impl Modulated {
         if configs.len() != modulator.states.len() {
             return Err(ModulatorError::Configs { configs: configs.len(), states: modulator.states.len() });
         }
+        // A live change cannot move packets between stages that change places.
         if configs.windows(2).any(|pair| pair[0].layout != pair[1].layout) {
             return Err(ModulatorError::Layouts);
         }
@@ -209,6 +212,7 @@ impl ModulationStage {
         let draws = Stream::new(seed, alloc::format!("modulator {}", modulated.modulator.name).as_bytes());
         let mut stage = Self { modulated, draws, state: 0, changes: 0, until: Instant::ZERO };
         stage.until = stage.end_of_state(Instant::ZERO);
+        // A link that joins later walks the same path from the begin of time, so that it changes with all other links of the modulator.
         while stage.next_change().is_some_and(|at| at <= now) {
             stage.change();
         }

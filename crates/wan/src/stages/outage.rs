@@ -189,6 +189,7 @@ impl OutageStage {
         }
         let begin = Self { outages: Outages::default(), span: 0, span_ends: Instant::MAX, last_taken: now };
         let mut stage = before.unwrap_or(begin);
+        // A link whose idle outages begin now has not been idle before.
         if stage.outages.idle.is_none() {
             stage.last_taken = now;
         }
@@ -209,6 +210,7 @@ impl OutageStage {
         if let Some(random) = self.outages.random {
             while self.span_ends <= now {
                 self.span += 1;
+                // Spans up and down alternate, and each is drawn once, so that the path does not depend on when packets ask.
                 let law = if self.span.is_multiple_of(2) { random.up } else { random.down };
                 self.span_ends = self.span_ends.saturating_add(drawn(law, draws, self.span));
                 // The sum saturates at the end of time. Without this exit a packet at the end of time would draw spans for ever.

@@ -111,6 +111,7 @@ impl PathTrace {
     /// Returns the delay \[ns\] and the probability of loss at `now`.
     pub(crate) fn at(&self, now: Instant) -> (u64, Probability) {
         let end = self.rows.last().map_or(Instant::ZERO, |last| last.at);
+        // `parse` refuses a repeating recording whose last row is at zero, for which the remainder would be undefined.
         let now = if self.repeats { Instant::from_nanos(now.as_nanos() % end.as_nanos()) } else { now };
         let next = self.rows.partition_point(|row| row.at <= now);
         // A checked recording has at least one row. Before the first row `next` is 0, and the first row holds.
@@ -120,6 +121,7 @@ impl PathTrace {
                 // `whole` is above zero: `after` is the first row later than `now`, and `row` is not later than `now`.
                 let (passed, whole) = (now.as_nanos() - row.at.as_nanos(), after.at.as_nanos() - row.at.as_nanos());
                 let (from, to) = (i128::from(row.delay_nanos), i128::from(after.delay_nanos));
+                // 128 bits hold the product of two times of 64 bits, with a sign.
                 let change = (to - from) * i128::from(passed) / i128::from(whole);
                 u64::try_from(from + change).unwrap_or(row.delay_nanos)
             }

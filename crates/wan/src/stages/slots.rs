@@ -115,6 +115,7 @@ impl<T> SlotStage<T> {
 
     /// Sets the configuration that holds from the next slot on. A chain of correlated gaps continues from its present state.
     pub(crate) fn reconfigure(&mut self, config: Slots) {
+        // The slot that is coming keeps its instant; only later gaps follow the new law.
         self.law = match (self.law.take(), &config.gap) {
             (_, SlotGap::Between { .. }) => None,
             (None, SlotGap::Drawn(delay)) => Some(DelayStage::new(delay)),
@@ -178,6 +179,7 @@ impl<T> SlotStage<T> {
                 min.saturating_add(Duration::from_nanos(beyond))
             }
             (SlotGap::Drawn(_), Some(law)) => Duration::from_nanos(law.draw_nanos_for(Purpose::Slot, now, word, draws)),
+            // Cannot occur: `new` and `reconfigure` make a law for every drawn gap.
             (SlotGap::Drawn(delay), None) => delay.mean(),
         };
         self.count += 1;

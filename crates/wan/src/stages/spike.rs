@@ -104,11 +104,13 @@ impl ImpairmentStage for SpikeStage {
         stage.pass(now);
         (stage.level, stage.at) = (stage.level_at(now), now);
         let rate = |config: Option<&Spike>| config.map_or(0.0, |config| config.rate);
+        // The next gap stays only if the rate is the same to the bit.
         let same_rate = rate(stage.config.as_ref()).to_bits() == rate(config).to_bits();
         stage.config = config.cloned();
         if config.is_none() {
             stage.level = 0.0;
         }
+        // An exponential gap has no memory, so that a new gap may begin at the present instant.
         if !same_rate {
             stage.next = now;
             stage.draw_next();

@@ -65,6 +65,7 @@ impl GilbertElliott {
     /// drawn.
     #[inline(always)]
     pub(crate) fn loses(&self, state: &mut State, transition: u64, loss: impl FnOnce() -> u64) -> bool {
+        // The transition always takes its word, and the loss takes a second word only if it is not certain.
         let before = *state;
         *state = match before {
             State::Good if self.p.happens(transition) => State::Bad,

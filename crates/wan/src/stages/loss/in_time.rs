@@ -77,6 +77,7 @@ impl GilbertElliottInTime {
     pub(crate) fn loses(&self, seen: &mut Option<Seen>, now: Instant, transition: u64, loss: u64) -> bool {
         let stationary = self.bad_fraction();
         let bad = match *seen {
+            // Before the first packet the state has the stationary law.
             None => stationary,
             Some(before) => {
                 let gap = now.saturating_duration_since(before.at).as_secs_f64();

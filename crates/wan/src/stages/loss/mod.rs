@@ -121,6 +121,7 @@ impl LossStage {
 
     /// Returns the stage with the model `loss`. A chain stays in its state if the previous model is of the same kind.
     pub(crate) fn reconfigured(before: Option<Self>, loss: Loss, initial: u64) -> Option<Self> {
+        // Independent loss has no state that could continue.
         let before = match before {
             Some(Self::WithMemory(before)) => Some(*before),
             Some(Self::Independent(_)) | None => None,

@@ -132,6 +132,7 @@ impl Pattern {
             longest = longest.max(run);
             end = Some(span.end);
         }
+        // A run longer than a period covers a whole period without a gap, and so every later period as well.
         let covers_all = self.period.is_some_and(|period| longest > period) || longest == u64::MAX;
         (!covers_all).then_some(longest)
     }

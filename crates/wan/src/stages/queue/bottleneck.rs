@@ -158,6 +158,7 @@ impl<T> BottleneckStage<T> {
     #[inline]
     pub(crate) fn departure_if_idle(&mut self, now: Instant, size: Bytes) -> Option<Instant> {
         let Service::Rate(rate) = &self.config.service else { return None };
+        // A waiting packet implies a packet on the line, so that the queue is empty here.
         if self.in_service.is_some() || matches!(self.config.discipline, Discipline::Red(_)) {
             return None;
         }

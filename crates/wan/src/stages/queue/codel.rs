@@ -71,12 +71,14 @@ impl CoDelState {
     /// Decides about the packet that leaves the queue `now` after waiting for `sojourn`, while `left_bytes` wait after it. After [`Verdict::Drop`] the caller
     /// asks about the next packet at the same instant. Follows the pseudocode of RFC 8289, section 5, with one packet per call.
     pub(crate) fn verdict(&mut self, codel: &CoDel, now: Instant, sojourn: Duration, left_bytes: u128, ecn_capable: bool) -> Verdict {
+        // Called for every packet that leaves, dropped or not, because it tracks since when waits exceed the target.
         let ok_to_drop = self.should_drop(codel, now, sojourn, left_bytes);
         match core::mem::take(&mut self.dropped) {
             Dropped::Entering => return Verdict::Send,
             Dropped::Again if ok_to_drop => self.drop_next = control_law(self.drop_next, codel.interval, self.count),
             Dropped::Again | Dropped::Not => {}
         }
+        // A mark replaces a drop, and the packet is sent: CoDel does not go on to the next packet.
         let marks = codel.ecn && ecn_capable;
         if self.dropping {
             if !ok_to_drop {
@@ -99,6 +101,7 @@ impl CoDelState {
         }
         self.dropping = true;
         // A queue that grew again soon after it was controlled continues with the rate of drops that controlled it.
+        // `count` is never below `last_count`: it grows while dropping, and both are set together.
         let since = self.count - self.last_count;
         let recently = now.saturating_duration_since(self.drop_next) < codel.interval.saturating_mul(16);
         self.count = if since > 1 && recently { since } else { 1 };
@@ -120,6 +123,7 @@ impl CoDelState {
 
     /// Returns whether waits have exceeded the target for an interval, and tracks since when they exceed it.
     fn should_drop(&mut self, codel: &CoDel, now: Instant, sojourn: Duration, left_bytes: u128) -> bool {
+        // A queue of at most one packet of the largest size cannot be shortened without leaving the line idle.
         if sojourn < codel.target || left_bytes <= u128::from(codel.mtu.get()) {
             self.first_above = None;
             return false;

@@ -105,6 +105,7 @@ impl RedState {
     pub(crate) fn verdict(&mut self, red: &Red, queued: u128, idle_packets: f64, ecn_capable: bool, word: u64) -> Verdict {
         #[expect(clippy::cast_precision_loss, reason = "an average")]
         let queued = queued as f64;
+        // While the line is idle the average decays as if empty queues had been observed at the rate of mean packets.
         self.average *= libm::pow(1.0 - red.weight, idle_packets);
         self.average += red.weight * (queued - self.average);
         #[expect(clippy::cast_precision_loss, reason = "thresholds of an average")]
@@ -113,6 +114,7 @@ impl RedState {
             self.count = 0.0;
             return Verdict::Pass;
         }
+        // Marks do not suffice above the upper threshold, so that every packet is dropped there, with ECN as well.
         if self.average >= max {
             self.count = 0.0;
             return Verdict::Drop;
@@ -120,6 +122,7 @@ impl RedState {
         let base = red.max_probability.get() * (self.average - min) / (max - min);
         // With this correction the gap between hits is uniform on 1 … 1/base (the paper's method 2).
         let left = 1.0 - self.count * base;
+        // When the count reaches the end of the uniform gap, the packet is hit with certainty.
         let hit = if left > base { base / left } else { 1.0 };
         if !Probability::new(hit).unwrap_or(Probability::ONE).happens(word) {
             self.count += 1.0;
