@@ -173,7 +173,7 @@ impl Modulated {
         if configs.len() != modulator.states.len() {
             return Err(ModulatorError::Configs { configs: configs.len(), states: modulator.states.len() });
         }
-        // A live change cannot move packets between stages that change places.
+        // A change of state reconfigures the stages in place, and so cannot change their order.
         if configs.windows(2).any(|pair| pair[0].layout != pair[1].layout) {
             return Err(ModulatorError::Layouts);
         }
