@@ -1,4 +1,4 @@
-//! When something happens for receivers that somebody waits for.
+//! Instants at which packets may reach the receivers that a driver waits for.
 
 use alloc::collections::BinaryHeap;
 use alloc::vec::Vec;
@@ -9,10 +9,11 @@ use cohaptic_units::Instant;
 use super::id::NodeId;
 use super::pending::LineId;
 
-/// The receivers, and the instants to come of the packets on the way to them.
+/// Awaited receivers, and the instants at which packets may reach them.
 #[derive(Clone, Debug)]
 pub(super) struct Awaited {
-    /// By node.
+    /// Whether a node is awaited, indexed by node.
+    /// Instants to come, earliest first. An instant may occur several times.
     is_awaited: Vec<bool>,
     instants: BinaryHeap<Reverse<Instant>>,
 }
@@ -28,7 +29,7 @@ impl Awaited {
         Self { is_awaited, instants: BinaryHeap::new() }
     }
 
-    /// A packet to that node comes out of a line.
+    /// Notes that a packet to node `to` leaves a line at `at`.
     #[inline]
     pub(super) fn schedule(&mut self, at: Instant, to: NodeId) {
         if self.is_awaited[to.index()] {
@@ -36,10 +37,11 @@ impl Awaited {
         }
     }
 
-    /// The engine of a line must be woken.
+    /// Notes that the engine of `line` must be woken at `at`.
     pub(super) fn announce(&mut self, at: Instant, line: LineId) {
         let is_awaited = match line {
-            // Its packets go to any node.
+            // The packets of an uplink go to any node.
+            // Links between all nodes are numbered `from * nodes + to`: the remainder is the receiver.
             LineId::Uplink(_) => true,
             LineId::Link(link) => self.is_awaited[link.index() % self.is_awaited.len()],
             LineId::Downlink(node) => self.is_awaited[node.index()],
@@ -53,7 +55,7 @@ impl Awaited {
         self.instants.peek().map(|Reverse(at)| *at)
     }
 
-    /// All that was due up to and including `now` has happened.
+    /// Forgets all instants up to and including `now`: their events have happened.
     #[inline]
     pub(super) fn pass(&mut self, now: Instant) {
         while self.instants.peek().is_some_and(|Reverse(at)| *at <= now) {

@@ -1,4 +1,4 @@
-//! What a network is made of.
+//! Configuration of a network, and the errors of its calls.
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -49,36 +49,36 @@ use crate::line::pipeline::TimeWentBack;
 /// ```
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub enum AccessLine {
-    /// All that the node sends.
+    /// The line that all packets of the node pass before their links.
     Uplink(NodeId),
-    /// All that the node receives.
+    /// The line that all packets to the node pass after their links.
     Downlink(NodeId),
 }
 
-/// What a network is made of.
+/// Configuration of a network.
 #[derive(Clone, Debug, Default)]
 pub struct NetworkConfig {
-    /// The seed of all random streams.
+    /// Seed of all random streams.
     pub seed: u64,
-    /// The names of the nodes. They are the addresses of the links' random numbers: equal names, equal draws.
+    /// Names of the nodes. The names address the random numbers of links: links with equal names and an equal seed draw equal numbers.
     pub nodes: Vec<String>,
-    /// Whether links whose only impairment is a constant delay take the general path too. It changes no answer, only the speed.
+    /// Whether links with a constant delay and no other impairment take the general path too. Only speed differs, no answer.
     pub general: bool,
 }
 
-/// Why a call failed. Nothing was changed.
+/// Why a call failed. The network is unchanged after each of these errors.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum NetworkError {
     /// An earlier call had a later instant.
     TimeWentBack(TimeWentBack),
-    /// There is no such node, or sender and receiver are the same.
+    /// No link for this path: a node does not exist, sender and receiver are the same node, or the network has links to other nodes only.
     NoLink {
         /// The sender.
         from: NodeId,
         /// The receiver.
         to: NodeId,
     },
-    /// There is no such access line.
+    /// The node of this access line does not exist.
     NoLine(AccessLine),
 }
 

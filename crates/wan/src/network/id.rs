@@ -1,18 +1,18 @@
-//! The names of nodes, paths and links in code: their places in lists.
+//! Identifiers of nodes, paths and links: indices into lists.
 
-/// A node of a network, by its place in [`NetworkConfig::nodes`](crate::NetworkConfig::nodes), from 0.
+/// A node of a network: an index into [`NetworkConfig::nodes`](crate::NetworkConfig::nodes), from 0.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub struct NodeId(pub u16);
 
 impl NodeId {
-    /// The node at this place of a list; at a place from 65,535 on it is a node that no network has.
+    /// Returns the node with this index. An index from 65,535 on gives a node that no network has.
     #[must_use]
     #[inline]
     pub fn new(index: usize) -> Self {
         Self(u16::try_from(index).unwrap_or(u16::MAX))
     }
 
-    /// The place in a list.
+    /// Returns the index of the node in a list of nodes.
     #[must_use]
     #[inline]
     pub const fn index(self) -> usize {
@@ -20,7 +20,7 @@ impl NodeId {
     }
 }
 
-/// From which node to which. A network has a link for each path, and perhaps access lines before and behind it.
+/// A pair of sender and receiver. A network has a link for each path, and may have access lines before and after the link.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub struct Path {
     /// The sender.
@@ -29,23 +29,23 @@ pub struct Path {
     pub to: NodeId,
 }
 
-/// A link, by its place in a list of links, from 0.
+/// A link: an index into a list of links, from 0.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub struct LinkId(pub u32);
 
 impl LinkId {
-    /// The link at this place of a list.
+    /// Returns the link with this index.
     ///
     /// # Panics
     ///
-    /// From 2^32 on: no memory holds 2^32 links.
+    /// With an index from 2^32 on, which no list in memory has.
     #[must_use]
     #[inline]
     pub fn new(index: usize) -> Self {
         Self(u32::try_from(index).expect("fewer than 2^32 links fit into memory"))
     }
 
-    /// The place in a list.
+    /// Returns the index of the link in a list of links.
     #[must_use]
     #[inline]
     pub const fn index(self) -> usize {

@@ -1,4 +1,4 @@
-//! The lines of a network.
+//! The lines of a network, and how a line is found.
 
 use alloc::vec::Vec;
 
@@ -8,26 +8,28 @@ use super::on_demand::OnDemand;
 use super::pending::{InNetwork, LineId};
 use crate::line::Line;
 
-/// The links and the access lines.
+/// Links and access lines of a network.
 #[derive(Clone, Debug)]
 pub(super) struct Lines<P> {
-    /// By number, which is by sender, then receiver; where all have links to all the diagonal is there too, and never used. Links on demand lie in the order in
-    /// which they were made.
+    /// Links, indexed by [`LinkId`]: in the order of senders, then of receivers. Where all nodes have links to all, the diagonal is included and never used.
+    /// Links on demand are instead in the order in which they were made, and `on_demand` gives their indices.
     pub(super) links: Vec<Line<P, InNetwork<P>>>,
-    /// `None`: all links are there from the beginning.
+    /// Models and places of links on demand; `None` if all links are made with the network.
     pub(super) on_demand: Option<OnDemand>,
+    /// Uplink of each node, indexed by node.
     pub(super) uplinks: Vec<Option<Line<P, InNetwork<P>>>>,
+    /// Downlink of each node, indexed by node.
     pub(super) downlinks: Vec<Option<Line<P, InNetwork<P>>>>,
 }
 
 impl<P> Lines<P> {
-    /// Lines of a network that has no links and no access lines yet.
+    /// Makes the lines of a network that has no links and no access lines yet.
     pub(super) fn new(config: &NetworkConfig, on_demand: Option<OnDemand>) -> Self {
         let none = || config.nodes.iter().map(|_| None).collect();
         Self { links: Vec::new(), on_demand, uplinks: none(), downlinks: none() }
     }
 
-    /// A link; `None` if it was not made yet, or there is none.
+    /// Returns a link, or `None` if the link was not made yet or does not exist.
     pub(super) fn find_link(&self, link: LinkId) -> Option<&Line<P, InNetwork<P>>> {
         let place = match &self.on_demand {
             None => link.index(),
@@ -36,7 +38,7 @@ impl<P> Lines<P> {
         self.links.get(place)
     }
 
-    /// A link that was made.
+    /// Returns a link that was made. Panics if the link does not exist.
     #[inline(always)]
     pub(super) fn link_mut(&mut self, link: LinkId) -> &mut Line<P, InNetwork<P>> {
         let place = match &self.on_demand {

@@ -1,4 +1,4 @@
-//! Links that are made when they are first used: their models, and where they lie.
+//! Links that are made when they are first used: their models, and their places in the list of links.
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -9,7 +9,7 @@ use crate::line::model::LinkModel;
 
 type ModelOf = dyn Fn(NodeId, NodeId) -> LinkModel + Send + Sync;
 
-/// The models of links that are made when they are first used, and the places of those that were made.
+/// Models of links that are made when they are first used, and places of the links made so far.
 #[derive(Clone)]
 pub(super) struct OnDemand {
     model: Arc<ModelOf>,
@@ -21,18 +21,18 @@ impl OnDemand {
         Self { model: Arc::new(model), places: Places::new() }
     }
 
-    /// The model of a link that is to be made.
+    /// Returns the model of a link that is to be made.
     pub(super) fn model(&self, path: Path) -> LinkModel {
         if path.from == path.to { LinkModel::default() } else { (self.model)(path.from, path.to) }
     }
 
-    /// The place of a link; `None` if the link was not made yet.
+    /// Returns the place of a link, or `None` if the link was not made yet.
     #[inline(always)]
     pub(super) fn place(&self, link: LinkId) -> Option<usize> {
         self.places.find(link.0)
     }
 
-    /// A link was made, and lies in that place.
+    /// Notes that a link was made, and that its index in the list of links is `place`.
     pub(super) fn made(&mut self, link: LinkId, place: usize) {
         self.places.insert(link.0, LinkId::new(place).0);
     }
@@ -44,16 +44,16 @@ impl fmt::Debug for OnDemand {
     }
 }
 
-/// Places by the numbers of links, in an open-addressed table: each packet looks its link up twice, and a tree took several comparisons more each time. Nothing asks the
-/// table for its order.
+/// Places of links in the list of links, indexed by link number, in an open-addressed hash table. The order of the slots is never visible, so that the hash
+/// function changes no answer.
 #[derive(Clone, Debug)]
 struct Places {
-    /// Numbers and places. The table has a power of two of slots, of which at most half are taken.
+    /// Pairs of link number and place, or [`FREE`]. The number of slots is a power of two, and at most half of the slots are taken.
     slots: Vec<(u32, u32)>,
     len: usize,
 }
 
-/// A slot without a link: links are counted in 29 bits.
+/// A slot without a link. No link has this number, because link numbers have 29 bits.
 const FREE: (u32, u32) = (u32::MAX, 0);
 
 impl Places {
@@ -61,13 +61,13 @@ impl Places {
         Self { slots: alloc::vec![FREE; 16], len: 0 }
     }
 
-    /// The slot of a number, or the free one in which it would be.
+    /// Returns the index of the slot that holds `number`, or of the free slot at which `number` is to be inserted.
     #[inline(always)]
     fn slot(&self, number: u32) -> usize {
         let mask = self.slots.len() - 1;
-        // Fibonacci hashing: numbers that are a fixed distance apart, as those of a ring of hosts, are spread evenly by the upper bits of the product.
+        // Fibonacci hashing: link numbers at a fixed distance, for example of a ring of hosts, are spread evenly by the upper bits of the product.
         let mut slot = (u64::from(number).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 32) as usize & mask;
-        // Half of the slots are free, so that the search ends.
+        // At least half of the slots are free, so that the search ends.
         while self.slots[slot].0 != number && self.slots[slot].0 != FREE.0 {
             slot = (slot + 1) & mask;
         }
@@ -84,7 +84,9 @@ impl Places {
         if 2 * self.len >= self.slots.len() {
             let doubled = alloc::vec![FREE; 2 * self.slots.len()];
             for (number, place) in core::mem::replace(&mut self.slots, doubled) {
+                // Doubling at half load: at most half of the slots are taken after this insertion.
                 if number != FREE.0 {
+                    // Each number's slot depends on the length of the table, so that all pairs are inserted again.
                     self.put(number, place);
                 }
             }
@@ -108,7 +110,7 @@ mod tests {
     use super::*;
     use crate::network::{Network, NetworkConfig};
 
-    /// 10⁴ nodes of which each sends to the next: as many links as senders, where there were 10⁸.
+    /// A ring of 10⁴ nodes, each of which sends to the next, makes as many links as senders instead of 10⁸.
     #[test]
     fn a_network_holds_the_links_that_carry_packets() {
         let nodes: Vec<_> = (0..10_000).map(|node| alloc::format!("node-{node}")).collect();
@@ -125,7 +127,7 @@ mod tests {
     }
 
     proptest! {
-        /// Numbers of a progression, as a ring of hosts or a star has them, and others.
+        /// Numbers of an arithmetic progression, as a ring of hosts or a star uses, mixed with random numbers.
         #[test]
         fn places_are_those_of_a_map(first in 0_u32..1000, step in 1_u32..30_000, count in 0_u32..300, others in prop::collection::vec(0_u32..1 << 29, 0..100)) {
             let (mut places, mut map) = (Places::new(), BTreeMap::new());

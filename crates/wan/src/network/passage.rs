@@ -1,4 +1,4 @@
-//! The way of a packet from line to line, until it arrives or is dropped.
+//! The way of a packet from line to line, until the packet arrives or is dropped.
 
 use cohaptic_units::Instant;
 
@@ -15,7 +15,7 @@ use crate::line::pipeline::Outcome;
 use crate::packet::{Marks, Outputs};
 
 impl<P: Clone> Network<P> {
-    /// Lets all that is due happen, and keeps the arrivals until they are polled.
+    /// Lets all events due by `now` happen, and keeps the final arrivals in `happened` until they are polled.
     #[inline]
     pub(super) fn let_happen(&mut self, now: Instant) {
         while let Some(pending) = self.traffic.pending.pop_due(now) {
@@ -25,7 +25,7 @@ impl<P: Clone> Network<P> {
         }
     }
 
-    /// Lets one pending event happen, and gives the arrival if it is a packet's last.
+    /// Lets one pending event happen, and returns the arrival if the packet has left its last line.
     #[inline(always)]
     pub(super) fn happen(&mut self, pending: Pending<P>) -> Option<PacketEvent<P, Path>> {
         let Pending { at, sequence, offered, entered, turn, path, size, payload } = pending;
@@ -36,6 +36,7 @@ impl<P: Clone> Network<P> {
         };
         let packet = InNetwork { sequence, offered, entered, path, size, payload };
         let next = match line {
+            // The packet has no receiver yet. `relay` makes one packet for each.
             LineId::Uplink(_) if path.is_to_relay() => {
                 self.lines.get_mut(line).deliver(entered, at);
                 self.relay(at, packet);
@@ -51,7 +52,7 @@ impl<P: Clone> Network<P> {
         None
     }
 
-    /// The packet comes out of the last of its lines.
+    /// Ends the way of a packet that has left its last line: delivers it, or drops it if its damage is discovered on arrival.
     #[inline(always)]
     fn arrive(&mut self, at: Instant, line: LineId, packet: InNetwork<P>) -> PacketEvent<P, Path> {
         let line = self.lines.get_mut(line);
@@ -68,7 +69,7 @@ impl<P: Clone> Network<P> {
         self.with_engine(line, |line, outputs, exits| line.wake(at, outputs, exits));
     }
 
-    /// Offers a packet to its link where there are no uplinks; its first random words may have been drawn before.
+    /// Offers a packet to its link in a network without uplinks. `words` holds the first random words of the packet if they were drawn before.
     #[inline(always)]
     pub(super) fn send(&mut self, now: Instant, path: Path, size: SizeAndMarks, payload: P, words: Option<Words>) {
         let (link, place) = self.link_and_place(path);
@@ -76,8 +77,8 @@ impl<P: Clone> Network<P> {
         self.offer(now, LineId::Link(link), words, || InNetwork { sequence, offered: now, entered: now, path, size, payload });
     }
 
-    /// Offers a packet to a line; its first random words may have been drawn before. The packet is made where it is known what becomes of it, so that one that only
-    /// propagates is written once.
+    /// Offers a packet to a line. `words` holds the first random words of the packet if they were drawn before. `packet` is called in the branch that needs
+    /// the packet, so that a packet in mere propagation is written once, into the event queue.
     #[inline(always)]
     pub(super) fn offer(&mut self, now: Instant, line: LineId, words: Option<Words>, packet: impl FnOnce() -> InNetwork<P>) {
         if self.has_filters {
@@ -90,7 +91,7 @@ impl<P: Clone> Network<P> {
         }
     }
 
-    /// As [`Network::offer`], where links have filters.
+    /// Offers a packet like [`Network::offer`], in a network with filters.
     #[inline(never)]
     fn offer_filtered(&mut self, now: Instant, line: LineId, words: Option<Words>, packet: InNetwork<P>) {
         if self.is_filtered(now, line, &packet) {
@@ -103,7 +104,7 @@ impl<P: Clone> Network<P> {
         }
     }
 
-    /// Whether the line's filter takes the packet.
+    /// Returns whether the line's filter drops the packet.
     fn is_filtered(&mut self, now: Instant, line: LineId, packet: &InNetwork<P>) -> bool {
         let offered = Offered { sequence: packet.sequence, now, info: packet.size.info(), payload: &packet.payload };
         self.lines.get_mut(line).filters(&offered)
@@ -119,7 +120,7 @@ impl<P: Clone> Network<P> {
         self.with_engine(line, |line, outputs, exits| line.enter(now, packet.size.info(), marks, packet, outputs, exits));
     }
 
-    /// Lets a line's engine do something, and asks it when to be woken.
+    /// Lets `act` act on the engine of a line, and schedules the wake that the engine announces.
     pub(super) fn with_engine(&mut self, line: LineId, act: impl FnOnce(&mut Line<P, InNetwork<P>>, &mut Outputs<InNetwork<P>>, &mut Exits<'_, P>)) {
         let engine = self.lines.get_mut(line);
         let before = self.traffic.happened.len();
@@ -128,19 +129,20 @@ impl<P: Clone> Network<P> {
             self.traffic.announce(at, line);
         }
         if !self.has_inner_events && self.traffic.happened.len() > before {
-            // The engine stands for a direct pipeline: arrivals that wait to be polled came before this drop, as in `drop`.
+            // A network without inner events keeps due arrivals in `pending` until they are polled. The arrivals due came before this drop, as in `drop`, so
+            // they are put before it.
             let dropped = self.traffic.happened.split_off(before);
             self.let_happen(self.now);
             self.traffic.happened.extend(dropped);
         }
     }
 
-    /// The packet was dropped when it was offered.
+    /// Counts and reports a packet that was dropped when it was offered.
     #[inline(never)]
     pub(super) fn drop(&mut self, now: Instant, line: LineId, cause: DropCause, packet: InNetwork<P>) {
         self.lines.get_mut(line).drop(cause);
         if !self.has_inner_events {
-            // Arrivals that wait to be polled came before this drop.
+            // Arrivals due that still wait to be polled came before this drop.
             self.let_happen(now);
         }
         let event = self.traffic.event(packet, now, Fate::Dropped(cause));

@@ -1,40 +1,43 @@
-//! Which nodes have links between them, and where these lie.
+//! Pairs of nodes that have links, and the numbers of these links.
 
 use alloc::vec::Vec;
 
 use super::id::{LinkId, NodeId, Path};
 
-/// The places of links, by sender, then receiver.
+/// Numbers of links, in the order of senders, then of receivers.
 #[derive(Clone, Debug)]
 pub(super) enum Paths {
-    /// From each node to each, itself included.
+    /// Links from each node to every node, itself included.
     All {
-        /// How many nodes there are.
+        /// Number of nodes.
         nodes: u16,
     },
-    /// Some.
+    /// Links to some receivers only.
     Some(SomePaths),
 }
 
-/// The places of some links.
+/// Numbers of links where each node has its own list of receivers.
 #[derive(Clone, Debug)]
 pub(super) struct SomePaths {
-    /// By sender where its receivers begin, and at last where they end.
+    /// Begin of each sender's part of `receivers`, indexed by sender, followed by the length of `receivers`. So `first[n]..first[n + 1]` is the part of node
+    /// `n`.
     first: Vec<u32>,
     receivers: Vec<NodeId>,
 }
 
-/// The most links: a [`Turn`](super::pending::Turn) counts them in 29 bits.
+/// Number of links, at most: a [`Turn`](super::pending::Turn) holds a link's number in 29 bits.
 const MOST_LINKS: usize = 1 << 29;
 
 impl Paths {
-    /// Those to the receivers of each node.
+    /// Makes the paths from each node to the receivers that `receivers_of` gives. Panics if a list of receivers is not strictly ascending, names a missing
+    /// node or its own sender, or if there are more than 2^29 links.
     pub(super) fn some<R: IntoIterator<Item = NodeId>>(nodes: u16, mut receivers_of: impl FnMut(NodeId) -> R) -> Self {
         let (mut first, mut receivers) = (Vec::with_capacity(usize::from(nodes) + 1), Vec::new());
         first.push(0);
         for from in (0..nodes).map(NodeId) {
             let begin = receivers.len();
             receivers.extend(receivers_of(from));
+            // `link` finds receivers by binary search, so that each list must be in order.
             let own = &receivers[begin..];
             assert!(
                 own.iter().all(|to| to.0 < nodes && *to != from) && own.is_sorted_by(|one, next| one < next),
@@ -53,7 +56,7 @@ impl Paths {
         }
     }
 
-    /// How many places there are.
+    /// Returns the number of links, those of nodes to themselves included.
     pub(super) fn lines(&self) -> usize {
         match self {
             Self::All { nodes } => usize::from(*nodes) * usize::from(*nodes),
@@ -61,7 +64,8 @@ impl Paths {
         }
     }
 
-    /// The receiver in a place of those of a node, which may be the node itself; `None` beyond the last.
+    /// Returns the receiver at index `place` in the list of `from`, or `None` after the last. The receiver may be `from` itself where all nodes have links to
+    /// all.
     pub(super) fn receiver(&self, from: NodeId, place: u16) -> Option<NodeId> {
         match self {
             Self::All { nodes } => (place < *nodes).then_some(NodeId(place)),
@@ -69,7 +73,7 @@ impl Paths {
         }
     }
 
-    /// Whether there is such a link, between nodes that there are.
+    /// Returns whether the path has a link. Both nodes of the path must exist.
     #[inline]
     pub(super) fn has(&self, path: Path) -> bool {
         match self {
@@ -84,7 +88,7 @@ impl SomePaths {
         &self.receivers[self.first[from.index()] as usize..self.first[from.index() + 1] as usize]
     }
 
-    /// The link of a path that there is.
+    /// Returns the number of the link of a path. Panics if the path has no link.
     pub(super) fn link(&self, path: Path) -> LinkId {
         let place = self.of(path.from).binary_search(&path.to).expect("packets travel on links that there are");
         LinkId::new(self.first[path.from.index()] as usize + place)

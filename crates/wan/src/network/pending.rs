@@ -1,4 +1,4 @@
-//! A packet on its way, and what will happen on a line, in as few bytes as they take: the event queue moves them.
+//! Packets on their way and events to come on lines. Both types are packed, because the event queue moves them.
 
 use core::num::NonZeroU32;
 
@@ -11,12 +11,12 @@ use crate::fates::record::{PacketEvent, PacketRecord};
 use crate::packet::PacketInfo;
 use crate::packet::damage::Damage;
 
-/// A packet on its way.
+/// A packet on its way through the network.
 #[derive(Clone, Debug)]
 pub(super) struct InNetwork<P> {
     pub(super) sequence: u64,
     pub(super) offered: Instant,
-    /// When it entered the line that it is in.
+    /// Instant at which the packet entered its current line.
     pub(super) entered: Instant,
     pub(super) path: Path,
     pub(super) size: SizeAndMarks,
@@ -33,7 +33,8 @@ impl<P> InNetwork<P> {
     }
 }
 
-/// The size of a packet in the upper 24 bits, and below what happened to it. A bit is always set, so that an `Option` of what has it is no larger.
+/// Size of a packet in bytes (upper 24 bits), its flags (bits 3 to 6) and its copy bits (bits 0 to 2, see [`LineId::copy_bit`]). Bit 7 is always set: the
+/// number is never zero, so that an `Option` of a type with this field needs no extra space.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct SizeAndMarks(NonZeroU32);
 
@@ -45,6 +46,7 @@ impl SizeAndMarks {
     pub(super) const DISCARDED_ON_ARRIVAL: u32 = 1 << 6;
 
     pub(super) fn new(info: PacketInfo) -> Self {
+        // Sizes above 24 bits saturate, so that the shift below loses no bit.
         let size = u32::try_from(info.size.get().min((1 << 24) - 1)).unwrap_or(u32::MAX);
         Self(Self::NOTHING.0 | size << 8).with(Self::ECN_CAPABLE, info.ecn_capable)
     }
@@ -66,22 +68,23 @@ impl SizeAndMarks {
     }
 
     pub(super) fn with(self, flag: u32, set: bool) -> Self {
+        // The complement may clear all bits as far as the type knows. Setting bit 7 again keeps the number nonzero without a check.
         Self(if set { self.0 | flag } else { Self::NOTHING.0 | self.0.get() & !flag })
     }
 }
 
-/// Something that will happen on a line.
+/// An event to come on a line: a packet leaves the line, or the line's engine must be woken.
 #[derive(Clone, Debug)]
 pub(super) struct Pending<P> {
     pub(super) at: Instant,
-    /// The packet's sequence on its path.
+    /// Sequence number of the packet on its path.
     pub(super) sequence: u64,
     pub(super) offered: Instant,
     pub(super) entered: Instant,
     pub(super) turn: Turn,
     pub(super) path: Path,
     pub(super) size: SizeAndMarks,
-    /// `None`: the time to wake the line's engine.
+    /// Payload of the packet; `None` if the event is a wake of the line's engine.
     pub(super) payload: Option<P>,
 }
 
@@ -94,7 +97,7 @@ pub(super) enum LineId {
 }
 
 impl LineId {
-    /// The bit in which a copy that this line made differs from its packet.
+    /// Returns the copy bit of [`SizeAndMarks`] that this line sets in the copies that it makes.
     pub(super) const fn copy_bit(self) -> u32 {
         match self {
             Self::Uplink(_) => 1,
@@ -104,12 +107,12 @@ impl LineId {
     }
 }
 
-/// What happens on which line, in one number: what breaks ties between simultaneous events. All engines are woken before anything arrives, so that what
-/// leaves one line finds the room that a departure from the next line makes at the same instant.
+/// Kind of event and line in one number, which orders simultaneous events. Wakes (kinds 0 to 2) come before arrivals (kinds 3 to 5): a packet that leaves one
+/// line finds the room that a departure from the next line makes at the same instant.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(super) struct Turn(u32);
 
-/// Links and nodes are counted in the lower bits of a [`Turn`].
+/// Number of lower bits of a [`Turn`] that hold the number of the link or node.
 const NUMBER_BITS: u32 = 29;
 
 impl Turn {
@@ -128,7 +131,7 @@ impl Turn {
         Self(Self::waking(line).0 + (3 << NUMBER_BITS))
     }
 
-    /// The link on which it happens, where there are links alone.
+    /// Returns the link of the event. The event must be one of a link, not of an access line.
     #[inline(always)]
     pub(super) const fn link(self) -> LinkId {
         LinkId(self.0 & ((1 << NUMBER_BITS) - 1))

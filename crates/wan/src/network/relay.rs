@@ -1,4 +1,4 @@
-//! A relay between uplinks and links: one packet up, one down to each receiver.
+//! A relay between uplinks and links: each packet passes the uplink once, and is then sent on to each receiver.
 
 use alloc::vec::Vec;
 
@@ -10,7 +10,7 @@ use super::pending::{InNetwork, LineId, SizeAndMarks};
 use crate::fates::record::{PacketEvent, PacketRecord};
 
 impl Path {
-    /// Of a packet that is not yet there for any receiver.
+    /// Returns the path of a packet before the relay, which has no receiver yet. Sender and receiver of the path are equal, which no other packet's path is.
     pub(super) const fn to_relay(from: NodeId) -> Self {
         Self { from, to: from }
     }
@@ -21,13 +21,14 @@ impl Path {
 }
 
 impl<P: Clone> Network<P> {
-    /// A packet enters the uplink of its sender.
+    /// Offers a packet to the uplink of its sender, and counts the packet on the path to each receiver.
     pub(super) fn send_to_relay(&mut self, now: Instant, from: NodeId, size: SizeAndMarks, payload: P) {
         let mut sequence = 0;
         let mut place = 0;
         while let Some(to) = self.places.receiver(from, place) {
             if to != from {
                 let (_, link) = self.link_and_place(Path { from, to });
+                // All paths of the sender have the same count, since a node sends all its packets to all. The last one read is the number for all receivers.
                 sequence = self.paths[link];
                 self.paths[link] += 1;
             }
@@ -37,7 +38,7 @@ impl<P: Clone> Network<P> {
         self.offer(now, LineId::Uplink(from), None, || InNetwork { sequence, offered: now, entered: now, path, size, payload });
     }
 
-    /// A packet has come out of its uplink, and enters the link to each receiver.
+    /// Offers a packet that has left its uplink to the link of each receiver.
     #[inline(never)]
     pub(super) fn relay(&mut self, now: Instant, packet: InNetwork<P>) {
         let damage = self.traffic.take_damage(&packet);
@@ -47,6 +48,7 @@ impl<P: Clone> Network<P> {
             if to != from {
                 let path = Path { from, to };
                 let packet = InNetwork { entered: now, path, payload: packet.payload.clone(), ..packet };
+                // The flag `DAMAGED` is copied with `size`, so that each receiver's packet needs its own entry.
                 if let Some(damage) = &damage {
                     self.traffic.put_damage(&packet, damage.clone());
                 }
@@ -56,7 +58,7 @@ impl<P: Clone> Network<P> {
         }
     }
 
-    /// The next event, if an uplink before a relay has dropped or copied a packet, becomes one for each receiver.
+    /// Replaces the next event, if the event is one of a packet before the relay, by one event for each receiver.
     pub(super) fn tell_each_receiver(&mut self) {
         if !self.traffic.happened.front().is_some_and(|event| event.path.is_to_relay()) {
             return;
@@ -66,6 +68,7 @@ impl<P: Clone> Network<P> {
         let receivers = (0..).map_while(|place| self.places.receiver(from, place)).filter(|to| *to != from);
         let on = |to| PacketEvent { record: PacketRecord { path: Path { from, to }, ..event.record }, ..event.clone() };
         let events: Vec<PacketEvent<P, Path>> = receivers.map(on).collect();
+        // Pushed in reverse order to the front, so that the events come out in the order of receivers.
         events.into_iter().rev().for_each(|event| self.traffic.happened.push_front(event));
     }
 }

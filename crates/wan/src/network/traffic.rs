@@ -1,4 +1,4 @@
-//! The packets of a network behind its lines: those that propagate, and the events that were not polled yet.
+//! Packets of a network after the decisions of its lines: packets in propagation, and events that were not polled yet.
 
 use alloc::boxed::Box;
 use alloc::collections::{BTreeMap, VecDeque};
@@ -19,9 +19,10 @@ use crate::packet::damage::Damage;
 pub(super) struct Traffic<P> {
     pub(super) pending: EventQueue<Pending<P>>,
     pub(super) happened: VecDeque<PacketEvent<P, Path>>,
-    /// The damage to packets on their way that are flagged as damaged.
+    /// Damage of packets on their way, indexed by path, sequence and copy bits. A packet has an entry exactly if its flag `DAMAGED` is set, so that undamaged
+    /// packets are never looked up.
     damages: BTreeMap<(Path, u64, u8), Damage>,
-    /// `None`: nobody asks for single receivers.
+    /// Instants at which single receivers may get a packet; `None` if no driver asks for single receivers.
     pub(super) awaited: Option<Box<Awaited>>,
 }
 
@@ -30,16 +31,17 @@ impl<P> Traffic<P> {
         Self { pending: EventQueue::new(), happened: VecDeque::new(), damages: BTreeMap::new(), awaited: None }
     }
 
-    /// The packet propagates on that line.
+    /// Lets a packet leave `line` at `at`: the packet propagates until then.
     #[inline(always)]
     pub(super) fn schedule(&mut self, at: Instant, line: LineId, packet: InNetwork<P>) {
         let InNetwork { sequence, offered, entered, path, size, payload } = packet;
         if let Some(awaited) = &mut self.awaited {
-            // From a relay it may go to any node.
+            // After a relay the packet goes to every receiver of its sender, so that any awaited node may be concerned.
             if path.is_to_relay() { awaited.announce(at, line) } else { awaited.schedule(at, path.to) }
         }
         let turn = Turn::arrival(line);
-        // Instants and turns decide nearly always, and are compared one by one: to compare whole keys took 30 instructions more.
+        // The order of events is that of `Pending::key`. Instants and turns differ for nearly all pairs, so the whole key is compared only when both are
+        // equal.
         let follows = match self.pending.last_in_order() {
             None => true,
             Some(last) if last.at != at => last.at < at,
@@ -49,12 +51,13 @@ impl<P> Traffic<P> {
         self.pending.push_made(at, follows, || Pending { at, sequence, offered, entered, turn, path, size, payload: Some(payload) });
     }
 
-    /// The line's engine must be woken.
+    /// Schedules a wake of the engine of `line` at `at`.
     pub(super) fn announce(&mut self, at: Instant, line: LineId) {
         if let Some(awaited) = &mut self.awaited {
             awaited.announce(at, line);
         }
         let turn = Turn::waking(line);
+        // A wake belongs to no packet, and its path and size are never read.
         let (path, size) = (Path { from: NodeId(0), to: NodeId(0) }, SizeAndMarks::NOTHING);
         self.pending.push(Pending { at, sequence: 0, offered: at, entered: at, turn, path, size, payload: None });
     }
@@ -80,7 +83,7 @@ impl<P> Traffic<P> {
     }
 }
 
-/// Where the packets of one line's engine go.
+/// The way out of one line's engine, into the traffic of the network.
 pub(super) struct Exits<'a, P> {
     pub(super) traffic: &'a mut Traffic<P>,
     pub(super) line: LineId,
@@ -109,7 +112,7 @@ impl<P> Sink<InNetwork<P>> for Exits<'_, P> {
 
     fn happened(&mut self, at: Instant, fate: Fate, packet: InNetwork<P>, copy: u8, marks: Marks) {
         let packet = self.marked(packet, copy, &marks);
-        // The damage is that of the packet and of its copy, of which each has an event of its own.
+        // A copy event is not the end of its packet: packet and copy each get a later event, and the damage goes with the last one only.
         let damage = marks.damage.filter(|_| fate.is_end());
         self.traffic.happened.push_back(packet.event(at, fate, damage));
     }

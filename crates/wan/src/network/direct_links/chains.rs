@@ -1,6 +1,5 @@
-//! Links whose delays follow those before, eight at a time: each step for all of them before the next, in registers as far as it is the same for all.
-//!
-//! Most delays come by fewer terms of their series than one alone would need.
+//! Links with correlated delays, eight at a time. Each step is done for all eight links before the next step, so that a processor can compute several links
+//! at once. Most delays are computed by fewer terms of their series than a single delay needs; the rest is left to a slower function.
 
 use alloc::vec::Vec;
 
@@ -14,27 +13,29 @@ use crate::random::PacketDraws;
 use crate::stages::delay::CorrelatedDelays;
 use crate::stages::loss::GilbertElliottState;
 
-/// What links of a kind do that remember the state of their losses and the normal number behind their latest delay, and no more.
+/// Links of a kind whose only state is the state of the losses and the normal number from which the latest delay was computed.
 #[derive(Clone, Debug)]
 pub(super) struct Chains {
-    /// In each state below which number the word of a packet, without its lowest 11 bits, makes its link leave that state.
+    /// Threshold for leaving a state, indexed by state (good, bad): a link leaves the state if the upper 53 bits of the packet's loss word are below the
+    /// threshold.
     leaves: [u64; 2],
-    /// In each state below which number it says that the packet is lost.
+    /// Threshold for a loss, indexed by the state before the packet: the packet is lost if the upper 53 bits of its loss word are below the threshold.
     loses: [u64; 2],
     delays: CorrelatedDelays,
     cubics: GammaCubics,
 }
 
-/// What such links remember, by link; behind the last are some that are none, so that eight can be looked at from any.
+/// State of the chain of delays and of the chain of losses, indexed by link. Padded by seven links, so that a load of eight links starting at any link stays
+/// within the arrays.
 #[derive(Clone, Debug)]
 pub(super) struct ChainStates {
-    /// The latest value of the chain of delays, NaN before the first packet.
+    /// Latest value of the chain of delays; NaN before the first packet.
     normals: Vec<f64>,
-    /// A bit for each link that is bad.
+    /// One bit per link, set if the link's chain of losses is in the bad state.
     bad: Vec<u8>,
 }
 
-/// The least whole number n such that an event of that probability happens if the upper 53 bits of its word are below n.
+/// Returns the smallest whole number n such that an event of this probability happens if and only if the upper 53 bits of its random word are below n.
 fn threshold(probability: Probability) -> u64 {
     const TWO_POW_53: f64 = 9_007_199_254_740_992.0;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number from 0 to 2^53")]
@@ -48,12 +49,13 @@ const fn is_below(word: u64, threshold: u64) -> bool {
 }
 
 impl Chains {
-    /// `None` if losses look at further words, or delays are of a law that does not come eight at a time.
+    /// Returns `None` if a loss needs more than one random word, or if the law of the delays cannot be computed for eight links at once.
     pub(super) fn new(losses: &Losses, delays: &CorrelatedDelays) -> Option<Self> {
         let (leaves, loses) = match losses {
             Losses::None => ([Probability::ZERO; 2], [Probability::ZERO; 2]),
             Losses::Independent(probability) => ([Probability::ZERO; 2], [*probability; 2]),
             Losses::GilbertElliott(chain) => {
+                // A loss with a probability strictly between 0 and 1 within a state would need a second word.
                 let certain = [chain.k, chain.h].map(|gets_through| {
                     let all_or_none = [(Probability::ONE, Probability::ZERO), (Probability::ZERO, Probability::ONE)];
                     all_or_none.into_iter().find(|(passes, _)| *passes == gets_through).map(|(_, lost)| lost)
@@ -64,7 +66,7 @@ impl Chains {
         Some(Self { leaves: leaves.map(threshold), loses: loses.map(threshold), delays: delays.clone(), cubics: delays.cubics()? })
     }
 
-    /// What becomes of a packet of the link in that place.
+    /// Computes the fate of a packet of the link `place`, and changes the link's state.
     pub(super) fn verdict(
         &self,
         now: Instant,
@@ -73,6 +75,7 @@ impl Chains {
         [loss_word, jitter_word]: Words,
         packet: PacketDraws,
     ) -> Verdict {
+        // Both thresholds are those of the state before the packet, also for the loss, although the state has changed by then.
         let state = usize::from(states.bad_from(place) & 1);
         states.change(place, u8::from(is_below(loss_word, self.leaves[state])));
         if is_below(loss_word, self.loses[state]) {
@@ -81,7 +84,7 @@ impl Chains {
         Verdict::Arrives(now.saturating_add_nanos(self.delays.draw_nanos(&mut states.normals[place], jitter_word, packet)))
     }
 
-    /// Offers a packet to neighbouring links, of which `first` is the first, but for those whose bit is set in `excluded`.
+    /// Offers a packet to each of these neighbouring links, of which the first has the number `first`. Links whose bit is set in `excluded` are left out.
     #[inline(always)]
     pub(super) fn offer(
         &self,
@@ -101,6 +104,7 @@ impl Chains {
             lost |= u8::from(is_below(loss_word, self.loses[state])) << place;
             leave |= u8::from(is_below(loss_word, self.leaves[state])) << place;
         }
+        // Lost packets change the state too. Links in `excluded` got no packet and keep their state.
         states.change(first, leave & !excluded);
         let Some(normals) = states.normals_from(first) else { return };
         let following = self.delays.following(normals, &jitter_words);
@@ -110,6 +114,7 @@ impl Chains {
             let link = &mut links[place];
             if excluded & bit == 0 {
                 link.offered += 1;
+                // The chain of delays does not move for a lost packet, so `normals` is written for arriving packets only.
                 if lost & bit != 0 {
                     link.lost += 1;
                 } else if nanos[place] == GammaCubics::UNKNOWN {
@@ -130,7 +135,8 @@ impl Chains {
         }
     }
 
-    /// Those packets arrive after delays that take longer. Not in the loop over all, which would look up all that it knows after each call.
+    /// Delivers the packets of the links in `slow`, whose delays `cubics` could not compute. A function of its own, because a call within the loop over all
+    /// links would force the loop's values out of registers.
     #[cold]
     #[inline(never)]
     fn offer_slowly(
@@ -156,27 +162,29 @@ impl ChainStates {
         Self { normals: Vec::new(), bad: Vec::new() }
     }
 
-    /// The state in which the link in that place begins, which is behind all others.
+    /// Sets the initial state of link `place`, whose number must be higher than those of all links before.
     pub(super) fn begin(&mut self, place: usize, state: GilbertElliottState) {
         self.normals.resize(place + DirectLinks::AT_ONCE, f64::NAN);
+        // `place / 8 + 2` bytes, so that a load of two bytes from any link's byte stays within the array.
         self.bad.resize(place / 8 + 2, 0);
         self.change(place, u8::from(state == GilbertElliottState::Bad));
     }
 
-    /// The latest values of eight chains.
+    /// Returns the latest values of the chains of eight links from `first` on.
     #[inline(always)]
     fn normals_from(&mut self, first: usize) -> Option<&mut [f64; DirectLinks::AT_ONCE]> {
         self.normals.get_mut(first..)?.first_chunk_mut()
     }
 
-    /// Which of eight links are bad.
+    /// Returns one bit for each of eight links from `first` on, set if the link is in the bad state.
     #[inline(always)]
     fn bad_from(&self, first: usize) -> u8 {
+        // Eight bits from any link on lie in two neighbouring bytes.
         let [low, _] = (u16::from_le_bytes([self.bad[first / 8], self.bad[first / 8 + 1]]) >> (first % 8)).to_le_bytes();
         low
     }
 
-    /// Those of eight links change their states.
+    /// Toggles the state of the links from `first` on whose bit is set in `which`.
     #[inline(always)]
     fn change(&mut self, first: usize, which: u8) {
         let [low, high] = (u16::from(which) << (first % 8)).to_le_bytes();
@@ -189,7 +197,7 @@ impl ChainStates {
 mod tests {
     use super::*;
 
-    /// At the words on either side of the threshold, and at both ends.
+    /// Words on either side of the threshold, and the smallest and largest words.
     #[test]
     fn a_threshold_says_what_happens() {
         for number in [0.0, f64::MIN_POSITIVE, 1e-20, 0.01, 0.3, 0.5, 1.0 - f64::EPSILON / 2.0, 1.0] {

@@ -1,4 +1,4 @@
-//! What links of one configuration have in common, and what each of them remembers.
+//! Data that links of one configuration share, and the state of each link.
 
 use cohaptic_units::{Instant, Probability};
 
@@ -11,14 +11,15 @@ use crate::stages::loss::{GilbertElliott, GilbertElliottState, Loss};
 use crate::stages::order::Order;
 use crate::stages::queue::{EqualPackets, Load, nanos};
 
-/// A kind of link.
+/// A kind of link: the configuration that links share, prepared for packets of one load.
 #[derive(Clone, Debug)]
 pub(super) struct Kind {
+    /// Whether the links draw random numbers.
     pub(super) is_random: bool,
     loss: Losses,
     delay: Delays,
     line: Line,
-    /// If they remember no more than that has.
+    /// Computation for eight links at once; `None` without correlated delays, with a line, or where [`Chains::new`] returns `None`.
     pub(super) chains: Option<Chains>,
 }
 
@@ -29,12 +30,12 @@ pub(super) enum Losses {
     GilbertElliott(GilbertElliott),
 }
 
-/// The line of a link, for packets of one size.
+/// The line of a link and the queue before the line, for packets of one size.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Line {
-    /// No packet waits, and each takes that long \[ns\]; nothing if there is no line.
+    /// No packet waits. Each packet takes this time on the line \[ns\]; 0 without a line.
     Free(u64),
-    /// Packets may wait.
+    /// A queue with tail drop, in which packets of one size may wait.
     Queued(EqualPackets),
 }
 
@@ -44,29 +45,29 @@ enum Delays {
     Correlated(CorrelatedDelays),
 }
 
-/// What a link remembers of earlier packets, and a counter that few links need.
+/// State that a link keeps from earlier packets, and a counter that few links need.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Remembered {
-    /// When the packet before left the queue.
+    /// Instant at which the previous packet leaves the queue.
     departure: Instant,
-    /// The latest value of the chain of delays, NaN before the first packet.
+    /// Latest value of the chain of delays; NaN before the first packet.
     normal: f64,
     state: GilbertElliottState,
     /// Packets that found no room in the queue.
     pub(super) found_full: u64,
 }
 
-/// What becomes of a packet.
+/// Fate of a packet.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Verdict {
     Arrives(Instant),
     Lost,
-    /// Dropped for another cause, which is counted.
+    /// Dropped for a cause other than loss. The function that returns this value has counted the drop.
     Dropped,
 }
 
 impl Kind {
-    /// The kind of such links, for packets of that load; `None` if they remember more than [`Remembered`].
+    /// Makes the kind of links of this configuration, for packets of this load. Returns `None` if the links need more state than [`Remembered`] has.
     pub(super) fn new(config: &LinkConfig, load: Load) -> Option<Self> {
         let loss = match &config.loss {
             Loss::None => Losses::None,
@@ -90,17 +91,17 @@ impl Kind {
         Some(Self { is_random: config.is_random(), loss, delay, line, chains })
     }
 
-    /// Whether its links remember anything.
+    /// Returns whether links of this kind have state.
     pub(super) const fn remembers(&self) -> bool {
         matches!(self.line, Line::Queued(_)) || matches!(self.loss, Losses::GilbertElliott(_)) || matches!(self.delay, Delays::Correlated(_))
     }
 
-    /// What a link remembers before its first packet.
+    /// Returns the state of a link before its first packet.
     pub(super) fn beginning(&self, draws: Stream) -> Remembered {
         Remembered { state: self.initial_state(draws), ..Remembered::NOTHING }
     }
 
-    /// The state in which losses begin.
+    /// Returns the state of the chain of losses before the first packet: drawn from the stationary distribution.
     pub(super) fn initial_state(&self, draws: Stream) -> GilbertElliottState {
         match &self.loss {
             Losses::GilbertElliott(chain) => chain.stationary_state(draws.packet(0).first(Purpose::InitialState)),
@@ -108,7 +109,7 @@ impl Kind {
         }
     }
 
-    /// What becomes of a packet of a link that remembers nothing.
+    /// Computes the fate of a packet of a link without state.
     #[inline(always)]
     pub(super) fn fate(&mut self, now: Instant, [loss_word, jitter_word]: Words, packet: PacketDraws) -> Verdict {
         match (&self.loss, &mut self.delay) {
@@ -124,7 +125,7 @@ impl Kind {
         }
     }
 
-    /// What becomes of a packet of a link that remembers that.
+    /// Computes the fate of a packet of a link with the state `link`, and changes the state.
     #[inline(always)]
     pub(super) fn verdict(&mut self, now: Instant, link: &mut Remembered, [loss_word, jitter_word]: Words, packet: PacketDraws) -> Verdict {
         let is_lost = match &self.loss {
@@ -135,6 +136,7 @@ impl Kind {
         if is_lost {
             return Verdict::Lost;
         }
+        // Lost packets take no time on the line, since losses come before the queue.
         let leaves = match &self.line {
             Line::Free(nanos) => now.saturating_add_nanos(*nanos),
             Line::Queued(queue) => match queue.offer(now, &mut link.departure) {
@@ -154,12 +156,13 @@ impl Kind {
 }
 
 impl Remembered {
-    /// That of a link that remembers nothing.
+    /// The state of a link that has none.
     pub(super) const NOTHING: Self = Self { departure: Instant::ZERO, normal: f64::NAN, state: GilbertElliottState::Good, found_full: 0 };
 }
 
 impl Line {
-    /// The line of a link for packets of that load; `None` if departures depend on more than [`EqualPackets`] knows, or lie behind the delay.
+    /// Makes the line of a link for packets of this load. Returns `None` if departures depend on more than [`EqualPackets`] knows, or if the line comes after
+    /// the delay (the layout of netem).
     pub(super) fn new(config: &LinkConfig, load: Load) -> Option<Self> {
         let Some(bottleneck) = &config.bottleneck else { return Some(Self::Free(0)) };
         if config.layout == Layout::Netem {

@@ -1,4 +1,4 @@
-//! Many links that decide at once what becomes of a packet, for drivers that keep the packets on the way themselves.
+//! Many links that decide at once what becomes of a packet. The driver keeps the packets on the way itself.
 
 mod chains;
 mod kind;
@@ -20,83 +20,93 @@ use crate::random::Stream;
 use crate::stages::config::LinkConfig;
 use crate::stages::queue::Load;
 
-/// Links that know at once when a packet arrives: outages, loss, a tail-drop queue before a line of one rate, or one of any discipline that no packet waits for, delay
-/// with jitter, and order. Each is a function from a packet to its arrival, with the memory that bursts, correlated delays and the line need. All links have one [`Load`].
+/// Links that know the arrival of a packet when the packet is offered. Possible parts are outages, loss, a tail-drop queue before a line of constant rate, a
+/// queue of any discipline in which no packet waits, delay with jitter, and order. Each link is a function from a packet to its arrival, with the state that
+/// bursts of loss, correlated delays and the line need. All links have one [`Load`].
 ///
-/// It is what [`crate::Network`] compiles such links to, with the same random numbers at the same addresses and the same counters, without the queue of packets
-/// on the way: a driver that looks at arrivals on a lattice of its own has a better one. Whether a packet arrives in time to be counted as delivered is
-/// known when it is offered, since the driver says until when it will look.
+/// Random numbers, their addresses and the counters are those of [`crate::Network`] with the same links. The queue of packets on the way is left to the
+/// driver, since a driver that looks at arrivals on a lattice of its own can use a simpler queue. The driver says until when it will look, so that a packet
+/// is counted as delivered or not when it is offered.
 ///
-/// Links are numbered from 0 as they are added. Those without memory take a cache line each, most others one and a half.
+/// Links are numbered from 0 in the order in which they are added. A link without state takes one cache line, most other links one and a half.
 #[derive(Clone, Debug)]
 pub struct DirectLinks {
+    /// End of the run. Packets that arrive later do not count as delivered.
     until: Instant,
     load: Load,
     links: Vec<LinkState>,
-    /// What links of a kind have in common.
+    /// Configurations of kinds of links, and the data that links of one kind share. Indexed by the number in [`Memory`].
     kinds: Vec<(LinkConfig, Kind)>,
-    /// What each link remembers, if any of a kind remembers anything.
+    /// State of each link, indexed by link. Shorter than `links`, or empty, if the last links, or all of them, need no such state.
     remembered: Vec<Remembered>,
+    /// State of links in [`Memory::Chained`], indexed by link.
     chained: ChainStates,
+    /// Links of no kind, indexed by the number in [`Memory::Other`].
     others: Vec<Other>,
-    /// When each link was offered its latest packet.
+    /// Instant of the latest packet offered to each link, indexed by link. Shorter than `links` for links that were not offered a packet yet.
     #[cfg(debug_assertions)]
     latest_offers: Vec<Option<Instant>>,
 }
 
-/// Packets that were offered to neighbouring links at one instant: one bit, and one place, for each link.
+/// Fates of packets that were offered to neighbouring links at one instant: one bit and one array entry for each link, from the first link on.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Arrivals {
-    /// The links whose packet arrives.
+    /// Bits of the links whose packet arrives.
     pub arrive: u8,
-    /// Those of them whose packet arrives before one that was sent earlier.
+    /// Bits of the links whose packet arrives before a packet that was sent earlier. A subset of `arrive`.
     pub overtake: u8,
-    /// The number of each packet on its link, from 0.
+    /// Number of each packet on its link, from 0.
     pub sequences: [u64; DirectLinks::AT_ONCE],
-    /// When each arrives; of no meaning for one that does not.
+    /// Arrival of each packet. Without meaning where the bit in `arrive` is clear.
     pub at: [Instant; DirectLinks::AT_ONCE],
 }
 
-/// A link: its counters, and where the rest of it is kept.
+/// Counters of a link, and where the rest of the link is kept.
 #[derive(Clone, Debug)]
 struct LinkState {
     draws: Stream,
     offered: u64,
+    /// Latest arrival of a packet so far.
     latest: Instant,
     delivered: u64,
+    /// Sum of the delays of delivered packets \[ns\].
     delay_nanos: u128,
     lost: u64,
     memory: Memory,
 }
 
-/// Which kind of link it is.
+/// Where the state of a link is kept, and the index of its kind in `kinds`.
 #[derive(Clone, Copy, Debug)]
 enum Memory {
-    /// One of a kind that remembers nothing.
+    /// A link of this kind, which has no state.
     Plain(u16),
-    /// One of a kind that remembers what [`Remembered`] has.
+    /// A link of this kind, whose state is in `remembered`.
     Remembering(u16),
-    /// One of a kind that remembers what [`ChainStates`] has.
+    /// A link of this kind, whose state is in `chained`.
     Chained(u16),
-    /// One of the others.
+    /// A link of no kind: the index in `others`.
     Other(u32),
 }
 
-/// A link that is of no kind.
+/// A link of no kind, with stages and counters of its own.
 #[derive(Clone, Debug)]
 struct Other {
     direct: Direct,
     line: Line,
+    /// Instant at which the latest packet leaves the queue.
     departure: Instant,
+    /// Packets dropped in outages.
     outage: u64,
+    /// Packets that found no room in the queue.
     found_full: u64,
 }
 
 impl DirectLinks {
-    /// Number of links to which a packet is offered at once: a processor computes several at the same time.
+    /// Number of links to which a packet is offered at once. The computations for these links do not depend on each other, so that a processor can overlap
+    /// them.
     pub const AT_ONCE: usize = 8;
 
-    /// No links, for packets of that load; those that arrive by `until` will count as delivered.
+    /// Makes an empty set of links for packets of this load. Packets that arrive by `until` count as delivered.
     #[must_use]
     pub const fn new(until: Instant, load: Load) -> Self {
         Self {
@@ -112,13 +122,15 @@ impl DirectLinks {
         }
     }
 
-    /// Whether such a link can be added: what becomes of a packet of that load is known as soon as it is offered, nothing is copied, marked or damaged.
+    /// Returns whether a link of this model can be added. The fate of a packet of this load must be certain when the packet is offered, and the link must not
+    /// copy, mark or damage packets.
     #[must_use]
     pub fn takes(model: &LinkModel, load: Load) -> bool {
         model.as_fixed().is_some_and(|config| config.is_direct_but_for_queue(load) && Line::new(config, load).is_some())
     }
 
-    /// Adds a link, and says whether it could be added: one that they do not [take](DirectLinks::takes) needs an engine, and is left out.
+    /// Adds a link, and returns true. If [`takes`](DirectLinks::takes) refuses the model, because the link needs an engine, nothing is added and false is
+    /// returned.
     ///
     /// # Panics
     ///
@@ -126,7 +138,7 @@ impl DirectLinks {
     #[must_use]
     pub fn add(&mut self, seed: u64, name: &LinkName, model: &LinkModel) -> bool {
         let Some(config) = model.as_fixed() else { return false };
-        // A kind that is known was asked for before: to ask of each link took a third of the time of adding it.
+        // A configuration in `kinds` was checked when its first link was added, and needs no second check.
         let known = self.kinds.iter().position(|(other, _)| other == config);
         if known.is_none() && !Self::takes(model, self.load) {
             return false;
@@ -140,6 +152,7 @@ impl DirectLinks {
             }
             Some((place, kind)) if kind.remembers() => {
                 let beginning = kind.beginning(draws);
+                // Links added since the last one with state have none. Their entries keep the index equal to the link's number.
                 self.remembered.resize(self.links.len(), Remembered::NOTHING);
                 self.remembered.push(beginning);
                 Memory::Remembering(place)
@@ -156,12 +169,12 @@ impl DirectLinks {
         true
     }
 
-    /// Offers a packet to each of `count` links from `first` on, at most [`DirectLinks::AT_ONCE`], but for those whose bit is set in `excluded`, and writes into
-    /// `arrivals` what becomes of them. Instants must not go back.
+    /// Offers a packet to each of `count` links from `first` on, at most [`DirectLinks::AT_ONCE`] links, and writes the fates of the packets into `arrivals`.
+    /// Links whose bit is set in `excluded` are left out. Instants must not go back.
     ///
     /// # Panics
     ///
-    /// If there are no such links; with debug assertions also if a packet comes earlier than the [`Load`] says.
+    /// If there are no such links. With debug assertions, also if a packet comes earlier than the [`Load`] allows.
     #[inline(always)]
     pub fn offer(&mut self, now: Instant, first: LinkId, count: usize, excluded: u8, arrivals: &mut Arrivals) {
         if self.are_chains() {
@@ -171,17 +184,19 @@ impl DirectLinks {
         }
     }
 
-    /// Whether the links are all of one kind, in which delays follow those before.
+    /// Returns whether all links are of one kind, and that kind has correlated delays and no other state than the chains of delays and of losses.
     #[must_use]
     pub fn are_chains(&self) -> bool {
         matches!(&self.kinds[..], [(_, Kind { chains: Some(_), .. })] if self.others.is_empty())
     }
 
-    /// [`DirectLinks::offer`], for a driver that asked before a loop [which links they are](DirectLinks::are_chains). Both in one loop take two instructions more for a packet of links with jitter and loss.
+    /// Offers packets like [`DirectLinks::offer`], for a driver that has called [`are_chains`](DirectLinks::are_chains) before a loop: `CHAINS` is the
+    /// answer. Each of the two loops then contains the code of its own kind of links only. With a wrong value the answers are the same, and slower to
+    /// compute.
     ///
     /// # Panics
     ///
-    /// As [`DirectLinks::offer`].
+    /// Like [`DirectLinks::offer`].
     #[inline(always)]
     pub fn offer_as<const CHAINS: bool>(&mut self, now: Instant, first: LinkId, count: usize, excluded: u8, arrivals: &mut Arrivals) {
         (arrivals.arrive, arrivals.overtake) = (0, 0);
@@ -189,7 +204,7 @@ impl DirectLinks {
         #[cfg(debug_assertions)]
         (0..count).filter(|place| excluded >> place & 1 == 0).for_each(|place| self.assert_load(now, first + place));
         let (links, span) = (&mut self.links[first..first + count], (now, self.until));
-        // Drawing for eight links what two need takes longer than one by one.
+        // With at most two links left, the joint draw for eight links would cost more than single offers.
         let are_few = count == Self::AT_ONCE && excluded.count_zeros() <= 2;
         match &mut self.kinds[..] {
             _ if are_few => self.offer_one_by_one(now, first, count, excluded, arrivals),
@@ -198,6 +213,7 @@ impl DirectLinks {
             }
             [(_, Kind { chains: Some(_), .. })] => self.offer_one_by_one(now, first, count, excluded, arrivals),
             _ if CHAINS => self.offer_one_by_one(now, first, count, excluded, arrivals),
+            // `remembered` may be shorter than `links` only where several kinds exist, so that with one kind the range is valid.
             [(_, kind)] if self.others.is_empty() && self.remembered.is_empty() => alike::<false>(kind, (links, &mut []), span, excluded, arrivals),
             [(_, kind)] if self.others.is_empty() => {
                 alike::<true>(kind, (links, &mut self.remembered[first..first + count]), span, excluded, arrivals);
@@ -219,7 +235,7 @@ impl DirectLinks {
         }
     }
 
-    /// How many packets were offered to a link.
+    /// Returns the number of packets that a link was offered.
     ///
     /// # Panics
     ///
@@ -230,11 +246,12 @@ impl DirectLinks {
         self.links[link.index()].offered
     }
 
-    /// Offers a packet to one link, and gives when it arrives, if it does, and whether before one that was sent earlier. Instants must not go back.
+    /// Offers a packet to one link, and returns the packet's arrival and whether the packet arrives before one that was sent earlier. Returns `None` if the
+    /// packet does not arrive. Instants must not go back.
     ///
     /// # Panics
     ///
-    /// As [`DirectLinks::offer`].
+    /// Like [`DirectLinks::offer`].
     #[inline]
     pub fn offer_one(&mut self, now: Instant, link: LinkId) -> Option<(Instant, bool)> {
         #[cfg(debug_assertions)]
@@ -242,13 +259,14 @@ impl DirectLinks {
         self.offer_alone(now, link)
     }
 
-    /// A link is offered a packet, which must not come earlier than the load says.
+    /// Checks that a packet offered to `link` at `now` does not come earlier than the load allows.
     #[cfg(debug_assertions)]
     fn assert_load(&mut self, now: Instant, link: usize) {
         if self.latest_offers.len() < self.links.len() {
             self.latest_offers.resize(self.links.len(), None);
         }
         let (before, gap) = (self.latest_offers[link].replace(now), self.load.gap);
+        // The first packet of a link has no gap before it, and passes the check.
         let since = before.map_or(gap, |before| now - before);
         assert!(since >= gap, "link {link} was offered a packet {since:?} after the one before, and was to be offered none within {gap:?}");
     }
@@ -270,7 +288,7 @@ impl DirectLinks {
         link.count(now, self.until, verdict)
     }
 
-    /// Takes back that a packet is delivered: nobody will look when it arrives.
+    /// Takes back the count of a delivered packet, of which the driver will not see the arrival.
     ///
     /// # Panics
     ///
@@ -283,7 +301,7 @@ impl DirectLinks {
         }
     }
 
-    /// The counters of a link.
+    /// Returns the counters of a link.
     ///
     /// # Panics
     ///
@@ -300,11 +318,12 @@ impl DirectLinks {
         LinkStats::counted(offered, delivered, delay_nanos, dropped)
     }
 
-    /// The kind of a link and its place, which may be known, if it is of a kind and there are not too many.
+    /// Returns the index of the link's kind and the kind. `known` is the index if the configuration has a kind already; else the kind is added. Returns
+    /// `None` if the configuration needs more state than a kind has, or if there are too many kinds.
     fn kind(&mut self, known: Option<usize>, config: &LinkConfig) -> Option<(u16, &Kind)> {
         let place = match known {
             Some(place) => place,
-            // Looking a kind up takes longer the more there are.
+            // The list is searched from its beginning for each added link, so its length is limited.
             None if self.kinds.len() >= 64 => return None,
             None => {
                 self.kinds.push((config.clone(), Kind::new(config, self.load)?));
@@ -337,7 +356,8 @@ impl Other {
     }
 }
 
-/// The first random words of the next packet of neighbouring links of one kind, if it is random, and the number of each.
+/// Draws the first random words of the next packet of each of these links, and writes the packet's number into `sequences`. The words are zero if the kind is
+/// not random.
 #[inline(always)]
 fn draw(is_random: bool, links: &[LinkState], sequences: &mut [u64; DirectLinks::AT_ONCE]) -> [Words; DirectLinks::AT_ONCE] {
     let mut words = [[0; 2]; DirectLinks::AT_ONCE];
@@ -350,9 +370,8 @@ fn draw(is_random: bool, links: &[LinkState], sequences: &mut [u64; DirectLinks:
     words
 }
 
-/// Offers a packet to neighbouring links of one kind, which remember something or nothing: each step for all of them before the next.
-///
-/// A closure for the verdict would be called for each packet: a seventh of the time of ten peers.
+/// Offers a packet to each of these links of one kind, which has state if `REMEMBER` is set. All draws come before all verdicts. The verdict is chosen by a
+/// constant rather than given as a closure, so that it is inlined into the loop.
 #[inline(always)]
 fn alike<const REMEMBER: bool>(
     kind: &mut Kind,
@@ -385,10 +404,10 @@ fn alike<const REMEMBER: bool>(
 }
 
 impl Arrivals {
-    /// None yet.
+    /// No packet arrives.
     pub const NONE: Self = Self { arrive: 0, overtake: 0, sequences: [0; DirectLinks::AT_ONCE], at: [Instant::ZERO; DirectLinks::AT_ONCE] };
 
-    /// The places of those that arrive, in order.
+    /// Returns the array indices of the packets that arrive, in ascending order.
     #[inline(always)]
     pub fn places(&self) -> impl Iterator<Item = usize> + use<> {
         let mut left = self.arrive;
@@ -399,7 +418,7 @@ impl Arrivals {
         })
     }
 
-    /// Whether the packet in that place overtakes.
+    /// Returns whether the packet at this array index arrives before a packet that was sent earlier.
     #[must_use]
     #[inline(always)]
     pub const fn overtakes(&self, place: usize) -> bool {
@@ -408,7 +427,7 @@ impl Arrivals {
 }
 
 impl LinkState {
-    /// Counts a packet, and gives when it arrives and whether it overtakes.
+    /// Counts a packet, and returns the packet's arrival and whether the packet overtakes. Returns `None` if the packet does not arrive.
     #[inline(always)]
     fn count(&mut self, now: Instant, until: Instant, verdict: Verdict) -> Option<(Instant, bool)> {
         self.offered += 1;
@@ -422,7 +441,7 @@ impl LinkState {
         }
     }
 
-    /// Counts the arrival of a packet, and says whether it overtakes.
+    /// Counts the arrival of a packet, and returns whether the packet overtakes an earlier one.
     #[inline(always)]
     fn count_arrival(&mut self, now: Instant, until: Instant, at: Instant) -> bool {
         if at <= until {
@@ -434,7 +453,7 @@ impl LinkState {
         overtakes
     }
 
-    /// The first random words of the next packet; zeros if it needs none.
+    /// Returns the first random words of the next packet, or zeros if the link's kind is not random.
     #[inline(always)]
     fn words(&self, kinds: &[(LinkConfig, Kind)]) -> Words {
         match self.memory {

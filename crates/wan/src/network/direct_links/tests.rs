@@ -11,14 +11,14 @@ use crate::stages::config::Layout;
 use crate::stages::delay::{Correlation, Delay, Jitter};
 use crate::stages::queue::{Bottleneck, CoDel, Discipline, Framing, QueueLimit, Red, TokenBucket, nanos};
 
-/// Packets of 64 bytes at any instants.
+/// Packets of 64 bytes, with any gaps.
 const OF_TESTS: Load = Load::of(Bytes::new(64));
 
 fn model(words: &str) -> LinkModel {
     Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap().into()
 }
 
-/// Those words, with this queue before a line of 100 kbit/s: 5.12 ms for 64 bytes.
+/// Returns a model of these words of netem, with a queue of this limit before a line of 100 kbit/s, on which 64 bytes take 5.12 ms.
 fn queued(words: &str, limit: Option<QueueLimit>) -> LinkModel {
     let bottleneck = Bottleneck { limit, ..Bottleneck::at_rate(Rate::bits_per_sec(100_000).unwrap()) };
     let config = Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap();
@@ -47,7 +47,7 @@ fn they_decide_what_whole_links_decide() {
     }
 }
 
-/// Packets come every 8 ms, or every 4: the line is idle, or its queue fills.
+/// Packets come every 8 ms, so that the line is idle, or every 4 ms, so that its queue fills.
 #[test]
 fn queues_decide_what_whole_links_decide() {
     let limits = [None, Some(QueueLimit::Packets(3)), Some(QueueLimit::Bytes(Bytes::new(200))), Some(QueueLimit::Time(Duration::from_millis(9)))];
@@ -61,7 +61,8 @@ fn queues_decide_what_whole_links_decide() {
     }
 }
 
-/// The same line where it is known that no two packets come within 5.12 ms, with every discipline, and a bucket that holds one packet: none waits, whatever the limit.
+/// The line of 100 kbit/s under a load whose packets are at least 5.12 ms apart, with every discipline and a token bucket that holds one packet. No packet
+/// waits, whatever the limit.
 #[test]
 fn lines_without_wait_decide_what_whole_links_decide() {
     let load = Load { gap: Duration::from_micros(5_120), ..OF_TESTS };
@@ -91,7 +92,7 @@ fn lines_without_wait_decide_what_whole_links_decide() {
     }
 }
 
-/// Behind jitter packets come closer together than they were offered.
+/// After jitter, packets may be closer together than they were offered.
 #[test]
 fn a_bucket_behind_jitter_needs_an_engine() {
     let load = Load { gap: Duration::from_millis(6), ..OF_TESTS };
@@ -106,8 +107,9 @@ fn a_bucket_behind_jitter_needs_an_engine() {
     }
 }
 
-/// Correlated gamma delays: of shapes that four terms tell nearly everywhere, of one for which they do not, and over a floor; with losses in bursts, with
-/// independent ones and without. Eleven links are eight and three, or twice five and one.
+/// Correlated gamma delays with losses in bursts, with independent losses and without loss. The shapes include some for which four terms of the series are
+/// enough nearly everywhere, one for which they are not, and delays above a floor. Eleven links are offered as groups of eight and three, and as groups of
+/// five, five and one.
 #[test]
 fn chains_decide_what_whole_links_decide() {
     let gamma = |sd: u64, floor: u64| Jitter {
@@ -133,13 +135,13 @@ fn chains_decide_what_whole_links_decide() {
     }
 }
 
-/// All links at once, in groups of eight and of five, against each as a [`Link`]: the same packets at the same
-/// instants, the same counters at the end.
+/// Compares links that are offered packets in groups of eight, then of five, with one [`Link`] for each model: the same packets at the same instants, and the
+/// same counters at the end.
 fn compare(direct: &[LinkModel]) {
     compare_under(OF_TESTS, direct);
 }
 
-/// [`compare`], where links know of that load, whose gap is at most 6 ms.
+/// [`compare`] for links of this load, whose gap is at most 6 ms.
 fn compare_under(load: Load, direct: &[LinkModel]) {
     [DirectLinks::AT_ONCE, 5].into_iter().for_each(|together| compare_in_groups(load, direct, together));
 }
@@ -152,7 +154,7 @@ fn compare_in_groups(load: Load, direct: &[LinkModel], together: usize) {
     let mut whole: Vec<Link<u64>> = direct.iter().enumerate().map(|(place, model)| Link::new(7, &name(place), model.clone())).collect();
     let mut arrivals: Vec<Vec<(Instant, u64)>> = vec![Vec::new(); direct.len()];
     for number in 0..500_u64 {
-        // Every 8 ms at first, every 4 ms later, or as close together as the load says.
+        // Packets come every 8 ms at first and every 4 ms later, or as close together as the load allows.
         let close = nanos(load.gap).max(4_000_000);
         let now = Instant::from_nanos(number.min(250) * 8_000_000 + number.saturating_sub(250) * close);
         // Every third packet is not offered to the second link.
@@ -190,7 +192,7 @@ fn compare_in_groups(load: Load, direct: &[LinkModel], together: usize) {
 
 #[test]
 fn what_is_forgotten_is_on_the_way_for_ever() {
-    // One that would have arrived at the very last instant.
+    // The packet arrives at the very last instant of the run.
     let mut links = DirectLinks::new(Instant::from_nanos(5_000_000), OF_TESTS);
     assert!(links.add(1, &LinkName::between("a", "b"), &model("delay 5ms")));
     let mut arrivals = Arrivals::NONE;
@@ -228,7 +230,7 @@ fn packets_that_come_earlier_than_the_load_says_are_an_error_of_the_program() {
                 true => assert!(links.offer_one(Instant::from_nanos(second), LinkId::new(1)).is_some()),
                 false => links.offer(Instant::from_nanos(second), LinkId::new(1), 1, 0, &mut Arrivals::NONE.clone()),
             }
-            // It was left out of the first ones.
+            // The first offer left this link out, so that its first packet comes now.
             links.offer_one(Instant::from_nanos(1), LinkId::new(0));
         })
         .is_ok()

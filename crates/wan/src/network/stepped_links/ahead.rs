@@ -1,4 +1,4 @@
-//! What a link has counted ahead of its driver.
+//! Drops and marks that a link has counted before its driver reached their instants.
 
 use alloc::vec::Vec;
 
@@ -6,21 +6,21 @@ use cohaptic_units::Instant;
 
 use crate::fates::fate::DropCause;
 
-/// Packets dropped, each for a cause, or marked, at instants that the driver of their link had not come to when the link decided about them.
+/// Drops (`Some` cause) and marks (`None`), each with its instant, which lies after the latest instant of the link's driver when the link decided.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Ahead(Vec<(Instant, Option<DropCause>)>);
 
 impl Ahead {
-    /// A packet is dropped for that cause, or marked, at `at`, as a link knows at `now`.
+    /// Notes a drop for cause `dropped`, or a mark if `dropped` is `None`, at `at`. The driver has reached `now`.
     pub(super) fn note(&mut self, (now, at): (Instant, Instant), dropped: Option<DropCause>) {
         if at > now {
-            // What the driver has come to counts for ever, so that there is never more here than between two packets.
+            // Events up to `now` stay counted for ever, so they are forgotten here. The list then never holds more than the events between two packets.
             self.0.retain(|(earlier, _)| *earlier > now);
             self.0.push((at, dropped));
         }
     }
 
-    /// What happened after an instant: the cause of each drop, or `None` for a mark.
+    /// Removes all entries, and returns those after `stop`: the cause of each drop, or `None` for a mark.
     pub(super) fn after(&mut self, stop: Instant) -> impl Iterator<Item = Option<DropCause>> {
         self.0.drain(..).filter(move |(at, _)| *at > stop).map(|(_, dropped)| dropped)
     }

@@ -1,4 +1,4 @@
-//! Many links in which packets wait, each driven from one offer to the next, for drivers that keep the packets on the way themselves.
+//! Many links in which packets wait, each driven from one offer to the next. The driver keeps the packets on the way itself.
 
 mod ahead;
 mod queued;
@@ -19,23 +19,23 @@ use crate::line::{Line, Sink};
 use crate::packet::{Marks, Outputs, PacketInfo};
 use queued::{QueuedKind, QueuedLink};
 
-/// Links of any kind, for a driver that knows when it will offer the next packet to each.
+/// Links of any kind, for a driver that knows when it will offer the next packet to each link.
 ///
-/// What a queue does with a packet may depend on those that come later, but never before they come. So a link that is told when its next packet comes decides at
-/// once all that happens until then: no queue of events wakes it. A driver that stops earlier [says so](SteppedLinks::stop), and what has not happened by then is
-/// not counted. It does what [`crate::Network`] does with such links, with the same random numbers at the
-/// same addresses and the same counters. Packets with the payload `T` come out in no order of time, each with its number and the word whether one that came out
-/// before it arrives later or at the same instant.
+/// A queue's decision about a packet may depend on later packets, but never before these packets come. So a link that is told the instant of its next packet
+/// decides at once everything that happens until then, and no queue of events is needed to wake the link. A driver that stops earlier calls
+/// [`stop`](SteppedLinks::stop), which takes back the counts of all that has not happened by then. Random numbers, their addresses and the counters are those
+/// of [`crate::Network`] with the same links. Packets with the payload `T` come out in no order of time. Each comes with its number, and with a flag that is
+/// set if a packet reported before arrives later or at the same instant.
 ///
 /// Links are numbered from 0 as they are added.
 #[derive(Clone, Debug)]
 pub struct SteppedLinks<T> {
     until: Instant,
-    /// The latest instant given. A driver does not stop before it.
+    /// The latest instant given by the driver. A driver does not stop before this instant.
     now: Instant,
     info: PacketInfo,
     links: Vec<Stepped<T>>,
-    /// What links have in common on which nothing waits but before a line of one rate.
+    /// Models of the links in `Stepped::Queued`, and the data that links of one model share. Indexed by the number in `Stepped::Queued`.
     kinds: Vec<(LinkModel, QueuedKind)>,
     outputs: Outputs<Sent<T>>,
     arrivals: Vec<(Instant, Sent<T>)>,
@@ -44,12 +44,12 @@ pub struct SteppedLinks<T> {
 #[derive(Clone, Debug)]
 #[expect(clippy::large_enum_variant, reason = "most links are queued, and lie together: a box for each would be one more place to look at")]
 enum Stepped<T> {
-    /// Of that kind.
+    /// A link with one queue before one line of constant rate at most: the index of its kind in `kinds`, and its own state.
     Queued(u8, QueuedLink<T>),
     Other(Box<Other<T>>),
 }
 
-/// A link of any kind, and the latest arrival over it so far.
+/// A link of any other kind, and the latest arrival over the link so far.
 #[derive(Clone, Debug)]
 struct Other<T> {
     line: Line<(), Sent<T>>,
@@ -57,7 +57,7 @@ struct Other<T> {
     ahead: Ahead,
 }
 
-/// A packet, its number, and when it was offered.
+/// A packet, its number on the link, and the instant of its offer.
 #[derive(Clone, Debug)]
 struct Sent<T> {
     at: Instant,
@@ -65,11 +65,13 @@ struct Sent<T> {
     item: T,
 }
 
-/// Kinds of links that are told apart: looking a kind up takes longer the more there are.
+/// Number of kinds of links, at most. The list of kinds is searched from its beginning, which takes longer with more kinds; links beyond the limit become
+/// `Stepped::Other`.
 const MOST_KINDS: usize = 64;
 
 impl SteppedLinks<()> {
-    /// Whether such a link can be added: one that damages packets, or counts those inside until they arrive, cannot.
+    /// Returns whether a link of this model can be added. Links that damage packets, links that limit the number of packets inside, replays, and models of
+    /// the kernel's queue cannot.
     #[must_use]
     pub fn takes(model: &LinkModel) -> bool {
         let takes = |config: &crate::LinkConfig| config.corruption.is_none() && config.limit.is_none();
@@ -82,13 +84,13 @@ impl SteppedLinks<()> {
 }
 
 impl<T: Clone> SteppedLinks<T> {
-    /// No links, for such packets; those that arrive by `until` will count as delivered.
+    /// Makes an empty set of links for packets of this size and ECN capability. Packets that arrive by `until` count as delivered.
     #[must_use]
     pub const fn new(until: Instant, info: PacketInfo) -> Self {
         Self { until, now: Instant::ZERO, info, links: Vec::new(), kinds: Vec::new(), outputs: Vec::new(), arrivals: Vec::new() }
     }
 
-    /// Adds a link that can be [taken](SteppedLinks::takes).
+    /// Adds a link, whose model must be one that [`takes`](SteppedLinks::takes) accepts.
     pub fn add(&mut self, seed: u64, name: &LinkName, model: &LinkModel) {
         let link = match self.kind(model) {
             Some(place) => Stepped::Queued(place, QueuedLink::new(seed, name, &self.kinds[usize::from(place)].1)),
@@ -99,7 +101,8 @@ impl<T: Clone> SteppedLinks<T> {
         self.links.push(link);
     }
 
-    /// The place of the kind of a link on which nothing waits but before a line of one rate, if it is such a link, and there are not too many kinds.
+    /// Returns the index of the model's kind in `kinds`, adding the kind if it is new. Returns `None` if packets wait elsewhere than before one line of
+    /// constant rate, or if `kinds` is full.
     fn kind(&mut self, model: &LinkModel) -> Option<u8> {
         let place = match self.kinds.iter().position(|(other, _)| other == model) {
             Some(place) => place,
@@ -112,15 +115,16 @@ impl<T: Clone> SteppedLinks<T> {
         u8::try_from(place).ok()
     }
 
-    /// Offers a packet to a link, and says until when nothing else is offered to it. `arrives` is told of each packet of which it is known by then that it arrives:
-    /// when, whether not after all that were told before, and its number on the link, from 0. Instants must not go back.
+    /// Offers a packet to a link at `now`, and promises that nothing else is offered to the link before `next`. `arrives` is called for each packet whose
+    /// arrival is certain by `next`, with the instant of the arrival, a flag that is set if a packet reported before arrives later or at the same instant,
+    /// and the packet's number on the link, from 0. Instants must not go back.
     ///
     /// # Panics
     ///
     /// If there is no such link.
     #[inline]
     pub fn offer(&mut self, (now, next): (Instant, Instant), link: LinkId, item: T, mut arrives: impl FnMut(Instant, bool, u64, T)) {
-        // What happens after the end is not counted.
+        // Events after the end of the run are not counted.
         let (until, next) = (self.until, next.min(self.until));
         self.now = now;
         match &mut self.links[link.index()] {
@@ -146,7 +150,7 @@ impl<T: Clone> SteppedLinks<T> {
         let fate = match line.offer(now, None) {
             Outcome::Arrives(at) => Some(Ok(at)),
             Outcome::Dropped(cause) => Some(Err(cause)),
-            // Most packets find an idle line. To lead them through its stages took more than half of their time.
+            // Most packets find an idle line. Their fate is computed here without a pass through the stages.
             Outcome::Enters => line.enter_at_once(now, *info, next),
         };
         let number = line.offered() - 1;
@@ -171,13 +175,13 @@ impl<T: Clone> SteppedLinks<T> {
         }
     }
 
-    /// Lets time pass on a link until `next`, before which nothing is offered to it.
+    /// Lets time pass on a link until `next`, before which nothing is offered to the link.
     ///
     /// # Panics
     ///
     /// If there is no such link.
     pub fn pass(&mut self, next: Instant, link: LinkId, arrives: &mut dyn FnMut(Instant, bool, u64, T)) {
-        // What happens after the end is not counted.
+        // Events after the end of the run are not counted.
         let (until, next) = (self.until, next.min(self.until));
         match &mut self.links[link.index()] {
             Stepped::Queued(kind, link) => link.pass((self.now, next, until), &self.kinds[usize::from(*kind)].1, arrives),
@@ -185,12 +189,13 @@ impl<T: Clone> SteppedLinks<T> {
         }
     }
 
-    /// Lets time pass on a link with stages besides a line, until `next` or the end at most. Generic, because most packets over such a link come here.
+    /// Lets time pass on a link in `Stepped::Other` until `next`, which is at most the end of the run. Generic in `arrives`, because most packets over links
+    /// with further stages pass here.
     fn pass_on_other(&mut self, next: Instant, link: LinkId, mut arrives: impl FnMut(Instant, bool, u64, T)) {
         let Self { until, now, links, outputs, arrivals, .. } = self;
         let Stepped::Other(other) = &mut links[link.index()] else { return };
         let Other { line, latest, ahead } = &mut **other;
-        // One instant after another, so that it is known when a packet that leaves was marked.
+        // Wakes come one instant at a time, so that `span` holds the instant at which a packet was marked.
         while let Some(wake) = line.next_wake().filter(|wake| *wake <= next) {
             line.wake(wake, outputs, &mut Arriving { arrivals, ahead, span: (*now, wake) });
         }
@@ -201,7 +206,8 @@ impl<T: Clone> SteppedLinks<T> {
         }
     }
 
-    /// Changes the model of a link, of which `seed` and `name` are those that it was added with; see [`crate::Network::set_link`]. Until then time has passed on it.
+    /// Changes the model of a link at `now`; see [`crate::Network::set_link`]. `seed` and `name` are those with which the link was added. Lets time pass on
+    /// the link until `now` first.
     ///
     /// # Panics
     ///
@@ -221,6 +227,7 @@ impl<T: Clone> SteppedLinks<T> {
         let changed = &mut links[link.index()];
         match (&mut *changed, kind) {
             (Stepped::Queued(place, queued), Some(kind)) => {
+                // A queued link becomes one of any kind with its packets inside, because the new model has no kind.
                 queued.reconfigure((now, until), (&kinds[usize::from(*place)].1, &kinds[usize::from(kind)].1), arrives);
                 *place = kind;
             }
@@ -228,13 +235,14 @@ impl<T: Clone> SteppedLinks<T> {
                 let mut other = queued.clone().into_other(now, &kinds[usize::from(*place)].1, info);
                 other.reconfigure(now, (seed, name), model, outputs, arrivals);
                 *changed = Stepped::Other(Box::new(other));
+                // A link that became `Other` stays so even if the new model has a kind: its stages may still hold packets.
             }
             (Stepped::Other(other), _) => other.reconfigure(now, (seed, name), model, outputs, arrivals),
         }
         self.pass(now, link, arrives);
     }
 
-    /// The driver stops at an instant, which is not before the latest one given: takes back that packets were dropped or marked later than that.
+    /// Stops the driver at an instant that is not before the latest instant given. The counts of packets dropped or marked after `at` are taken back.
     pub fn stop(&mut self, at: Instant) {
         for link in &mut self.links {
             match link {
@@ -247,7 +255,7 @@ impl<T: Clone> SteppedLinks<T> {
         }
     }
 
-    /// Takes back that a packet is delivered: nobody will look when it arrives.
+    /// Takes back the count of a delivered packet, of which the driver will not see the arrival.
     ///
     /// # Panics
     ///
@@ -261,7 +269,7 @@ impl<T: Clone> SteppedLinks<T> {
         }
     }
 
-    /// The counters of a link.
+    /// Returns the counters of a link.
     ///
     /// # Panics
     ///
@@ -289,18 +297,18 @@ impl<T: Clone> Other<T> {
     }
 }
 
-/// Where packets that leave a line's stages go.
+/// The way out of a link's stages: collects arrivals, and notes drops and marks that lie ahead of the driver.
 struct Arriving<'a, T> {
     arrivals: &'a mut Vec<(Instant, Sent<T>)>,
     ahead: &'a mut Ahead,
-    /// The latest instant given to the links, and that at which these packets leave.
+    /// The latest instant given by the driver, and the instant of the wake or offer in which these packets leave the stages.
     span: (Instant, Instant),
 }
 
 impl<T> Sink<Sent<T>> for Arriving<'_, T> {
     fn arrives(&mut self, at: Instant, packet: Sent<T>, _copy: u8, marks: Marks) {
         if marks.congestion {
-            // No line before this one marks packets.
+            // Only the line from which the packet leaves now can have marked it, so that the instant of the wake is the instant of the mark.
             self.ahead.note(self.span, None);
         }
         self.arrivals.push((at, packet));

@@ -1,7 +1,9 @@
-//! Links on which nothing waits but before a line of one rate, for packets of one size.
+//! Links in which packets wait before one line of constant rate only, for packets of one size.
 //!
-//! Kept are the stages that decide at once, the packet on the line, and those that wait. It does what [`BottleneckStage`] does between the stages of
-//! [`Staged`](crate::line::staged::Staged), in a tenth of the memory.
+//! A link keeps the stages that decide at once, the packet on the line, and the waiting packets. Its answers are those of [`BottleneckStage`] between the
+//! stages of [`Staged`](crate::line::staged::Staged), with less memory per link: equal packet sizes make the waiting bytes and bits multiples of the number
+//! of packets.
+//!
 
 use alloc::boxed::Box;
 use alloc::collections::VecDeque;
@@ -26,29 +28,31 @@ use crate::stages::queue::{
     giga_bits, idle_packets,
 };
 
-/// What such links of one configuration have in common.
+/// Data that all queued links of one configuration share.
 #[derive(Clone, Debug)]
 pub(super) struct QueuedKind {
     config: LinkConfig,
     line: Option<LineKind>,
 }
 
-/// A line of one rate and the queue before it, for packets of one size.
+/// A line of constant rate and the queue before the line, for packets of one size.
 #[derive(Clone, Debug)]
 struct LineKind {
     bottleneck: Bottleneck,
     rate: Rate,
+    /// Size of each packet.
     size: Bytes,
-    /// What a packet takes on the line, in 10⁻⁹ bit.
+    /// Size of a packet on the line, framing included \[10⁻⁹ bit\].
     bits: u128,
-    /// How long it takes.
+    /// Transmission time of a packet.
     time: Duration,
-    /// How long a mean packet of RED is on the line \[s\].
+    /// Transmission time of a mean packet of RED \[s\]; 0 for other disciplines.
     mean_packet: f64,
 }
 
 impl QueuedKind {
-    /// The kind of such links, for packets of that size; `None` if they are no such links, or mark packets.
+    /// Returns the kind of queued links of this model, for packets of `size`. Returns `None` if the model needs further stages, has the layout of netem, has
+    /// a line without a constant rate, or marks packets.
     pub(super) fn new(model: &LinkModel, size: Bytes) -> Option<Self> {
         let config = model.as_fixed()?;
         if config.layout == Layout::Netem || !config.is_direct_but_for_queue(Load::of(size)) {
@@ -69,46 +73,50 @@ impl LineKind {
             Discipline::TailDrop | Discipline::HeadDrop => 0.0,
             Discipline::CoDel(codel) if !codel.ecn => 0.0,
             Discipline::Red(red) if !red.ecn() => bottleneck.time_of_mean_packet(&red),
+            // Marks would have to be carried with each waiting packet, for which `Offered` has no field.
             Discipline::CoDel(_) | Discipline::Red(_) => return None,
         };
         let bits = giga_bits(bottleneck.framing.on_the_line(size));
         Some(Self { bottleneck: bottleneck.clone(), rate, size, bits, time: rate.transmission_time(bits), mean_packet })
     }
 
+    /// Returns the size of this number of packets \[byte\].
     fn bytes(&self, packets: usize) -> u128 {
         packets as u128 * u128::from(self.size.get())
     }
 }
 
-/// One such link, with the packets on the line and before it.
+/// A queued link, with the packets on the line and before the line.
 #[derive(Clone, Debug)]
 pub(super) struct QueuedLink<T> {
     direct: Direct,
     flow: Flow,
+    /// Latest arrival of a packet so far.
     latest: Instant,
+    /// The line and its queue; `None` if the kind has no line.
     line: Option<LineState<T>>,
     /// Boxed, because few packets are dropped.
     drops: Option<Box<Drops>>,
 }
 
-/// Counters of dropped packets, and the drops that the driver of the link has not come to.
+/// Counters of dropped packets, and the drops that the link's driver has not reached.
 #[derive(Clone, Debug, Default)]
 struct Drops {
     counted: Seldom,
     ahead: Ahead,
 }
 
-/// The packets on a line and before it.
+/// The packets on a line and before the line.
 #[derive(Clone, Debug)]
 struct LineState<T> {
     on_line: Option<OnLine<T>>,
-    /// Since when the line has had nothing to send.
+    /// Instant since which the line has had nothing to send. Meaningful while `on_line` is empty.
     idle_since: Instant,
     waiting: VecDeque<Offered<T>>,
     discipline: DisciplineState,
 }
 
-/// A packet on the line: what was left of it at an instant, in 10⁻⁹ bit, and when it leaves.
+/// A packet on the line: at `since`, `left` of it was still to be sent \[10⁻⁹ bit\], and it leaves the line at `leaves`.
 #[derive(Clone, Debug)]
 struct OnLine<T> {
     packet: Offered<T>,
@@ -117,7 +125,7 @@ struct OnLine<T> {
     leaves: Instant,
 }
 
-/// A packet, its number on the link, and when it was offered.
+/// A packet, its number on the link, and the instant of its offer.
 #[derive(Clone, Debug)]
 struct Offered<T> {
     at: Instant,
@@ -125,7 +133,7 @@ struct Offered<T> {
     item: T,
 }
 
-/// What a discipline remembers.
+/// State that a discipline keeps between packets.
 #[derive(Clone, Debug)]
 enum DisciplineState {
     Nothing,
@@ -144,13 +152,13 @@ impl DisciplineState {
 }
 
 impl<T> QueuedLink<T> {
-    /// An idle link of that kind.
+    /// Makes an idle link of this kind.
     pub(super) fn new(seed: u64, name: &LinkName, kind: &QueuedKind) -> Self {
         let line = kind.line.as_ref().map(LineState::new);
         Self { direct: Direct::new(seed, name, &kind.config), flow: Flow::default(), latest: Instant::ZERO, line, drops: None }
     }
 
-    /// See [`SteppedLinks::offer`](super::SteppedLinks::offer).
+    /// Offers a packet to the link; see [`SteppedLinks::offer`](super::SteppedLinks::offer).
     #[inline(always)]
     pub(super) fn offer(&mut self, (now, until): (Instant, Instant), kind: &QueuedKind, item: T, mut arrives: impl FnMut(Instant, bool, u64, T)) {
         let number = self.flow.offered;
@@ -167,7 +175,7 @@ impl<T> QueuedLink<T> {
         }
     }
 
-    /// See [`SteppedLinks::pass`](super::SteppedLinks::pass).
+    /// Lets time pass until `next`; see [`SteppedLinks::pass`](super::SteppedLinks::pass).
     #[inline(always)]
     pub(super) fn pass(
         &mut self,
@@ -185,6 +193,7 @@ impl<T> QueuedLink<T> {
 
     #[inline(always)]
     fn propagate(&mut self, (leaves, until): (Instant, Instant), packet: Offered<T>, arrives: &mut (impl FnMut(Instant, bool, u64, T) + ?Sized)) {
+        // The words are computed again from the packet's number, so that waiting packets need not carry them.
         let at = self.direct.arrival(leaves, packet.number, self.direct.words(packet.number));
         self.flow.deliver_by(until, packet.at, at);
         arrives(at, at <= self.latest, packet.number, packet.item);
@@ -196,14 +205,14 @@ impl<T> QueuedLink<T> {
         count_drop(&mut self.drops, (now, now), cause);
     }
 
-    /// See [`SteppedLinks::stop`](super::SteppedLinks::stop).
+    /// Takes back the drops after `at`; see [`SteppedLinks::stop`](super::SteppedLinks::stop).
     pub(super) fn stop(&mut self, at: Instant) {
         if let Some(Drops { counted, ahead }) = self.drops.as_deref_mut() {
             ahead.after(at).for_each(|dropped| counted.take_back(dropped));
         }
     }
 
-    /// The link is of another kind from now on: see [`Staged::reconfigure`](crate::line::staged::Staged::reconfigure).
+    /// Changes the kind of the link from `before` to `kind`; see [`Staged::reconfigure`](crate::line::staged::Staged::reconfigure).
     pub(super) fn reconfigure(
         &mut self,
         (now, until): (Instant, Instant),
@@ -217,6 +226,7 @@ impl<T> QueuedLink<T> {
                 Some(line)
             }
             (line, _, kind) => {
+                // Without a queue after the change, packets on the line and before the line go on to the delay at once.
                 let given_up = line.into_iter().flat_map(LineState::dismantle);
                 given_up.for_each(|packet| self.propagate((now, until), packet, arrives));
                 kind.as_ref().map(LineState::new)
@@ -224,7 +234,7 @@ impl<T> QueuedLink<T> {
         };
     }
 
-    /// As a link of any kind, with all that is inside.
+    /// Converts the link to one of any kind, with all packets and counters inside.
     pub(super) fn into_other(self, now: Instant, kind: &QueuedKind, info: PacketInfo) -> Other<T>
     where
         T: Clone,
@@ -239,18 +249,18 @@ impl<T> QueuedLink<T> {
         Other { line: Line::resumed(stats, pipeline), latest, ahead }
     }
 
-    /// Takes back that a packet is delivered.
+    /// Takes back the count of a delivered packet.
     pub(super) fn forget(&mut self, sent: Instant, arrival: Instant) {
         self.flow.forget(sent, arrival);
     }
 
-    /// The counters.
+    /// Returns the counters of the link.
     pub(super) fn stats(&self) -> LinkStats {
         LinkStats { flow: self.flow, seldom: self.drops.as_ref().map_or_else(Seldom::default, |drops| drops.counted) }
     }
 }
 
-/// Counts a packet that is dropped at an instant, as is known at the first one.
+/// Counts a drop at the second instant of `span`. The first instant is the latest one of the driver, which may be earlier.
 fn count_drop(drops: &mut Option<Box<Drops>>, span: (Instant, Instant), cause: DropCause) {
     let Drops { counted, ahead } = &mut **drops.get_or_insert_default();
     counted.dropped[cause.index()] += 1;
@@ -263,12 +273,13 @@ impl<T> LineState<T> {
         Self { on_line: None, idle_since: Instant::ZERO, waiting: VecDeque::new(), discipline }
     }
 
-    /// A packet is dropped at once, perhaps others in its stead, or on the line, or waits. `word` is its random word for queues.
+    /// Drops a packet, sends it on an idle line, or lets it wait; with head drop, waiting packets may be dropped in its place. `word` gives the packet's
+    /// random word for queues, and is called by RED only.
     #[inline(always)]
     fn take(&mut self, now: Instant, kind: &LineKind, packet: Offered<T>, word: impl FnOnce() -> u64, mut dropped: impl FnMut(DropCause)) {
         if let (DisciplineState::Red(state), Discipline::Red(red)) = (&mut self.discipline, &kind.bottleneck.discipline) {
             let idle = if self.on_line.is_none() { now.saturating_duration_since(self.idle_since) } else { Duration::ZERO };
-            // Time that was idle counts once.
+            // Idle time since the previous packet is counted now, so that the next packet does not count it again.
             self.idle_since = now;
             let verdict = state.verdict(red, kind.bytes(self.waiting.len()), idle_packets(idle, kind.mean_packet), false, word());
             if verdict == RedVerdict::Drop {
@@ -278,6 +289,7 @@ impl<T> LineState<T> {
         if self.on_line.is_none() {
             return self.serve(now, kind, packet, dropped);
         }
+        // Head drop removes waiting packets until the new packet has room. Other disciplines drop the new packet, as does head drop once no packet waits.
         while !self.admits(now, kind) {
             dropped(DropCause::QueueFull);
             if kind.bottleneck.discipline != Discipline::HeadDrop || self.waiting.pop_front().is_none() {
@@ -287,10 +299,12 @@ impl<T> LineState<T> {
         self.waiting.push_back(packet);
     }
 
+    /// Returns whether the queue's limit has room for one more packet.
     fn admits(&self, now: Instant, kind: &LineKind) -> bool {
         let Some(limit) = kind.bottleneck.limit else { return true };
         let (packets, bytes) = (self.waiting.len(), kind.bytes(self.waiting.len()));
         let time = match (limit, &self.on_line) {
+            // The waiting time is that of the rest of the packet on the line plus that of all waiting packets.
             (QueueLimit::Time(_), Some(on_line)) => {
                 let sent = kind.rate.bits_sent(now.saturating_duration_since(on_line.since));
                 kind.rate.transmission_time(on_line.left.saturating_sub(sent) + packets as u128 * kind.bits)
@@ -300,7 +314,7 @@ impl<T> LineState<T> {
         limit.admits(Waiting { packets: packets as u64, bytes, time }, kind.size)
     }
 
-    /// The packet that leaves the line by `next`, and when; the first that waits is on the line then.
+    /// Removes the packet that leaves the line by `next`, and returns the packet and its instant. The first waiting packet is on the line afterwards.
     #[inline(always)]
     fn leave(&mut self, next: Instant, kind: &LineKind, mut dropped: impl FnMut(Instant, DropCause)) -> Option<(Instant, Offered<T>)> {
         let OnLine { packet, leaves, .. } = self.on_line.take_if(|on_line| on_line.leaves <= next)?;
@@ -311,7 +325,7 @@ impl<T> LineState<T> {
         Some((leaves, packet))
     }
 
-    /// Begins to send a packet, or one behind it if CoDel drops it.
+    /// Begins to send `packet`, or the first packet after it that CoDel does not drop.
     #[inline(always)]
     fn serve(&mut self, now: Instant, kind: &LineKind, mut packet: Offered<T>, mut dropped: impl FnMut(DropCause)) {
         if let (DisciplineState::CoDel(state), Discipline::CoDel(codel)) = (&mut self.discipline, &kind.bottleneck.discipline) {
@@ -325,9 +339,10 @@ impl<T> LineState<T> {
             }
         }
         self.on_line = Some(OnLine { packet, since: now, left: kind.bits, leaves: now.saturating_add(kind.time) });
+        // Without waiting packets the line runs empty, as if the dropped packet had left.
     }
 
-    /// Nothing is left to send.
+    /// Notes that the line has nothing to send from `now` on.
     fn run_empty(&mut self, now: Instant) {
         self.idle_since = now;
         if let DisciplineState::CoDel(state) = &mut self.discipline {
@@ -335,23 +350,25 @@ impl<T> LineState<T> {
         }
     }
 
-    /// See [`BottleneckStage::reconfigure`].
+    /// Changes the kind of the line; see [`BottleneckStage::reconfigure`].
     fn reconfigure(&mut self, now: Instant, before: &LineKind, kind: &LineKind) {
         if let Some(OnLine { since, left, leaves, .. }) = &mut self.on_line {
+            // Bits sent so far count at the rate before the change, and the rest of the packet takes the time of the new rate.
             *left = left.saturating_sub(before.rate.bits_sent(now.saturating_duration_since(*since)));
             (*since, *leaves) = (now, now.saturating_add(kind.rate.transmission_time(*left)));
         }
+        // A discipline with other parameters keeps its state. Another discipline starts anew.
         if core::mem::discriminant(&before.bottleneck.discipline) != core::mem::discriminant(&kind.bottleneck.discipline) {
             self.discipline = DisciplineState::new(&kind.bottleneck.discipline);
         }
     }
 
-    /// Everything that is on the line or waits, in order.
+    /// Returns the packet on the line, then the waiting packets in their order.
     fn dismantle(self) -> impl Iterator<Item = Offered<T>> {
         self.on_line.into_iter().map(|on_line| on_line.packet).chain(self.waiting)
     }
 
-    /// As the stage that takes packets of any size.
+    /// Converts the line to the stage that takes packets of any size.
     fn into_stage(self, kind: &LineKind, info: PacketInfo) -> BottleneckStage<Sent<T>> {
         let Self { on_line, idle_since, waiting, discipline } = self;
         let packet = |Offered { at, number, item }| -> (Instant, Carried<Sent<T>>) {

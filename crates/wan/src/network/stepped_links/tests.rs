@@ -31,8 +31,8 @@ fn red(ecn: bool) -> Discipline {
     Discipline::Red(Red::new(SIZE, Bytes::new(320), Probability::new(0.5).unwrap(), 0.02, SIZE, ecn).unwrap())
 }
 
-/// What becomes of packets that are offered at these instants, by a whole link and by a stepped one, of which `then` has the models from
-/// those packets on.
+/// Compares the arrivals and the counters of a whole link with those of a stepped link. Packets are offered at `instants`, and each pair in `then` changes
+/// the model of both links right before the packet at that index.
 fn compare(model: &LinkModel, then: &[(usize, &LinkModel)], (instants, until): (&[Instant], Instant)) {
     let (name, info) = (LinkName::between("a", "b"), PacketInfo { size: SIZE, ecn_capable: true });
     let mut whole = Link::new(7, &name, model.clone());
@@ -64,8 +64,8 @@ fn compare(model: &LinkModel, then: &[(usize, &LinkModel)], (instants, until): (
     assert_eq!(stepped.stats(LinkId(0)), whole.stats(), "{}", model.words());
 }
 
-/// Packets of 64 bytes take 5.12 ms and come in bursts of 40 that are 3 ms apart, then 120 that are 8 ms apart: most find an idle line, some a queue, and some leave
-/// just when the next one comes.
+/// Two bursts of 160 packets of 64 bytes. At 100 kbit/s a packet takes 5.12 ms. The first 40 packets of a burst are 3 ms apart and form a queue, the other
+/// 120 are 8 ms apart, of which most find an idle line. At 64 kbit/s packets leave just when the next one comes.
 fn bursts() -> Vec<Instant> {
     (0..320).map(|n: u64| millis(n / 160 * 1_500 + (n % 160).min(40) * 3 + (n % 160).saturating_sub(40) * 8)).collect()
 }
@@ -85,7 +85,7 @@ fn discipline(place: usize) -> Discipline {
 
 #[test]
 fn they_decide_what_whole_links_decide() {
-    // At 64 kbit/s a packet takes 8 ms, and leaves when the next one comes.
+    // At 64 kbit/s a packet takes 8 ms, and leaves at the instant at which the next one comes.
     for (discipline, bits, layout) in (0..DISCIPLINES).map(discipline).flat_map(|discipline| {
         [(discipline, 100_000, Layout::Physical), (discipline, 64_000, Layout::Physical), (discipline, 100_000, Layout::Netem)]
     }) {
@@ -96,7 +96,8 @@ fn they_decide_what_whole_links_decide() {
     }
 }
 
-/// A driver that stops 2 ms after a packet, before the next one, has counted what has happened by then: no drop and no mark of which the link knows that they come later.
+/// A driver stops 2 ms after a packet, before the next one. Counters then hold the events up to the stop only: no drop and no mark that the link has decided
+/// for a later instant.
 #[test]
 fn what_is_ahead_of_a_driver_that_stops_is_taken_back() {
     let (name, info, until) = (LinkName::between("a", "b"), PacketInfo { size: SIZE, ecn_capable: true }, millis(2_900));
@@ -125,8 +126,8 @@ fn what_is_ahead_of_a_driver_that_stops_is_taken_back() {
     }
 }
 
-/// From a packet of the first burst on, which finds others on the line and before it, a link is another one: of another rate, discipline or limit, without a queue, with a
-/// stage that needs an engine, and back.
+/// A link changes at a packet that finds other packets on the line and before the line. The new link has another rate, discipline or limit, or no queue, or a
+/// stage that needs an engine. A second change leads back.
 #[test]
 fn what_is_inside_stays_when_links_change() {
     let netem = |words: &str| Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap();
@@ -151,16 +152,16 @@ fn what_is_inside_stays_when_links_change() {
         .chain([with(Discipline::TailDrop, 100_000, Layout::Netem)])
         .collect();
     for (from, to) in models.iter().flat_map(|from| models.iter().map(move |to| (from, to))) {
-        // The line is busy, or has just sent all, or has been idle for long.
+        // At these packets the line is busy, has just sent its last packet, or has been idle for long.
         for at in [1, 17, 30, 44, 52, 60, 68, 100] {
             compare(from, &[(at, to)], (&bursts(), millis(2_900)));
         }
-        // Again while one packet is on the line, to a discipline that needs an engine.
+        // A second change follows while one packet is on the line, to a discipline that needs an engine.
         compare(from, &[(16, to), (17, &models[3])], (&bursts(), millis(2_900)));
     }
 }
 
-/// Losses in bursts and delays that follow those before, which remember.
+/// Queues between losses in bursts and correlated delays, both of which have state.
 #[test]
 fn queues_between_memories_decide_what_whole_links_decide() {
     for words in ["delay 24ms 4ms 50% loss gemodel 5% 20%", "delay 24ms", "loss 30%"] {
@@ -174,7 +175,7 @@ fn queues_between_memories_decide_what_whole_links_decide() {
 }
 
 proptest! {
-    /// With gaps from none to longer than the queue, limits of each kind, and intervals of CoDel that are long over before the end or never.
+    /// Gaps range from zero to longer than the queue, limits are of each kind, and intervals of CoDel end long before the run does or never.
     #[test]
     fn queues_decide_what_whole_links_decide(
         limit in limits(90_000_000),
@@ -190,7 +191,7 @@ proptest! {
         let delay = Delay::with_jitter(Duration::from_millis(24), Jitter::new(Duration::from_millis(6), Default::default())).unwrap();
         let model = LinkConfig { bottleneck: Some(bottleneck(discipline, limit, bits)), loss, delay, ..LinkConfig::default() }.into();
         prop_assert!(QueuedKind::new(&model, SIZE).is_some());
-        // A run ends when its last packet was offered, or later.
+        // A run ends at the offer of its last packet, or later.
         let until = Instant::from_nanos(until).max(*instants.last().expect("there is one"));
         compare(&model, &[], (&instants, until));
     }
