@@ -1,6 +1,6 @@
-//! The stages that decide at once and make no copies: outage, loss, delay with jitter, order.
+//! The stages that decide at once and make no copies: outage, loss, delay with jitter, and order.
 //!
-//! A link with no other stage is these and nothing else: a function from a packet to its arrival.
+//! A link with no other stage is a function from a packet to its arrival.
 
 use alloc::boxed::Box;
 
@@ -15,15 +15,15 @@ use crate::stages::loss::LossStage;
 use crate::stages::order::OrderStage;
 use crate::stages::outage::OutageStage;
 
-/// The first words of a packet for loss and for jitter.
+/// First random words of a packet: the word for loss, then the word for jitter.
 pub(crate) type Words = [u64; 2];
 
 #[derive(Clone, Debug)]
 pub(crate) struct Direct {
-    /// The random numbers of the link, one address a packet.
+    /// Random numbers of the link, addressed by packet number.
     pub(crate) draws: Stream,
     is_random: bool,
-    /// In a box, as whatever is seldom: the links of a large mesh fill the cache.
+    /// Boxed, because few links have outages and a large mesh has many links.
     outages: Option<Box<OutageStage>>,
     pub(crate) loss: Option<LossStage>,
     pub(crate) delay: DelayStage,
@@ -43,19 +43,20 @@ impl Direct {
         }
     }
 
-    /// The first random words of packet number `number`, which [`Direct::offer`] wants; zeros if the link draws none.
+    /// Returns the first random words of packet number `number`, which [`Direct::offer`] takes, or zeros if the link draws none.
     #[inline]
     pub(crate) fn words(&self, number: u64) -> Words {
         if self.is_random { self.draws.packet(number).loss_and_jitter() } else { [0; 2] }
     }
 
-    /// When a packet arrives, or why it never does.
+    /// Returns the arrival of a packet, or the cause of its drop.
     #[inline(always)]
     pub(crate) fn offer(&mut self, now: Instant, number: u64, words: Words) -> Result<Instant, DropCause> {
         self.offer_through(now, number, words, Ok)
     }
 
-    /// When a packet arrives, or why it never does, with a `queue` between loss and delay that says when it leaves.
+    /// Returns the arrival of a packet, or the cause of its drop. `queue` stands between loss and delay: it takes the instant of the packet's entry, and
+    /// returns the instant of its departure or the cause of its drop.
     #[inline(always)]
     pub(crate) fn offer_through(
         &mut self,
@@ -70,18 +71,19 @@ impl Direct {
         }
     }
 
-    /// Why a packet does not come to the queue, if it does not.
+    /// Returns the cause for which a packet is dropped before the queue, or `None` if the packet reaches the queue.
     #[inline(always)]
     pub(crate) fn dropped(&mut self, now: Instant, number: u64, [word, _]: Words) -> Option<DropCause> {
         if self.is_down(now) {
             return Some(DropCause::Outage);
         }
+        // Outage comes before loss, and a packet in an outage leaves the chain of losses as it is.
         let packet = self.draws.packet(number);
         let is_lost = self.loss.as_mut().is_some_and(|loss| loss.loses(now, number, word, packet));
         is_lost.then_some(DropCause::Loss)
     }
 
-    /// When a packet arrives that leaves the queue at that instant.
+    /// Returns the arrival of a packet that leaves the queue at `leaves`.
     #[inline(always)]
     pub(crate) fn arrival(&mut self, leaves: Instant, number: u64, [_, word]: Words) -> Instant {
         let delay = self.delay.draw_nanos(leaves, word, self.draws.packet(number));
@@ -92,13 +94,13 @@ impl Direct {
         self.outages.is_some()
     }
 
-    /// Whether the link is down for a packet that is offered `now`.
+    /// Returns whether the link is down for a packet that is offered at `now`.
     #[inline]
     pub(crate) fn is_down(&mut self, now: Instant) -> bool {
         self.outages.as_mut().is_some_and(|outages| outages.is_down(now, self.draws))
     }
 
-    /// Changes the configuration, keeping what the stages remember.
+    /// Changes the configuration. The stages keep their state.
     pub(crate) fn reconfigure(&mut self, now: Instant, config: &LinkConfig) {
         self.is_random = config.is_random();
         self.outages = OutageStage::reconfigured(self.outages.take().map(|stage| *stage), now, config.outages.clone(), self.draws).map(Box::new);

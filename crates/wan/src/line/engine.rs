@@ -1,4 +1,4 @@
-//! The state machine of a link that cannot say at once what becomes of a packet.
+//! The state machine of a link whose packets have no certain fate when they are offered.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -11,12 +11,13 @@ use crate::line::staged::Staged;
 use crate::netem::kernel_link::KernelStage;
 use crate::packet::{Carried, Outputs, PacketInfo};
 
-/// An engine and, after a change to one of another kind, those before it, until the packets inside them have left.
+/// The current engine of a link, and earlier engines of other kinds that still hold packets.
 #[derive(Clone, Debug)]
 pub(crate) struct Engine<T> {
     pub(crate) kind: Kind<T>,
+    /// Earlier engines, which take no new packets.
     retiring: Vec<Kind<T>>,
-    /// For when its owner has been told to wake it.
+    /// Earliest instant for which the owner has been told to wake this engine; `None` if no such wake is outstanding.
     announced: Option<Instant>,
 }
 
@@ -50,7 +51,7 @@ impl<T: Clone> Engine<T> {
         Self { kind, retiring: Vec::new(), announced: None }
     }
 
-    /// Takes a packet while `inside` others are inside the link.
+    /// Offers a packet while `inside` other packets are inside the link.
     pub(crate) fn offer(&mut self, now: Instant, packet: Carried<T>, inside: u64, outputs: &mut Outputs<T>) {
         match &mut self.kind {
             Kind::Staged(staged) => staged.offer(now, packet, inside, outputs),
@@ -59,17 +60,19 @@ impl<T: Clone> Engine<T> {
         }
     }
 
-    /// Takes a packet if it is known at once what becomes of it: see [`Staged::offer_at_once`].
+    /// Takes a packet if its fate is certain at once: see [`Staged::offer_at_once`].
     #[inline]
     pub(crate) fn offer_at_once(&mut self, now: Instant, number: u64, info: PacketInfo, until: Instant) -> Option<Result<Instant, DropCause>> {
         match &mut self.kind {
+            // Nothing may be inside the link for a certain fate, so that no earlier engine may hold packets.
             Kind::Staged(staged) if self.retiring.is_empty() => staged.offer_at_once(now, number, info, until),
             Kind::Staged(_) | Kind::Replay(_) | Kind::Kernel(_) => None,
         }
     }
 
-    /// Lets all happen that is due.
+    /// Lets everything due by `now` happen.
     pub(crate) fn pass(&mut self, now: Instant, outputs: &mut Outputs<T>) {
+        // Earlier engines go first, so that older packets come out before newer ones at one instant.
         for kind in &mut self.retiring {
             kind.pass(now, outputs);
         }
@@ -77,7 +80,7 @@ impl<T: Clone> Engine<T> {
         self.kind.pass(now, outputs);
     }
 
-    /// When [`Engine::pass`] must be called.
+    /// Returns the instant at which [`Engine::pass`] must be called next, or `None` if no packet waits.
     pub(crate) fn next_at(&self) -> Option<Instant> {
         let next = self.kind.next_at();
         if self.retiring.is_empty() {
@@ -86,16 +89,18 @@ impl<T: Clone> Engine<T> {
         self.retiring.iter().filter_map(Kind::next_at).chain(next).min()
     }
 
-    /// The owner was woken for that instant: says again when it must be.
+    /// Notes that the owner woke the engine for `at`, so that the next wake is announced again.
     pub(crate) fn woken(&mut self, at: Instant) {
         if self.announced == Some(at) {
             self.announced = None;
         }
     }
 
-    /// When [`Engine::pass`] must be called, if that was not said yet: for an owner that notes it.
+    /// Returns the instant at which [`Engine::pass`] must be called next, if no wake at or before that instant was announced. For an owner that keeps
+    /// announced instants.
     pub(crate) fn announce(&mut self) -> Option<Instant> {
         let next = self.next_at()?;
+        // The announced wake comes first, and the engine announces the next one then.
         if self.announced.is_some_and(|announced| announced <= next) {
             return None;
         }
@@ -103,7 +108,7 @@ impl<T: Clone> Engine<T> {
         Some(next)
     }
 
-    /// Another engine takes what comes from now on; packets inside go on in the engine that took them.
+    /// Replaces the current engine. Packets offered from now on enter the new engine, and packets inside go on in the engine that took them.
     pub(crate) fn replace(&mut self, kind: Kind<T>) {
         let before = core::mem::replace(&mut self.kind, kind);
         if before.next_at().is_some() {

@@ -1,4 +1,4 @@
-//! Packets that a program picks.
+//! Filters: predicates of a program that choose packets to drop.
 
 use alloc::sync::Arc;
 use core::fmt;
@@ -10,17 +10,17 @@ use crate::packet::PacketInfo;
 /// A packet as a filter sees it.
 #[derive(Clone, Copy, Debug)]
 pub struct Offered<'a, P> {
-    /// The number of the packet on this link, from 0.
+    /// Number of the packet on this link, from 0.
     pub sequence: u64,
-    /// When it is offered.
+    /// Instant of the packet's offer.
     pub now: Instant,
-    /// What the link knows of it.
+    /// Size and ECN capability of the packet.
     pub info: PacketInfo,
-    /// What it carries.
+    /// Payload of the packet.
     pub payload: &'a P,
 }
 
-/// A predicate on packets.
+/// A predicate that returns true for packets to drop. Shared between clones of a line.
 pub(crate) struct Filter<P>(Arc<Predicate<P>>);
 
 type Predicate<P> = dyn Fn(&Offered<'_, P>) -> bool + Send + Sync;

@@ -1,7 +1,8 @@
-//! One line: all that decides and counts what becomes of the packets that are offered to it, without the packets that propagate.
+//! A line: decides the fates of packets that are offered to the line, and counts them. Packets in propagation are outside.
 //!
-//! A [`model`] is compiled to the least [`pipeline`] that does what the model says. A [`Line`] is such a pipeline with a filter before it and counters around
-//! it. The owner of a line ([`Link`](crate::Link), [`Network`](crate::Network)) keeps what propagates in an event queue of its own.
+//! A [`model`] is compiled to the smallest [`pipeline`] that does what the model says. A [`Line`] is such a pipeline with a filter before the pipeline and
+//! counters around it. The owner of a line ([`Link`](crate::Link), [`Network`](crate::Network)) keeps packets in propagation in an event queue of its own,
+//! and tells the line the time.
 
 pub(crate) mod direct;
 pub(crate) mod engine;
@@ -26,73 +27,74 @@ use crate::fates::fate::{DropCause, Fate};
 use crate::fates::stats::{Flow, LinkStats, Seldom};
 use crate::packet::{Exit, Marks, Outputs, Packet, PacketInfo};
 
-/// A line whose packets have the payload `P`, and which its owner hands in as `T`.
+/// A line. `P` is the payload type that filters see, and `T` is the packet type that the owner hands in and gets back.
 #[derive(Clone, Debug)]
 pub(crate) struct Line<P, T> {
     flow: Flow,
     pipeline: Pipeline<T>,
-    /// In a box, as whatever is seldom, so that a line takes one cache line: the links of a large mesh fill the cache.
+    /// Boxed, because few lines have a filter and few packets touch these counters. An unboxed `Rare` would make a line larger than one cache line.
     rare: Option<Box<Rare<P>>>,
 }
 
-/// What few lines have, and counters that few packets touch.
+/// Parts that few lines have, and counters that few packets touch.
 #[derive(Clone, Debug)]
 struct Rare<P> {
     filter: Option<Filter<P>>,
     seldom: Seldom,
 }
 
-/// Where an engine's packets go: the side of a line's owner.
+/// The owner's side of a line: takes the packets that come out of the line's engine.
 pub(crate) trait Sink<T> {
-    /// The packet propagates, and arrives then.
+    /// Takes a packet that propagates until `at`, and arrives then. `copy` is the packet's copy number, 0 for the packet itself.
     fn arrives(&mut self, at: Instant, packet: T, copy: u8, marks: Marks);
 
-    /// The packet was dropped, or a copy was made of it.
+    /// Takes a packet that was dropped at `at`, or of which a copy was made at `at`.
     fn happened(&mut self, at: Instant, fate: Fate, packet: T, copy: u8, marks: Marks);
 }
 
 impl<P, T> Line<P, T> {
-    /// What the line did so far.
+    /// Returns the counters of the line.
     pub(crate) fn stats(&self) -> LinkStats {
         LinkStats { flow: self.flow, seldom: self.rare.as_ref().map_or_else(Seldom::default, |rare| rare.seldom) }
     }
 }
 
 impl<P, T: Clone> Line<P, T> {
-    /// A line that does what the model says; as the most general pipeline if `general`. The seed and the name are the address of its random numbers.
+    /// Makes a line of this model, with the most general pipeline if `general` is set. `seed` and `name` are the address of the line's random numbers.
     pub(crate) fn new(seed: u64, name: &LinkName, model: LinkModel, general: bool) -> Self {
         Self { flow: Flow::default(), pipeline: Pipeline::new(seed, name, model, general), rare: None }
     }
 
-    /// A line that goes on from where another one was.
+    /// Makes a line that goes on with the counters and the pipeline of another line. The new line has no filter.
     pub(crate) fn resumed(stats: LinkStats, pipeline: Pipeline<T>) -> Self {
         Self { flow: stats.flow, pipeline, rare: Some(Box::new(Rare { filter: None, seldom: stats.seldom })) }
     }
 
-    /// Drops every packet of which the filter says so, before anything else happens to it.
+    /// Sets the filter of the line, which drops packets before anything else happens to them.
     pub(crate) fn set_filter(&mut self, filter: Filter<P>) {
         self.rare().filter = Some(filter);
     }
 
-    /// How many packets were offered, which is the number of the next one.
+    /// Returns the number of packets offered so far, which is the number of the next packet.
     #[inline]
     pub(crate) const fn offered(&self) -> u64 {
         self.flow.offered
     }
 
-    /// The first random words of the next packet; zeros if it needs none.
+    /// Returns the first random words of the next packet, or zeros if the packet needs none.
     #[inline]
     pub(crate) fn words(&self) -> Words {
         self.pipeline.words(self.flow.offered)
     }
 
-    /// Whether the line has a filter.
+    /// Returns whether the line has a filter.
     #[inline(always)]
     pub(crate) fn has_filter(&self) -> bool {
         self.rare.as_ref().is_some_and(|rare| rare.filter.is_some())
     }
 
-    /// Whether the filter takes the packet, which was offered then and is to be [dropped](Line::drop). Called before [`Line::offer`].
+    /// Returns whether the filter drops the packet. If so, the packet counts as offered, and the caller must tell [`Line::drop`]. Called before
+    /// [`Line::offer`].
     #[inline(never)]
     pub(crate) fn filters(&mut self, packet: &Offered<'_, P>) -> bool {
         let is_dropped = self.rare.as_ref().and_then(|rare| rare.filter.as_ref()).is_some_and(|filter| filter.drops(packet));
@@ -100,8 +102,8 @@ impl<P, T: Clone> Line<P, T> {
         is_dropped
     }
 
-    /// Decides about the next packet, whose first random words may have been drawn before. A packet that is [dropped](Outcome::Dropped) is told to [`Line::drop`], one that
-    /// [enters](Outcome::Enters) the engine is handed to [`Line::enter`].
+    /// Decides about the next packet. `words` holds the packet's first random words if they were drawn before. The caller must tell [`Line::drop`] about a
+    /// packet that is [dropped](Outcome::Dropped), and hand a packet that [enters](Outcome::Enters) the engine to [`Line::enter`].
     #[inline(always)]
     pub(crate) fn offer(&mut self, now: Instant, words: Option<Words>) -> Outcome {
         let number = self.flow.offered;
@@ -109,20 +111,20 @@ impl<P, T: Clone> Line<P, T> {
         self.pipeline.offer(now, number, words)
     }
 
-    /// Counts a packet that is dropped.
+    /// Counts a dropped packet.
     #[inline(never)]
     pub(crate) fn drop(&mut self, cause: DropCause) {
         self.rare().seldom.dropped[cause.index()] += 1;
     }
 
-    /// Takes back that a packet was dropped for that cause, or that it was marked.
+    /// Takes back the count of a drop for this cause, or of a mark if `dropped` is `None`.
     pub(crate) fn take_back(&mut self, dropped: Option<DropCause>) {
         self.rare().seldom.take_back(dropped);
     }
 
-    /// Hands the packet that was offered last to the engine, with the marks that lines before this one left on it.
+    /// Hands the packet that was offered last to the engine, with the marks that earlier lines left on the packet.
     pub(crate) fn enter(&mut self, now: Instant, info: PacketInfo, marks: Marks, item: T, outputs: &mut Outputs<T>, sink: &mut impl Sink<T>) {
-        // The packet itself is counted already.
+        // `offer` has counted the packet itself already.
         let inside = self.stats().in_flight() - 1;
         let number = self.flow.offered - 1;
         if let Some(engine) = self.pipeline.engine() {
@@ -131,15 +133,16 @@ impl<P, T: Clone> Line<P, T> {
         self.come_out(outputs, sink);
     }
 
-    /// In place of [`Line::enter`] for a packet that no line before this one has marked, where no other is offered before `until`: when it arrives or why it never does,
-    /// if that is known at once.
+    /// Takes the packet that was offered last, in place of [`Line::enter`], if the packet's fate is certain at once, and returns its arrival or the cause of
+    /// its drop. No earlier line may have marked the packet, and no other packet may be offered before `until`. Returns `None` without any change if the fate
+    /// is not certain: [`Line::enter`] is called then.
     #[inline]
     pub(crate) fn enter_at_once(&mut self, now: Instant, info: PacketInfo, until: Instant) -> Option<Result<Instant, DropCause>> {
         let number = self.flow.offered - 1;
         self.pipeline.engine()?.offer_at_once(now, number, info, until)
     }
 
-    /// Wakes the engine.
+    /// Wakes the engine at `at`, and hands on the packets that come out.
     pub(crate) fn wake(&mut self, at: Instant, outputs: &mut Outputs<T>, sink: &mut impl Sink<T>) {
         if let Some(engine) = self.pipeline.engine() {
             engine.woken(at);
@@ -148,7 +151,7 @@ impl<P, T: Clone> Line<P, T> {
         self.come_out(outputs, sink);
     }
 
-    /// Changes the model. What propagates keeps its delay.
+    /// Changes the model at `now`. Packets in propagation keep their delay.
     pub(crate) fn reconfigure(
         &mut self,
         now: Instant,
@@ -162,41 +165,42 @@ impl<P, T: Clone> Line<P, T> {
         self.come_out(outputs, sink);
     }
 
-    /// Counts a packet that comes out of the far end after it has entered at `entered`.
+    /// Counts the arrival at `at` of a packet that entered the line at `entered`.
     #[inline(always)]
     pub(crate) fn deliver(&mut self, entered: Instant, at: Instant) {
         self.flow.deliver(entered, at);
     }
 
-    /// The counters of every packet, for an owner that knows when packets come out.
+    /// Returns the counters that every packet touches, for an owner that counts arrivals itself.
     #[inline(always)]
     pub(crate) const fn flow(&mut self) -> &mut Flow {
         &mut self.flow
     }
 
-    /// Whether packets may enter an engine, which must be woken.
+    /// Returns whether packets may enter an engine, which must be woken.
     #[inline]
     pub(crate) const fn has_engine(&self) -> bool {
         matches!(self.pipeline, Pipeline::Engine(_))
     }
 
-    /// When the engine must be woken, for an owner that asks before every step.
+    /// Returns the instant at which the engine must be woken, for an owner that asks before every step.
     #[inline]
     pub(crate) fn next_wake(&self) -> Option<Instant> {
         self.pipeline.next_wake()
     }
 
-    /// When the engine must be woken, if that was not said yet, for an owner that notes it.
+    /// Returns the instant at which the engine must be woken if that instant was not announced yet, for an owner that keeps announced instants.
     pub(crate) fn announce(&mut self) -> Option<Instant> {
         self.pipeline.engine()?.announce()
     }
 
-    /// Hands on what has come out of the engine, and counts it.
+    /// Hands the packets that came out of the engine to `sink`, and counts marks, damage, drops and copies.
     fn come_out(&mut self, outputs: &mut Outputs<T>, sink: &mut impl Sink<T>) {
         for output in outputs.drain(..) {
             let Packet { copy, was_marked, was_damaged, marks, item, .. } = *output.packet;
             match output.exit {
                 Exit::Arrives(at) => {
+                    // Marks and damage of earlier lines were counted there. Only what is new is counted here.
                     let (is_marked, is_damaged) = (marks.congestion && !was_marked, marks.damage.is_some() && !was_damaged);
                     if is_marked || is_damaged {
                         let seldom = &mut self.rare().seldom;

@@ -1,4 +1,4 @@
-//! What kind of link it is.
+//! Models of links.
 
 use crate::laws::sojourn::Sojourn;
 use alloc::borrow::ToOwned as _;
@@ -18,22 +18,23 @@ use crate::stages::config::{Layout, LinkConfig};
 use crate::stages::modulation::Modulated;
 use crate::stages::queue::Load;
 
-/// What a link is: one configuration, several in turn, a recording, or Linux's netem to the bit.
+/// Model of a link: one configuration, several configurations in turn, a recording, or Linux's netem to the bit.
 #[derive(Clone, PartialEq, Debug)]
 #[expect(clippy::large_enum_variant, reason = "nearly all links are of the large variant, and a scene shares one model between its links")]
 pub enum LinkModel {
-    /// One configuration.
+    /// One configuration for the whole run.
     Fixed(LinkConfig),
     /// A configuration for each state of a modulator.
     Modulated(Modulated),
-    /// The n-th packet meets the fate of the n-th packet of the log, as long after it was offered. A packet offered after the log has ended is dropped.
+    /// A log of fates. The n-th packet meets the fate of the n-th packet of the log, after the same time since its offer. A packet offered after the end of
+    /// the log is dropped.
     Replay(Arc<FateLog>),
-    /// What Linux 6.6 does with these words: see [`crate::netem::kernel`].
+    /// The behaviour of Linux 6.6 with these words of netem: see [`crate::netem::kernel`].
     Kernel(KernelNetem),
 }
 
-/// A kernel's netem, checked. Its packets have the length of the link's, so that an overhead counts from there; each link draws with a seed of its own, unless
-/// the words name one.
+/// A checked configuration of the kernel's netem. Packets have the length that the link sees, to which a configured overhead is added. Each link draws with a
+/// seed of its own, unless the words name a seed.
 #[derive(Clone, PartialEq, Debug)]
 pub struct KernelNetem {
     words: Netem,
@@ -41,24 +42,25 @@ pub struct KernelNetem {
 }
 
 impl KernelNetem {
-    /// Checks the words. `tables` has those distributions that they name and that are not built in.
+    /// Checks the words. `tables` holds the distributions that the words name and that are not built in.
     ///
     /// # Errors
     ///
-    /// [`QdiscError`] if options contradict each other, a delay is beyond what `tc` counts, or a table is missing.
+    /// [`QdiscError`] if options contradict each other, a delay is larger than `tc` can represent, or a table is missing.
     pub fn new(words: Netem, tables: Vec<(TableName, kernel::Table)>) -> Result<Self, QdiscError> {
         let checked = Self { words, tables: tables.into() };
         checked.build::<()>(0)?;
         Ok(checked)
     }
 
-    /// The words.
+    /// Returns the words of netem.
     #[must_use]
     pub const fn words(&self) -> &Netem {
         &self.words
     }
 
     pub(crate) fn qdisc<T>(&self, seed: u64) -> Qdisc<T> {
+        // `new` built the same words and tables, and the seed decides nothing about success.
         self.build(seed).expect("it was built once when it was checked")
     }
 
@@ -69,7 +71,7 @@ impl KernelNetem {
 }
 
 impl Default for LinkModel {
-    /// The ideal link.
+    /// Returns the model of an ideal link: no delay, no loss, no queue.
     fn default() -> Self {
         Self::Fixed(LinkConfig::default())
     }
@@ -94,7 +96,7 @@ impl From<KernelNetem> for LinkModel {
 }
 
 impl LinkModel {
-    /// The configuration, if there is but one.
+    /// Returns the configuration if the model is a single one, else `None`.
     #[must_use]
     pub const fn as_fixed(&self) -> Option<&LinkConfig> {
         match self {
@@ -103,28 +105,29 @@ impl LinkModel {
         }
     }
 
-    /// The order of its stages, if it has stages.
+    /// Returns the order of the link's stages, or `None` if the model has no stages.
     pub(crate) fn layout(&self) -> Option<Layout> {
         match self {
             Self::Fixed(config) => Some(config.layout),
+            // All configurations of a modulated link have one layout, so that the first one is enough.
             Self::Modulated(modulated) => modulated.configs().first().map(|config| config.layout),
             Self::Replay(_) | Self::Kernel(_) => None,
         }
     }
 
-    /// Whether all that the link does is to delay every packet by the same span.
+    /// Returns whether the link delays every packet by the same time and does nothing else.
     #[must_use]
     pub fn is_constant_delay(&self) -> bool {
         self.as_fixed().is_some_and(LinkConfig::is_constant_delay)
     }
 
-    /// The span by which the link delays every packet of that load, if that is all that it does: see [`LinkConfig::constant_delay_of`].
+    /// Returns the time by which the link delays every packet of this load, or `None` if the link does anything else: see [`LinkConfig::constant_delay_of`].
     #[must_use]
     pub fn constant_delay_of(&self, load: Load) -> Option<Duration> {
         self.as_fixed()?.constant_delay_of(load)
     }
 
-    /// The mean propagation delay asked for, of all states alike; zero where only a recording knows.
+    /// Returns the configured mean propagation delay: the unweighted mean over the states of a modulator, and zero for a recording.
     #[must_use]
     pub fn mean_delay(&self) -> Duration {
         match self {
@@ -138,7 +141,7 @@ impl LinkModel {
         }
     }
 
-    /// Whether anything that this link does is left to chance.
+    /// Returns whether anything that this link does is random.
     #[must_use]
     pub fn has_chance(&self) -> bool {
         match self {
@@ -148,7 +151,7 @@ impl LinkModel {
         }
     }
 
-    /// Whether bits of a packet may be flipped that arrives.
+    /// Returns whether the link may deliver packets with flipped bits.
     #[must_use]
     pub fn may_damage(&self) -> bool {
         match self {
@@ -159,18 +162,18 @@ impl LinkModel {
         }
     }
 
-    /// Whether this link draws random numbers for loss or for jitter as soon as a packet is offered.
+    /// Returns whether this link draws random numbers for loss or for jitter when a packet is offered.
     pub(crate) fn is_random(&self) -> bool {
         self.as_fixed().is_some_and(LinkConfig::is_random)
     }
 
-    /// Whether what becomes of a packet is known as soon as it is offered, and nothing is copied.
+    /// Returns whether a packet's fate is certain when the packet is offered, and no packet is copied.
     pub(crate) fn is_direct(&self) -> bool {
         self.as_fixed().is_some_and(LinkConfig::is_direct)
     }
 }
 
-/// The parameters that say which kind of link it is, which cannot change with the state of a modulator.
+/// Parameters that choose the kind of a link. A modulator cannot change them between its states.
 pub const LINK_KIND_PARAMETERS: [Key; 4] = [
     usual(
         "modulated",
@@ -191,13 +194,13 @@ static MODULATED: Table = Table::with_others(
     &[&[required("by", Form::Text, "The name of a modulator; beside it keys of the link under the names of its states")]],
     &Form::Table(&STATE),
 );
-/// Keys that hold in a state of a modulator.
+/// Keys of a link that hold in one state of a modulator.
 static STATE: Table = Table::over(&LINK_PARAMETERS);
 const PROFILES: [(&str, &str); 2] = [("exact", "what the words say"), ("kernel-6.6", "what Linux 6.6 does when it is told so")];
 const NETEM: Form = Form::Like(&["delay 20ms 5ms 25% distribution normal loss gemodel 1% 10%", "none"]);
 
 impl LinkModel {
-    /// The link in words: each stage that is configured, with its numbers.
+    /// Returns a description of the link: each configured stage with its numbers.
     #[must_use]
     pub fn words(&self) -> String {
         match self {

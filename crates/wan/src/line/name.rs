@@ -1,33 +1,33 @@
-//! The names of links.
+//! Names of links.
 
 use alloc::string::String;
 
-/// The name of a link: the address of its random numbers, and what records call it.
+/// The name of a link: the address of the link's random numbers, and the link's name in records.
 ///
-/// It is made of the names of the nodes, not of their places in a list, so that adding a node moves nobody else's randomness.
+/// The name is made of the names of nodes, not of their indices, so that adding a node changes no other link's random numbers.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub struct LinkName(String);
 
 impl LinkName {
-    /// The link from one node to another: `left->right`.
+    /// Returns the name of the link from one node to another: `left->right`.
     #[must_use]
     pub fn between(from: &str, to: &str) -> Self {
         Self(alloc::format!("{from}->{to}"))
     }
 
-    /// The line that a node sends through: `left->*`.
+    /// Returns the name of the line through which a node sends: `left->*`.
     #[must_use]
     pub fn uplink(node: &str) -> Self {
         Self::between(node, "*")
     }
 
-    /// The line that a node receives through: `*->left`.
+    /// Returns the name of the line through which a node receives: `*->left`.
     #[must_use]
     pub fn downlink(node: &str) -> Self {
         Self::between("*", node)
     }
 
-    /// The name.
+    /// Returns the name as text.
     #[must_use]
     pub fn as_str(&self) -> &str {
         &self.0

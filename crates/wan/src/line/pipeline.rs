@@ -1,4 +1,4 @@
-//! The part of a line that decides what becomes of a packet, compiled to the least that the link needs.
+//! The part of a line that decides the fate of a packet, compiled to the smallest form that the link needs.
 //!
 //! | link | compiled to |
 //! | --- | --- |
@@ -26,12 +26,12 @@ use crate::stages::modulation::ModulationStage;
 use crate::stages::order::{Order, OrderStage};
 use crate::stages::queue::BottleneckStage;
 
-/// Time was given that is earlier than a time given before. Nothing was changed.
+/// The error of a call with an instant before that of an earlier call. The callee is unchanged.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct TimeWentBack {
-    /// The time given.
+    /// Instant of the failed call.
     pub now: Instant,
-    /// The latest time given before.
+    /// Latest instant of the calls before.
     pub was: Instant,
 }
 
@@ -44,7 +44,7 @@ impl fmt::Display for TimeWentBack {
 
 impl core::error::Error for TimeWentBack {}
 
-/// Checks that time does not go back, and remembers it.
+/// Checks that `now` is not before `clock`, and sets `clock` to `now`.
 pub(crate) fn check_time(clock: &mut Instant, now: Instant) -> Result<(), TimeWentBack> {
     if now < *clock {
         return Err(TimeWentBack { now, was: *clock });
@@ -53,26 +53,26 @@ pub(crate) fn check_time(clock: &mut Instant, now: Instant) -> Result<(), TimeWe
     Ok(())
 }
 
-/// What becomes of an offered packet, as far as it is known at once.
+/// Fate of an offered packet, as far as it is certain at once.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Outcome {
     Arrives(Instant),
     Dropped(DropCause),
-    /// It must go into the engine: see [`Pipeline::engine`].
+    /// The packet must be offered to the engine: see [`Pipeline::engine`].
     Enters,
 }
 
-/// What a link is compiled to.
+/// The compiled form of a link.
 #[derive(Clone, Debug)]
 pub(crate) enum Pipeline<T> {
-    /// Nothing but a constant delay \[ns\]. The order stage only remembers the latest arrival, for a live change to `in-order`.
+    /// A constant delay \[ns\] only. The order stage keeps the latest arrival, which a later change to the order `in-order` needs.
     Constant(u64, OrderStage),
     Direct(Box<Direct>),
     Engine(Box<Engine<T>>),
 }
 
 impl<T: Clone> Pipeline<T> {
-    /// The least that this model needs, or the most general if `general`.
+    /// Makes the smallest pipeline for this model, or the most general one if `general` is set.
     pub(crate) fn new(seed: u64, name: &LinkName, model: LinkModel, general: bool) -> Self {
         match model {
             LinkModel::Fixed(config) if config.is_constant_delay() && !general => {
@@ -85,12 +85,12 @@ impl<T: Clone> Pipeline<T> {
         }
     }
 
-    /// An engine with a bottleneck besides the stages that decide at once, with the packets in it.
+    /// Makes an engine with the stages in `direct` and a bottleneck, which keeps its packets.
     pub(crate) fn resumed(now: Instant, direct: Direct, config: LinkConfig, bottleneck: BottleneckStage<T>) -> Self {
         Self::Engine(Box::new(Engine::new(Kind::Staged(Box::new(Staged::resumed(now, direct, config, bottleneck))))))
     }
 
-    /// The first random words of packet number `number`, which [`Pipeline::offer`] takes; zeros if it needs none.
+    /// Returns the first random words of packet number `number`, which [`Pipeline::offer`] takes, or zeros if the packet needs none.
     #[inline]
     pub(crate) fn words(&self, number: u64) -> Words {
         match self {
@@ -99,7 +99,7 @@ impl<T: Clone> Pipeline<T> {
         }
     }
 
-    /// Decides about packet number `number` of this link, whose first words may have been drawn before.
+    /// Decides about packet number `number` of this link. `words` holds the packet's first words if they were drawn before.
     #[inline(always)]
     pub(crate) fn offer(&mut self, now: Instant, number: u64, words: Option<Words>) -> Outcome {
         match self {
@@ -115,7 +115,7 @@ impl<T: Clone> Pipeline<T> {
         }
     }
 
-    /// The engine, if the link has one.
+    /// Returns the engine, or `None` if the link has none.
     pub(crate) fn engine(&mut self) -> Option<&mut Engine<T>> {
         match self {
             Self::Engine(engine) => Some(engine),
@@ -123,7 +123,7 @@ impl<T: Clone> Pipeline<T> {
         }
     }
 
-    /// When the engine must be woken, if the link has one.
+    /// Returns the instant at which the engine must be woken, or `None` if no engine waits.
     #[inline]
     pub(crate) fn next_wake(&self) -> Option<Instant> {
         match self {
@@ -132,13 +132,15 @@ impl<T: Clone> Pipeline<T> {
         }
     }
 
-    /// Changes the model. What propagates keeps its delay. What leaves the engine by that is in `outputs`.
+    /// Changes the model at `now`. Packets in propagation keep their delay. Packets that leave the engine because of the change are put into `outputs`.
     pub(crate) fn reconfigure(&mut self, now: Instant, seed: u64, name: &LinkName, model: LinkModel, outputs: &mut Outputs<T>) {
         match (self, model) {
             (Self::Constant(delay, _), LinkModel::Fixed(config)) if config.is_constant_delay() => *delay = constant_nanos(&config),
             (Self::Direct(direct), LinkModel::Fixed(config)) if config.is_direct() => direct.reconfigure(now, &config),
             (Self::Engine(engine), model) => reconfigure_engine(engine, now, seed, name, model, outputs),
             (pipeline, model) => {
+                // The state of the direct stages and the latest arrival go on in the new pipeline. The new pipeline is never a `Constant`, which keeps no
+                // such state.
                 let past = match pipeline {
                     Self::Direct(direct) => Some((**direct).clone()),
                     Self::Constant(delay, order) => {
@@ -164,7 +166,8 @@ impl<T: Clone> Pipeline<T> {
 fn reconfigure_engine<T: Clone>(engine: &mut Engine<T>, now: Instant, seed: u64, name: &LinkName, model: LinkModel, outputs: &mut Outputs<T>) {
     engine.pass(now, outputs);
     match (&mut engine.kind, model) {
-        // Packets inside are at a place in the old order of stages, which they go on in; new ones find the stages that remember as they are.
+        // Packets inside are at a place in the old order of stages, and go on in that order. New packets meet the new order, with the state of the direct
+        // stages as it is now.
         (Kind::Staged(staged), model) if model.layout().is_some_and(|layout| layout != staged.layout()) => {
             let past = staged.direct().clone();
             engine.replace(kind(now, seed, name, model, Some(past)));
@@ -174,14 +177,15 @@ fn reconfigure_engine<T: Clone>(engine: &mut Engine<T>, now: Instant, seed: u64,
             let modulation = ModulationStage::new(seed, modulated, now);
             staged.reconfigure(now, modulation.config().clone(), Some(modulation), outputs);
         }
+        // A replay and the kernel's queue take no state over from stages, and give none to them.
         (_, model) => engine.replace(kind(now, seed, name, model, None)),
     }
 }
 
-/// The engine for a model, around the stages that decide at once if they have a past.
+/// Makes the engine of a model. `past` holds the direct stages of the pipeline before, if it had any.
 fn kind<T: Clone>(now: Instant, seed: u64, name: &LinkName, model: LinkModel, past: Option<Direct>) -> Kind<T> {
     let staged = |config: LinkConfig, modulation| {
-        // A link that becomes one with stages later begins its outages then.
+        // Outages of a link that gets stages during the run begin at `now`, not at the beginning of the run.
         let direct = past.unwrap_or_else(|| {
             let mut direct = Direct::new(seed, name, &LinkConfig::default());
             direct.reconfigure(now, &config);

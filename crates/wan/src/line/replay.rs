@@ -1,4 +1,4 @@
-//! A link that replays a fate log.
+//! A link that replays a log of fates.
 
 use alloc::collections::BinaryHeap;
 use alloc::sync::Arc;
@@ -14,12 +14,13 @@ use crate::fates::record::PacketRecord;
 use crate::packet::damage::Damage;
 use crate::packet::{Carried, Exit, Output, Outputs};
 
-/// The log, and its events to come other than arrivals.
+/// A log, and the drops and copies to come. Arrivals are given to the owner at the offer.
 #[derive(Clone, Debug)]
 pub(crate) struct ReplayStage<T> {
     log: Arc<FateLog>,
-    /// By instant and place in `later`.
+    /// Instant of each output to come, and its index in `later`. Simultaneous outputs come in the order of the log.
     order: BinaryHeap<Reverse<(Instant, usize)>>,
+    /// Outputs to come; `None` where the output has come out. Emptied when no output is left, so that indices in `order` stay valid.
     later: Vec<Option<Output<T>>>,
 }
 
@@ -35,7 +36,8 @@ impl<T: Clone> ReplayStage<T> {
             outputs.push(Output { packet, exit: Exit::Dropped(now, DropCause::EndOfLog) });
             return;
         }
-        // The log may write the number of the packet or of the copy beside a copy's making: the n-th made is the n-th that ends.
+        // A log may record the making of a copy under the number of the packet or under that of the copy. So the n-th copy made is taken as the n-th copy
+        // that ends.
         let mut copies = records.iter().filter(|record| record.copy > 0 && record.fate.is_end()).map(|record| record.copy);
         for record in records {
             let at = now.saturating_add(after(record));
@@ -50,6 +52,7 @@ impl<T: Clone> ReplayStage<T> {
                 packet.marks.damage(Some(Damage::unknown()), false);
             }
             let output = Output { packet, exit };
+            // An arrival goes out at once, since the owner keeps packets in propagation. A later drop or copy waits here for its instant.
             if at == now || matches!(exit, Exit::Arrives(_)) {
                 outputs.push(output);
             } else {
@@ -74,7 +77,7 @@ impl<T: Clone> ReplayStage<T> {
     }
 }
 
-/// How long after its offer it happened.
+/// Returns the time from a packet's offer to the recorded event.
 fn after(record: &PacketRecord) -> Duration {
     record.at.saturating_duration_since(record.offered)
 }

@@ -5,7 +5,8 @@
 //! netem      mtu ► outage ► duplication ► loss ► corruption ► limit ► reorder, trace, delay, order ► bucket ► bottleneck ► slots
 //! ```
 //!
-//! A stage that is not configured is `None`, and no packet comes to it. A packet walks from stage to stage until one keeps it, drops it, or lets it out.
+//! A stage that is not configured is `None`, and is not on the route of packets. A packet walks from stage to stage until a stage keeps the packet, drops it,
+//! or lets it out.
 
 use alloc::boxed::Box;
 use alloc::collections::{BinaryHeap, VecDeque};
@@ -69,7 +70,7 @@ const NETEM: [Stage; 10] = [
     Stage::Slots,
 ];
 
-/// The stages of one line and the packets in them. Seldom stages are in boxes: the lines of a large mesh fill the cache.
+/// The stages of one line and the packets in them. Rarely configured stages are boxed: a large mesh has many lines, and each must stay small.
 #[derive(Clone, Debug)]
 pub(crate) struct Staged<T> {
     layout: &'static [Stage; 10],
@@ -80,36 +81,39 @@ pub(crate) struct Staged<T> {
     marks_instead_of_loss: bool,
     duplication: Option<ChanceStage>,
     corruption: Option<Box<CorruptionStage>>,
+    /// Number of packets inside the line, at most.
     limit: Option<u64>,
     bucket: Option<Box<TokenBucketStage<T>>>,
     bottleneck: Option<BottleneckStage<T>>,
-    /// Whether there is no stage but a bottleneck, the physical way round, and those that decide at once.
+    /// Whether the line has a bottleneck in the physical layout, and no other stage that keeps, copies, marks or damages packets. See
+    /// [`Staged::offer_at_once`].
     is_plain: bool,
     slots: Option<Box<SlotStage<T>>>,
     reorder: ReorderStage<T>,
     trace: Option<PathTrace>,
     listed: Option<Box<ImpairmentStages>>,
-    /// What propagates before other stages, where the layout has any behind.
+    /// Packets in propagation. Used only in layouts in which propagation is not the last stage (netem).
     line: BinaryHeap<Propagating<T>>,
-    /// How many have propagated there: what breaks ties.
+    /// Packets pushed to `line` so far. Orders packets that leave `line` at the same instant.
     line_count: u64,
     modulation: Option<Box<ModulationStage>>,
-    /// What happens next, and the next change of state: kept, because they are asked for more often than they change.
+    /// Next event and its stage, and (below) the next change of state. Both are computed by `look_ahead` after each change of the stages, because they are
+    /// read more often than they change.
     next: Option<(Instant, Stage)>,
     next_change: Option<Instant>,
-    /// Memory for what leaves a stage, to be used again.
+    /// Buffer for packets that leave a stage, kept so that its memory is used again. Empty between calls.
     released: VecDeque<Carried<T>>,
 }
 
-/// The stages that there are, in the order of the layout. Going past all ten, of which mostly two are there, and asking each when it will act, took a sixth of
-/// a packet's time.
+/// The configured stages, in the order of the layout. Most lines have two of the ten, so packets and searches for the next event visit these only.
 #[derive(Clone, Debug)]
 struct Route {
+    /// The configured stages in the first `count` entries. The rest is not read.
     stages: [Stage; 10],
     count: u8,
-    /// The place of the first that may keep a packet.
+    /// Index of the first configured stage after the limit: only stages from there on can keep a packet.
     keeping: u8,
-    /// By stage: the place of the first one behind it.
+    /// Index in `stages` of the first configured stage after a stage, indexed by that stage.
     behind: [u8; 10],
 }
 
@@ -129,13 +133,13 @@ impl Route {
         route
     }
 
-    /// Those that may keep a packet: what stands behind the limit.
+    /// Returns the configured stages that can keep a packet: all stages after the limit.
     fn keeping(&self) -> &[Stage] {
         &self.stages[usize::from(self.keeping)..usize::from(self.count)]
     }
 }
 
-/// A packet on the line between two stages, ordered so that the heap gives the earliest.
+/// A packet in propagation between two stages. The order is reversed, so that the heap gives the earliest packet first.
 #[derive(Clone, Debug)]
 struct Propagating<T> {
     until: Instant,
@@ -164,7 +168,7 @@ impl<T> Ord for Propagating<T> {
 }
 
 impl<T: Clone> Staged<T> {
-    /// The stages around those that decide at once, which may have a past.
+    /// Makes the stages of this configuration. `direct` holds the stages that decide at once, which may have state from before.
     pub(crate) fn new(now: Instant, direct: Direct, config: LinkConfig, modulation: Option<ModulationStage>) -> Self {
         let mut stages = Self {
             layout: &PHYSICAL,
@@ -189,41 +193,42 @@ impl<T: Clone> Staged<T> {
             next_change: None,
             released: VecDeque::new(),
         };
-        // Nothing is inside that could come out.
+        // No packet is inside, so `apply` has no outputs.
         stages.apply(now, config, &mut Vec::new());
         stages.modulation = modulation.map(Box::new);
         stages.look_ahead();
         stages
     }
 
-    /// A link with a bottleneck besides the stages that decide at once, with the packets in it.
+    /// Makes the stages of a line that goes on from another one: `bottleneck` keeps its packets, and `direct` its state.
     pub(crate) fn resumed(now: Instant, direct: Direct, config: LinkConfig, bottleneck: BottleneckStage<T>) -> Self {
-        // To configure the stages that decide at once as they are changes nothing.
+        // `new` configures the stages in `direct` with the configuration that they have already, which changes nothing.
         let mut stages = Self { bottleneck: Some(bottleneck), ..Self::new(now, direct, config, None) };
         stages.look_ahead();
         stages
     }
 
-    /// The order of the stages.
+    /// Returns the order of the stages.
     pub(crate) fn layout(&self) -> Layout {
         if self.layout[self.layout.len() - 1] == Stage::Propagation { Layout::Physical } else { Layout::Netem }
     }
 
-    /// The stages that decide at once, with what they remember.
+    /// Returns the stages that decide at once, with their state.
     pub(crate) const fn direct(&self) -> &Direct {
         &self.direct
     }
 
-    /// Takes a packet while `inside` others are inside the line.
+    /// Offers a packet while `inside` other packets are inside the line.
     pub(crate) fn offer(&mut self, now: Instant, packet: Carried<T>, inside: u64, outputs: &mut Outputs<T>) {
+        // Events due come first, so that departures make room. The pass after the walk lets out packets that leave at `now`.
         self.pass(now, outputs);
         self.walk(0, now, packet, inside, outputs);
         self.look_ahead();
         self.pass(now, outputs);
     }
 
-    /// Takes packet number `number` if it is known at once what becomes of it, and says when it arrives, or why it never does: nothing is inside, and it leaves the
-    /// bottleneck by `until`, before which no other comes.
+    /// Takes packet number `number` if its fate is certain at once, and returns its arrival or the cause of its drop. The fate is certain if no packet is
+    /// inside and the packet leaves the bottleneck by `until`, before which no other packet comes. Returns `None` without any change in all other cases.
     #[inline]
     pub(crate) fn offer_at_once(&mut self, now: Instant, number: u64, info: PacketInfo, until: Instant) -> Option<Result<Instant, DropCause>> {
         if !self.is_plain || self.next.is_some() || self.modulation.is_some() {
@@ -231,6 +236,7 @@ impl<T: Clone> Staged<T> {
         }
         let bottleneck = self.bottleneck.as_mut()?;
         let departure = bottleneck.departure_if_idle(now, info.size).filter(|departure| *departure <= until)?;
+        // From here on the packet is taken, and the stages change their state.
         let words = self.direct.words(number);
         Some(self.direct.offer_through(now, number, words, |_| {
             bottleneck.is_idle_from(departure);
@@ -238,14 +244,14 @@ impl<T: Clone> Staged<T> {
         }))
     }
 
-    /// When [`Staged::pass`] must be called next; `None` if nothing waits.
+    /// Returns the instant at which [`Staged::pass`] must be called next, or `None` if no packet waits.
     pub(crate) fn next_at(&self) -> Option<Instant> {
         let (next, _) = self.next?;
-        // While something waits a change of state may change when it leaves.
+        // While a packet waits, a change of state may change the instant at which the packet leaves.
         Some(self.next_change.map_or(next, |change| change.min(next)))
     }
 
-    /// Lets all happen that is due, which mostly is nothing.
+    /// Lets everything due by `now` happen. Mostly nothing is due.
     #[inline]
     pub(crate) fn pass(&mut self, now: Instant, outputs: &mut Outputs<T>) {
         if self.next.is_some_and(|(at, _)| at <= now) || self.next_change.is_some_and(|at| at <= now) {
@@ -259,7 +265,7 @@ impl<T: Clone> Staged<T> {
             let event = self.next.filter(|(at, _)| *at <= now);
             let change = self.next_change.filter(|at| *at <= now);
             match (event, change) {
-                // At one instant what leaves does so before the change.
+                // A packet that leaves at the instant of a change leaves before the change.
                 (Some((at, stage)), change) if change.is_none_or(|change| at <= change) => self.release(at, stage, outputs),
                 (_, Some(change)) => self.change(change, outputs),
                 _ => return,
@@ -268,7 +274,7 @@ impl<T: Clone> Staged<T> {
         }
     }
 
-    /// Changes the configuration. What propagates keeps its delay; what waits in a stage that is gone goes on at once.
+    /// Changes the configuration. Packets in propagation keep their delay. Packets in a stage that is no longer configured go on at once.
     pub(crate) fn reconfigure(&mut self, now: Instant, config: LinkConfig, modulation: Option<ModulationStage>, outputs: &mut Outputs<T>) {
         self.pass(now, outputs);
         self.modulation = modulation.map(Box::new);
@@ -302,6 +308,8 @@ impl<T: Clone> Staged<T> {
         self.limit = config.limit;
         self.trace = config.trace;
         self.listed = ImpairmentStages::reconfigured(self.listed.take(), now, &config.listed, self.direct.draws);
+        // Packets of removed stages, with the stage that they leave. The later stages of the physical order come first, so that older packets go on before
+        // newer ones.
         let mut given_up: Vec<(Stage, Carried<T>)> = Vec::new();
         self.slots = match (self.slots.take(), config.slots) {
             (None, new) => new.map(|new| Box::new(SlotStage::new(new))),
@@ -336,6 +344,7 @@ impl<T: Clone> Staged<T> {
                 None
             }
         };
+        // The route must be that of the new configuration before any packet goes on.
         self.route = Route::new(self.layout, |stage| self.has(stage));
         if config.reorder.is_none() {
             for packet in self.reorder.dismantle() {
@@ -371,7 +380,8 @@ impl<T: Clone> Staged<T> {
         }
     }
 
-    /// What happens next and in which stage; of simultaneous events the one furthest along, so that it makes room for the others.
+    /// Returns the next event and its stage, or `None` if no packet waits. Of simultaneous events the one in the last stage of the route comes first, so that
+    /// a departure makes room for packets from stages before.
     fn next_event(&self) -> Option<(Instant, Stage)> {
         let mut next: Option<(Instant, Stage)> = None;
         for &stage in self.route.keeping().iter().rev() {
@@ -396,6 +406,7 @@ impl<T: Clone> Staged<T> {
     }
 
     fn release(&mut self, now: Instant, stage: Stage, outputs: &mut Outputs<T>) {
+        // Taken out of `self`, since `walk_on` borrows `self` while the buffer is drained.
         let mut released = core::mem::take(&mut self.released);
         match stage {
             Stage::Bucket => released.extend(self.bucket.as_mut().and_then(|bucket| bucket.release(now))),
@@ -429,11 +440,11 @@ impl<T: Clone> Staged<T> {
     }
 
     fn walk_on(&mut self, after: Stage, now: Instant, packet: Carried<T>, outputs: &mut Outputs<T>) {
-        // The limit stands before all stages that keep packets.
+        // All stages that keep packets come after the limit, so that no stage ahead reads `inside`.
         self.walk(usize::from(self.route.behind[after as usize]), now, packet, 0, outputs);
     }
 
-    /// Leads a packet through the stages from that one on.
+    /// Leads a packet through the stages from index `from` of the route on. `inside` is the number of other packets in the line, which the limit reads.
     fn walk(&mut self, from: usize, now: Instant, mut packet: Carried<T>, inside: u64, outputs: &mut Outputs<T>) {
         let draws = self.direct.draws.copy(packet.number, packet.copy);
         for place in from..usize::from(self.route.count) {
@@ -464,12 +475,13 @@ impl<T: Clone> Staged<T> {
                         outputs.push(Output { packet: copy.clone(), exit: Exit::Copied(now) });
                         let before = outputs.len();
                         self.walk(place + 1, now, packet, inside, outputs);
-                        // The packet may have been dropped, or others from the head of a queue in its stead.
+                        // The walk may have dropped the packet, or packets at the head of a queue in its place.
                         let dropped = outputs[before..].iter().filter(|output| matches!(output.exit, Exit::Dropped(..))).count() as u64;
                         return self.walk(place + 1, now, copy, (inside + 1).saturating_sub(dropped), outputs);
                     }
                 }
                 Stage::Corruption => {
+                    // The damage is drawn by the packet and copy number, so that packet and copy are damaged independently.
                     if let Some(corruption) = &mut self.corruption
                         && let Some(damage) = corruption.damage(packet.info, draws)
                     {
@@ -514,7 +526,7 @@ impl<T: Clone> Staged<T> {
         by_model || by_trace || by_listed
     }
 
-    /// Puts a packet into its place among the others, and lets it propagate.
+    /// Places a packet among the others according to the reorder stage, and lets the packet propagate.
     fn place(&mut self, now: Instant, packet: Carried<T>, outputs: &mut Outputs<T>) {
         if self.reorder.is_idle() {
             return self.propagate(now, packet, Travel::InOrder, outputs);
@@ -528,7 +540,7 @@ impl<T: Clone> Staged<T> {
             Placed::Held => {}
         }
         for packet in behind {
-            // A nanosecond later, so that it comes behind over a constant delay too.
+            // A packet released after another one is one nanosecond later, so that it also arrives later over a constant delay.
             self.propagate(now, packet, Travel::Late(Duration::from_nanos(1)), outputs);
         }
     }
@@ -537,7 +549,7 @@ impl<T: Clone> Staged<T> {
         let draws = self.direct.draws.copy(packet.number, packet.copy);
         let mut delay = || {
             let traced = self.trace.as_ref().map_or(0, |trace| trace.at(now).0);
-            // Drawing a word that nobody looks at took 5 % of a link with a queue.
+            // A word is drawn only if the delay reads it. Words have addresses, so that skipping one changes no other.
             let word = if self.direct.delay.is_random() { draws.first(Purpose::Jitter) } else { 0 };
             let listed = self.listed.as_mut().map_or(0, |listed| listed.delay_nanos(now, packet.info));
             self.direct.delay.draw_nanos(now, word, draws).saturating_add(traced).saturating_add(listed)
@@ -558,11 +570,14 @@ impl<T: Clone> Staged<T> {
     }
 }
 
-/// How a packet travels.
+/// How a packet is delayed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Travel {
+    /// By the delay of the line.
     InOrder,
+    /// Not at all: the packet jumps ahead.
     AtOnce,
+    /// By the delay of the line and this time more.
     Late(Duration),
 }
 
