@@ -1,4 +1,4 @@
-//! Why words are refused, and the words with a mark under the one to blame.
+//! Errors of reading words, and an excerpt of the words with a mark under the faulty word.
 
 use alloc::format;
 use alloc::string::{String, ToString};
@@ -9,12 +9,12 @@ use cohaptic_units::Spot;
 
 use super::Contradiction;
 
-/// Why the words are no netem, and which of them is to blame.
+/// Why words cannot be read as a netem, and which word is at fault.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct NetemError {
-    /// The fault.
+    /// Kind of the fault.
     pub kind: NetemErrorKind,
-    /// The bytes of the word to blame in the text that was read.
+    /// Byte range of the faulty word in the text that was read.
     pub span: Range<usize>,
 }
 
@@ -32,40 +32,40 @@ impl core::error::Error for NetemError {}
 pub enum NetemErrorKind {
     /// A word where an option was expected.
     UnknownWord {
-        /// The word.
+        /// The unknown word.
         word: String,
     },
-    /// A word that is not what its option takes.
+    /// A word that is not a value of its option.
     Value {
-        /// The option.
+        /// Name of the option.
         option: &'static str,
-        /// The word.
+        /// The refused word.
         word: String,
-        /// What would have been right.
+        /// Description of the values that the option takes.
         expected: &'static str,
     },
-    /// A number without a unit, where another notation or another version of `tc` reads something else. Zero is the same everywhere and needs none.
+    /// A number without a unit that another notation, or another version of `tc`, reads differently. Zero means the same everywhere and needs no unit.
     NoUnit {
-        /// The option.
+        /// Name of the option.
         option: &'static str,
-        /// The word.
+        /// The number without a unit.
         word: String,
-        /// The reading of each notation, and the words that would have been right.
+        /// The reading of each notation, and the words to write instead.
         readings: String,
     },
-    /// The end, where an option lacks a value.
+    /// The end of the words, where an option still needs a value.
     Missing {
-        /// The option.
+        /// Name of the option.
         option: &'static str,
-        /// What would have been right.
+        /// Description of the values that the option takes.
         expected: &'static str,
     },
-    /// An option said before. `tc` would take the last, mixed with what it leaves out.
+    /// An option that was given before. `tc` would use the last one, mixed with values of the first that the last leaves out.
     Repeated {
-        /// The option.
+        /// Name of the option.
         option: &'static str,
     },
-    /// Options that do not go together.
+    /// Options that contradict each other.
     Contradiction(Contradiction),
 }
 
@@ -94,25 +94,25 @@ impl From<Contradiction> for NetemErrorKind {
 }
 
 impl NetemError {
-    /// The line of `input` with carets under the word to blame, and what was expected there.
+    /// Returns the line of `input` that contains the faulty word, with carets under the word and a description of the values expected.
     ///
     /// ```text
     /// delay 24ms loss 250%
     ///                 ^^^^ expected a percentage from 0 to 100
     /// ```
     ///
-    /// `input` is the text that was read; with another one the mark stands elsewhere, or at the end.
+    /// `input` must be the text that was read. With another text the carets stand elsewhere, or at the end.
     #[must_use]
     pub fn excerpt(&self, input: &str) -> String {
         let Spot { line, marked } = Spot::of(input, self.span.clone());
-        // A tab stays a tab, so that the caret stands below its word whatever the width of tabs.
+        // Tabs are kept, so that the caret stands below the word whatever the width of a tab.
         let indent: String = input[line.start..marked.start].chars().map(|c| if c == '\t' { '\t' } else { ' ' }).collect();
         let carets = "^".repeat(input[marked].chars().count().max(1));
         let line = input[line].trim_end_matches('\r');
         format!("{line}\n{indent}{carets} {}", self.advice())
     }
 
-    /// What was expected, without repeating the word that stands above it.
+    /// Returns a description of the values expected, without the faulty word, which the excerpt shows already.
     fn advice(&self) -> String {
         match &self.kind {
             NetemErrorKind::Value { expected, .. } => format!("expected {expected}"),

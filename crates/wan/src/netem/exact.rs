@@ -1,7 +1,7 @@
-//! Words that mean what they say: the link that they ask for.
+//! The link that does exactly what the words say.
 //!
-//! Each option becomes the stage of the same name, in netem's order ([`Layout::Netem`]). Nothing is rounded to ticks and nothing wraps around.
-//! `docs/netem.md` says the meaning word by word, and what the kernel does instead.
+//! Each option becomes the stage of the same name, in netem's order ([`Layout::Netem`]). No time is rounded to ticks, and no sum wraps around.
+//! `docs/netem.md` gives the meaning word by word, and the kernel's behaviour beside it.
 
 use alloc::sync::Arc;
 use core::fmt;
@@ -21,50 +21,51 @@ use crate::stages::queue::{Bottleneck, Cells, Framing};
 use crate::stages::reorder::{Displacement, Reorder};
 use crate::stages::slots::Slots;
 
-/// Why words that `tc` accepts ask for what cannot be.
+/// Why words that `tc` accepts describe an impossible link.
 #[derive(Clone, PartialEq, Debug)]
 pub enum ExactError {
-    /// Options that do not go together.
+    /// Options that contradict each other.
     Contradiction(Contradiction),
-    /// A law with a least value that would begin below zero. netem sends at once what should leave before it came, which is another law with another mean.
+    /// A law with a smallest value, which would be below zero. netem sends a packet at once if its time lies in the past, which is another law with another
+    /// mean.
     BelowZero {
-        /// The option.
+        /// Name of the option.
         option: &'static str,
-        /// The law.
+        /// Name of the law.
         law: &'static str,
-        /// The mean.
+        /// Mean of the law.
         mean: Duration,
-        /// The jitter: half the width if the law is uniform, else the standard deviation.
+        /// Jitter: half the width if the law is uniform, else the standard deviation.
         jitter: Duration,
-        /// The largest jitter possible.
+        /// Largest jitter for which the law does not begin below zero.
         largest: Duration,
     },
-    /// A delay or a gap between slots that no law has.
+    /// A delay or a gap between slots that the law cannot have.
     Delay {
-        /// The option.
+        /// Name of the option.
         option: &'static str,
-        /// What cannot be.
+        /// Why the delay is impossible.
         reason: DelayError,
     },
-    /// A correlation that such events cannot have.
+    /// A correlation that events of this probability cannot have.
     Chance {
-        /// The option.
+        /// Name of the option.
         option: &'static str,
-        /// What cannot be.
+        /// Why the correlation is impossible.
         reason: ChanceError,
     },
-    /// A four-state chain that cannot be.
+    /// A four-state chain with impossible probabilities.
     State(FourStateError),
-    /// A table that nobody has.
+    /// A table that the caller does not have.
     NoTable(TableName),
-    /// A rate that cannot be counted in bits.
+    /// A rate that does not fit into 64 bits of bits per second.
     Rate {
-        /// The rate.
+        /// Requested rate \[bytes/s\].
         bytes_per_sec: u64,
     },
-    /// A cell that is smaller on the line than what it carries.
+    /// A negative cell overhead: a cell cannot be smaller on the line than its payload.
     CellOverhead {
-        /// What was said.
+        /// Requested cell overhead \[bytes\].
         found: i32,
     },
 }
@@ -105,7 +106,7 @@ impl From<Contradiction> for ExactError {
 }
 
 impl ExactError {
-    /// The option to blame.
+    /// Returns the name of the option to change.
     #[must_use]
     pub const fn option(&self) -> &'static str {
         match self {
@@ -118,18 +119,18 @@ impl ExactError {
     }
 }
 
-/// Where tables come from.
+/// Function that finds the table of a distribution, or `None`.
 type Tables<'a> = &'a mut dyn FnMut(&TableName) -> Option<Arc<DistTable>>;
 
 impl Netem {
-    /// The link that does what the words say. `tables` finds the distributions that are not built in.
+    /// Returns the link that does what the words say. `tables` finds the distributions that are not built in.
     ///
-    /// Not as in the kernel: without `limit` any number of packets is held, and `seed` says nothing, since every link has random numbers of its own.
+    /// In contrast to the kernel, any number of packets is held without `limit`, and `seed` is ignored, since every link has random numbers of its own.
     ///
     /// # Errors
     ///
-    /// [`ExactError`] if the words ask for what cannot be: a uniform or Pareto delay that reaches below zero, a correlation that the law cannot have, a
-    /// table that is missing.
+    /// [`ExactError`] if the words describe an impossible link: a uniform or Pareto delay that reaches below zero, a correlation that the law cannot have, or
+    /// a table that is missing.
     pub fn to_link_config(&self, tables: &mut dyn FnMut(&TableName) -> Option<Arc<DistTable>>) -> Result<LinkConfig, ExactError> {
         self.check()?;
         let corrupted = self.corrupt.map_or_else(|| Ok(Chance::default()), |spec| chance("corrupt", spec))?;
@@ -199,7 +200,7 @@ fn loss(spec: &LossSpec) -> Result<Loss, ExactError> {
 
 fn four_state(spec: &StateSpec) -> Result<FourState, ExactError> {
     let [p13, p31, p32, p23, p14] = spec.probabilities();
-    // Percentages whose sum is 100 may be a hair more in binary, which the words do not mean.
+    // Percentages whose sum is 100 may sum to slightly more in binary. The excess is cut off.
     let [p32, p14] = [p32.min(1.0 - p31), p14.min(1.0 - p13)];
     let [p13, p31, p32, p23, p14] = [p13, p31, p32, p23, p14].map(probability);
     FourState::new(p13, p31, p32, p23, p14).map_err(ExactError::State)
@@ -207,7 +208,7 @@ fn four_state(spec: &StateSpec) -> Result<FourState, ExactError> {
 
 fn gilbert_elliott(spec: &GemodelSpec) -> GilbertElliott {
     let [p, r, loss_in_bad, loss_in_good] = spec.probabilities();
-    // The words name the fractions lost, the model the fractions that get through.
+    // The words give the fractions lost, the model takes the fractions that get through.
     let [p, r, h, k] = [p, r, 1.0 - loss_in_bad, 1.0 - loss_in_good].map(probability);
     GilbertElliott { p, r, h, k }
 }
@@ -234,7 +235,7 @@ fn with_jitter(option: &'static str, mean: Duration, spec: &JitterSpec, tables: 
     let jitter = Jitter { correlation, ..Jitter::new(sd, distribution) };
     Delay::with_jitter(mean, jitter).map_err(|reason| match reason {
         DelayError::ReachesBelowFloor { law, largest, .. } => {
-            // In the measure of the words, which for a uniform law is half its width.
+            // In the unit of the words: for a uniform law half its width, which may be at most the mean.
             let largest = if matches!(spec.distribution, None | Some(Distribution::Uniform)) { mean } else { largest };
             ExactError::BelowZero { option, law, mean, jitter: spec.time, largest }
         }
@@ -244,7 +245,8 @@ fn with_jitter(option: &'static str, mean: Duration, spec: &JitterSpec, tables: 
     })
 }
 
-/// The deviation of a uniform law, 1/√3 of its half-width, down to a nanosecond: a law that may just begin at zero then does.
+/// Returns the standard deviation of a uniform law, 1/√3 of the half-width, rounded down to a nanosecond. Rounding down keeps a law valid that begins exactly
+/// at zero.
 fn deviation_of_half_width(half_width: Duration) -> Duration {
     #[expect(
         clippy::cast_precision_loss,
@@ -271,7 +273,7 @@ fn bottleneck(spec: &RateSpec) -> Result<Bottleneck, ExactError> {
     Ok(Bottleneck { framing, ..Bottleneck::at_rate(rate) })
 }
 
-/// A fraction that was computed from percentages.
+/// Returns a fraction computed from percentages as a probability. Rounding errors outside of 0..=1 are cut off.
 fn probability(value: f64) -> Probability {
     Probability::new(value.clamp(0.0, 1.0)).unwrap_or_default()
 }

@@ -1,4 +1,4 @@
-//! A link that is the kernel's netem.
+//! A link that behaves like the kernel's netem.
 
 use alloc::vec;
 
@@ -9,7 +9,7 @@ use crate::netem::kernel::{DropReason, Output as QdiscOutput, Qdisc};
 use crate::packet::damage::Damage;
 use crate::packet::{Carried, Exit, Output, Outputs};
 
-/// The queueing discipline, on a device of infinite speed.
+/// The kernel's queueing discipline on a device of infinite speed, as a stage of a link.
 #[derive(Clone, Debug)]
 pub(crate) struct KernelStage<T> {
     qdisc: Qdisc<Carried<T>>,
@@ -46,7 +46,7 @@ impl<T: Clone> KernelStage<T> {
         while let Some(at) = self.qdisc.next_at().filter(|at| *at <= now) {
             let before = outputs.len();
             self.leave(at, outputs);
-            // Looking may only have moved the slot on; but if it did not, looking again helps nobody.
+            // A look may only have moved the next slot to a later instant, and the loop goes on. A look without any effect would repeat for ever.
             if outputs.len() == before && self.qdisc.next_at() == Some(at) {
                 return;
             }
@@ -55,6 +55,7 @@ impl<T: Clone> KernelStage<T> {
 
     fn leave(&mut self, now: Instant, outputs: &mut Outputs<T>) {
         while let Some(left) = self.qdisc.dequeue(now) {
+            // Marks of earlier lines stay on the packet.
             let mut packet = left.item.as_copy(left.copy);
             packet.marks.congestion |= left.marked;
             if let Some(bit) = left.corrupted {

@@ -1,11 +1,11 @@
-//! The words of `tc-netem`, and what the Linux kernel makes of them.
+//! The words of `tc-netem`, and the links that they describe: as written, and as the Linux kernel behaves.
 //!
-//! Three parts:
+//! The module has three parts:
 //!
-//! - [`Netem`]: what the words say. [`Netem::parse`] reads them as `tc` of iproute2 6.6 does (without `tc qdisc … netem`), refuses what makes no
-//!   sense with [an error that points at the word](NetemError::excerpt), and `Display` prints words that read back to the same value.
-//! - [`Netem::to_link_config`]: a link that does what the words say, exactly.
-//! - [`kernel`]: what Linux 6.6 does when it is told so, draw for draw. That is often not what the words say: `loss 1% 25%` loses 0.00015 %.
+//! - [`Netem`]: the options in the words. [`Netem::parse`] reads words as `tc` of iproute2 6.6 does (without `tc qdisc … netem`), refuses contradictions with
+//!   [an error that points at the word](NetemError::excerpt), and `Display` prints words that read back to the same value.
+//! - [`Netem::to_link_config`]: a link that does exactly what the words say.
+//! - [`kernel`]: the behaviour of Linux 6.6 with the same words, draw for draw. The kernel often differs from the words: `loss 1% 25%` loses 0.00015 %.
 //!
 //! ```
 //! use cohaptic_wan::netem::{LossSpec, Netem};

@@ -1,7 +1,7 @@
 //! Numbers with units, as `tc` reads them.
 //!
-//! A number is what C's `strtod` reads of decimals (sign, point, exponent), the rest is its unit; units ignore case. Not read, though `strtod` does:
-//! hexadecimal floats, `inf` and `nan`. Integers are what `strtol` reads: octal after `0`, hexadecimal after `0x`.
+//! A number is the longest prefix that C's `strtod` reads as a decimal (sign, point, exponent), and the rest of the word is the unit. Units ignore case.
+//! Hexadecimal floats, `inf` and `nan`, which `strtod` reads too, are refused. Integers are read like `strtol` does: octal after `0`, hexadecimal after `0x`.
 
 use alloc::format;
 use alloc::string::String;
@@ -10,15 +10,15 @@ use core::time::Duration;
 
 use super::Percent;
 
-/// A number and what stands behind it.
+/// A number and the unit after the number.
 struct Number<'a> {
     value: f64,
-    /// The value if it was written as a plain integer: exact where the floating-point value is not.
+    /// The value if it was written as a plain integer, which is exact also where `value` is rounded; else `None`.
     integer: Option<u128>,
     unit: &'a str,
 }
 
-/// Splits a text into a finite number, not below zero, and its unit.
+/// Splits a text into a finite number of at least zero and the number's unit. Returns `None` if the text does not begin with such a number.
 fn number(text: &str) -> Option<Number<'_>> {
     let bytes = text.as_bytes();
     let digits_from = |from: usize| bytes[from..].iter().take_while(|byte| byte.is_ascii_digit()).count();
@@ -38,6 +38,7 @@ fn number(text: &str) -> Option<Number<'_>> {
     }
     let is_integer = end == sign + whole;
     let mut is_plain = is_integer;
+    // As in `strtod`, an `e` belongs to the number only if digits follow. Otherwise the unit begins with it.
     if matches!(bytes.get(end), Some(b'e' | b'E')) {
         let sign = usize::from(matches!(bytes.get(end + 1), Some(b'+' | b'-')));
         let exponent = digits_from((end + 1 + sign).min(bytes.len()));
@@ -53,32 +54,33 @@ fn number(text: &str) -> Option<Number<'_>> {
 }
 
 impl Number<'_> {
-    /// The scale of the unit among `units`.
+    /// Returns the scale of the number's unit among `units`, or `None` if the unit is not there.
     fn scale(&self, units: &[(&str, u64)]) -> Option<u64> {
         units.iter().find(|(name, _)| name.eq_ignore_ascii_case(self.unit)).map(|&(_, scale)| scale)
     }
 
-    /// The number times `scale`, as an integer where it was written as one.
+    /// Returns the number times `scale`: as an integer if the number was written as one and the product fits, else as a real number.
     fn times(&self, scale: u64) -> Scaled {
         let product = self.integer.and_then(|integer| integer.checked_mul(u128::from(scale)));
         product.map_or_else(|| Scaled::Real(self.value * real(scale)), Scaled::Integer)
     }
 }
 
-/// A number times the scale of its unit.
+/// A number times the scale of the number's unit.
 enum Scaled {
     Integer(u128),
     Real(f64),
 }
 
-/// The readings of a number without unit in each notation, and the words that would have been right; `None` for a number with a unit, for zero and for a word that is no number.
+/// Returns the readings of a number without unit in each notation, and the words to write instead. Returns `None` for a number with a unit, for zero, and for
+/// a word that is no number.
 ///
-/// `tc` changed the unit of a delay between versions, and a number in a scene is a fraction where the same word of `tc` is a percentage.
+/// `tc` changed the default unit of a delay between versions, and a scene reads a number as a fraction where `tc` reads a percentage.
 pub(super) fn without_unit(text: &str, kind: Plain) -> Option<String> {
     let number = number(text).filter(|number| number.unit.is_empty() && number.value != 0.0)?;
     Some(match kind {
         Plain::Percentage => {
-            // The digits of the product beyond the twelfth come from rounding to binary.
+            // Rounding to binary makes the digits of the product after the twelfth, which are cut off.
             let fraction = libm::rint(number.value * 1e12) / 1e10;
             format!("tc reads {text} %, a scene would read the fraction {text}, which is {fraction} %: expected {text}%")
         }
@@ -91,7 +93,7 @@ pub(super) fn without_unit(text: &str, kind: Plain) -> Option<String> {
     })
 }
 
-/// The meaning of a number without unit.
+/// The option in which a number without unit was written.
 #[derive(Clone, Copy)]
 pub(super) enum Plain {
     Percentage,
@@ -99,7 +101,7 @@ pub(super) enum Plain {
     Slot,
 }
 
-/// Every scale is below 2⁵³ or has few bits set.
+/// Converts a scale to a real number. Every scale is below 2⁵³ or has few bits set, and is exact.
 #[expect(clippy::cast_precision_loss, reason = "the scales of the tables below are exact")]
 fn real(scale: u64) -> f64 {
     scale as f64
@@ -108,6 +110,7 @@ fn real(scale: u64) -> f64 {
 /// 2³², whose square is 2⁶⁴.
 const TWO_POW_32: f64 = 4_294_967_296.0;
 
+/// Returns the integer part of a value, or `None` if that is outside of 0..2⁶⁴.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to be in 0..2^64; the fraction is cut off as in C")]
 fn truncated(value: f64) -> Option<u64> {
     (0.0..TWO_POW_32 * TWO_POW_32).contains(&value).then_some(value as u64)
@@ -115,7 +118,7 @@ fn truncated(value: f64) -> Option<u64> {
 
 pub(super) const TIME: &str = "a time such as 10ms, 250us or 1.5s, below 292 years (units: s, ms, us, ns)";
 
-/// Reads a time, rounded to the nearest nanosecond. Of numbers without unit only zero is a time: see [`without_unit`].
+/// Reads a time, rounded to the nearest nanosecond. Callers refuse nonzero numbers without unit: see [`without_unit`].
 pub(super) fn time(text: &str) -> Option<Duration> {
     const S: u64 = 1_000_000_000;
     const MS: u64 = 1_000_000;
@@ -130,7 +133,7 @@ pub(super) fn time(text: &str) -> Option<Duration> {
         ("us", US),
         ("usec", US),
         ("usecs", US),
-        // The micro sign and the Greek letter; `tc` has neither.
+        // The micro sign and the Greek letter mu, neither of which `tc` reads.
         ("\u{b5}s", US),
         ("\u{3bc}s", US),
         ("ns", 1),
@@ -143,12 +146,13 @@ pub(super) fn time(text: &str) -> Option<Duration> {
         Scaled::Integer(nanos) => u64::try_from(nanos).ok()?,
         Scaled::Real(nanos) => truncated(libm::rint(nanos))?,
     };
+    // The kernel holds times in signed 64 bits.
     (nanos <= i64::MAX.unsigned_abs()).then_some(Duration::from_nanos(nanos))
 }
 
 pub(super) const PERCENT: &str = "a percentage from 0 to 100";
 
-/// Reads a percentage, with or without its sign: see [`without_unit`].
+/// Reads a percentage, with or without the percent sign: see [`without_unit`].
 pub(super) fn percent(text: &str) -> Option<Percent> {
     let number = number(text)?;
     matches!(number.unit, "" | "%").then_some(())?;
@@ -157,7 +161,7 @@ pub(super) fn percent(text: &str) -> Option<Percent> {
 
 pub(super) const RATE: &str = "a rate of at least 8bit such as 10mbit, 64kbit or 1.5mbps (units: bit, kbit, mbit, gbit, tbit and, for bytes per second, bps, kbps, mbps, gbps, tbps)";
 
-/// Reads a rate as bytes per second, cut off as `tc` does.
+/// Reads a rate in bytes per second, rounded down as in `tc`.
 pub(super) fn rate(text: &str) -> Option<NonZeroU64> {
     const KI: u64 = 1 << 10;
     let units = [
@@ -189,7 +193,7 @@ pub(super) fn rate(text: &str) -> Option<NonZeroU64> {
     NonZeroU64::new(bytes)
 }
 
-/// Reads a size in bytes, or a count of packets: `tc` reads `limit` with the same words. The prefixes are binary.
+/// Reads a size in bytes, or a count of packets, since `tc` reads `limit` like a size. Prefixes are binary.
 pub(super) fn size(text: &str) -> Option<u32> {
     const KI: u64 = 1 << 10;
     let units = [
@@ -212,7 +216,7 @@ pub(super) fn size(text: &str) -> Option<u32> {
     }
 }
 
-/// Reads an integer not below zero, in base 8, 10 or 16 as its prefix says.
+/// Reads an integer of at least zero, in base 8, 10 or 16 according to the integer's prefix.
 pub(super) fn unsigned(text: &str) -> Option<u64> {
     let digits = text.strip_prefix('+').unwrap_or(text);
     let (digits, radix) = match digits.strip_prefix("0x").or_else(|| digits.strip_prefix("0X")) {
@@ -220,12 +224,12 @@ pub(super) fn unsigned(text: &str) -> Option<u64> {
         None if digits.len() > 1 && digits.starts_with('0') => (&digits[1..], 8),
         None => (digits, 10),
     };
-    // The standard reader would take a second sign.
+    // `from_str_radix` would accept a second sign.
     digits.starts_with(|c: char| c.is_digit(radix)).then_some(())?;
     u64::from_str_radix(digits, radix).ok()
 }
 
-/// Reads an integer with a sign, in base 8, 10 or 16 as its prefix says.
+/// Reads a signed integer, in base 8, 10 or 16 according to the integer's prefix.
 pub(super) fn signed(text: &str) -> Option<i64> {
     let magnitude = |digits| i64::try_from(unsigned(digits)?).ok();
     match text.strip_prefix('-') {
@@ -235,7 +239,7 @@ pub(super) fn signed(text: &str) -> Option<i64> {
     }
 }
 
-/// Reads a decimal integer.
+/// Reads a decimal integer of at least zero, without a sign.
 pub(super) fn decimal(text: &str) -> Option<u64> {
     text.starts_with(|c: char| c.is_ascii_digit()).then_some(())?;
     text.parse().ok()

@@ -1,7 +1,7 @@
-//! From words to [`Netem`].
+//! Reading of words into [`Netem`].
 //!
-//! An option may be shortened as `tc` lets one: the first option in the order of [`KEYWORDS`] that begins with the word is meant. Values that may be
-//! left out are taken if the next word begins with a digit (or, where an overhead may be negative, a minus).
+//! An option may be shortened as in `tc`: a word means the first option in the order of [`KEYWORDS`] that begins with the word. An optional value is read if
+//! the next word begins with a digit (or with a minus, where an overhead may be negative).
 
 use alloc::string::ToString;
 use alloc::vec::Vec;
@@ -16,10 +16,11 @@ use super::{
     Percent, RateSpec, ReorderSpec, SlotGap, SlotSpec, StateSpec,
 };
 
-/// What an option is called in messages, which is its full name too.
+/// Full name of an option, which is also its name in messages.
 type Keyword = &'static str;
 
-/// The options in the order in which `tc` compares them, and what each is: `l` is `limit`, `d` is `delay`, `r` is `reorder`, `s` is `seed`.
+/// Words for options in the order in which `tc` compares them, and the option of each. So `l` is `limit`, `d` is `delay`, `r` is `reorder`, and `s` is
+/// `seed`.
 const KEYWORDS: [(&str, Keyword); 14] = [
     ("limit", "limit"),
     ("latency", "delay"),
@@ -47,16 +48,17 @@ const CELL: &str = "a cell size from 1 to 4294967295 bytes";
 const SEED: &str = "a decimal number from 0 to 18446744073709551615";
 
 impl Netem {
-    /// Reads the options of a netem, in any order: what stands behind `netem` in a command for `tc`.
+    /// Reads the options of a netem, in any order: the words after `netem` in a command for `tc`.
     ///
-    /// Stricter than `tc`: nothing may be said twice, negative times, sizes and counts are refused, and so are zero where it would switch off
-    /// an impairment (`gap 0`, a cell of 0, `rate 0`), rates below a byte per second, and chains whose ways out of a state sum to more than 1. Times and
-    /// percentages need their units, but for zero: `delay 20` is 20 µs for iproute2 6.6 and 20 ns from 6.9 on, and `loss 1` is 1 % where the number 1 in a scene
-    /// is 100 %. More lenient: `packets` and `bytes` of a slot may stand in either order, and `ns` is a unit of `delay` (as in iproute2 from 6.9 on).
+    /// The reader is stricter than `tc`. Nothing may be given twice. Negative times, sizes and counts are refused, and so are zeros that would switch off an
+    /// impairment (`gap 0`, a cell of 0, `rate 0`), rates below a byte per second, and chains whose ways out of a state sum to more than 1. Times and
+    /// percentages other than zero need their units: `delay 20` is 20 µs for iproute2 6.6 and 20 ns from 6.9 on, and `loss 1` is 1 % where the number 1 in a
+    /// scene is 100 %. In two points the reader is more lenient: `packets` and `bytes` of a slot may stand in either order, and `ns` is a unit of `delay` (as
+    /// in iproute2 from 6.9 on).
     ///
     /// # Errors
     ///
-    /// [`NetemError`], which points at the word to blame.
+    /// [`NetemError`], which points at the faulty word.
     pub fn parse(input: &str) -> Result<Self, NetemError> {
         let mut parser =
             Parser { words: words(input).peekable(), last: 0..0, seen: Vec::new(), netem: Self::default(), distribution: None, gap: None };
@@ -67,12 +69,13 @@ impl Netem {
     }
 }
 
-/// A word and where it stands.
+/// A word and its byte range in the input.
 struct Word<'a> {
     text: &'a str,
     span: Range<usize>,
 }
 
+/// Splits a text into words at white space.
 fn words(input: &str) -> impl Iterator<Item = Word<'_>> {
     let mut rest = 0;
     core::iter::from_fn(move || {
@@ -83,7 +86,7 @@ fn words(input: &str) -> impl Iterator<Item = Word<'_>> {
     })
 }
 
-/// A word to which a contradiction can point.
+/// A word to which the error of a contradiction can point.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Place {
     Option(Keyword),
@@ -94,11 +97,14 @@ enum Place {
 
 struct Parser<'a, W: Iterator<Item = Word<'a>>> {
     words: Peekable<W>,
-    /// Where the word that was read last stands.
+    /// Byte range of the word that was read last.
     last: Range<usize>,
+    /// Words to which the error of a contradiction can point, with their byte ranges.
     seen: Vec<(Place, Range<usize>)>,
     netem: Netem,
+    /// Value of `distribution`, which may be given before the delay that it belongs to.
     distribution: Option<Distribution>,
+    /// Value of `gap`, which may be given before the `reorder` that it belongs to.
     gap: Option<NonZeroU32>,
 }
 
@@ -124,13 +130,13 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
             "duplicate" => self.netem.duplicate = Some(self.chance(option)?),
             "distribution" => self.distribution = Some(self.value(option, NAME, Distribution::named)?),
             "rate" => self.netem.rate = Some(self.rate()?),
-            // The rest of the table.
+            // `slot`, the only option that is left in the table.
             _ => self.netem.slot = Some(self.slot()?),
         }
         Ok(())
     }
 
-    /// Puts together what was said apart, and checks the whole.
+    /// Moves values into the options that they belong to, and checks the whole.
     fn finish(mut self) -> Result<Netem, NetemError> {
         if let Some(distribution) = self.distribution.take() {
             match self.netem.delay.as_mut().and_then(|delay| delay.jitter.as_mut()) {
@@ -182,7 +188,7 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
         }
     }
 
-    /// The first is required, the others follow as long as there are numbers.
+    /// Reads the first probability, which is required, and further probabilities as long as numbers follow.
     fn probabilities<const N: usize>(&mut self) -> Result<[Option<Percent>; N], NetemError> {
         let mut said = [None; N];
         said[0] = Some(self.percent("loss")?);
@@ -202,7 +208,7 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
         let framing = match self.optional_signed("rate", OVERHEAD, overhead)? {
             None => None,
             Some(bytes) => {
-                // A minus here would be the overhead of a cell whose size was not said.
+                // A minus here would be the overhead of a cell whose size was not given. The reader of the size refuses it.
                 let cell = match self.optional_signed("rate", CELL, count)? {
                     None => None,
                     Some(size) => Some(CellSpec { size, overhead: self.optional_signed("rate", OVERHEAD, overhead)? }),
@@ -229,6 +235,7 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
         };
         let mut slot = SlotSpec { gap, packets: None, bytes: None };
         while let Some(word) = self.words.peek() {
+            // The empty word does not occur, so that a prefix has at least one letter.
             let budget = ["packets", "bytes"].into_iter().find(|name| name.starts_with(word.text));
             let Some(option) = budget else { break };
             let said = if option == "packets" { slot.packets } else { slot.bytes };
@@ -246,7 +253,7 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
         Ok(slot)
     }
 
-    /// The next word, which must be there and must be right.
+    /// Reads the next word with `read`. The error is one of a missing value at the end of the words, and one of a wrong value if `read` returns `None`.
     fn value<V>(&mut self, option: Keyword, expected: &'static str, read: impl Fn(&str) -> Option<V>) -> Result<V, NetemError> {
         let Some(word) = self.words.next() else {
             return Err(NetemError { kind: NetemErrorKind::Missing { option, expected }, span: self.last.clone() });
@@ -255,22 +262,22 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
         read(word.text).ok_or_else(|| NetemError { kind: NetemErrorKind::Value { option, word: word.text.to_string(), expected }, span: word.span })
     }
 
-    /// The next word as a time, with its unit.
+    /// Reads the next word as a time with a unit.
     fn time(&mut self, option: Keyword, expected: &'static str, kind: Plain) -> Result<Duration, NetemError> {
         self.with_unit(option, expected, kind, number::time)
     }
 
-    /// The next word as a percentage, with its sign.
+    /// Reads the next word as a percentage with its sign.
     fn percent(&mut self, option: Keyword) -> Result<Percent, NetemError> {
         self.with_unit(option, PERCENT, Plain::Percentage, number::percent)
     }
 
-    /// The next word as a percentage if it begins with a digit.
+    /// Reads the next word as a percentage if the word begins with a digit.
     fn optional_percent(&mut self, option: Keyword) -> Result<Option<Percent>, NetemError> {
         if self.number_follows() { self.percent(option).map(Some) } else { Ok(None) }
     }
 
-    /// The next word, which must be there, must be right, and must have a unit where notations differ.
+    /// Reads the next word like `value`, and refuses a number without unit where notations differ.
     fn with_unit<V>(&mut self, option: Keyword, expected: &'static str, kind: Plain, read: impl Fn(&str) -> Option<V>) -> Result<V, NetemError> {
         let text = self.words.peek().map_or("", |word| word.text);
         let value = self.value(option, expected, read)?;
@@ -283,7 +290,7 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
         self.words.peek().is_some_and(|word| word.text.starts_with(|c: char| c.is_ascii_digit()))
     }
 
-    /// The next word if it begins with a digit or a minus; then it must be right.
+    /// Reads the next word if the word begins with a digit or a minus, and is then required to be a value.
     fn optional_signed<V>(&mut self, option: Keyword, expected: &'static str, read: impl Fn(&str) -> Option<V>) -> Result<Option<V>, NetemError> {
         let follows = self.words.peek().is_some_and(|word| word.text.starts_with(|c: char| c.is_ascii_digit() || c == '-'));
         if follows { self.value(option, expected, read).map(Some) } else { Ok(None) }
@@ -299,7 +306,7 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
         self.seen.push((place, self.last.clone()));
     }
 
-    /// The error that points at the last word of those that contradict each other.
+    /// Returns the error of a contradiction. The error points at the last word of the contradiction, or at the last word read if no word belongs to it.
     fn blame(&self, contradiction: Contradiction) -> NetemError {
         let places: &[Place] = match contradiction {
             Contradiction::ReorderWithoutDelay => &[Place::Option("reorder")],
@@ -310,7 +317,7 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
             Contradiction::WaysOutOfState3 => &[Place::Probability(2)],
             Contradiction::SlotRange => &[Place::SlotMax],
             Contradiction::SlotWithoutJitter => &[Place::SlotJitter],
-            // Refused word by word, or impossible to say.
+            // The parser refuses these values word by word, so that no text leads here.
             Contradiction::ProbabilitySkipped | Contradiction::SlotTooLarge | Contradiction::TimeTooLong => &[],
         };
         let at = self.seen.iter().find(|(place, _)| places.contains(place));
@@ -319,7 +326,7 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
     }
 }
 
-/// A number above zero.
+/// Reads an integer above zero.
 fn count(text: &str) -> Option<NonZeroU32> {
     NonZeroU32::new(u32::try_from(number::unsigned(text)?).ok()?)
 }

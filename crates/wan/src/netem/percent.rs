@@ -1,4 +1,4 @@
-//! A percentage, as it was said and as `tc` rounds it.
+//! A percentage, as written and as rounded by `tc`.
 
 use core::fmt;
 
@@ -6,51 +6,51 @@ use cohaptic_units::Probability;
 
 /// A percentage from 0 to 100.
 ///
-/// It keeps the number that was said, since `tc` divides by a hundred in binary: not every fraction can be said as a percentage.
+/// The number is kept as written, since `tc` divides by a hundred in binary: not every fraction can be written as a percentage.
 #[derive(Clone, Copy, PartialEq, PartialOrd, Debug, Default)]
 pub struct Percent(f64);
 
-/// What probability 1 is to the kernel.
+/// Probability 1 in the 32 bits of the kernel.
 const ALL: f64 = 4_294_967_295.0;
 
 impl Percent {
-    /// Never.
+    /// 0 %.
     pub const ZERO: Self = Self(0.0);
-    /// Always.
+    /// 100 %.
     pub const HUNDRED: Self = Self(100.0);
 
-    /// A percentage; `None` unless it lies in 0..=100.
+    /// Makes a percentage. Returns `None` unless `percent` lies in 0..=100.
     #[must_use]
     pub fn new(percent: f64) -> Option<Self> {
-        // Adding zero makes −0 a 0, so that equal values print equally.
+        // The sum turns −0 into 0, so that equal values print equally.
         (0.0..=100.0).contains(&percent).then_some(Self(percent + 0.0))
     }
 
-    /// The percentage, from 0 to 100.
+    /// Returns the percentage, from 0 to 100.
     #[must_use]
     pub const fn get(self) -> f64 {
         self.0
     }
 
-    /// The fraction, from 0 to 1.
+    /// Returns the fraction, from 0 to 1.
     #[must_use]
     pub const fn fraction(self) -> f64 {
         self.0 / 100.0
     }
 
-    /// The fraction as a probability.
+    /// Returns the fraction as a probability.
     #[must_use]
     pub fn probability(self) -> Probability {
         Probability::new(self.fraction()).unwrap_or(Probability::ONE)
     }
 
-    /// The number that `tc` hands to the kernel: rint(p·(2³² − 1)), ties to even.
+    /// Returns the number that `tc` hands to the kernel for p: rint(p·(2³² − 1)), ties to even.
     #[must_use]
     pub fn as_u32(self) -> u32 {
         scaled(self.fraction())
     }
 
-    /// What `tc` takes for 1 − p where p was said and 1 − p is the default of another: rint((1 − p)·(2³² − 1)).
+    /// Returns the number that `tc` hands to the kernel for 1 − p, where the complement is the default of another probability: rint((1 − p)·(2³² − 1)).
     #[must_use]
     pub fn complement_as_u32(self) -> u32 {
         scaled(1.0 - self.fraction())
@@ -64,7 +64,7 @@ fn scaled(fraction: f64) -> u32 {
 }
 
 impl fmt::Display for Percent {
-    /// As `tc` reads it back: `0.3%`.
+    /// Prints the percentage as `tc` reads it: `0.3%`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}%", self.0)
     }
@@ -76,7 +76,7 @@ mod tests {
 
     #[test]
     fn a_percentage_is_rounded_as_tc_rounds_it() {
-        // Recorded from tc of iproute2 6.1: 0.1·(2³² − 1) ends in one half and goes to the even neighbour.
+        // Recorded from tc of iproute2 6.1. The product 0.1·(2³² − 1) ends in one half and is rounded to the even neighbour.
         let recorded = [(10.0, 0x1999_999a), (5.0, 0x0ccc_cccd), (1.0, 0x028f_5c29), (1e-7, 4), (0.1, 0x0041_8937), (100.0, u32::MAX), (0.0, 0)];
         for (percent, kernel) in recorded {
             assert_eq!(Percent::new(percent).unwrap().as_u32(), kernel, "{percent} %");

@@ -1,4 +1,4 @@
-//! From [`Netem`] to words that read back to the same value.
+//! Printing of [`Netem`] as words that read back to the same value.
 
 use core::fmt;
 use core::num::NonZeroU64;
@@ -7,7 +7,7 @@ use core::time::Duration;
 use super::{ChanceSpec, DelaySpec, GemodelSpec, LossSpec, Netem, Percent, RateSpec, SlotGap, SlotSpec, StateSpec};
 
 impl fmt::Display for Netem {
-    /// The words `tc` takes, in the order of its manual, every time and rate as an integer. Nothing for a netem without options.
+    /// Prints words for `tc`, in the order of its manual, with every time and rate as an integer. A netem without options prints nothing.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut words = Words { f, separator: "" };
         if let Some(limit) = self.limit {
@@ -47,7 +47,7 @@ impl fmt::Display for Netem {
     }
 }
 
-/// Words with spaces between them.
+/// Prints words with spaces between them.
 struct Words<'f, 'a> {
     f: &'f mut fmt::Formatter<'a>,
     separator: &'static str,
@@ -60,6 +60,7 @@ impl Words<'_, '_> {
         Ok(())
     }
 
+    /// Prints percentages that are given. No given percentage follows a missing one, so that the words read back in order.
     fn put_all(&mut self, percentages: &[Option<Percent>]) -> fmt::Result {
         percentages.iter().flatten().try_for_each(|percent| self.put(percent))
     }
@@ -128,7 +129,7 @@ impl Words<'_, '_> {
     }
 }
 
-/// A time as an integer of the largest unit that allows one.
+/// Prints a time as an integer of the largest unit that needs no fraction.
 struct Time(Duration);
 
 impl fmt::Display for Time {
@@ -140,7 +141,7 @@ impl fmt::Display for Time {
     }
 }
 
-/// A rate as an integer of the largest unit that allows one.
+/// Prints a rate as an integer of the largest unit that needs no fraction.
 struct Bits(NonZeroU64);
 
 impl fmt::Display for Bits {

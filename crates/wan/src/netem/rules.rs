@@ -1,34 +1,34 @@
-//! Which options contradict each other.
+//! Contradictions between options.
 
 use core::fmt;
 use core::time::Duration;
 
 use super::{DelaySpec, GemodelSpec, LossSpec, Netem, Percent, SlotGap, SlotSpec, StateSpec};
 
-/// Two options that cannot both be meant, or one that lacks another.
+/// Two options that contradict each other, an option that needs another one, or a value out of range.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Contradiction {
-    /// There is nothing to overtake.
+    /// `reorder` without a delay: no waiting packet can be overtaken.
     ReorderWithoutDelay,
-    /// A gap says which packets may be reordered.
+    /// `gap` without `reorder`, of which the gap chooses the candidates.
     GapWithoutReorder,
-    /// A mark stands for a loss.
+    /// `ecn` without a loss, in whose place packets are marked.
     EcnWithoutLoss,
-    /// A distribution has something to distribute.
+    /// `distribution` without a jitter, of which the distribution is the law.
     DistributionWithoutJitter,
-    /// p13 + p14 is above 1.
+    /// p13 + p14 of the four-state chain is above 1.
     WaysOutOfState1,
-    /// p31 + p32 is above 1.
+    /// p31 + p32 of the four-state chain is above 1.
     WaysOutOfState3,
-    /// A model's probability was given without one that has to be said before it.
+    /// A probability of a loss model was given without all probabilities before it.
     ProbabilitySkipped,
-    /// The longest is shorter than the shortest.
+    /// The longest gap between slots is shorter than the shortest.
     SlotRange,
-    /// A slot distribution without deviation.
+    /// A slot distribution has no deviation.
     SlotWithoutJitter,
-    /// More than the kernel's signed 32 bits count.
+    /// A count of packets or bytes per slot does not fit into the kernel's signed 32 bits.
     SlotTooLarge,
-    /// Longer than the kernel's 64 bits count.
+    /// A time does not fit into the kernel's signed 64 bits of nanoseconds.
     TimeTooLong,
 }
 
@@ -55,7 +55,7 @@ impl fmt::Display for Contradiction {
 impl core::error::Error for Contradiction {}
 
 impl Contradiction {
-    /// The option that should be said otherwise.
+    /// Returns the name of the option to change.
     #[must_use]
     pub const fn option(self) -> &'static str {
         match self {
@@ -70,15 +70,15 @@ impl Contradiction {
     }
 }
 
-/// The rounding of decimal percentages to binary must not make 100 % more than that.
+/// Tolerance for sums of probabilities: decimal percentages that sum to 100 may be larger after rounding to binary.
 const SLACK: f64 = 1e-9;
 
 impl Netem {
-    /// Whether all options can be meant at once. What [`Netem::parse`] gives always can.
+    /// Checks that no options contradict each other. Every value that [`Netem::parse`] returns passes.
     ///
     /// # Errors
     ///
-    /// The first [`Contradiction`] in the order of the fields.
+    /// The first [`Contradiction`] in the order in which the options are checked: delay, loss, `ecn`, `reorder`, `slot`.
     pub fn check(&self) -> Result<(), Contradiction> {
         self.delay.as_ref().map_or(Ok(()), check_delay)?;
         match &self.loss {
@@ -93,7 +93,7 @@ impl Netem {
         self.slot.as_ref().map_or(Ok(()), check_slot)
     }
 
-    /// As `tc` tells it: the chains count as a loss whatever their probabilities.
+    /// Returns whether `tc` sees a loss: the chains count as a loss whatever their probabilities.
     fn can_lose(&self) -> bool {
         match &self.loss {
             None => false,
@@ -105,6 +105,7 @@ impl Netem {
     fn check_reorder(&self) -> Result<(), Contradiction> {
         let Some(reorder) = &self.reorder else { return Ok(()) };
         let delayed = self.delay.as_ref().is_some_and(|delay| !delay.time.is_zero());
+        // A reorder of 0 % switches reordering off, and then needs no delay.
         if reorder.chance.percent.as_u32() == 0 {
             return if reorder.gap.is_some() { Err(Contradiction::GapWithoutReorder) } else { Ok(()) };
         }

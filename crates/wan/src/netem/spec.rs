@@ -1,4 +1,4 @@
-//! What the words of `tc-netem` say, typed.
+//! The options of `tc-netem`, typed.
 
 use alloc::string::String;
 use core::num::{NonZeroU32, NonZeroU64};
@@ -6,57 +6,57 @@ use core::time::Duration;
 
 use super::Percent;
 
-/// The options of one netem, as they were said: what was not said is `None`.
+/// The options of one netem, as they were written. An option that was not written is `None`.
 ///
-/// [`Netem::parse`] makes only values that pass [`Netem::check`]; one made by hand should be checked.
+/// [`Netem::parse`] makes only values that pass [`Netem::check`]. Check a value that is made in another way.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Netem {
-    /// `limit`: how many packets are held at most, those under way included. The kernel's default is 1000.
+    /// `limit`: number of packets held at most, packets in propagation included. The kernel's default is 1000.
     pub limit: Option<u32>,
     /// `delay`, and the `distribution` of its jitter.
     pub delay: Option<DelaySpec>,
-    /// `loss`.
+    /// `loss`: the model of loss.
     pub loss: Option<LossSpec>,
-    /// `ecn`: packets that can carry a congestion mark are marked where they would be lost.
+    /// `ecn`: marks packets that can carry a congestion mark, instead of losing them.
     pub ecn: bool,
-    /// `corrupt`: one bit of the packet is flipped.
+    /// `corrupt`: flips one bit of a packet.
     pub corrupt: Option<ChanceSpec>,
-    /// `duplicate`: the packet is sent twice.
+    /// `duplicate`: sends a packet twice.
     pub duplicate: Option<ChanceSpec>,
-    /// `reorder`, and its `gap`: the packet is sent at once, before those that wait.
+    /// `reorder` and its `gap`: sends a packet at once, before the waiting packets.
     pub reorder: Option<ReorderSpec>,
-    /// `rate`.
+    /// `rate`: the rate of the line, and the framing of packets.
     pub rate: Option<RateSpec>,
-    /// `slot`: packets are let go in bunches.
+    /// `slot`: lets packets leave in bunches.
     pub slot: Option<SlotSpec>,
-    /// `seed` of the kernel's generator.
+    /// `seed`: the seed of the kernel's generator.
     pub seed: Option<u64>,
 }
 
 /// `delay TIME [JITTER …]`.
 #[derive(Clone, PartialEq, Debug)]
 pub struct DelaySpec {
-    /// The mean, to the nearest nanosecond.
+    /// Mean delay, to the nearest nanosecond.
     pub time: Duration,
-    /// The variation around it.
+    /// Variation around the mean delay.
     pub jitter: Option<JitterSpec>,
 }
 
 /// `JITTER [CORRELATION]`, and `distribution NAME`.
 #[derive(Clone, PartialEq, Debug)]
 pub struct JitterSpec {
-    /// Half the width if the distribution is uniform, else the standard deviation.
+    /// Half the width of a uniform distribution, or the standard deviation of any other.
     pub time: Duration,
-    /// The correlation of one packet's delay with the one before.
+    /// Correlation of a packet's delay with the delay of the packet before.
     pub correlation: Option<Percent>,
-    /// The law; `None` is uniform.
+    /// Law of the jitter; `None` is uniform.
     pub distribution: Option<Distribution>,
 }
 
-/// The law of jitter or slots.
+/// The law of jitter or of the gaps between slots.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Distribution {
-    /// `uniform`, which the manual lists and `tc` cannot find: the law that holds where none is named.
+    /// `uniform`: the law if no other is named. The manual lists the name, for which `tc` finds no file.
     Uniform,
     /// `normal`.
     Normal,
@@ -64,12 +64,12 @@ pub enum Distribution {
     Pareto,
     /// `paretonormal`: a quarter of normal and three quarters of Pareto.
     ParetoNormal,
-    /// Any other name: that of a file `NAME.dist`.
+    /// Any other name: the name of a file `NAME.dist`.
     Table(TableName),
 }
 
 impl Distribution {
-    /// The distribution of that name; `None` if it is no single word.
+    /// Returns the distribution of this name, or `None` if the name is not a single word.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         Some(match name {
@@ -81,7 +81,7 @@ impl Distribution {
         })
     }
 
-    /// The name that names it.
+    /// Returns the name of the distribution.
     #[must_use]
     pub fn name(&self) -> &str {
         match self {
@@ -94,12 +94,12 @@ impl Distribution {
     }
 }
 
-/// The name of a distribution that is read from a file: one word, and none of the built-in names.
+/// The name of a distribution that is read from a file: one word, and not the name of a built-in distribution.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub struct TableName(String);
 
 impl TableName {
-    /// Checks a name; `None` if it is empty, has white space in it, or is that of a built-in distribution.
+    /// Checks a name. Returns `None` if the name is empty, contains white space, or is the name of a built-in distribution.
     #[must_use]
     pub fn new(name: &str) -> Option<Self> {
         let built_in = ["uniform", "normal", "pareto", "paretonormal"].contains(&name);
@@ -107,19 +107,19 @@ impl TableName {
         (one_word && !built_in).then(|| Self(name.into()))
     }
 
-    /// The name.
+    /// Returns the name as text.
     #[must_use]
     pub fn as_str(&self) -> &str {
         &self.0
     }
 }
 
-/// `PERCENT [CORRELATION]`: how often, and how much alike neighbours are.
+/// `PERCENT [CORRELATION]`: the share of packets, and the correlation of neighbouring packets.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ChanceSpec {
-    /// How many packets are meant.
+    /// Share of packets that are affected.
     pub percent: Percent,
-    /// The correlation asked for.
+    /// Requested correlation of neighbouring packets.
     pub correlation: Option<Percent>,
 }
 
@@ -136,23 +136,23 @@ pub enum LossSpec {
 
 /// The four-state chain of Salsano, Ludovici & Ordine (2009): 1 received in a gap, 2 received in a burst, 3 lost in a burst, 4 lost alone.
 ///
-/// Each can be said only if those before it are.
+/// Each probability can be given only if all probabilities before it are given.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct StateSpec {
-    /// From a gap into a burst.
+    /// From state 1 to state 3: from a gap into a burst.
     pub p13: Percent,
-    /// From a burst's loss into a gap. Default: 1 − p13.
+    /// From state 3 to state 1: from a loss in a burst into a gap. Default: 1 − p13.
     pub p31: Option<Percent>,
-    /// From a burst's loss to a reception in the burst. Default: 0.
+    /// From state 3 to state 2: from a loss in a burst to a reception in the burst. Default: 0.
     pub p32: Option<Percent>,
-    /// From a reception in a burst to a loss in it. Default: 1.
+    /// From state 2 to state 3: from a reception in a burst to a loss in the burst. Default: 1.
     pub p23: Option<Percent>,
-    /// From a gap to a loss alone. Default: 0.
+    /// From state 1 to state 4: from a gap to a single loss. Default: 0.
     pub p14: Option<Percent>,
 }
 
 impl StateSpec {
-    /// \[p13, p31, p32, p23, p14\] as fractions, with the defaults.
+    /// Returns \[p13, p31, p32, p23, p14\] as fractions, with defaults where a probability is not given.
     #[must_use]
     pub fn probabilities(&self) -> [f64; 5] {
         let or = |said: Option<Percent>, default: f64| said.map_or(default, Percent::fraction);
@@ -161,21 +161,21 @@ impl StateSpec {
     }
 }
 
-/// The chain of Gilbert and Elliott. Each can be said only if those before it are.
+/// The chain of Gilbert and Elliott. Each probability can be given only if all probabilities before it are given.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct GemodelSpec {
-    /// From good to bad.
+    /// Probability of the change from the good to the bad state, per packet.
     pub p: Percent,
-    /// From bad to good. Default: 1 − p.
+    /// Probability of the change from the bad to the good state, per packet. Default: 1 − p.
     pub r: Option<Percent>,
-    /// 1 − h, the loss in the bad state. Default: 1.
+    /// Share of packets lost in the bad state, 1 − h. Default: 1.
     pub loss_in_bad: Option<Percent>,
-    /// 1 − k, the loss in the good state. Default: 0.
+    /// Share of packets lost in the good state, 1 − k. Default: 0.
     pub loss_in_good: Option<Percent>,
 }
 
 impl GemodelSpec {
-    /// \[p, r, 1 − h, 1 − k\] as fractions, with the defaults.
+    /// Returns \[p, r, 1 − h, 1 − k\] as fractions, with defaults where a probability is not given.
     #[must_use]
     pub fn probabilities(&self) -> [f64; 4] {
         let or = |said: Option<Percent>, default: f64| said.map_or(default, Percent::fraction);
@@ -187,67 +187,67 @@ impl GemodelSpec {
 /// `reorder PERCENT [CORRELATION] [gap DISTANCE]`.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ReorderSpec {
-    /// How often a packet whose turn it is goes at once.
+    /// Share of the candidate packets that are sent at once.
     pub chance: ChanceSpec,
-    /// Every how many packets it is one's turn. Default: 1, always.
+    /// Distance of candidate packets: with gap n, at least n − 1 packets are delayed before the next candidate. Default: 1, every packet is a candidate.
     pub gap: Option<NonZeroU32>,
 }
 
 /// `rate RATE [PACKETOVERHEAD [CELLSIZE [CELLOVERHEAD]]]`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct RateSpec {
-    /// The rate \[bytes/s\], rounded down as `tc` does.
+    /// Rate \[bytes/s\], rounded down as in `tc`.
     pub bytes_per_sec: NonZeroU64,
-    /// The bytes added to a packet's length.
+    /// Bytes added to a packet's length.
     pub framing: Option<FramingSpec>,
 }
 
 /// `PACKETOVERHEAD [CELLSIZE [CELLOVERHEAD]]`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct FramingSpec {
-    /// Added to the length of a packet \[bytes\].
+    /// Bytes added to the length of each packet; may be negative.
     pub overhead: i32,
-    /// The cells into which packets are cut.
+    /// Cells into which packets are cut; `None` if they are not cut.
     pub cell: Option<CellSpec>,
 }
 
 /// `CELLSIZE [CELLOVERHEAD]`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct CellSpec {
-    /// What a cell carries \[bytes\]; the last one is filled up.
+    /// Payload of a cell \[bytes\]. The last cell of a packet is padded.
     pub size: NonZeroU32,
-    /// What a cell has besides \[bytes\].
+    /// Bytes of a cell besides the payload \[bytes\]. Default: 0.
     pub overhead: Option<i32>,
 }
 
 /// `slot { MIN [MAX] | distribution NAME DELAY JITTER } [packets N] [bytes N]`.
 #[derive(Clone, PartialEq, Debug)]
 pub struct SlotSpec {
-    /// From one slot to the next.
+    /// Time from one slot to the next.
     pub gap: SlotGap,
-    /// How many packets leave in one slot.
+    /// Number of packets that leave in one slot, at most. Default: no limit.
     pub packets: Option<NonZeroU32>,
-    /// How many bytes leave in one slot: the packet that uses up the last one still does.
+    /// Number of bytes that leave in one slot. The packet that uses up the last byte still leaves. Default: no limit.
     pub bytes: Option<NonZeroU32>,
 }
 
 /// The time from one slot to the next.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum SlotGap {
-    /// `MIN [MAX]`: uniform between them.
+    /// `MIN [MAX]`: uniform between the two times.
     Range {
-        /// The shortest.
+        /// Shortest time.
         min: Duration,
-        /// The longest; `None`: the shortest.
+        /// Longest time; `None` if it is the same as the shortest.
         max: Option<Duration>,
     },
     /// `distribution NAME DELAY JITTER`.
     Drawn {
-        /// The law.
+        /// Law of the times.
         distribution: Distribution,
-        /// Its mean.
+        /// Mean of the times.
         delay: Duration,
-        /// Its deviation, above zero.
+        /// Standard deviation of the times, above zero (half the width if the law is uniform).
         jitter: Duration,
     },
 }

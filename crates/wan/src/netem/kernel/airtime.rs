@@ -1,8 +1,8 @@
-//! How long a packet occupies the line, in the kernel's arithmetic.
+//! Transmission time of a packet, in the kernel's arithmetic.
 
 use crate::netem::{CellSpec, FramingSpec, RateSpec};
 
-/// A rate, and the overhead added to a packet's length.
+/// A rate, and the overhead that is added to a packet's length.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Airtime {
     bytes_per_sec: u64,
@@ -23,7 +23,8 @@ impl Airtime {
         Self { bytes_per_sec: rate.bytes_per_sec.get(), overhead, cell: cells.map(cell) }
     }
 
-    /// ⌊length·10⁹/rate⌋ \[ns\]. Whatever wraps around in the kernel does so here: an overhead below −size gives absurd times there too.
+    /// Returns the transmission time ⌊length·10⁹/rate⌋ \[ns\] of a packet of `size` bytes. Sums and products wrap around as in the kernel: an overhead below
+    /// −size gives absurd times there too.
     pub(super) fn of(&self, size: u32) -> u64 {
         let mut length = u64::from(size).wrapping_add_signed(i64::from(self.overhead));
         if let Some(cell) = self.cell {

@@ -1,4 +1,4 @@
-//! The tables that iproute2 ships, computed.
+//! The distribution tables that iproute2 ships, computed.
 
 use alloc::boxed::Box;
 use core::f64::consts::SQRT_2;
@@ -16,17 +16,17 @@ pub(super) fn pareto() -> Box<[i16]> {
 }
 
 pub(super) fn pareto_normal() -> Box<[i16]> {
-    // The lowest normal entry enters before it is cut, and the division cuts towards zero.
+    // The lowest normal entry enters the sum before it is clamped, and the division rounds towards zero.
     (0..ENTRIES).map(|rank| clamped((normal_entry(rank) + 3 * pareto_entry(rank)) / 4)).collect()
 }
 
-/// The quantile of the standard normal law at (4·rank + ½)/16384, down to a grid, in 1/8192.
+/// Returns the quantile of the standard normal law at (4·rank + ½)/16384, rounded down to a grid, in 1/8192.
 fn normal_entry(rank: i32) -> i32 {
     const STEP: f64 = 5e-5;
     let point = |index: i32| -10.0 + f64::from(index) * STEP;
     let target = (4.0 * f64::from(rank) + 0.5) / 16_384.0;
     let is_below = |index: i32| 0.5 + 0.5 * libm::erf(point(index) / SQRT_2) < target;
-    // Φ(−10) is below every target, Φ(10) above.
+    // Φ(−10) is below every target and Φ(10) above, so that the search keeps a grid point on either side.
     let (mut below, mut above) = (0, 400_000);
     while above - below > 1 {
         let middle = i32::midpoint(below, above);

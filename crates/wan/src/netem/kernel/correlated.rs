@@ -1,11 +1,11 @@
-//! The kernel's correlated random numbers, and the delays made of them.
+//! The kernel's correlated random numbers, and the delays made from them.
 
 use super::prng::{Prng, Unseeded};
 use super::table::Table;
 
-/// xₙ = (uₙ·(2³² − ρ′) + xₙ₋₁·ρ′) ≫ 32 with ρ′ = ρ + 1 and ρ the 32 bits of the correlation; uₙ itself if ρ is 0.
+/// A sequence of correlated random numbers: xₙ = (uₙ·(2³² − ρ′) + xₙ₋₁·ρ′) ≫ 32, with ρ′ = ρ + 1 and ρ the 32 bits of the correlation; xₙ = uₙ if ρ is 0.
 ///
-/// Its values are not uniform: the deviation shrinks by √((1−ρ)/(1+ρ)) and the tails vanish. This is why correlated loss loses next to nothing.
+/// The values are not uniform: the deviation shrinks by √((1−ρ)/(1+ρ)), and the tails vanish. For this reason correlated loss loses next to nothing.
 #[derive(Clone, Debug)]
 pub(super) struct Correlated {
     rho: u32,
@@ -13,7 +13,7 @@ pub(super) struct Correlated {
 }
 
 impl Correlated {
-    /// A sequence that begins where `unseeded` says.
+    /// Makes a sequence whose first value comes from `unseeded`.
     pub(super) fn new(rho: u32, unseeded: &mut Unseeded) -> Self {
         Self { rho, last: unseeded.next_u32() }
     }
@@ -30,20 +30,20 @@ impl Correlated {
         self.last
     }
 
-    /// Whether an event of that probability happens. Nothing is drawn for 0.
+    /// Returns whether an event of this probability (in 1/2³²) happens. No number is drawn for probability 0.
     #[inline]
     pub(super) fn happens(&mut self, probability: u32, prng: &mut Prng) -> bool {
         probability != 0 && probability >= self.next(prng)
     }
 }
 
-/// What a table's entries are multiples of: one standard deviation is 8192.
+/// Scale of table entries: an entry of 8192 is one standard deviation.
 pub(super) const TABLE_SCALE: i32 = 8192;
 
-/// A time around `mean` \[ns\] made of 32 random bits, which are not drawn if `sigma` is 0.
+/// Returns a time around `mean` \[ns\] made from 32 random bits, which are not drawn if `sigma` is 0.
 ///
-/// Without a table uniform on mean ± sigma, but for the bias of the remainder; with one, mean + sigma·entry/8192, the remainder of sigma rounded apart.
-/// May be below zero.
+/// Without a table the time is uniform on mean ± sigma, apart from the bias of the remainder. With a table the time is mean + sigma·entry/8192, where the
+/// remainder of sigma by 8192 is multiplied and rounded separately, as in the kernel. The time may be below zero.
 pub(super) fn distributed(mean: i64, sigma: i32, draw: impl FnOnce() -> u32, table: Option<&Table>) -> i64 {
     if sigma == 0 {
         return mean;
@@ -64,7 +64,7 @@ pub(super) fn distributed(mean: i64, sigma: i32, draw: impl FnOnce() -> u32, tab
 mod tests {
     use super::*;
 
-    /// So the probability of v is (v + 1)/2³², and 0 for 0.
+    /// An event happens if the draw is at most v, so that its probability is (v + 1)/2³², and 0 for v = 0.
     #[test]
     fn a_draw_on_the_bound_is_an_event_and_zero_draws_nothing() {
         let mut sequence = Correlated::new(0, &mut Unseeded::new(1));
@@ -76,7 +76,7 @@ mod tests {
         assert_eq!(prng, Prng::new(1));
     }
 
-    /// ρ′ = 2³¹ + 1 of 2³² here: by hand, half of the draw and half of the last value.
+    /// With ρ′ = 2³¹ + 1 the weights are nearly one half each. The expected value is computed by hand.
     #[test]
     fn a_correlated_number_is_a_running_mean() {
         let mut sequence = Correlated { rho: 1 << 31, last: 1000 };

@@ -4,7 +4,7 @@ use super::correlated::Correlated;
 use super::prng::{Prng, Unseeded};
 use crate::netem::{GemodelSpec, LossSpec, Percent, StateSpec};
 
-/// A loss model and where it is.
+/// A loss model and its current state.
 #[derive(Clone, Debug)]
 pub(super) enum LossModel {
     Random { probability: u32, sequence: Correlated },
@@ -12,20 +12,20 @@ pub(super) enum LossModel {
     GilbertElliott { chain: GilbertElliott, bad: bool },
 }
 
-/// What the packet was to which the four-state chain moved last.
+/// State of the four-state chain: the fate of the packet for which the chain moved last.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum State {
-    /// 1.
+    /// State 1.
     ReceivedInGap,
-    /// 2.
+    /// State 2.
     ReceivedInBurst,
-    /// 3.
+    /// State 3.
     LostInBurst,
-    /// 4.
+    /// State 4.
     LostAlone,
 }
 
-/// The probabilities of the four-state chain, in 1/2³².
+/// Probabilities of the four-state chain, in 1/2³².
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct FourState {
     pub(super) p13: u32,
@@ -47,10 +47,10 @@ impl FourState {
         }
     }
 
-    /// Moves the chain by one packet; that packet is lost if the new state says so, but for two cases.
+    /// Moves the chain by one packet, and returns whether the packet is lost: whether the new state is a lost one, except at bounds.
     ///
-    /// A draw that equals a bound belongs to neither side: the state stays, and the packet passes whatever the state. Sums wrap around at 2³²: two
-    /// probabilities that sum to 1 and are both rounded up switch one another off.
+    /// A draw that equals a bound belongs to neither side: the state stays, and the packet passes, in state 3 too. Sums of probabilities wrap around at 2³²:
+    /// two probabilities that sum to 1 and are both rounded up switch each other off.
     fn loses(&self, state: &mut State, random: u32) -> bool {
         let next = match *state {
             State::ReceivedInGap => {
@@ -85,14 +85,14 @@ impl FourState {
     }
 }
 
-/// The probabilities of the Gilbert–Elliott chain, in 1/2³².
+/// Probabilities of the Gilbert–Elliott chain, in 1/2³².
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct GilbertElliott {
     pub(super) p: u32,
     pub(super) r: u32,
-    /// Of passing in the bad state.
+    /// Probability that a packet passes in the bad state.
     pub(super) h: u32,
-    /// 1 − k, of being lost in the good state.
+    /// Probability that a packet is lost in the good state, 1 − k.
     pub(super) k1: u32,
 }
 
@@ -106,7 +106,7 @@ impl GilbertElliott {
         }
     }
 
-    /// Two draws for each packet: the transition, then the loss with the probability of the state before it.
+    /// Decides about a packet by two draws: one for the transition, then one for the loss, with the probability of the state before the transition.
     fn loses(&self, bad: &mut bool, prng: &mut Prng) -> bool {
         let (transition, loss) = (prng.next_u32(), prng.next_u32());
         if *bad {
@@ -120,7 +120,7 @@ impl GilbertElliott {
 }
 
 impl LossModel {
-    /// The model as it begins: received in a gap, or good.
+    /// Makes the model in its initial state: state 1 of the four-state chain, or the good state.
     pub(super) fn new(said: Option<&LossSpec>, unseeded: &mut Unseeded) -> Self {
         match said {
             None => Self::Random { probability: 0, sequence: Correlated::new(0, unseeded) },
@@ -133,7 +133,7 @@ impl LossModel {
         }
     }
 
-    /// Whether the next packet is lost.
+    /// Returns whether the next packet is lost.
     pub(super) fn loses(&mut self, prng: &mut Prng) -> bool {
         match self {
             Self::Random { probability, sequence } => sequence.happens(*probability, prng),
@@ -162,7 +162,7 @@ mod tests {
         }
     }
 
-    /// Every number recorded from what tc of iproute2 6.1 sent to a kernel.
+    /// Numbers recorded from the messages of tc of iproute2 6.1 to a kernel.
     #[test]
     fn chains_have_the_numbers_that_tc_sends() {
         let [p13, p31, p32, p23, p14] = [0x028f_5c29, 0x051e_b852, 0x07ae_147b, 0x0a3d_70a4, 0x0ccc_cccd];
@@ -190,7 +190,7 @@ mod tests {
         assert_eq!(state, State::LostAlone);
     }
 
-    /// Of seed 1 the first draw is 0.064, the second 0.0044, the third 0.54, the fourth 0.0022: transition, loss, transition, loss.
+    /// The first draws of seed 1 are 0.064, 0.0044, 0.54 and 0.0022: transition, loss, transition, loss.
     #[test]
     fn the_transition_is_drawn_first_and_the_loss_with_the_state_before_it() {
         let (mut prng, mut bad) = (Prng::new(1), false);

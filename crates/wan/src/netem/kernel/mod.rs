@@ -1,35 +1,36 @@
-//! What Linux 6.6 does with a netem (`net/sched/sch_netem.c`), draw for draw.
+//! The behaviour of Linux 6.6 with a netem (`net/sched/sch_netem.c`), draw for draw.
 //!
-//! A [`Qdisc`] is the queueing discipline on a device of infinite speed, without a child and at the root: offer it packets with
-//! [`Qdisc::enqueue`], take what leaves with [`Qdisc::dequeue`]. With the same `seed` it makes the same decisions as the kernel, except for what the
-//! kernel does not draw from its seeded generator (below). Written anew from formulas and facts; no code of the kernel is in it.
+//! A [`Qdisc`] is the queueing discipline on a device of infinite speed, without a child and at the root. Offer packets with [`Qdisc::enqueue`], and take
+//! packets that leave with [`Qdisc::dequeue`]. With the same `seed` its decisions are those of the kernel, except for values that the kernel does not draw
+//! from its seeded generator (below). The code was written anew from formulas and facts, and contains no code of the kernel.
 //!
-//! # What happens to a packet
+//! # The way of a packet
 //!
-//! 1. A draw decides whether it is duplicated, the next whether it is lost (or marked, with `ecn`). **One that is duplicated and lost passes once.**
-//! 2. The copy goes through all of this again before the packet goes on, with draws of its own and without being duplicated.
-//! 3. A draw decides whether one of its bits is flipped.
-//! 4. If `limit` packets are held already, **those under way included**, it is dropped.
-//! 5. If its turn to be reordered has come and the draw says so, it leaves at once: before all others, past rate and slots.
-//! 6. Else its time to leave is now + delay; with a rate, max(now + delay, the latest time to leave of those held) + transmission time: **the
-//!    serialiser stands behind the delay**, where it undoes jitter.
-//! 7. It leaves at its time, in the order of the times, equal times in the order of arrival; with slots, when one is open.
+//! 1. A draw decides whether the packet is duplicated, and the next draw whether it is lost (or marked, with `ecn`). **A packet that is both duplicated and
+//!    lost passes once.**
+//! 2. The copy goes through all of these steps before the packet goes on, with draws of its own and without being duplicated.
+//! 3. A draw decides whether one bit of the packet is flipped.
+//! 4. If `limit` packets are held already, **packets in propagation included**, the packet is dropped.
+//! 5. If the packet is a candidate for reordering and the draw says so, the packet leaves at once: before all other packets, past rate and slots.
+//! 6. Otherwise the packet's time to leave is now + delay. With a rate, the time is max(now + delay, the latest time to leave of the packets held) +
+//!    transmission time: **the serialiser comes after the delay**, and undoes jitter.
+//! 7. The packet leaves at its time, in the order of times, and of arrival for equal times. With slots, the packet leaves when a slot is open.
 //!
 //! # Random numbers
 //!
-//! [`Prng`] is the kernel's, seeded by `seed` of the words or of [`Qdisc::new`]. The kernel takes three things from its unseeded generator: where the
-//! flipped bit is, the gap between slots that have no distribution, and the first value of every correlated sequence. Here these come from
-//! a SplitMix64 (Steele, Lea & Flood 2014), seeded by the seed of [`Qdisc::new`] alone.
+//! [`Prng`] is the kernel's generator, seeded by `seed` of the words or of [`Qdisc::new`]. The kernel takes three values from its unseeded generator: the
+//! place of a flipped bit, the gap between slots without a distribution, and the first value of every correlated sequence. Here these values come from a
+//! SplitMix64 (Steele, Lea & Flood 2014), seeded by the seed of [`Qdisc::new`] alone.
 //!
-//! # What `tc` does on the way
+//! # Rounding by `tc`
 //!
-//! The numbers are those that `tc` of iproute2 6.6 hands over: probabilities of 32 bits, a delay and jitter of whole microseconds and then
-//! of whole ticks of 64 ns, both rounded down, jitter of at most 2.147483647 s. It forgets the correlation of `duplicate` unless delay, random
-//! loss, corrupt or reorder has one too.
+//! The numbers are the ones that `tc` of iproute2 6.6 hands over: probabilities of 32 bits, delay and jitter in whole microseconds and then in whole ticks of
+//! 64 ns, both rounded down, and jitter of at most 2.147483647 s. `tc` forgets the correlation of `duplicate` unless delay, random loss, corrupt or reorder
+//! has a correlation too.
 //!
 //! # Parts left out
 //!
-//! Segmentation offload (a packet is a packet), a child or parent qdisc, a device that is slow or stops, timers that are late.
+//! Segmentation offload (each packet is a single one), a child or parent qdisc, a device that is slow or stops, and timers that are late.
 
 mod airtime;
 mod built_in;

@@ -1,4 +1,4 @@
-//! The numbers that `tc` makes of the words, and that the kernel holds.
+//! The numbers that `tc` computes from the words and the kernel holds.
 
 use core::num::NonZeroU32;
 use core::time::Duration;
@@ -7,25 +7,25 @@ use super::airtime::Airtime;
 use super::qdisc::QdiscError;
 use crate::netem::{ChanceSpec, LossSpec, Netem, Percent};
 
-/// What a kernel knows of a netem, but for its loss model, its tables and its slots.
+/// The kernel's parameters of a netem, except for the loss model, the tables and the slots.
 #[derive(Clone, Debug)]
 pub(super) struct Parameters {
     pub(super) limit: u32,
-    /// \[ns\]
+    /// Mean delay \[ns\].
     pub(super) latency: i64,
-    /// \[ns\]
+    /// Jitter \[ns\].
     pub(super) jitter: i32,
     pub(super) ecn: bool,
     pub(super) duplicate: u32,
     pub(super) corrupt: u32,
     pub(super) reorder: u32,
-    /// 0: nothing is reordered.
+    /// Distance of candidates for reordering; 0 if no packet is reordered.
     pub(super) gap: u32,
     pub(super) airtime: Option<Airtime>,
     pub(super) correlations: Correlations,
 }
 
-/// The 32 bits of every correlation but that of loss.
+/// Correlations in 1/2³², except for that of loss.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Correlations {
     pub(super) delay: u32,
@@ -70,24 +70,24 @@ impl Correlations {
         };
         let corrupt = of(netem.corrupt);
         let reorder = of(netem.reorder.map(|reorder| reorder.chance));
-        // tc sends correlations if it was told of one of these; duplicate's alone does not count.
+        // tc sends correlations if one of these four was given. A correlation of `duplicate` alone is not sent.
         let sent = [delay, loss, corrupt, reorder].into_iter().any(|correlation| correlation.is_some());
         let bits = |correlation: Option<Percent>| correlation.map_or(0, Percent::as_u32);
         Self { delay: bits(delay), duplicate: if sent { bits(of(netem.duplicate)) } else { 0 }, corrupt: bits(corrupt), reorder: bits(reorder) }
     }
 }
 
-/// A span in nanoseconds, which a checked netem has below 2⁶³.
+/// Returns a time in nanoseconds, which is below 2⁶³ in a checked netem.
 pub(super) fn nanos(span: Duration) -> i64 {
     i64::try_from(span.as_nanos()).unwrap_or(i64::MAX)
 }
 
-/// A deviation as the kernel holds it.
+/// Returns a deviation in the kernel's 32 bits. Larger values count as the largest.
 pub(super) fn sigma(nanos: i64) -> i32 {
     i32::try_from(nanos).unwrap_or(i32::MAX)
 }
 
-/// What a delay is after `tc` has counted it in ticks \[ns\]: whole microseconds t, ⌊t·15.625⌋ ticks in 32 bits, 64 ns each.
+/// Returns a delay after the conversion by `tc` \[ns\]: whole microseconds t, then ⌊t·15.625⌋ ticks of 64 ns. Ticks must fit into 32 bits.
 fn through_ticks(span: Duration) -> Result<i64, QdiscError> {
     let ticks = span.as_micros() * 125 / 8;
     match u32::try_from(ticks) {
@@ -104,7 +104,7 @@ mod tests {
         Parameters::new(&Netem::parse(words).unwrap()).unwrap()
     }
 
-    /// Ticks recorded from what tc of iproute2 6.1 sent to a kernel.
+    /// Ticks recorded from the messages of tc of iproute2 6.1 to a kernel.
     #[test]
     fn delays_go_through_ticks_as_in_tc() {
         let recorded = [
@@ -131,7 +131,7 @@ mod tests {
         assert_eq!(parameters("delay 5s 2s").jitter, 2_000_000_000);
     }
 
-    /// As recorded from tc of iproute2 6.1.
+    /// Recorded from tc of iproute2 6.1.
     #[test]
     fn the_correlation_of_duplicate_needs_company() {
         assert_eq!(parameters("duplicate 1% 5%").correlations.duplicate, 0);

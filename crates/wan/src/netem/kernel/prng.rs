@@ -1,16 +1,16 @@
-//! The kernel's generator, and ours for what the kernel does not seed.
+//! The kernel's seeded generator, and a generator for values that the kernel does not seed.
 
-/// Four combined linear feedback shift registers with a period of about 2¹¹³ (L'Ecuyer 1999, LFSR113), seeded as netem does: without warming up.
+/// Four combined linear feedback shift registers with a period of about 2¹¹³ (L'Ecuyer 1999, LFSR113), seeded as by netem: without a warm-up.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Prng {
     registers: [u32; 4],
 }
 
-/// Of each register: the bits that its step keeps, the two shifts of the feedback, and the shift of the kept bits.
+/// Constants of each register: the mask of the bits that a step keeps, the two shifts of the feedback, and the shift of the kept bits.
 const STEPS: [(u32, u32, u32, u32); 4] = [(!1, 6, 13, 18), (!7, 2, 27, 2), (!15, 13, 21, 7), (!127, 3, 12, 13)];
 
 impl Prng {
-    /// The generator that `seed SEED` gives.
+    /// Makes the generator that `seed SEED` gives.
     #[must_use]
     pub const fn new(seed: u64) -> Self {
         #[expect(clippy::cast_possible_truncation, reason = "the seed is folded into 32 bits")]
@@ -18,7 +18,7 @@ impl Prng {
         Self { registers: [at_least(folded, 2), at_least(folded, 8), at_least(folded, 16), at_least(folded, 128)] }
     }
 
-    /// 32 uniform bits.
+    /// Returns 32 uniform bits.
     #[inline]
     pub fn next_u32(&mut self) -> u32 {
         let mut output = 0;
@@ -31,12 +31,12 @@ impl Prng {
     }
 }
 
-/// A register must have a bit among those that its step keeps.
+/// Returns `value`, raised if needed so that the register has a bit among the bits that its step keeps.
 const fn at_least(value: u32, least: u32) -> u32 {
     if value < least { value + least } else { value }
 }
 
-/// SplitMix64 (Steele, Lea & Flood 2014): for what the kernel takes from its global generator.
+/// SplitMix64 (Steele, Lea & Flood 2014), in place of the kernel's global generator.
 #[derive(Clone, Debug)]
 pub(super) struct Unseeded {
     state: u64,
@@ -47,7 +47,7 @@ impl Unseeded {
         Self { state: seed }
     }
 
-    /// 32 uniform bits.
+    /// Returns 32 uniform bits.
     pub(super) const fn next_u32(&mut self) -> u32 {
         self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut word = self.state;
@@ -56,7 +56,7 @@ impl Unseeded {
         ((word ^ (word >> 31)) >> 32) as u32
     }
 
-    /// A number below `bound`; 0 if that is 0. The bias is at most bound/2³².
+    /// Returns a number below `bound`, or 0 if `bound` is 0. The bias is at most bound/2³².
     pub(super) fn below(&mut self, bound: u32) -> u32 {
         ((u64::from(self.next_u32()) * u64::from(bound)) >> 32) as u32
     }
@@ -75,13 +75,13 @@ mod tests {
 
     #[test]
     fn a_seed_is_folded_into_32_bits() {
-        // (seed ≫ 32) ⊕ (seed ≪ 10) ⊕ seed, by hand: 2³² folds to 1, as does 1 to 1 + 2¹⁰.
+        // By hand, (seed ≫ 32) ⊕ (seed ≪ 10) ⊕ seed folds 2³² to 1, and 1 to 1 + 2¹⁰.
         assert_eq!(Prng::new(1 << 32).registers, [3, 9, 17, 129]);
         assert_eq!(Prng::new(1).registers, [1025; 4]);
         assert_eq!(Prng::new(0).registers, [2, 8, 16, 128]);
     }
 
-    /// First outputs of SplitMix64 from 1234567, as Vigna's reference gives them; we take the upper halves.
+    /// First outputs of SplitMix64 from seed 1234567, from Vigna's reference. `Unseeded` takes the upper halves.
     #[test]
     fn what_is_not_seeded_by_the_kernel_comes_from_splitmix() {
         let mut unseeded = Unseeded::new(1_234_567);

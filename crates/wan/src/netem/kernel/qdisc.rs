@@ -1,4 +1,4 @@
-//! The queueing discipline.
+//! The queueing discipline of the kernel's netem.
 
 use alloc::vec::Vec;
 use core::fmt;
@@ -15,11 +15,11 @@ use super::table::Table;
 use super::time_fifo::TimeFifo;
 use crate::netem::{Contradiction, Distribution, Netem, SlotGap, TableName};
 
-/// Netem as Linux 6.6 has it, on a device of infinite speed.
+/// The netem of Linux 6.6, on a device of infinite speed.
 ///
-/// The kernel looks at the queue after every packet it is offered and whenever a timer ends; with slots it draws when it looks. So to see what it
-/// does, call [`dequeue`](Self::dequeue) until it gives `None` after every [`enqueue`](Self::enqueue) and at [`next_at`](Self::next_at), and never
-/// else. Time must not go back.
+/// The kernel looks at the queue after every packet offered and whenever a timer ends, and with slots each look may draw random numbers. To get the kernel's
+/// decisions, call [`dequeue`](Self::dequeue) until `None` is returned, after every [`enqueue`](Self::enqueue) and at [`next_at`](Self::next_at), and at no
+/// other time. Time must not go back.
 #[derive(Clone, Debug)]
 pub struct Qdisc<T> {
     parameters: Parameters,
@@ -32,9 +32,9 @@ pub struct Qdisc<T> {
     duplicate_sequence: Correlated,
     corrupt_sequence: Correlated,
     reorder_sequence: Correlated,
-    /// How many packets were delayed since one was reordered.
+    /// Number of packets delayed since the last one was reordered.
     counter: u32,
-    /// Packets that leave at once, the last one first, and when they came \[ns\].
+    /// Packets that leave at once, and the times at which they came \[ns\]. The packet that came last leaves first.
     reordered: Vec<(i64, Packet<T>)>,
     line: TimeFifo<Packet<T>>,
 }
@@ -49,19 +49,19 @@ struct Packet<T> {
     corrupted: Option<FlippedBit>,
 }
 
-/// Why a netem has no qdisc.
+/// Why no qdisc can be made of a netem.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum QdiscError {
     /// The options contradict each other.
     Contradiction(Contradiction),
-    /// There is no table of that name.
+    /// A distribution has no table.
     UnknownTable {
-        /// The name.
+        /// Name of the distribution.
         name: TableName,
     },
-    /// `tc` counts delays in 2³² ticks of 64 ns.
+    /// A delay that does not fit into the 2³² ticks of 64 ns of `tc`.
     DelayTooLong {
-        /// The delay, or the jitter.
+        /// The delay or the jitter.
         delay: Duration,
     },
 }
@@ -90,73 +90,73 @@ impl From<Contradiction> for QdiscError {
     }
 }
 
-/// What happens to a packet as it is offered.
+/// An event of a packet in the call that offers the packet.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Output<T> {
-    /// A copy was made. It goes its own way, and is told of before the packet.
+    /// A copy of the packet was made. Packet and copy go on separately, and the events of the copy come first.
     Duplicated,
-    /// It was dropped.
+    /// The packet or its copy was dropped.
     Dropped {
-        /// The packet.
+        /// The dropped packet.
         item: T,
         /// 0 for the packet, 1 for its copy.
         copy: u8,
-        /// Why.
+        /// Reason of the drop.
         reason: DropReason,
     },
 }
 
-/// Why a packet was dropped.
+/// The reason of a drop.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum DropReason {
-    /// The loss model took it.
+    /// The loss model lost the packet.
     Loss,
-    /// `limit` packets were held already.
+    /// The qdisc held `limit` packets already.
     Limit,
 }
 
-/// A packet that leaves.
+/// A packet that leaves the qdisc.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Dequeued<T> {
-    /// The packet.
+    /// The packet, as it was offered.
     pub item: T,
-    /// Its length as it was offered \[bytes\].
+    /// Length of the packet as it was offered \[bytes\].
     pub size: u32,
     /// 0 for the packet, 1 for its copy.
     pub copy: u8,
-    /// Whether it got a congestion mark in place of a loss. The kernel counts this as a drop.
+    /// Whether the packet was marked instead of lost. The kernel counts the mark as a drop.
     pub marked: bool,
-    /// The bit that was flipped. The checksums were completed before, so a host that checks them drops the packet.
+    /// The flipped bit, or `None`. The kernel completes checksums before it flips the bit, so a host that verifies checksums drops the packet.
     pub corrupted: Option<FlippedBit>,
-    /// Whether it left before those that waited.
+    /// Whether the packet left before packets that were waiting.
     pub reordered: bool,
 }
 
-/// Where a bit was flipped.
+/// The place of a flipped bit.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct FlippedBit {
-    /// The byte, from the beginning of the Ethernet header.
+    /// Index of the byte, from the beginning of the Ethernet header.
     pub byte: u32,
-    /// The bit in it, 0 for the least significant.
+    /// Index of the bit in the byte, 0 for the least significant.
     pub bit: u8,
 }
 
 impl<T> Qdisc<T> {
-    /// The qdisc as it is when `tc` has just added it, at [`Instant::ZERO`]. `seed` takes the place of `seed` in the words where there is none, and
-    /// seeds what the kernel draws elsewhere.
+    /// Makes the qdisc in its state right after `tc` has added it, at [`Instant::ZERO`]. `seed` seeds the values that the kernel draws from its unseeded
+    /// generator, and also the seeded generator if the words have no `seed`.
     ///
     /// # Errors
     ///
-    /// [`QdiscError`] if options contradict each other, a delay is beyond what `tc` counts, or a distribution is not built in.
+    /// [`QdiscError`] if options contradict each other, a delay does not fit into the ticks of `tc`, or a distribution is not built in.
     pub fn new(netem: &Netem, seed: u64) -> Result<Self, QdiscError> {
         Self::with_tables(netem, seed, |_| None)
     }
 
-    /// Like [`new`](Self::new), with `tables` for the distributions that are not built in.
+    /// Makes the qdisc like [`new`](Self::new). `tables` gives the tables of distributions that are not built in.
     ///
     /// # Errors
     ///
-    /// As for [`new`](Self::new); a name is unknown if `tables` gives `None`.
+    /// Like [`new`](Self::new); a distribution is unknown if `tables` returns `None`.
     pub fn with_tables(netem: &Netem, seed: u64, mut tables: impl FnMut(&TableName) -> Option<Table>) -> Result<Self, QdiscError> {
         netem.check()?;
         let parameters = Parameters::new(netem)?;
@@ -179,6 +179,7 @@ impl<T> Qdisc<T> {
                 Slots::new(slot, table)
             }
         };
+        // The sequences draw their first values in the order of the fields below, which decides their values for a given seed.
         let mut unseeded = Unseeded::new(seed);
         let correlations = parameters.correlations;
         Ok(Self {
@@ -198,39 +199,42 @@ impl<T> Qdisc<T> {
         })
     }
 
-    /// How many packets are held, copies included. This is what `limit` limits.
+    /// Returns the number of packets held, copies included. `limit` is the limit of this number.
     #[must_use]
     pub fn len(&self) -> usize {
         self.reordered.len() + self.line.len()
     }
 
-    /// Whether no packet is held.
+    /// Returns whether no packet is held.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// When [`dequeue`](Self::dequeue) must be called next; `None` if no packet is held. May change with every call.
+    /// Returns the instant at which [`dequeue`](Self::dequeue) must be called next, or `None` if no packet is held. The instant may change with every call.
     ///
-    /// No packet leaves earlier. With slots one may leave later: the call finds that another slot has to open, and moves this instant on.
+    /// No packet leaves before this instant. With slots a packet may leave later: the call then finds that another slot has to open, and the instant moves
+    /// on.
     #[must_use]
     pub fn next_at(&self) -> Option<Instant> {
         let time = match self.reordered.last() {
             Some((time, _)) => *time,
             None => self.line.first_time()?.max(self.slots.as_ref().map_or(i64::MIN, |slots| slots.next)),
         };
-        // A time before the beginning is due at the beginning.
+        // A time before the beginning of the run is due at the beginning.
         Some(Instant::from_nanos(u64::try_from(time).unwrap_or(0)))
     }
 
-    /// Takes out what leaves at `now`; `None` if nothing (more) does.
+    /// Removes and returns a packet that leaves at `now`, or returns `None` if no further packet leaves.
     pub fn dequeue(&mut self, now: Instant) -> Option<Dequeued<T>> {
+        // Reordered packets leave before all others, and use no slot.
         if let Some((_, packet)) = self.reordered.pop() {
             return Some(packet.leave(true));
         }
         let now = nanos(now);
         let time = self.line.first_time()?;
         if let Some(slots) = &mut self.slots {
+            // A slot that opened before the packet's time is over, and another slot has to open first.
             if slots.next < time {
                 slots.advance(now, &mut self.prng, &mut self.unseeded);
             }
@@ -252,8 +256,8 @@ impl<T> Qdisc<T> {
 }
 
 impl<T: Clone> Qdisc<T> {
-    /// Offers a packet of `size` bytes, **with** the 14 of the Ethernet header, which is what the kernel counts (an overhead of −14 in `rate` takes
-    /// them off again). `ect` says whether it can carry a congestion mark. What happens to it at once is told to `out`.
+    /// Offers a packet of `size` bytes. The size **includes** the 14 bytes of the Ethernet header, which the kernel counts (an overhead of −14 in `rate`
+    /// subtracts them again). `ect` says whether the packet can carry a congestion mark. `out` is called for each event of the packet in this call.
     pub fn enqueue(&mut self, now: Instant, size: u32, ect: bool, item: T, out: &mut impl FnMut(Output<T>)) {
         let packet = Packet { item, size, copy: 0, ect, marked: false, corrupted: None };
         self.admit(nanos(now), packet, out);
@@ -276,6 +280,7 @@ impl<T: Clone> Qdisc<T> {
             return out(Output::Dropped { item: packet.item, copy: packet.copy, reason: DropReason::Loss });
         }
         if copies == 2 {
+            // The copy goes first through all steps, so that its draws come before the packet's remaining draws.
             out(Output::Duplicated);
             self.admit(now, Packet { copy: 1, ..packet.clone() }, out);
         }
@@ -295,7 +300,7 @@ impl<T: Clone> Qdisc<T> {
         }
     }
 
-    /// Whether a packet's turn to be reordered has come, and the draw, made only then, says so.
+    /// Returns whether a packet leaves at once. The draw is made only if the packet is a candidate.
     fn goes_at_once(&mut self) -> bool {
         let gap = self.parameters.gap;
         gap != 0 && self.counter >= gap - 1 && self.parameters.reorder >= self.reorder_sequence.next(&mut self.prng)
@@ -305,7 +310,8 @@ impl<T: Clone> Qdisc<T> {
         let Parameters { latency, jitter, airtime, .. } = self.parameters;
         let delay = distributed(latency, jitter, || self.delay_sequence.next(&mut self.prng), self.table.as_ref());
         let Some(airtime) = airtime else { return now.saturating_add(delay) };
-        // The packet reordered longest ago counts as well: it can only be a copy, just now.
+        // The packet that was reordered first counts as well. Only a copy of the packet offered can be in the list here, since the driver empties the list
+        // after each offer.
         let reordered = self.reordered.first().map(|(time, _)| *time);
         let ready = match self.line.last_time().max(reordered) {
             None => now.saturating_add(delay),
@@ -321,14 +327,14 @@ impl<T> Packet<T> {
     }
 }
 
-/// A bit of a packet, if it has any.
+/// Chooses a bit of a packet, or returns `None` for a packet without bytes.
 fn flip(size: u32, unseeded: &mut Unseeded) -> Option<FlippedBit> {
     let byte = unseeded.below(size);
     let bit = u8::try_from(unseeded.below(8)).unwrap_or(0);
     (size > 0).then_some(FlippedBit { byte, bit })
 }
 
-/// An instant \[ns\], of which there are 292 years here.
+/// Returns an instant \[ns\]. Instants from 2⁶³ ns (292 years) on count as 2⁶³ − 1.
 fn nanos(instant: Instant) -> i64 {
     i64::try_from(instant.as_nanos()).unwrap_or(i64::MAX)
 }

@@ -1,4 +1,4 @@
-//! Slots: when packets may leave.
+//! Slots: the times at which packets may leave.
 
 use core::num::NonZeroU32;
 
@@ -8,13 +8,13 @@ use super::prng::{Prng, Unseeded};
 use super::table::Table;
 use crate::netem::{SlotGap, SlotSpec};
 
-/// The slots of a qdisc, and the packets and bytes that the present one still takes.
+/// The slots of a qdisc, and the budget of packets and bytes left in the current slot.
 #[derive(Clone, Debug)]
 pub(super) struct Slots {
     gap: Gap,
     packets: i32,
     bytes: i32,
-    /// When the present slot opens, or opened \[ns\].
+    /// Time at which the current slot opens, or opened \[ns\].
     pub(super) next: i64,
     packets_left: i32,
     bytes_left: i32,
@@ -27,7 +27,8 @@ enum Gap {
 }
 
 impl Slots {
-    /// The slots as they begin: the first is open. `None` if all their times are zero, which is no slots to the kernel.
+    /// Makes the slots in their initial state, in which the first slot is open. Returns `None` if all times of a range are zero, which the kernel takes for
+    /// no slots.
     pub(super) fn new(said: &SlotSpec, table: Option<Table>) -> Option<Self> {
         let gap = match &said.gap {
             SlotGap::Range { min, max } => {
@@ -39,14 +40,16 @@ impl Slots {
             }
             SlotGap::Drawn { delay, jitter, .. } => Gap::Drawn { mean: nanos(*delay), sigma: sigma(nanos(*jitter)), table },
         };
+        // The kernel reads a missing budget as the largest one.
         let count = |said: Option<NonZeroU32>| said.map_or(i32::MAX, |count| i32::try_from(count.get()).unwrap_or(i32::MAX));
         let (packets, bytes) = (count(said.packets), count(said.bytes));
         Some(Self { gap, packets, bytes, next: 0, packets_left: packets, bytes_left: bytes })
     }
 
-    /// The next slot, counted from `now`.
+    /// Moves on to the next slot, whose gap is counted from `now` \[ns\].
     ///
-    /// The width of a range is multiplied by 32 bits in 64: above 2³¹ ns (2.1 s) the product can wrap around, and the slot lie in the past.
+    /// The width of a range is multiplied by 32 random bits in 64 bits. For widths above 2³¹ ns (2.1 s) the product can wrap around, and the slot then lies
+    /// in the past, as in the kernel.
     pub(super) fn advance(&mut self, now: i64, prng: &mut Prng, unseeded: &mut Unseeded) {
         let gap = match &self.gap {
             Gap::Range { min, width } => min.wrapping_add(i64::from(unseeded.next_u32()).wrapping_mul(*width) >> 32),
@@ -57,7 +60,7 @@ impl Slots {
         self.bytes_left = self.bytes;
     }
 
-    /// Takes a packet of `size` bytes from the budget; says whether nothing is left of it.
+    /// Takes a packet of `size` bytes from the budget of the current slot, and returns whether the budget is used up.
     pub(super) fn spend(&mut self, size: u32) -> bool {
         self.packets_left = self.packets_left.wrapping_sub(1);
         self.bytes_left = self.bytes_left.wrapping_sub_unsigned(size);

@@ -1,8 +1,8 @@
-//! Packets in the order of their time to leave, equal times in the order of arrival.
+//! Packets in the order of their times to leave, and of arrival for equal times.
 
 use alloc::collections::BTreeMap;
 
-/// The delay line.
+/// The packets in propagation. Keys are the time to leave \[ns\] and the number of the arrival.
 #[derive(Clone, Debug)]
 pub(super) struct TimeFifo<P> {
     packets: BTreeMap<(i64, u64), P>,
@@ -23,12 +23,12 @@ impl<P> TimeFifo<P> {
         self.arrivals += 1;
     }
 
-    /// The earliest time to leave \[ns\].
+    /// Returns the earliest time to leave \[ns\], or `None` if no packet is held.
     pub(super) fn first_time(&self) -> Option<i64> {
         self.packets.first_key_value().map(|((time, _), _)| *time)
     }
 
-    /// The latest time to leave \[ns\].
+    /// Returns the latest time to leave \[ns\], or `None` if no packet is held.
     pub(super) fn last_time(&self) -> Option<i64> {
         self.packets.last_key_value().map(|((time, _), _)| *time)
     }

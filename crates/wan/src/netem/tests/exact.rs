@@ -1,4 +1,4 @@
-//! Each word and the configuration that it must give.
+//! Words of each option, and the link configuration that they must give.
 
 use alloc::sync::Arc;
 use core::time::Duration;
@@ -51,7 +51,7 @@ fn delay_and_jitter() {
     let constant = netem(LinkConfig { delay: Delay::constant(100 * MILLISECOND), ..LinkConfig::default() });
     assert_eq!(exact("delay 100ms"), constant);
     assert_eq!(exact("delay 100ms 0 50%"), constant);
-    // 10 ms / √3, to the nanosecond.
+    // Half a width of 10 ms is a deviation of 10 ms / √3, to the nanosecond.
     let uniform = Jitter::new(Duration::from_nanos(5_773_502), Distribution::Uniform);
     assert_eq!(exact("delay 100ms 10ms"), delay(uniform.clone()));
     assert_eq!(exact("delay 100ms 10ms distribution uniform"), delay(uniform));
@@ -87,17 +87,17 @@ fn losses() {
     let chain = |p13, p31, p32, p23, p14| Loss::FourState(FourState::new(p(p13), p(p31), p(p32), p(p23), p(p14)).unwrap());
     assert_eq!(exact("loss state 10%"), loss(chain(0.1, 0.9, 0.0, 1.0, 0.0)));
     assert_eq!(exact("loss state 2% 60% 25% 50% 1%"), loss(chain(0.02, 0.6, 0.25, 0.5, 0.01)));
-    // What wraps around in the kernel.
+    // In the kernel the sum of these probabilities wraps around.
     assert_eq!(exact("loss state 50% 50% 0% 100% 50%"), loss(chain(0.5, 0.5, 0.0, 1.0, 0.5)));
     let model = |p_, r, h, k| Loss::GilbertElliott(GilbertElliott { p: p(p_), r: p(r), h: p(h), k: p(k) });
     assert_eq!(exact("loss gemodel 25%"), loss(model(0.25, 0.75, 0.0, 1.0)));
-    // The words say the fractions lost, 1 − h and 1 − k; the model the fractions that get through.
+    // The words give the fractions lost, 1 − h and 1 − k, and the model takes the fractions that get through.
     assert_eq!(exact("loss gemodel 1% 10% 75% 25%"), loss(model(0.01, 0.1, 0.25, 0.75)));
     let marks = LinkConfig { marks_instead_of_loss: true, ..loss(Loss::Independent(p(0.01))) };
     assert_eq!(exact("loss 1% ecn"), marks);
 }
 
-/// 0.1 and 0.9 times a tenth of a percent may sum to a hair more than 1.
+/// Two shares in tenths of a percent, x and 100 % − x, may sum to slightly more than 1 in binary.
 #[test]
 fn ways_out_of_a_state_may_sum_to_all() {
     for tenth in 0..=1000 {
@@ -178,7 +178,7 @@ fn what_no_link_can_do_is_refused_with_the_option_and_what_could_be() {
         assert_eq!(error.to_string(), message, "{words}");
         assert_eq!(error.option(), message.split(':').next().unwrap());
     }
-    // The largest jitter is one that is accepted, and a law without a least value is cut at zero.
+    // A jitter of exactly the largest size is accepted, and a law without a smallest value is cut at zero.
     exact("delay 1ms 1ms");
     assert_eq!(exact("delay 1ms 10ms distribution normal").delay.least(), Duration::ZERO);
     let by_hand = Netem { ecn: true, ..Netem::default() };

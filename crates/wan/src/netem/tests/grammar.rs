@@ -1,4 +1,4 @@
-//! What is read. Values marked as recorded are what `tc` of iproute2 6.1 sent to a kernel for the same words.
+//! Words that are read, and their values. Values marked as recorded are those that `tc` of iproute2 6.1 sent to a kernel for the same words.
 
 use core::num::{NonZeroU32, NonZeroU64};
 use core::time::Duration;
@@ -126,7 +126,7 @@ fn times_have_units() {
     assert_eq!(netem("slot 100ns 2us").slot.unwrap().gap, slot);
 }
 
-/// Recorded.
+/// Recorded rates.
 #[test]
 fn rates_are_bytes_per_second_cut_off() {
     let rates = [
@@ -149,7 +149,7 @@ fn rates_are_bytes_per_second_cut_off() {
     }
 }
 
-/// Recorded.
+/// Recorded limits.
 #[test]
 fn limits_are_read_as_sizes() {
     let limits =
@@ -159,7 +159,7 @@ fn limits_are_read_as_sizes() {
     }
 }
 
-/// Recorded.
+/// Recorded integers.
 #[test]
 fn integers_may_be_octal_and_hexadecimal() {
     let overhead = |words: &str| netem(words).rate.unwrap().framing.unwrap().overhead;

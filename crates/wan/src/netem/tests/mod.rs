@@ -1,4 +1,4 @@
-//! The words: which are read, which are refused and where, and that printing and reading are inverse.
+//! Tests of the words: words that are read, words that are refused and where the error points, and printing as the inverse of reading.
 
 mod exact;
 mod exact_line;

@@ -1,8 +1,8 @@
-//! What is refused, with the word that is to blame.
+//! Words that are refused, and the word at which the error points.
 
 use crate::netem::{Contradiction, DelaySpec, LossSpec, Netem, NetemErrorKind, Percent, StateSpec};
 
-/// Words, and the part of them to which the error must point.
+/// Refused words, and the part of the words to which the error must point.
 const REFUSED: &[(&str, &str)] = &[
     ("foo", "foo"),
     ("delay 1ms jitter 5", "jitter"),
@@ -53,7 +53,7 @@ const REFUSED: &[(&str, &str)] = &[
     ("slot 1us packets 0", "0"),
     ("slot 1us bytes 3000000000", "3000000000"),
     ("slot 1us packets 5 packets 6", "packets"),
-    // Said twice.
+    // Options given twice.
     ("delay 1ms loss 1% delay 2ms", "delay"),
     ("loss 1% drop 2%", "drop"),
     // Contradictions.
@@ -74,8 +74,8 @@ const REFUSED: &[(&str, &str)] = &[
     ("slot distribution normal 1ms 0", "0"),
 ];
 
-/// Words with a number that notations read differently, the word to blame, and both readings. iproute2 6.6 (`get_time`, `get_percent`): µs in `delay`, ns in `slot`,
-/// hundredths. iproute2 6.9 (`get_time64`): ns in `delay`. A number in a scene is a fraction.
+/// Words with a number that notations read differently, the faulty word, and parts of the message with both readings. iproute2 6.6 (`get_time`,
+/// `get_percent`) reads µs in `delay`, ns in `slot`, and hundredths. iproute2 6.9 (`get_time64`) reads ns in `delay`. A number in a scene is a fraction.
 const WITHOUT_UNIT: &[(&str, &str, &[&str])] = &[
     ("loss 1", "1", &["tc reads 1 %", "fraction 1, which is 100 %", "expected 1%"]),
     ("loss 0.07", "0.07", &["tc reads 0.07 %", "which is 7 %", "expected 0.07%"]),
@@ -103,7 +103,7 @@ fn a_number_without_unit_is_refused_with_both_readings() {
         }
         assert!(error.excerpt(words).contains("^ no unit: tc reads "), "{}", error.excerpt(words));
     }
-    // Zero is the same in all of them, and what has no unit in any of them needs none.
+    // Zero means the same in all notations, and a value that has no unit in any notation needs none.
     for words in ["loss 0 0", "delay 0 0 0%", "slot 0 0 packets 5 bytes 100", "limit 10", "rate 1000", "loss gemodel 0 0 0 0", "seed 5"] {
         assert!(Netem::parse(words).is_ok(), "{words}");
     }
@@ -114,7 +114,6 @@ fn every_error_points_at_the_word_to_blame() {
     for (words, blamed) in REFUSED {
         let error = Netem::parse(words).expect_err(words);
         assert_eq!(&words[error.span.clone()], *blamed, "{words}: {error}");
-        // The last of several equal words is the one that was read when it went wrong, but for those said twice first.
         let excerpt = error.excerpt(words);
         let (line, marks) = excerpt.split_once('\n').unwrap();
         assert_eq!(line, *words);

@@ -20,7 +20,7 @@ fn chance() -> impl Strategy<Value = ChanceSpec> {
     (percent(), of(percent())).prop_map(|(percent, correlation)| ChanceSpec { percent, correlation })
 }
 
-/// Above zero; every number of digits is as likely.
+/// Times above zero, in which every number of binary digits is equally likely.
 fn time() -> impl Strategy<Value = Duration> {
     (1..=63_u32, any::<u64>()).prop_map(|(bits, word)| Duration::from_nanos((word >> (64 - bits)).max(1)))
 }
@@ -36,7 +36,7 @@ fn delay() -> impl Strategy<Value = DelaySpec> {
     (time(), of(jitter)).prop_map(|(time, jitter)| DelaySpec { time, jitter })
 }
 
-/// The first `count` of them.
+/// Percentages of which only the first ones are given, as the grammar demands.
 fn said<const N: usize>() -> impl Strategy<Value = [Option<Percent>; N]> {
     (prop::collection::vec(percent(), N), 0..=N).prop_map(|(all, count)| core::array::from_fn(|index| (index < count).then_some(all[index])))
 }
@@ -86,7 +86,7 @@ pub(in crate::netem) fn netem() -> impl Strategy<Value = Netem> {
             seed,
         })
         .prop_map(|mut netem| {
-            // What would contradict goes.
+            // Options that would contradict others are removed.
             netem.ecn = netem.ecn && Netem { reorder: None, ..netem.clone() }.check().is_ok();
             if netem.check().is_err() {
                 netem.reorder = None;
@@ -95,7 +95,7 @@ pub(in crate::netem) fn netem() -> impl Strategy<Value = Netem> {
         })
 }
 
-/// Words that are likely to mean something, in an order that is not.
+/// Words of the grammar, in a random order that is mostly wrong.
 fn salad() -> impl Strategy<Value = String> {
     let word = prop_oneof![
         prop::sample::select(vec![

@@ -1,10 +1,10 @@
-//! Packet by packet: duplication, loss, marks, flipped bits.
+//! Decisions packet by packet: duplication, loss, marks, and flipped bits.
 
 use crate::netem::Netem;
 use crate::netem::kernel::tests::{Driver, SIZE, at, qdisc, run};
 use crate::netem::kernel::{DropReason, FlippedBit, Output, Prng, Qdisc, QdiscError, Table};
 
-/// What `enqueue` tells of one packet.
+/// Collects the outputs of `enqueue` for one packet.
 fn told(words: &str, ect: bool) -> (Vec<Output<u64>>, Qdisc<u64>) {
     let mut qdisc = qdisc(words, 1);
     let mut outputs = Vec::new();
@@ -30,29 +30,29 @@ fn a_copy_is_told_of_first_and_leaves_first() {
 #[test]
 fn a_copy_is_not_duplicated_but_may_be_lost() {
     let run = run("duplicate 100% loss 50%", 1, 100_000, 1000);
-    // A copy is made of each packet that is not lost, and half of the copies are lost.
+    // Each packet that is not lost gets a copy, and half of the copies are lost.
     let copies = run.duplicated as f64;
     assert!((copies - 50_000.0).abs() < 5.0 * 158.2, "{copies}: five standard errors of a binomial");
     assert!((run.lost.len() as f64 - copies / 2.0).abs() < 5.0 * 112.0);
-    // A packet whose own draw says lost passes in the place of its copy: nobody is left out.
+    // A packet whose own draw says lost passes in place of its copy, so that every packet passes once at least.
     let originals: Vec<u64> = run.delivered.iter().filter(|(_, packet)| packet.copy == 0).map(|(_, packet)| packet.item).collect();
     assert_eq!(originals, (0..100_000).collect::<Vec<_>>());
 }
 
-/// The first draws of the kernel, by hand: duplication, loss, then the copy's loss, its reordering, the packet's reordering.
+/// The first draws of the kernel, by hand: duplication, loss, then the copy's loss, the copy's reordering, and the packet's reordering.
 #[test]
 fn draws_are_made_in_the_order_of_the_kernel() {
     let seed = 1;
     let mut prng = Prng::new(seed);
     let draws: Vec<u32> = (0..5).map(|_| prng.next_u32()).collect();
-    // The second draw (0.0044) loses at 1 %, the fourth (0.0022) reorders at 1 %, none of the others do.
+    // The second draw (0.0044) loses at 1 % and the fourth (0.0022) reorders at 1 %. No other draw is below 1 %.
     let small: Vec<bool> = draws.iter().map(|&draw| f64::from(draw) < 0.01 * 4_294_967_295.0).collect();
     assert_eq!(small, [false, true, false, true, false]);
     let mut driver = Driver::new(qdisc("delay 1ms duplicate 10% loss 1% reorder 1%", seed));
-    // The packet: 0.064 duplicates at 10 %, 0.0044 loses at 1 %, so it passes once; reorder draws 0.535: it waits.
+    // The first packet: 0.064 duplicates at 10 % and 0.0044 loses at 1 %, so the packet passes once. The draw for reordering is 0.535, so the packet waits.
     driver.offer(at(0), 0, SIZE, false);
     assert_eq!((driver.run.delivered.len(), driver.run.duplicated, driver.qdisc.len()), (0, 0, 1));
-    // The next packet: 0.0022 duplicates at 10 %, 0.75 keeps. Its copy draws for loss and reordering, then it does.
+    // The next packet: 0.0022 duplicates at 10 %, and 0.75 does not lose. The copy draws for loss and reordering first, then the packet draws.
     driver.offer(at(1), 1, SIZE, false);
     assert_eq!((driver.run.duplicated, driver.qdisc.len() + driver.run.delivered.len()), (1, 3));
 }
@@ -79,11 +79,11 @@ fn the_copy_is_made_before_the_bit_is_flipped() {
     let run = run("corrupt 50% duplicate 100%", 1, 10_000, 1000);
     let of = |copy: u8| run.delivered.iter().filter(move |(_, packet)| packet.copy == copy).map(|(_, packet)| packet.corrupted.is_some());
     let both = of(0).zip(of(1)).filter(|(original, copy)| *original && *copy).count();
-    // Independent: a quarter of 10⁴, five standard errors of 43.3.
+    // Independent events: a quarter of 10⁴, with five standard errors of 43.3.
     assert!((2283..=2717).contains(&both), "{both}");
 }
 
-/// χ² of the flipped bit over 8·32 places: 255 degrees of freedom, whose 0.999 quantile is 330.5.
+/// χ² of the flipped bit over 8·32 places has 255 degrees of freedom, for which the 0.999 quantile is 330.5.
 #[test]
 fn the_flipped_bit_is_anywhere() {
     let mut driver = Driver::new(qdisc("corrupt 100%", 5));
@@ -107,7 +107,7 @@ fn an_empty_packet_has_no_bit_to_flip() {
     assert_eq!(qdisc.dequeue(at(0)).unwrap().corrupted, None);
 }
 
-/// What is said of a seed: the words' comes before the argument, which moves only what the kernel does not seed.
+/// A seed in the words has priority over the argument, which then decides only the values that the kernel does not seed.
 #[test]
 fn the_seed_of_the_words_decides() {
     let times = |words: &str, seed| run(words, seed, 1000, 1_000_000).delivered;

@@ -1,9 +1,9 @@
-//! What correlation does: it makes loss vanish and leaves delay independent.
+//! Effects of correlation in the kernel: loss nearly vanishes, and delays stay independent.
 
 use crate::netem::kernel::tests::{SIZE, at, autocorrelation, qdisc};
 use crate::netem::kernel::{Output, Qdisc};
 
-/// How many of `draws` packets the words lose.
+/// Returns the number of packets lost out of `draws`.
 fn losses(words: &str, seed: u64, draws: u64) -> u64 {
     let mut qdisc = qdisc(words, seed);
     let mut lost = 0;
@@ -14,16 +14,16 @@ fn losses(words: &str, seed: u64, draws: u64) -> u64 {
     lost
 }
 
-/// P(X < p) for the stationary X = (1 − ρ)·U + ρ·X′ with U uniform and X′ like X, found as the fixed point of its distribution function F on a grid:
-/// F(x) = 1/(1 − ρ) · ∫ ρ·F(y) dy over y from (x − (1 − ρ))/ρ to x/ρ. A reference that draws nothing.
+/// Returns P(X < p) for the stationary X = (1 − ρ)·U + ρ·X′ with U uniform and X′ distributed like X. The distribution function F is found as the fixed point
+/// of F(x) = 1/(1 − ρ) · ∫ ρ·F(y) dy over y from (x − (1 − ρ))/ρ to x/ρ on a grid. The reference needs no random numbers.
 fn below(p: f64, rho: f64) -> f64 {
     const CELLS: usize = 1 << 16;
-    // The cell in which x lies, and how far.
+    // Cell of the grid that contains x, and the position of x in the cell.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "x is in 0..1")]
     let locate = |x: f64| ((x * CELLS as f64) as usize, (x * CELLS as f64).fract());
     let mut function: Vec<f64> = (0..=CELLS).map(|i| i as f64 / CELLS as f64).collect();
     for _ in 0..60 {
-        // The integral of F from 0 up to each grid point.
+        // Integral of F from 0 up to each grid point.
         let mut integral = vec![0.0; CELLS + 1];
         for i in 0..CELLS {
             integral[i + 1] = integral[i] + f64::midpoint(function[i], function[i + 1]) / CELLS as f64;
@@ -35,7 +35,7 @@ fn below(p: f64, rho: f64) -> f64 {
                 integral[CELLS] + (x - 1.0)
             } else {
                 let (cell, part) = locate(x);
-                // F is a line within a cell.
+                // F is linear within a cell.
                 let end = function[cell] + (function[cell + 1] - function[cell]) * part;
                 integral[cell] + f64::midpoint(function[cell], end) * part / CELLS as f64
             }
@@ -49,7 +49,7 @@ fn below(p: f64, rho: f64) -> f64 {
     function[cell] + (function[cell + 1] - function[cell]) * part
 }
 
-/// Published, from 2·10⁶ draws each: words, asked for, lost; with the seed-free reference beside it.
+/// Published from 2·10⁶ draws each: words, requested loss and measured loss. The reference `below` stands beside the measurement, and needs no seed.
 #[test]
 fn correlated_loss_loses_next_to_nothing() {
     let published = [
@@ -63,8 +63,8 @@ fn correlated_loss_loses_next_to_nothing() {
     let draws = 2_000_000_u64;
     for (words, p, rho, figure, digit) in published {
         let expected = below(p, rho);
-        // A binomial count, inflated by (1 + ρ)/(1 − ρ) at most for the correlation of neighbours; five standard errors of it, and one
-        // packet: a significance below 10⁻⁶.
+        // A binomial count has its variance inflated by at most (1 + ρ)/(1 − ρ) for the correlation of neighbours. The tolerance is five standard errors and
+        // one packet, a significance below 10⁻⁶.
         let error = 5.0 * (expected * (1.0 - expected) * (1.0 + rho) / (1.0 - rho) / draws as f64).sqrt() + 1.0 / draws as f64;
         assert!((expected - figure).abs() < error + digit, "{words}: published {figure}, law {expected}");
         let lost = losses(words, 1, draws) as f64 / draws as f64;
@@ -74,7 +74,7 @@ fn correlated_loss_loses_next_to_nothing() {
     assert!((uncorrelated - 0.05).abs() < 5.0 * (0.05 * 0.95 / draws as f64).sqrt());
 }
 
-/// The delays that a qdisc gives to packets so far apart that each is alone \[ms\].
+/// Returns the delays that a qdisc gives to packets so far apart that each packet is alone \[ms\].
 fn delays(words: &str, count: u64) -> Vec<f64> {
     let mut qdisc: Qdisc<u64> = qdisc(words, 3);
     (1..=count)
@@ -88,7 +88,7 @@ fn delays(words: &str, count: u64) -> Vec<f64> {
         .collect()
 }
 
-/// Published: the autocorrelation of neighbours at each requested correlation. 10⁶ draws have a standard error of 0.001; four of it.
+/// Published: the autocorrelation of neighbours for each requested correlation. 10⁶ draws have a standard error of 0.001, and the tolerance is four of these.
 #[test]
 fn correlated_delay_is_not_correlated() {
     let uniform = [(25.0, 0.000), (50.0, 0.000), (90.0, 0.005), (99.0, 0.051)];

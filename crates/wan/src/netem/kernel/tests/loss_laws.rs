@@ -1,4 +1,4 @@
-//! The chains lose what their stationary law says, in the bursts it says.
+//! The chains lose as many packets as their stationary laws say, in bursts as long as these laws say.
 
 use crate::netem::Netem;
 use crate::netem::kernel::Prng;
@@ -10,14 +10,14 @@ fn model(words: &str) -> LossModel {
     LossModel::new(Netem::parse(words).unwrap().loss.as_ref(), &mut Unseeded::new(1))
 }
 
-/// 1 for every packet lost.
+/// Returns 1 for every packet lost, and 0 for every other packet.
 fn losses(words: &str, count: usize) -> Vec<f64> {
     let mut model = model(words);
     let mut prng = Prng::new(1);
     (0..count).map(|_| f64::from(u8::from(model.loses(&mut prng)))).collect()
 }
 
-/// π₃ + π₄ with π₁ = 1/(1 + p14 + a(1 + p32/p23)), π₄ = p14·π₁, π₃ = a·π₁, a = p13/p31.
+/// Returns the stationary loss π₃ + π₄ with π₁ = 1/(1 + p14 + a(1 + p32/p23)), π₄ = p14·π₁, π₃ = a·π₁, a = p13/p31.
 fn stationary_loss([p13, p31, p32, p23, p14]: [f64; 5]) -> f64 {
     let a = p13 / p31;
     (a + p14) / (1.0 + p14 + a * (1.0 + p32 / p23))
@@ -28,8 +28,8 @@ fn state(probabilities: [f64; 5]) -> String {
     format!("loss state {}", percentages.join(" "))
 }
 
-/// Published: three sets of parameters agree to 0.0003. That is more than three standard errors of 6·10⁷ packets: in the first set, the worst,
-/// bursts leave twelve packets the weight of one independent one.
+/// Published: three sets of parameters agree to 0.0003. The tolerance is more than three standard errors of 6·10⁷ packets: in the first set, which is the
+/// worst, bursts leave twelve packets the weight of one independent packet.
 #[test]
 fn the_four_state_chain_has_its_stationary_loss() {
     const PACKETS: u32 = 60_000_000;
@@ -42,7 +42,7 @@ fn the_four_state_chain_has_its_stationary_loss() {
     }
 }
 
-/// Published: (loss 5 %, burst 10, density 0.8, isolated 0.5 %, good run 3) gives a simulated loss of 0.0495, for 0.05 asked.
+/// Published: (loss 5 %, burst 10, density 0.8, isolated 0.5 %, good run 3) gives a simulated loss of 0.0495 for a requested loss of 0.05.
 #[test]
 fn general_and_intuitive_parameters_give_the_loss_they_name() {
     let [loss, burst, density, isolated, good_run] = [0.05, 10.0, 0.8, 0.005, 3.0];
@@ -52,11 +52,11 @@ fn general_and_intuitive_parameters_give_the_loss_they_name() {
     let p14 = isolated / (1.0 - isolated);
     let p13 = (loss - isolated) / (burst * (1.0 - isolated) * (density - loss));
     let actual = mean(&losses(&state([p13, p31, p32, p23, p14]), 5_000_000));
-    // Bursts of 10 leave 5·10⁶ packets the weight of some 4·10⁵: a standard error of 0.0003.
+    // Bursts of 10 leave 5·10⁶ packets the weight of some 4·10⁵ independent packets: a standard error of 0.0003.
     assert!((actual - loss).abs() < 0.0012 && (actual - 0.0495).abs() < 0.0015, "{actual}");
 }
 
-/// `state p13` alone is the Bernoulli law, as the manual says.
+/// A chain `state p13` without further probabilities is the Bernoulli law, as the manual says.
 #[test]
 fn a_single_probability_is_independent_loss() {
     for words in ["loss state 20%", "loss gemodel 20%"] {
@@ -66,8 +66,8 @@ fn a_single_probability_is_independent_loss() {
     }
 }
 
-/// Loss (k₁·r + (1−h)·p)/(p + r); autocorrelation ((1−h−k₁)²·πB·πG/(ℓ(1−ℓ)))·(1−p−r)ⁿ at lag n. Published for a chain with 0.529 and 0.331 at lags
-/// one and two, which p = 4.1 %, r = 33.3 %, 1 − h = 86 % has too (the original one is not known): 0.529 and 0.330 were counted.
+/// The loss is (k₁·r + (1−h)·p)/(p + r), and the autocorrelation at lag n is ((1−h−k₁)²·πB·πG/(ℓ(1−ℓ)))·(1−p−r)ⁿ. Published for a chain with 0.529 and 0.331
+/// at lags one and two. The parameters of that chain are not known; p = 4.1 %, r = 33.3 %, 1 − h = 86 % give the same, and 0.529 and 0.330 were counted.
 #[test]
 fn the_gilbert_elliott_chain_has_its_loss_and_its_bursts() {
     let chains = [(0.041, 0.333, 0.86, 0.0), (0.01, 0.1, 0.7, 0.001), (0.05, 0.5, 0.9, 0.02)];

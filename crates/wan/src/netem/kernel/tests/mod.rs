@@ -1,5 +1,5 @@
-//! The kernel's netem: its tables, its laws and its queue. Figures called *published* are those of the table of what netem really does, in
-//! `docs/netem.md`; each comes from a run of the published formulas, so it has a sampling error of its own, which the tolerances include.
+//! Tests of the kernel's netem: its tables, its laws and its queue. Figures called *published* are those of the table of netem's real behaviour in
+//! `docs/netem.md`. Each figure comes from a run of the published formulas and has a sampling error of its own, which the tolerances include.
 
 mod choices;
 mod correlation;
@@ -13,7 +13,7 @@ use cohaptic_units::Instant;
 use super::{Dequeued, DropReason, Output, Qdisc};
 use crate::netem::Netem;
 
-/// The length of the packets where it does not matter.
+/// Length of packets \[bytes\] in tests in which the length does not matter.
 const SIZE: u32 = 1000;
 
 fn at(nanos: u64) -> Instant {
@@ -25,17 +25,17 @@ fn qdisc(words: &str, seed: u64) -> Qdisc<u64> {
     Qdisc::new(&netem, seed).unwrap_or_else(|error| panic!("{words}: {error}"))
 }
 
-/// What came of packets that are numbered from 0.
+/// Fates of packets that are numbered from 0.
 #[derive(Default)]
 struct Run {
-    /// When each left, in this order.
+    /// Packets that left, with their instants, in the order in which they left.
     delivered: Vec<(Instant, Dequeued<u64>)>,
     lost: Vec<u64>,
     over_limit: Vec<u64>,
     duplicated: u64,
 }
 
-/// Drives the queue as an infinitely fast device does: whatever is due leaves at once.
+/// Drives the queue like an infinitely fast device: each packet that is due leaves at once.
 struct Driver {
     qdisc: Qdisc<u64>,
     run: Run,
@@ -52,7 +52,7 @@ impl Driver {
         }
     }
 
-    /// Lets everything leave that does so before `until`.
+    /// Lets all packets leave that are due before `until`.
     fn advance(&mut self, until: Instant) {
         while let Some(next) = self.qdisc.next_at().filter(|next| *next < until) {
             self.drain(next);
@@ -77,7 +77,7 @@ impl Driver {
     }
 }
 
-/// Offers `count` packets of [`SIZE`] bytes, one each `spacing` nanoseconds from one spacing on.
+/// Offers `count` packets of [`SIZE`] bytes, `spacing` nanoseconds apart, the first one after one spacing.
 fn run(words: &str, seed: u64, count: u64, spacing: u64) -> Run {
     let mut driver = Driver::new(qdisc(words, seed));
     for number in 0..count {
@@ -95,7 +95,7 @@ fn deviation(values: &[f64]) -> f64 {
     (values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// The autocorrelation at `lag`.
+/// Returns the autocorrelation at `lag`.
 fn autocorrelation(values: &[f64], lag: usize) -> f64 {
     let mean = mean(values);
     let moment = |lag: usize| values.iter().zip(&values[lag..]).map(|(a, b)| (a - mean) * (b - mean)).sum::<f64>();

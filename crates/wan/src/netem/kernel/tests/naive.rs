@@ -1,5 +1,5 @@
-//! The queue against one that is obviously right and slow: one vector, sorted anew for every look. Only random numbers, times of transmission and
-//! slots' lengths come from the subject's parts.
+//! Compares the queue with a slow one that is simple enough to be checked by reading: a vector that is sorted anew for every look. Only random numbers,
+//! transmission times and lengths of slots come from the tested code.
 
 use core::num::NonZeroU32;
 use core::time::Duration;
@@ -15,7 +15,7 @@ use crate::netem::kernel::tests::at;
 use crate::netem::kernel::{Output, Prng, Qdisc};
 use crate::netem::{ChanceSpec, DelaySpec, JitterSpec, LossSpec, Netem, Percent, ReorderSpec, SlotGap, SlotSpec};
 
-/// Everything held, in the order of arrival.
+/// The simple queue, with the packets held in the order of their arrival.
 struct Naive {
     netem: Netem,
     held: Vec<Held>,
@@ -48,7 +48,7 @@ enum Event {
 impl Naive {
     fn new(netem: &Netem, seed: u64) -> Self {
         let mut unseeded = Unseeded::new(seed);
-        // Loss, delay, duplicate, corrupt, reorder: without correlation what they begin with does not matter.
+        // Sequences of loss, delay, duplicate, corrupt and reorder. Without correlation their first values have no effect.
         let sequences = core::array::from_fn(|_| Correlated::new(0, &mut unseeded));
         let slots = netem.slot.as_ref().and_then(|slot| Slots::new(slot, None));
         Self { netem: netem.clone(), held: Vec::new(), prng: Prng::new(seed), unseeded, sequences, slots, since_reordered: 0, arrivals: 0 }
@@ -99,13 +99,13 @@ impl Naive {
         let delay = distributed(mean, i32::try_from(sigma).unwrap(), || self.sequences[1].next(prng), None);
         let Some(rate) = &self.netem.rate else { return now + delay };
         let transmission = i64::try_from(Airtime::new(rate).of(size)).unwrap();
-        // max(last, now + delay) + transmission, and without a last one now + delay + transmission.
+        // The time is max(last, now + delay) + transmission time, or now + delay + transmission time if no packet is held.
         self.held.iter().map(|held| held.time).max().unwrap_or(i64::MIN).max(now + delay) + transmission
     }
 
     fn dequeue(&mut self, now: i64) -> Event {
         let mut order = self.held.clone();
-        // At once before the others, the last one first; then by time, and by arrival.
+        // Packets that leave at once come before all others, the last arrival first. The others come in the order of time, then of arrival.
         order.sort_by_key(|held| if held.at_once { (0, 0, u64::MAX - held.arrival) } else { (1, held.time, held.arrival) });
         let Some(first) = order.first() else { return Event::Nothing };
         if !first.at_once {
@@ -131,7 +131,7 @@ impl Naive {
     }
 }
 
-/// Whole microseconds in ticks of 64 ns.
+/// Converts a time to whole microseconds, then to whole ticks of 64 ns \[ns\].
 fn ticks(span: Duration) -> i64 {
     i64::try_from(span.as_micros() * 1000 / 64 * 64).unwrap()
 }
@@ -140,7 +140,7 @@ fn chance() -> impl Strategy<Value = ChanceSpec> {
     (0..=100_u32).prop_map(|percent| ChanceSpec { percent: Percent::new(f64::from(percent)).unwrap(), correlation: None })
 }
 
-/// Netems whose times are about those between the operations.
+/// Netems whose times are similar to those between the operations.
 fn netem() -> impl Strategy<Value = Netem> {
     let time = || (1..200_u64).prop_map(Duration::from_micros);
     let delay = (time(), of(time()))
@@ -167,7 +167,7 @@ fn netem() -> impl Strategy<Value = Netem> {
     )
 }
 
-/// Waits that long \[µs\], then offers a packet of that size, or only looks.
+/// Operations: each waits for a time \[µs\], then offers a packet of a size, or only looks.
 fn operations() -> impl Strategy<Value = Vec<(u64, Option<u32>)>> {
     prop::collection::vec((0..60_u64, of(prop_oneof![4 => 60..1514_u32])), 1..120)
 }
@@ -182,7 +182,7 @@ fn drain(qdisc: &mut Qdisc<u64>, naive: &mut Naive, now: u64) -> Result<(u64, u6
         }
         left += 1;
     }
-    // What is due is gone: the next look is later.
+    // No packet is due any more, so that the next look is later.
     prop_assert!(qdisc.next_at().is_none_or(|next| next > at(now)));
     prop_assert_eq!(qdisc.len(), naive.held.len());
     Ok((left, now))
@@ -196,7 +196,7 @@ proptest! {
         let (mut now, mut offered, mut copied, mut dropped, mut left) = (0, 0_u64, 0_u64, 0_u64, 0);
         for (wait, size) in operations {
             let until = now + wait * 1000;
-            // A look whenever the subject says that something is due.
+            // The simple queue looks whenever the tested queue says that an event is due.
             while let Some(next) = qdisc.next_at().filter(|next| *next <= at(until)) {
                 now = next.as_nanos();
                 left += drain(&mut qdisc, &mut naive, now)?.0;
@@ -217,14 +217,14 @@ proptest! {
             left += drain(&mut qdisc, &mut naive, now)?.0;
             prop_assert_eq!(offered + copied, left + dropped + qdisc.len() as u64, "nothing comes from nowhere or is forgotten");
         }
-        // It runs empty by itself.
+        // The queue runs empty by itself.
         while let Some(next) = qdisc.next_at() {
             left += drain(&mut qdisc, &mut naive, next.as_nanos().max(now))?.0;
         }
         prop_assert_eq!(offered + copied, left + dropped);
     }
 
-    /// Whatever the words, nothing panics and nothing is forgotten.
+    /// No words make the queue panic or lose track of a packet.
     #[test]
     fn every_netem_conserves_packets(
         netem in crate::netem::tests::round_trip::netem(),

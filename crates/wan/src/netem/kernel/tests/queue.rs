@@ -1,11 +1,11 @@
-//! The queue: limit, rate, reordering, slots.
+//! Tests of the queue: limit, rate, reordering, and slots.
 
 use crate::netem::kernel::Qdisc;
 use crate::netem::kernel::tests::{Driver, Run, SIZE, at, qdisc, run};
 
 const MILLISECOND: u64 = 1_000_000;
 
-/// The share of packets that arrive after a later one (RFC 4737).
+/// Returns the share of packets that arrive after a later packet (RFC 4737).
 fn reordered_share(run: &Run) -> f64 {
     let mut latest = 0;
     let mut late = 0_u32;
@@ -16,19 +16,19 @@ fn reordered_share(run: &Run) -> f64 {
     f64::from(late) / run.delivered.len() as f64
 }
 
-/// Published: the limit of 1000 packets holds for the delay line too, so 100 ms pass 10 000 packets/s at most.
+/// Published: the limit of 1000 packets includes packets in propagation, so that a delay of 100 ms lets through 10 000 packets/s at most.
 #[test]
 fn the_default_limit_caps_what_a_delay_lets_through() {
     let run = run("delay 100ms", 1, 40_000, 50_000);
-    // Offered for 2 s at 20 000 packets/s: 1000 in each 100 ms.
+    // Packets are offered for 2 s at 20 000 packets/s, and 1000 packets pass in each 100 ms.
     assert_eq!(run.delivered.len(), 20_000);
     assert_eq!(run.over_limit.len(), 20_000);
     assert_eq!(self::run("delay 100ms limit 2001", 1, 40_000, 50_000).over_limit.len(), 0);
     assert_eq!(self::run("limit 0", 1, 10, 50_000).over_limit.len(), 10);
 }
 
-/// Published: the RFC 4737 reordered share of independent jitter, at 1 kHz and at 125 Hz. 10⁵ packets have a standard error of some 0.0015 (neighbours
-/// are not independent); half a digit and four of it.
+/// Published: the RFC 4737 reordered share of independent jitter, at 1 kHz and at 125 Hz. 10⁵ packets have a standard error of some 0.0015, since neighbours
+/// are not independent. The tolerance is half a digit and four standard errors.
 #[test]
 fn independent_jitter_reorders_absurdly() {
     let published = [
@@ -60,7 +60,7 @@ fn equal_times_keep_the_order_of_arrival() {
     assert_eq!(order, (0..10).collect::<Vec<_>>());
 }
 
-/// Departure = max(last departure, arrival + delay) + transmission time, checked with the delays that the same seed gives without the rate.
+/// The departure is max(last departure, arrival + delay) + transmission time, with the delays that the same seed gives without a rate.
 #[test]
 fn the_line_stands_behind_the_delay_and_undoes_jitter() {
     let count = 10_000;
@@ -69,7 +69,7 @@ fn the_line_stands_behind_the_delay_and_undoes_jitter() {
     for (instant, packet) in run("delay 30ms 10ms seed 4", 1, count, spacing).delivered {
         free[usize::try_from(packet.item).unwrap()] = instant.as_nanos();
     }
-    // 1000 bytes at 8 Mbit/s take a millisecond.
+    // A packet of 1000 bytes takes a millisecond at 8 Mbit/s.
     let lined = run("delay 30ms 10ms rate 8mbit seed 4", 1, count, spacing);
     assert_eq!(reordered_share(&lined), 0.0);
     let mut last = 0;
@@ -79,7 +79,7 @@ fn the_line_stands_behind_the_delay_and_undoes_jitter() {
     }
 }
 
-/// The kernel compares with the latest time to leave only while a packet is held: a line that has just become free is free.
+/// The kernel compares with the latest time to leave only while a packet is held. A line that has just become free serves the next packet at once.
 #[test]
 fn a_rate_limits_throughput_to_itself() {
     let run = run("rate 8mbit limit 100000", 1, 1000, 1000);
@@ -98,16 +98,16 @@ fn every_gap_th_packet_is_reordered_when_all_are_to_be() {
     }
 }
 
-/// The mean distance of reordered packets is gap − 1 + 1/p: gap − 1 packets are delayed, then one after another with probability 1 − p.
+/// The mean distance of reordered packets is gap − 1 + 1/p: gap − 1 packets are delayed, and each further packet with probability 1 − p.
 #[test]
 fn a_gap_makes_reordering_rarer_than_said() {
     let run = run("delay 10ms reorder 25% gap 5", 1, 100_000, MILLISECOND);
     let share = run.delivered.iter().filter(|(_, packet)| packet.reordered).count() as f64 / 1e5;
-    // Renewals with mean 8 and deviation √12: a standard error of √12/8^1.5/√10⁵ = 0.0005; five of it.
+    // Renewals with mean 8 and deviation √12 have a standard error of √12/8^1.5/√10⁵ = 0.0005. The tolerance is five of these.
     assert!((share - 1.0 / 8.0).abs() < 0.0025, "{share}");
 }
 
-/// A copy that is about to leave counts as the last packet: the line does not begin before it, though the delay may be below zero.
+/// A copy that is about to leave counts as the last packet. The line does not begin before the copy, although the delay may be below zero.
 #[test]
 fn a_reordered_copy_holds_the_line() {
     let now = at(1000 * MILLISECOND);
@@ -121,7 +121,7 @@ fn a_reordered_copy_holds_the_line() {
             assert!(qdisc.next_at() >= now.checked_add(core::time::Duration::from_millis(1)));
         }
     }
-    // A quarter of 1000, five standard errors of 13.7.
+    // A quarter of 1000, with five standard errors of 13.7.
     assert!((181..=319).contains(&seen), "{seen}");
 }
 
@@ -134,7 +134,7 @@ fn reordered_packets_pass_rate_and_slots() {
     assert_eq!((instant.as_nanos(), packet.item, packet.reordered), (2 * MILLISECOND, 1, true));
 }
 
-/// The typical words of the commit that brought slots. Between openings lie at least 800 µs, and each lets 42 packets out at most.
+/// The typical words in the kernel commit that introduced slots. Slots open at least 800 µs apart, and each lets out 42 packets at most.
 #[test]
 fn slots_let_packets_out_in_bunches() {
     let run = run("slot 800us 10ms bytes 64k packets 42 limit 100000", 1, 20_000, 10_000);
@@ -155,7 +155,7 @@ fn slots_let_packets_out_in_bunches() {
     assert!((mean - 5.4).abs() < 5.0 * 2.66 / (gaps.len() as f64).sqrt(), "{mean}");
 }
 
-/// Published: the width of a slot times 32 random bits overflows 64 bits beyond 2.1 s; half of the slots then lie in the past.
+/// Published: the width of a slot times 32 random bits overflows 64 bits for widths above 2.1 s, and half of the slots then lie in the past.
 #[test]
 fn a_slot_range_wider_than_two_seconds_overflows() {
     let delays = |words: &str| -> Vec<u64> {
@@ -171,7 +171,7 @@ fn a_slot_range_wider_than_two_seconds_overflows() {
     let within = delays("slot 0 2s");
     assert!(within.iter().all(|delay| *delay < 2000 * MILLISECOND));
     assert!(within.iter().filter(|delay| **delay == 0).count() < 5);
-    // u·4 s: from u = 2³² · 2.147/4 on the product is negative: 1 − 0.537 of them. Five standard errors of 0.016.
+    // For a slot of u·4 s the product is negative from u = 2³² · 2.147/4 on, in 1 − 0.537 of the cases. The tolerance is five standard errors of 0.016.
     let beyond = delays("slot 0 4s");
     let past = beyond.iter().filter(|delay| **delay == 0).count() as f64 / 1000.0;
     assert!((past - 0.463).abs() < 0.08, "{past}");
@@ -185,7 +185,7 @@ fn slots_with_a_distribution_are_drawn_from_it() {
     let times: Vec<f64> = run.delivered.iter().map(|(instant, _)| instant.as_nanos() as f64 / 1e6).collect();
     let gaps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let (mean, deviation) = (super::mean(&gaps), super::deviation(&gaps));
-    // Standard errors 0.014 and 0.01; five of them.
+    // Standard errors are 0.014 and 0.01. The tolerances are five of these.
     assert!((mean - 5.0).abs() < 0.07 && (deviation - 1.0).abs() < 0.05, "{mean} ± {deviation}");
 }
 
@@ -196,12 +196,12 @@ fn slots_of_no_time_are_no_slots() {
     assert!(run.delivered.iter().all(|(instant, packet)| instant.as_nanos() == (packet.item + 1) * 1000 + MILLISECOND));
 }
 
-/// A jitter above the delay gives times in the past: the packet leaves at once, and before those that wait.
+/// A jitter above the delay gives times in the past: such a packet leaves at once, before packets that wait.
 #[test]
 fn a_delay_below_zero_leaves_at_once() {
     let run = run("delay 1ms 10ms", 1, 10_000, 100 * MILLISECOND);
     let at_once = run.delivered.iter().filter(|(instant, packet)| instant.as_nanos() == (packet.item + 1) * 100 * MILLISECOND).count();
-    // Uniform on −9…11 ms: 45 % are below zero. Five standard errors of 50.
+    // The time is uniform on −9…11 ms: 45 % are below zero. The tolerance is five standard errors of 50.
     assert!((4250..=4750).contains(&at_once), "{at_once}");
     let mut first: Qdisc<u64> = qdisc("delay 1ms 10ms", 3);
     first.enqueue(at(0), SIZE, false, 0, &mut |_| {});

@@ -1,11 +1,11 @@
-//! The built-in tables and the files.
+//! Tests of the built-in tables and of files.
 
 use crate::laws::delay::DistTableError;
 use crate::netem::kernel::correlated::distributed;
 use crate::netem::kernel::tests::{deviation, mean};
 use crate::netem::kernel::{Prng, Table};
 
-/// Fowler, Noll and Vo's hash (FNV-1a, 64 bits) of the entries as decimal numbers, one a line.
+/// Returns the hash of Fowler, Noll and Vo (FNV-1a, 64 bits) of the entries as decimal numbers, one per line.
 fn hash(table: &Table) -> u64 {
     let text: String = table.entries().iter().map(|entry| format!("{entry}\n")).collect();
     text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
@@ -19,7 +19,7 @@ const NORMAL: u64 = 0x18ed_0e78_e18a_b760;
 const PARETO: u64 = 0x83bc_dab8_5f71_9569;
 const PARETO_NORMAL: u64 = 0x297e_427b_1dcf_ae14;
 
-/// The hashes were taken from the files normal.dist, pareto.dist and paretonormal.dist of iproute2 6.1.
+/// The hashes were computed from the files normal.dist, pareto.dist and paretonormal.dist of iproute2 6.1.
 #[test]
 fn the_tables_are_those_that_iproute2_ships() {
     assert_eq!(hash(&Table::normal()), NORMAL);
@@ -27,7 +27,7 @@ fn the_tables_are_those_that_iproute2_ships() {
     assert_eq!(hash(&Table::pareto_normal()), PARETO_NORMAL);
 }
 
-/// Published: mean, deviation and support of each, to the digits given.
+/// Published: mean, deviation and support of each table, to the digits given.
 #[test]
 fn the_tables_have_the_moments_that_were_published() {
     let published = [
@@ -62,7 +62,7 @@ fn what_is_no_table_is_refused_with_its_place() {
     assert_eq!(Table::new(Vec::new()), None);
 }
 
-/// mean + sigma·entry/8192 in two parts: the remainder of sigma by 8192 rounded half away from zero, the rest exact.
+/// The value mean + sigma·entry/8192 is computed in two parts: the remainder of sigma by 8192 is rounded half away from zero, the rest is exact.
 #[test]
 fn a_table_scales_by_parts() {
     let one = Table::parse("5000").unwrap();
@@ -73,8 +73,8 @@ fn a_table_scales_by_parts() {
     }
 }
 
-/// Published: uniform jitter of ±σ has deviation σ/√3 (577 ms for 1 s), but the remainder of 2³² by 2·10⁹ makes it 598 ms; a table multiplies
-/// the deviation by 1.73 beside that.
+/// Published: uniform jitter of ±σ has the deviation σ/√3 (577 ms for 1 s), but the remainder of 2³² by 2·10⁹ makes it 598 ms. A table multiplies the
+/// deviation by 1.73 as well.
 #[test]
 fn jitter_is_a_half_width_without_and_a_deviation_with_a_table() {
     let draws = |sigma: i32, table: Option<&Table>| {
@@ -82,7 +82,7 @@ fn jitter_is_a_half_width_without_and_a_deviation_with_a_table() {
         let values: Vec<f64> = (0..1_000_000).map(|_| distributed(0, sigma, || prng.next_u32(), table) as f64 / f64::from(sigma)).collect();
         deviation(&values)
     };
-    // The standard error of a deviation from 10⁶ draws is below 0.0011 for all these laws; five of it, and half a digit.
+    // The standard error of a deviation from 10⁶ draws is below 0.0011 for all these laws. The tolerance is five of these and half a digit.
     let uniform = draws(10_000_000, None);
     assert!((uniform - 1.0 / 3.0_f64.sqrt()).abs() < 0.0055, "{uniform}");
     assert!((draws(1_000_000_000, None) - 0.598).abs() < 0.0055);
