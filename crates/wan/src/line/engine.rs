@@ -76,6 +76,7 @@ impl<T: Clone> Engine<T> {
         for kind in &mut self.retiring {
             kind.pass(now, outputs);
         }
+        // An engine without a next event holds no packet any more.
         self.retiring.retain(|kind| kind.next_at().is_some());
         self.kind.pass(now, outputs);
     }

@@ -98,6 +98,7 @@ impl<P, T: Clone> Line<P, T> {
     #[inline(never)]
     pub(crate) fn filters(&mut self, packet: &Offered<'_, P>) -> bool {
         let is_dropped = self.rare.as_ref().and_then(|rare| rare.filter.as_ref()).is_some_and(|filter| filter.drops(packet));
+        // A dropped packet is counted here, because `offer` is not called for the packet.
         self.flow.offered += u64::from(is_dropped);
         is_dropped
     }

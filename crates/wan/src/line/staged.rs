@@ -231,6 +231,7 @@ impl<T: Clone> Staged<T> {
     /// inside and the packet leaves the bottleneck by `until`, before which no other packet comes. Returns `None` without any change in all other cases.
     #[inline]
     pub(crate) fn offer_at_once(&mut self, now: Instant, number: u64, info: PacketInfo, until: Instant) -> Option<Result<Instant, DropCause>> {
+        // A next event means that a packet is inside, and a modulator may change a stage before the packet leaves.
         if !self.is_plain || self.next.is_some() || self.modulation.is_some() {
             return None;
         }
@@ -346,6 +347,7 @@ impl<T: Clone> Staged<T> {
         };
         // The route must be that of the new configuration before any packet goes on.
         self.route = Route::new(self.layout, |stage| self.has(stage));
+        // Packets that the reorder stage holds back go on with their delay, since no later packet would release them.
         if config.reorder.is_none() {
             for packet in self.reorder.dismantle() {
                 self.propagate(now, packet, Travel::InOrder, outputs);
@@ -384,6 +386,7 @@ impl<T: Clone> Staged<T> {
     /// a departure makes room for packets from stages before.
     fn next_event(&self) -> Option<(Instant, Stage)> {
         let mut next: Option<(Instant, Stage)> = None;
+        // Reversed, so that the comparison with `<` keeps the last stage among simultaneous events.
         for &stage in self.route.keeping().iter().rev() {
             let at = match stage {
                 Stage::Bucket => self.bucket.as_ref().and_then(|bucket| bucket.next_at()),
@@ -421,6 +424,7 @@ impl<T: Clone> Staged<T> {
                 }
             }
             Stage::Propagation => {
+                // Propagation has two sources of events. At equal instants, a packet that has propagated goes before a packet held back.
                 if self.line.peek().is_some_and(|first| first.until <= now) {
                     released.extend(self.line.pop().map(|first| first.packet));
                 } else {
@@ -461,6 +465,7 @@ impl<T: Clone> Staged<T> {
                 }
                 Stage::Loss => {
                     if self.loses(now, &packet) {
+                        // A packet that can carry a congestion mark is marked in place of the loss, and goes on.
                         if !(self.marks_instead_of_loss && packet.info.ecn_capable) {
                             return drop(outputs, now, DropCause::Loss, packet);
                         }
@@ -561,6 +566,7 @@ impl<T: Clone> Staged<T> {
         };
         let until = self.direct.order.arrival(wanted);
         let last = self.layout[self.layout.len() - 1] == Stage::Propagation;
+        // Without a later stage, the owner of the line keeps the packet until it arrives.
         if last || (self.bucket.is_none() && self.bottleneck.is_none() && self.slots.is_none()) {
             outputs.push(Output { packet, exit: Exit::Arrives(until) });
         } else {

@@ -138,6 +138,7 @@ impl Netem {
             loss: self.loss.as_ref().map_or(Ok(Loss::None), loss)?,
             marks_instead_of_loss: self.ecn,
             duplication: self.duplicate.map_or_else(|| Ok(Chance::default()), |spec| chance("duplicate", spec))?,
+            // As in the kernel, checksums are complete before a bit flips, so that receivers discard the packet.
             corruption: (!corrupted.is_never()).then_some(Corruption {
                 bits: Flips::Bits { packets: corrupted, count: 1 },
                 within: None,

@@ -113,6 +113,7 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
         let Some(&(_, option)) = KEYWORDS.iter().find(|(name, _)| name.starts_with(word.text)) else {
             return Err(NetemError { kind: NetemErrorKind::UnknownWord { word: word.text.to_string() }, span: word.span });
         };
+        // Synonyms have one name in `KEYWORDS`, so that `drop` after `loss` is a repetition too.
         if self.seen.iter().any(|(place, _)| *place == Place::Option(option)) {
             return Err(NetemError { kind: NetemErrorKind::Repeated { option }, span: word.span });
         }

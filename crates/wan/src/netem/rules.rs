@@ -164,6 +164,7 @@ fn check_slot(slot: &SlotSpec) -> Result<(), Contradiction> {
             }
         }
     }
+    // The kernel holds both budgets of a slot in signed 32 bits.
     let countable = [slot.packets, slot.bytes].into_iter().flatten().all(|count| i32::try_from(count.get()).is_ok());
     if countable { Ok(()) } else { Err(Contradiction::SlotTooLarge) }
 }

@@ -238,8 +238,8 @@ impl<P: Clone> Network<P> {
         self.handle_packet_timed(now, Path { from, to }, info, payload).map(|_| ())
     }
 
-    /// Takes a packet like [`Network::handle_packet`], and returns the instant of the packet's arrival if that arrival is already certain. With `None` the
-    /// arrival is not certain, and an event may wait to be polled.
+    /// Takes a packet like [`Network::handle_packet`], and returns the instant of the packet's arrival if that arrival is already certain. Returns `None`
+    /// if the packet was dropped or its arrival is not certain yet; an event may then wait to be polled.
     ///
     /// # Errors
     ///
@@ -341,6 +341,7 @@ impl<P: Clone> Network<P> {
             return Ok(());
         }
         if !self.is_random {
+            // No link draws random numbers, so that no words need to be collected first.
             for to in (0..self.nodes).map(NodeId).filter(|to| *to != from) {
                 self.send(now, Path { from, to }, size, payload.clone(), None);
             }

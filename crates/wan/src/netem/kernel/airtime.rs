@@ -30,6 +30,7 @@ impl Airtime {
         if let Some(cell) = self.cell {
             #[expect(clippy::cast_possible_truncation, reason = "the kernel counts cells in 32 bits")]
             let mut cells = length as u32 / cell.size;
+            // The division rounds down, and the last cell of a packet is padded.
             if length > u64::from(cells.wrapping_mul(cell.size)) {
                 cells = cells.wrapping_add(1);
             }

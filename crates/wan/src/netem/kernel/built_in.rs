@@ -42,6 +42,7 @@ fn normal_entry(rank: i32) -> i32 {
 fn pareto_entry(rank: i32) -> i32 {
     let survival = 1.0 - f64::from(rank) / f64::from(ENTRIES);
     let value = (libm::pow(survival, -1.0 / 3.0) - 1.5) * 4.0 / 3.0;
+    // The highest ranks do not fit into 16 bits, and are cut before they enter `pareto_normal`.
     rounded(value * f64::from(TABLE_SCALE)).min(i32::from(i16::MAX))
 }
 

@@ -56,6 +56,7 @@ pub(super) fn distributed(mean: i64, sigma: i32, draw: impl FnOnce() -> u32, tab
     let entry = table.entry(random);
     let scale = i64::from(TABLE_SCALE);
     let product = i64::from(sigma % TABLE_SCALE) * entry;
+    // The division below truncates, so that half a step away from zero makes it round half away from zero.
     let rounded = if product >= 0 { product + scale / 2 } else { product - scale / 2 };
     (rounded / scale + i64::from(sigma / TABLE_SCALE) * entry).wrapping_add(mean)
 }

@@ -77,6 +77,7 @@ impl FourState {
                     None
                 }
             }
+            // A single loss is followed by a reception, whatever the draw.
             State::LostAlone => Some(State::ReceivedInGap),
         };
         let Some(next) = next else { return false };
@@ -101,6 +102,7 @@ impl GilbertElliott {
         Self {
             p: said.p.as_u32(),
             r: said.r.map_or_else(|| said.p.complement_as_u32(), Percent::as_u32),
+            // The words give the share lost in the bad state, and the kernel holds the share that passes.
             h: said.loss_in_bad.map_or(0, |loss| u32::MAX - loss.as_u32()),
             k1: said.loss_in_good.map_or(0, Percent::as_u32),
         }

@@ -53,6 +53,7 @@ impl Parameters {
             duplicate: probability(&netem.duplicate),
             corrupt: probability(&netem.corrupt),
             reorder,
+            // Without a chance of reordering, no packet is a candidate, whatever the gap.
             gap: if reorder == 0 { 0 } else { gap },
             airtime: netem.rate.as_ref().map(Airtime::new),
             correlations: Correlations::new(netem),

@@ -273,6 +273,7 @@ impl<T: Clone> Qdisc<T> {
             if self.parameters.ecn && packet.ect {
                 packet.marked = true;
             } else {
+                // If a copy was to be made as well, one packet is left: the packet itself passes, and no copy is made.
                 copies -= 1;
             }
         }

@@ -62,6 +62,7 @@ impl Slots {
 
     /// Takes a packet of `size` bytes from the budget of the current slot, and returns whether the budget is used up.
     pub(super) fn spend(&mut self, size: u32) -> bool {
+        // A packet larger than the rest of the budget has left all the same, and makes the budget negative.
         self.packets_left = self.packets_left.wrapping_sub(1);
         self.bytes_left = self.bytes_left.wrapping_sub_unsigned(size);
         self.packets_left <= 0 || self.bytes_left <= 0

@@ -43,7 +43,8 @@ pub struct DirectLinks {
     chained: ChainStates,
     /// Links of no kind, indexed by the number in [`Memory::Other`].
     others: Vec<Other>,
-    /// Instant of the latest packet offered to each link, indexed by link. Shorter than `links` for links that were not offered a packet yet.
+    /// Instant of the latest packet offered to each link, indexed by link; `None` before the first packet. Resized at the first offer after links are
+    /// added.
     #[cfg(debug_assertions)]
     latest_offers: Vec<Option<Instant>>,
 }
