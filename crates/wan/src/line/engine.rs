@@ -72,7 +72,7 @@ impl<T: Clone> Engine<T> {
 
     /// Lets everything due by `now` happen.
     pub(crate) fn pass(&mut self, now: Instant, outputs: &mut Outputs<T>) {
-        // Earlier engines go first, so that older packets come out before newer ones at one instant.
+        // Earlier engines go first, so that older packets come out first at equal instants.
         for kind in &mut self.retiring {
             kind.pass(now, outputs);
         }

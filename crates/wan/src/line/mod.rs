@@ -135,8 +135,8 @@ impl<P, T: Clone> Line<P, T> {
     }
 
     /// Takes the packet that was offered last, in place of [`Line::enter`], if the packet's fate is certain at once, and returns its arrival or the cause of
-    /// its drop. No earlier line may have marked the packet, and no other packet may be offered before `until`. Returns `None` without any change if the fate
-    /// is not certain: [`Line::enter`] is called then.
+    /// its drop. No earlier line may have marked the packet, and no other packet may be offered before `until`. If the fate is not certain, returns
+    /// `None` and takes no packet: the caller then calls [`Line::enter`].
     #[inline]
     pub(crate) fn enter_at_once(&mut self, now: Instant, info: PacketInfo, until: Instant) -> Option<Result<Instant, DropCause>> {
         let number = self.flow.offered - 1;

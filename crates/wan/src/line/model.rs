@@ -109,7 +109,7 @@ impl LinkModel {
     pub(crate) fn layout(&self) -> Option<Layout> {
         match self {
             Self::Fixed(config) => Some(config.layout),
-            // All configurations of a modulated link have one layout, so that the first one is enough.
+            // All configurations of a modulated link have one layout, so that the first configuration is enough.
             Self::Modulated(modulated) => modulated.configs().first().map(|config| config.layout),
             Self::Replay(_) | Self::Kernel(_) => None,
         }

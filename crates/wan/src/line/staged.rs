@@ -200,7 +200,7 @@ impl<T: Clone> Staged<T> {
         stages
     }
 
-    /// Makes the stages of a line that goes on from another one: `bottleneck` keeps its packets, and `direct` its state.
+    /// Makes the stages of a line that takes over the packets of `bottleneck` and the state of `direct`.
     pub(crate) fn resumed(now: Instant, direct: Direct, config: LinkConfig, bottleneck: BottleneckStage<T>) -> Self {
         // `new` configures the stages in `direct` with the configuration that they have already, which changes nothing.
         let mut stages = Self { bottleneck: Some(bottleneck), ..Self::new(now, direct, config, None) };
@@ -228,7 +228,7 @@ impl<T: Clone> Staged<T> {
     }
 
     /// Takes packet number `number` if its fate is certain at once, and returns its arrival or the cause of its drop. The fate is certain if no packet is
-    /// inside and the packet leaves the bottleneck by `until`, before which no other packet comes. Returns `None` without any change in all other cases.
+    /// inside and the packet leaves the bottleneck by `until`, before which no other packet comes. In all other cases, returns `None` and takes no packet.
     #[inline]
     pub(crate) fn offer_at_once(&mut self, now: Instant, number: u64, info: PacketInfo, until: Instant) -> Option<Result<Instant, DropCause>> {
         // A next event means that a packet is inside, and a modulator may change a stage before the packet leaves.
@@ -545,7 +545,7 @@ impl<T: Clone> Staged<T> {
             Placed::Held => {}
         }
         for packet in behind {
-            // A packet released after another one is one nanosecond later, so that it also arrives later over a constant delay.
+            // One nanosecond of additional delay keeps these packets after the packet placed above over a constant delay too.
             self.propagate(now, packet, Travel::Late(Duration::from_nanos(1)), outputs);
         }
     }
@@ -554,7 +554,7 @@ impl<T: Clone> Staged<T> {
         let draws = self.direct.draws.copy(packet.number, packet.copy);
         let mut delay = || {
             let traced = self.trace.as_ref().map_or(0, |trace| trace.at(now).0);
-            // A word is drawn only if the delay reads it. Words have addresses, so that skipping one changes no other.
+            // Words have addresses, so a word that the delay does not read can be skipped without an effect on other words.
             let word = if self.direct.delay.is_random() { draws.first(Purpose::Jitter) } else { 0 };
             let listed = self.listed.as_mut().map_or(0, |listed| listed.delay_nanos(now, packet.info));
             self.direct.delay.draw_nanos(now, word, draws).saturating_add(traced).saturating_add(listed)

@@ -60,7 +60,7 @@ pub enum NetemErrorKind {
         /// Description of the values that the option takes.
         expected: &'static str,
     },
-    /// An option that was given before. `tc` would use the last one, mixed with values of the first that the last leaves out.
+    /// An option that was given before. `tc` would use the last values, and earlier values where the last are incomplete.
     Repeated {
         /// Name of the option.
         option: &'static str,

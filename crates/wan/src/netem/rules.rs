@@ -5,7 +5,7 @@ use core::time::Duration;
 
 use super::{DelaySpec, GemodelSpec, LossSpec, Netem, Percent, SlotGap, SlotSpec, StateSpec};
 
-/// Two options that contradict each other, an option that needs another one, or a value out of range.
+/// A contradiction between two options, an option without a required second option, or a value out of range.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Contradiction {
     /// `reorder` without a delay: no waiting packet can be overtaken.

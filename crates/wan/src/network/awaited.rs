@@ -41,7 +41,8 @@ impl Awaited {
     pub(super) fn announce(&mut self, at: Instant, line: LineId) {
         let is_awaited = match line {
             // The packets of an uplink go to any node.
-            // Links between all nodes are numbered `from * nodes + to`: the remainder is the receiver.
+            // In a network with links between all nodes, link numbers are `from * nodes + to`, and the remainder is the receiver. Links of
+            // `Paths::Some` are numbered in another way.
             LineId::Uplink(_) => true,
             LineId::Link(link) => self.is_awaited[link.index() % self.is_awaited.len()],
             LineId::Downlink(node) => self.is_awaited[node.index()],

@@ -12,7 +12,7 @@ use crate::line::Line;
 #[derive(Clone, Debug)]
 pub(super) struct Lines<P> {
     /// Links, indexed by [`LinkId`]: in the order of senders, then of receivers. Where all nodes have links to all, the diagonal is included and never used.
-    /// Links on demand are instead in the order in which they were made, and `on_demand` gives their indices.
+    /// Links on demand are in the order of their making instead, and `on_demand` gives their indices.
     pub(super) links: Vec<Line<P, InNetwork<P>>>,
     /// Models and places of links on demand; `None` if all links are made with the network.
     pub(super) on_demand: Option<OnDemand>,

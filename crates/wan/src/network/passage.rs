@@ -52,7 +52,7 @@ impl<P: Clone> Network<P> {
         None
     }
 
-    /// Ends the way of a packet that has left its last line: delivers it, or drops it if its damage is discovered on arrival.
+    /// Ends the way of a packet after the last line: counts and returns the delivery, or the drop of a packet that is discarded on arrival.
     #[inline(always)]
     fn arrive(&mut self, at: Instant, line: LineId, packet: InNetwork<P>) -> PacketEvent<P, Path> {
         let line = self.lines.get_mut(line);

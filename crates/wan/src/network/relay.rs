@@ -10,7 +10,7 @@ use super::pending::{InNetwork, LineId, SizeAndMarks};
 use crate::fates::record::{PacketEvent, PacketRecord};
 
 impl Path {
-    /// Returns the path of a packet before the relay, which has no receiver yet. Sender and receiver of the path are equal, which no other packet's path is.
+    /// Returns the path of a packet before the relay, where the packet has no receiver yet: sender and receiver are equal, as in no other path.
     pub(super) const fn to_relay(from: NodeId) -> Self {
         Self { from, to: from }
     }

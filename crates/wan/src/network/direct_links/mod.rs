@@ -28,7 +28,7 @@ use crate::stages::queue::Load;
 /// driver, since a driver that looks at arrivals on a lattice of its own can use a simpler queue. The driver says until when it will look, so that a packet
 /// is counted as delivered or not when it is offered.
 ///
-/// Links are numbered from 0 in the order in which they are added. A link without state takes one cache line, most other links one and a half.
+/// Links are numbered from 0 in the order in which they are added. A link without state takes one cache line, and most links with state take one and a half.
 #[derive(Clone, Debug)]
 pub struct DirectLinks {
     /// End of the run. Packets that arrive later do not count as delivered.
@@ -247,7 +247,7 @@ impl DirectLinks {
         self.links[link.index()].offered
     }
 
-    /// Offers a packet to one link, and returns the packet's arrival and whether the packet arrives before one that was sent earlier. Returns `None` if the
+    /// Offers a packet to one link, and returns the packet's arrival and whether the packet overtakes an earlier packet. Returns `None` if the
     /// packet does not arrive. Instants must not go back.
     ///
     /// # Panics
