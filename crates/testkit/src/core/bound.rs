@@ -1,16 +1,17 @@
-//! Sockets of a host, by their ports.
+//! Bound sockets of a host, looked up by port.
 
-/// A socket, until it is closed.
+/// Index of a socket in [`Sockets`](super::sockets::Sockets). Valid until the socket is closed; a later socket may then get the same index.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct SocketId(pub(super) usize);
 
-/// Sockets that are bound on a host, in the order of version of IP and port; those of one port in the order in which they were bound.
+/// Bound sockets of a host, sorted by version of IP, then by port. Sockets of the same port keep the order in which they were bound.
 ///
-/// A sorted array, since each datagram that arrives looks its port up here and most hosts have few sockets. Ports that are given in turn are added at the end.
+/// A sorted array, because each arriving datagram looks up its port and most hosts have few sockets. Dynamic ports ascend, so most sockets are added at the
+/// end.
 #[derive(Debug, Default)]
 pub(super) struct Bound(Vec<(Port, SocketId)>);
 
-/// A port of one version of IP: its number, and the bit above for version 6.
+/// Port of one version of IP. The lower 16 bits are the number of the port; the next bit is set for version 6.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(super) struct Port(u32);
 
@@ -34,20 +35,20 @@ impl Port {
 }
 
 impl Bound {
-    /// Returns the sockets of a port.
+    /// Returns the sockets of `port`, in the order in which they were bound.
     #[inline]
     pub(super) fn at(&self, port: Port) -> impl Iterator<Item = SocketId> {
         let first = self.0.partition_point(|(bound, _)| *bound < port);
         self.0[first..].iter().take_while(move |(bound, _)| *bound == port).map(|(_, socket)| *socket)
     }
 
-    /// Adds a socket.
+    /// Adds a socket after all sockets of the same port.
     pub(super) fn add(&mut self, port: Port, socket: SocketId) {
         let place = self.0.partition_point(|(bound, _)| *bound <= port);
         self.0.insert(place, (port, socket));
     }
 
-    /// Removes a socket; a host that went down has forgotten it.
+    /// Removes a socket. Does nothing if the socket is not there, because its host crashed in between and forgot all its sockets.
     pub(super) fn remove(&mut self, port: Port, socket: SocketId) {
         let first = self.0.partition_point(|(bound, _)| *bound < port);
         let place = self.at(port).position(|bound| bound == socket);
@@ -72,7 +73,7 @@ mod tests {
         let at = |bound: &Bound, port| bound.at(port).map(|socket| socket.0).collect::<Vec<_>>();
         assert_eq!(at(&bound, port(false, 7)), [2, 3, 5]);
         bound.remove(port(false, 7), SocketId(3));
-        // The second time it is gone.
+        // The second call finds the socket gone and does nothing.
         bound.remove(port(false, 7), SocketId(3));
         assert_eq!(at(&bound, port(false, 7)), [2, 5]);
         assert_eq!(at(&bound, port(true, 7)), [1]);

@@ -1,7 +1,8 @@
 //! Access to the state of a run: by the thread of the run while the run goes on, and by any thread after its end, to drop values of the run.
 //!
-//! A socket that another thread uses would act at an instant that depends on the machine. Its thread would also have to wait until the thread of the run has time, for ever if a
-//! task waits for that other thread. So such a use is an error at once, and the run fails with the same words.
+//! A socket used on another thread would act at an instant that depends on the machine. The other thread would also have to wait until the thread of the run
+//! releases the state, and would wait for ever if a task waits for that other thread. Hence such a use is an error at once, and the run fails with the text of
+//! the error.
 
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,14 +16,16 @@ use crate::current;
 /// Acts that other threads have left for the thread of a run.
 #[derive(Default)]
 pub(super) struct Elsewhere {
+    /// Whether `left` may hold something. Read without the lock between two polls of tasks.
     is_any: AtomicBool,
     left: Mutex<Left>,
 }
 
 #[derive(Default)]
 struct Left {
-    /// The first fault of the test, in words: a value of the run that another thread used, or a socket that a task without a host has made.
+    /// Text of the first fault of the test: another thread used a value of the run, or a task without a host made a socket.
     misuse: Option<String>,
+    /// Acts in the order in which they were left.
     acts: Vec<Act>,
 }
 
@@ -36,24 +39,25 @@ impl Elsewhere {
     }
 
     fn take(&self) -> Left {
+        // The mark goes before the lock is taken. An act left in between is either taken here, or marks again; no act is forgotten.
         self.is_any.store(false, Ordering::Relaxed);
         std::mem::take(&mut self.left.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
 impl Shared {
-    /// Whether the run is that of this thread.
+    /// Returns whether this thread runs the test bed of this state.
     #[inline]
     fn is_running(&self) -> bool {
         current::run() == self.run()
     }
 
-    /// Whether this thread may have the state, which may lie elsewhere: it runs the test bed, or the run has ended.
+    /// Returns whether this thread may take the state out of `home`: this thread runs the test bed, or the run has ended.
     pub(super) fn may_be_had(&self) -> bool {
         self.is_running() || self.has_ended()
     }
 
-    /// Asks the state for something of that host: `kind`, such as "a UDP socket".
+    /// Asks the state about a value of the host `host`. `kind` names the value in errors, such as "a UDP socket".
     ///
     /// # Errors
     ///
@@ -64,11 +68,12 @@ impl Shared {
         Ok(self.ask(visit, ask))
     }
 
-    /// Fails unless something of that host may be used here and now.
+    /// Checks that a value of the host `host` may be used on this thread now. `kind` names the value in the error.
     ///
     /// # Errors
     ///
-    /// [`io::ErrorKind::ConnectionAborted`] once the run has ended; [`io::ErrorKind::Unsupported`] on another thread than that of the run, which fails then.
+    /// [`io::ErrorKind::ConnectionAborted`] after the end of the run; [`io::ErrorKind::Unsupported`] on a thread that does not run the test bed, and the run
+    /// then fails as well.
     #[inline]
     pub(crate) fn check_open(&self, host: NodeId, kind: &str) -> io::Result<()> {
         if self.is_at_hand() || self.is_running() { Ok(()) } else { self.refuse(host, kind) }
@@ -87,7 +92,7 @@ impl Shared {
         Err(io::Error::new(io::ErrorKind::Unsupported, self.note_misuse(&format!("{kind} of host `{name}`"))))
     }
 
-    /// Notes that another thread uses this, so that the run fails, and says so.
+    /// Notes that another thread uses the value `what`, so that the run fails. Returns the text of the fault.
     pub(super) fn note_misuse(&self, what: &str) -> String {
         let text = format!(
             "{what} was used on another thread{}: the sockets of a test bed belong to the thread that runs it. Use them in its tasks, and let other threads hand over what \
@@ -98,7 +103,7 @@ impl Shared {
         text
     }
 
-    /// Notes a fault of the test, with which the run fails once its task has returned.
+    /// Notes a fault of the test. The run fails with the first noted fault, after the polled task has returned.
     pub(crate) fn note_fault(&self, text: &str) {
         self.elsewhere.leave(|left| {
             left.misuse.get_or_insert_with(|| text.to_owned());
@@ -111,7 +116,7 @@ impl Shared {
         self.elsewhere.is_any.load(Ordering::Acquire)
     }
 
-    /// Lets go of something: now, or, on a thread that may not have the state, when the task that the run's thread polls has returned.
+    /// Releases a value of the run with `act`: now if this thread may ask the state, otherwise when the task polled by the thread of the run has returned.
     pub(crate) fn release(&self, act: impl FnOnce(&mut Core) + Send + 'static) {
         if self.may_be_asked() {
             self.with(act);
@@ -120,11 +125,11 @@ impl Shared {
         }
     }
 
-    /// Does what other threads have left: between two polls of tasks.
+    /// Performs the acts left by other threads. Called between two polls of tasks.
     ///
     /// # Panics
     ///
-    /// If another thread has used something of the run.
+    /// If a fault of the test was noted, such as a use of the run on another thread.
     #[inline]
     pub(crate) fn attend(&self) {
         if self.elsewhere.is_any.load(Ordering::Acquire) {
@@ -135,6 +140,7 @@ impl Shared {
     #[cold]
     #[expect(clippy::panic, reason = "a misuse, and the way out")]
     fn attend_now(&self) {
+        // The acts come first: they release values even if the run fails.
         let Left { misuse, acts } = self.elsewhere.take();
         acts.into_iter().for_each(|act| self.with(act));
         if let Some(text) = misuse {

@@ -1,48 +1,50 @@
-//! The two ends of a packet, in as few bytes as they take: the event queue moves them.
+//! Addresses and ports of both ends of a packet, packed into 16 bytes because the event queue moves them with the packet.
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 
 use super::bound::Port;
 use crate::address::Addresses;
 
-/// The two ends of a packet, and its kind.
+/// Both ends of a packet, and the kind of the packet.
 #[derive(Clone, Copy, Default, Debug)]
 pub(crate) struct Ends {
-    /// Sender and receiver, as [`Addresses::short`].
+    /// Address of the sender, as [`Addresses::short`].
     pub(super) from: u32,
+    /// Address of the receiver, as [`Addresses::short`].
     pub(super) to: u32,
     from_port: u16,
     to_port: u16,
+    /// Whether both addresses are of IPv6.
     is_six: bool,
     pub(super) kind: Kind,
 }
 
-/// What a packet is.
+/// Kind of a packet.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub(super) enum Kind {
     #[default]
     Datagram,
-    /// "There is no socket at that port", which IP tells a sender.
+    /// Message of IP to the sender of a datagram: no socket is bound to the port.
     Unreachable,
-    /// A segment of TCP: the bytes are the whole IP packet.
+    /// Segment of TCP. The bytes of the packet are the whole IP packet.
     #[cfg(feature = "tcp")]
     Segment,
 }
 
 impl Ends {
-    /// Both of one version of IP, and addresses of hosts, of loopback or for all.
+    /// Packs two addresses. Both must be of the same version of IP, and each must be an address of a host, of loopback, or broadcast.
     #[cfg(any(test, feature = "tcp"))]
     pub(super) fn new(from: SocketAddr, to: SocketAddr, kind: Kind) -> Self {
         Self::of([from, to].map(|end| Addresses::short(end.ip())), [from, to].map(|end| end.port()), to.is_ipv6(), kind)
     }
 
-    /// As [`Ends::new`], of short addresses.
+    /// Like [`Ends::new`], but takes short addresses.
     #[inline]
     pub(super) const fn of([from, to]: [u32; 2], [from_port, to_port]: [u16; 2], is_six: bool, kind: Kind) -> Self {
         Self { from, to, from_port, to_port, is_six, kind }
     }
 
-    /// The version and the port of the receiver.
+    /// Returns the port of the receiver, with the version of IP.
     #[inline]
     pub(super) const fn port(&self) -> Port {
         Port::new(self.is_six, self.to_port)
@@ -58,18 +60,18 @@ impl Ends {
         SocketAddr::new(Addresses::long(self.to, self.is_six), self.to_port)
     }
 
-    /// Whether it goes to an address that every host has: of loopback, or for all.
+    /// Returns whether the packet goes to an address that every host has: an address of loopback, or broadcast.
     #[inline(never)]
     pub(super) fn is_to_any_host(&self) -> bool {
         self.is_broadcast() || Addresses::is_loopback(self.to, self.is_six)
     }
 
-    /// Whether it goes to all hosts.
+    /// Returns whether the packet goes to the broadcast address 255.255.255.255.
     pub(super) fn is_broadcast(&self) -> bool {
         self.to().ip() == IpAddr::V4(Ipv4Addr::BROADCAST)
     }
 
-    /// What goes back.
+    /// Returns the ends of an answer of kind `kind`: sender and receiver are swapped.
     pub(super) const fn back(self, kind: Kind) -> Self {
         let Self { from, to, from_port, to_port, is_six, .. } = self;
         Self { from: to, to: from, from_port: to_port, to_port: from_port, is_six, kind }

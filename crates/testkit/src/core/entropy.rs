@@ -1,29 +1,29 @@
-//! Random bytes for programs that want them: others in every run of another seed, the same in every run of the same one.
+//! Random bytes for programs. The bytes depend on the seed of the run: equal seeds give equal bytes.
 
 use std::collections::BTreeMap;
 
 use cohaptic_wan::NodeId;
 use cohaptic_wan::random::{Purpose, Stream};
 
-/// The label of the stream of programs. Links have labels of their own: see [`cohaptic_wan::LinkName`].
+/// Label of the random streams of programs. The labels of links differ: see [`cohaptic_wan::LinkName`].
 #[cfg(any(test, feature = "quinn"))]
 const LABEL: &[u8] = b"entropy of the programs of a test bed";
 
-/// Where the random bytes of programs come from.
+/// Source of the random bytes of one host.
 #[derive(Debug)]
 pub(crate) struct Entropy {
     stream: Stream,
-    /// How often some were asked for.
+    /// Number of requests so far. Each request draws from the stream at its own position.
     asked: u64,
 }
 
 impl Entropy {
-    /// A stream of its own: its draws move no draw of another one.
+    /// Creates a source on the stream of `seed` and `label`. Draws of this stream do not move the draws of other streams.
     fn labelled(seed: u64, label: &[u8]) -> Self {
         Self { stream: Stream::new(seed, label), asked: 0 }
     }
 
-    /// Fills a buffer.
+    /// Fills `buffer` with the bytes of the next request.
     pub(crate) fn fill(&mut self, buffer: &mut [u8]) {
         let mut draws = self.stream.packet(self.asked).draws(Purpose::InitialState);
         self.asked += 1;
@@ -32,7 +32,7 @@ impl Entropy {
         }
     }
 
-    /// An array of them.
+    /// Returns `N` bytes of the next request.
     pub(crate) fn bytes<const N: usize>(&mut self) -> [u8; N] {
         let mut bytes = [0; N];
         self.fill(&mut bytes);
@@ -40,8 +40,8 @@ impl Entropy {
     }
 }
 
-/// Random bytes for the programs of each host, and for those of no host. Each host has a stream of its own, by its name: what other hosts ask for, and which
-/// hosts there are besides, changes none of the bytes.
+/// Random bytes for the programs of each host, and for programs of no host. Each host has a stream labelled with its name, so neither requests of other hosts
+/// nor the list of hosts change its bytes.
 #[derive(Debug)]
 pub(crate) struct ByHost {
     seed: u64,
@@ -59,7 +59,7 @@ impl ByHost {
         Self { seed, label, streams: BTreeMap::new() }
     }
 
-    /// The bytes of a host; `names` are those of all hosts.
+    /// Returns the source of a host. `names` are the names of all hosts, indexed by host.
     pub(crate) fn of(&mut self, host: Option<NodeId>, names: &[String]) -> &mut Entropy {
         let Self { seed, label, streams } = self;
         streams.entry(host).or_insert_with(|| {
@@ -68,7 +68,7 @@ impl ByHost {
         })
     }
 
-    /// Returns whether any were asked for.
+    /// Returns whether any source was asked for.
     pub(super) fn was_asked(&self) -> bool {
         !self.streams.is_empty()
     }
@@ -105,7 +105,7 @@ mod tests {
         assert_eq!(first, same.bytes());
         assert_ne!(first, other.bytes());
         assert_ne!(first, one.bytes());
-        // A shorter buffer has the beginning of a longer one.
+        // The bytes for a shorter buffer are the beginning of the bytes for a longer one.
         let mut longer = [0; 21];
         Entropy::new(1).fill(&mut longer);
         assert_eq!(longer[..13], first);

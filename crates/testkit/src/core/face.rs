@@ -1,4 +1,4 @@
-//! The part of the state that is read without its lock: the time, and how often a program has called at one instant.
+//! Part of the state that is read without the lock of the state: the time, and the number of calls at the present instant.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -7,18 +7,21 @@ use cohaptic_units::print::Seconds;
 
 use crate::current;
 
-/// The time, and the calls since it last passed. The holder of the state writes the time; a call that is lost between two threads counts for nothing.
+/// The time of the run, and the number of calls since time last passed. Only the holder of the state writes the time. Two threads may count a call at once and
+/// lose one count; the limits are so high that a lost count does not matter.
 #[derive(Debug)]
 pub(crate) struct Face {
+    /// Time of the run \[ns\].
     now: AtomicU64,
+    /// Calls since time last passed.
     calls: AtomicU64,
-    /// How often tasks were polled since it last passed, as far as they are counted here.
+    /// Polls of tasks since time last passed, as counted by [`Face::count_poll`].
     #[cfg(feature = "tokio")]
     polled: AtomicU64,
-    /// How often tasks may be polled at one instant.
+    /// Limit of `polled`.
     #[cfg(feature = "tokio")]
     patience: u64,
-    /// How many calls there may be at one instant.
+    /// Limit of `calls`: ten times the patience.
     most_calls: u64,
 }
 
@@ -40,7 +43,7 @@ impl Face {
         Instant::from_nanos(self.now.load(Ordering::Relaxed))
     }
 
-    /// Time passes.
+    /// Sets the time to `now`, and the counts to zero.
     #[inline]
     pub(super) fn pass(&self, now: Instant) {
         self.now.store(now.as_nanos(), Ordering::Relaxed);
@@ -49,7 +52,7 @@ impl Face {
         self.polled.store(0, Ordering::Relaxed);
     }
 
-    /// A task is polled. Gives the patience if time has stood still for too long.
+    /// Counts a poll of a task. Returns the patience if the tasks were polled more often than that since time last passed.
     #[cfg(feature = "tokio")]
     pub(super) fn count_poll(&self) -> Option<u64> {
         let polled = self.polled.load(Ordering::Relaxed) + 1;
@@ -57,11 +60,11 @@ impl Face {
         (polled > self.patience).then_some(self.patience)
     }
 
-    /// The program asks for something that takes no time.
+    /// Counts a request of a program that takes no time.
     ///
     /// # Panics
     ///
-    /// If it has done so for so often since time last passed that it seems to wait for time without letting it pass.
+    /// If programs have called so often since time last passed that a task seems to wait for time without letting time pass.
     #[inline]
     pub(crate) fn note_call(&self) {
         if !self.count_call() {
@@ -69,7 +72,7 @@ impl Face {
         }
     }
 
-    /// As [`Face::note_call`]; says whether there have not been too many calls.
+    /// Like [`Face::note_call`], but returns whether the calls are within the limit, in place of a panic.
     #[inline]
     pub(super) fn count_call(&self) -> bool {
         let calls = self.calls.load(Ordering::Relaxed).wrapping_add(1);
@@ -77,11 +80,11 @@ impl Face {
         calls <= self.most_calls
     }
 
-    /// Fails the run, because time does not pass. `socket` is the one that was called last, in words.
+    /// Fails the run, because time does not pass. `socket` names the socket that was called last.
     #[cold]
     #[expect(clippy::panic, reason = "time cannot pass; says who keeps it, why, and the way out")]
     pub(super) fn lose_patience(&self, socket: Option<&str>) -> ! {
-        // A value that is dropped while it unwinds may ask again.
+        // A value that is dropped during the unwinding may call again. Without the reset that call would panic within a panic and abort the process.
         self.calls.store(0, Ordering::Relaxed);
         let who = match (current::task(), socket) {
             (Some(task), Some(socket)) => format!(". It is {task}, which called {socket} last"),

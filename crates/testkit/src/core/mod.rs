@@ -1,4 +1,5 @@
-//! The hosts, their sockets and the network between them, as one state machine: it is told the time.
+//! State of one run: the hosts, their sockets and timers, and the network between the hosts, as one state machine. The machine reads no clock: the caller
+//! passes the time in.
 
 mod bound;
 mod elsewhere;
@@ -56,7 +57,7 @@ pub(crate) struct Core {
     tcp: tcp::Tcp,
     pub(crate) woken: Woken,
     face: Arc<Face>,
-    /// Which run it is the state of.
+    /// Number of the run whose state this is. 0 until [`Shared`] gives the number.
     run: u64,
 }
 
@@ -88,12 +89,12 @@ impl Core {
         }
     }
 
-    /// Whether other threads look at it while a task has its own: at a record, or at what laws did.
+    /// Returns whether other threads read the state while a task runs: a record of the run, or the counters of laws.
     fn is_looked_at(&self) -> bool {
         self.settings.traces || self.settings.keeps_packets || self.settings.laws.iter().next().is_some()
     }
 
-    /// When the network or a timer wants to be woken.
+    /// Returns the next instant at which the network or a timer has an event, or `None` if nothing is under way.
     #[cfg_attr(not(feature = "tcp"), expect(clippy::needless_pass_by_ref_mut, reason = "only connections that are stuck are looked at twice"))]
     pub(crate) fn next_event(&mut self) -> Option<Instant> {
         let next = wire::earlier(self.wire.next(), self.timers.next());
@@ -107,11 +108,12 @@ impl Core {
         self.wire.now()
     }
 
-    /// Lets time pass: what arrives until then arrives, and then timers go off.
+    /// Lets time pass until `now`, in one step. Packets arrive first, then timers go off.
     pub(crate) fn pass(&mut self, now: Instant) {
         if self.wire.set_now(now) {
             self.face.pass(now);
         }
+        // Packets that come out of the links up to a change are handed over before the next change.
         while self.wire.change_next() {
             self.take_arrivals();
         }
@@ -123,7 +125,7 @@ impl Core {
         self.timers.fire(self.wire.now(), &mut self.woken);
     }
 
-    /// Lets time pass until then, event by event, unless it has: tokio's clock may have jumped over some.
+    /// Lets time pass until `now`, event by event. Does nothing if `now` has passed: tokio's clock may have jumped over several events.
     #[cfg(feature = "tokio")]
     fn pass_until(&mut self, now: Instant) {
         if now <= self.now() {
@@ -135,11 +137,12 @@ impl Core {
         self.pass(now);
     }
 
-    /// A program calls a socket, which takes no time.
+    /// Counts a call of a socket by a program. A call takes no time.
     ///
     /// # Panics
     ///
-    /// If it has done so for so often since time last passed that it seems to wait for time without letting it pass, with the host and the socket.
+    /// If programs have called so often since time last passed that a task seems to wait for time without letting time pass. The message names the host and the
+    /// socket.
     #[inline]
     pub(crate) fn note_call(&self, socket: impl FnOnce(&Self) -> SocketName) {
         if !self.face.count_call() {
@@ -152,7 +155,7 @@ impl Core {
         self.face.lose_patience(Some(&socket.words(&self.plan)))
     }
 
-    /// Fails the run, which holds too many bytes: that socket has sent last.
+    /// Fails the run, which holds too many bytes. `socket` is the socket that sent last.
     #[cold]
     #[inline(never)]
     fn fail_for(&self, socket: SocketName) {
@@ -160,7 +163,7 @@ impl Core {
         self.wire.held.fail(format_args!("{}{task}", socket.words(&self.plan)));
     }
 
-    /// Random bytes for a program of a host.
+    /// Returns the source of random bytes for the programs of `host`, or for programs of no host.
     #[cfg(feature = "quinn")]
     pub(crate) fn entropy(&mut self, host: Option<NodeId>) -> &mut entropy::Entropy {
         self.entropy.of(host, self.plan.names())
@@ -183,15 +186,16 @@ impl Core {
     }
 }
 
-/// A host.
+/// State of a host.
 #[derive(Debug, Default)]
 struct HostState {
+    /// Whether the host has crashed and has not been restarted.
     is_down: bool,
-    /// Its program was killed, and not begun again.
+    /// Whether the program of the host was killed and has not been restarted.
     is_idle: bool,
-    /// The sockets of its ports.
+    /// Sockets of the host, by port.
     bound: Bound,
-    /// The port that is given next to a socket that asks for none.
+    /// Offset from [`FIRST_DYNAMIC`](sockets::FIRST_DYNAMIC) of the port to try next for a socket that asks for no particular port.
     next_port: u16,
 }
 
@@ -200,7 +204,7 @@ impl Core {
         !self.hosts[host.index()].is_down
     }
 
-    /// Fails if the host is down, so that nothing can be bound there.
+    /// Checks that the host is up. A host that is down cannot bind sockets.
     pub(crate) fn check_up(&self, host: NodeId) -> std::io::Result<()> {
         if self.is_up(host) {
             return Ok(());
@@ -209,7 +213,7 @@ impl Core {
         Err(std::io::Error::new(std::io::ErrorKind::NetworkDown, text))
     }
 
-    /// The host is gone with all its sockets. What it has sent is on its way still.
+    /// Crashes the host: all its sockets die. Packets that the host has sent stay under way. Does nothing if the host is down.
     pub(crate) fn crash(&mut self, host: NodeId) {
         let state = &mut self.hosts[host.index()];
         if std::mem::replace(&mut state.is_down, true) {
@@ -225,7 +229,8 @@ impl Core {
         self.wire.note(Happening::Crashed(host));
     }
 
-    /// The program of the host is gone, and the host is not: its sockets are closed, as when the program drops them.
+    /// Kills the program of the host. The host stays up, and its sockets are closed as if the program had dropped the sockets. Does nothing if the host is
+    /// down.
     pub(crate) fn kill(&mut self, host: NodeId) {
         if !self.is_up(host) {
             return;
@@ -242,7 +247,7 @@ impl Core {
         self.kill_tcp(host);
     }
 
-    /// The host is up again; says whether its program is to begin anew.
+    /// Brings the host up again. Returns whether its program must start anew.
     pub(crate) fn restart(&mut self, host: NodeId) -> bool {
         let state = &mut self.hosts[host.index()];
         let (was_down, was_idle) = (std::mem::take(&mut state.is_down), std::mem::take(&mut state.is_idle));
@@ -252,7 +257,7 @@ impl Core {
         was_down || was_idle
     }
 
-    /// The host has other addresses from now on.
+    /// Gives the host new addresses, and returns the new addresses.
     pub(crate) fn change_addresses(&mut self, host: NodeId) -> address::Addresses {
         self.wire.note(Happening::Readdressed(host));
         self.plan.change(host)

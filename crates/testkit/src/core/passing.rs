@@ -1,4 +1,4 @@
-//! The way of a datagram: from a socket into its link, and from the link to a socket.
+//! Way of a datagram from the sending socket into its link, and from the link to the receiving socket.
 
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
@@ -10,26 +10,27 @@ use crate::address::Addresses;
 use crate::trace::{Lost, PacketName};
 use crate::wire::Arrival;
 
-/// The longest datagram over IPv4 and over IPv6 \[bytes\].
+/// Longest datagram over IPv4 and over IPv6 \[bytes\].
 const LONGEST: [usize; 2] = [65_507, 65_527];
 
-/// What a socket sends.
+/// Datagram that a socket sends.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Outgoing<'a> {
-    /// The receiver; `None`: the peer to which the socket is connected.
+    /// Address of the receiver. `None`: the peer to which the socket is connected.
     pub(crate) to: Option<&'a SocketAddr>,
     pub(crate) bytes: &'a [u8],
+    /// Whether the datagram is marked as ECN-capable.
     pub(crate) ecn_capable: bool,
 }
 
-/// The receivers of a datagram.
+/// Receivers of a datagram.
 #[derive(Clone, Copy, Debug)]
 enum Receivers {
-    /// A host, which may be the one that sends.
+    /// A single host, which may be the sender itself.
     One(NodeId),
-    /// All other hosts.
+    /// All hosts except the sender.
     All,
-    /// Nobody; a host may have had the address.
+    /// No host. A host may have had the address before.
     Nobody,
 }
 
@@ -38,7 +39,7 @@ fn refuse<T>(kind: io::ErrorKind, text: String) -> io::Result<T> {
     Err(io::Error::new(kind, text))
 }
 
-/// Says why a socket at `local` cannot send a datagram of that length to that address.
+/// Returns the error of a socket at `local` that cannot send a datagram of `len` bytes to the address `to`.
 #[cold]
 fn refuse_datagram(local: SocketAddr, to: SocketAddr, len: usize) -> io::Result<()> {
     let longest = LONGEST[usize::from(to.is_ipv6())];
@@ -53,7 +54,7 @@ fn refuse_datagram(local: SocketAddr, to: SocketAddr, len: usize) -> io::Result<
 }
 
 impl Core {
-    /// Sends a datagram, now.
+    /// Sends a datagram at the present instant.
     #[inline(always)]
     pub(crate) fn send(&mut self, id: SocketId, outgoing: Outgoing<'_>) -> io::Result<()> {
         self.note_call(|core| core.sockets.get(id).name());
@@ -70,7 +71,7 @@ impl Core {
         if is_six != socket.port.is_six() || to.port() == 0 || bytes.len() > LONGEST[usize::from(is_six)] {
             return refuse_datagram(socket.local(), *to, bytes.len());
         }
-        // An address that a host has is no other kind of address: most often this is all that is asked.
+        // An address of a host belongs to no other kind of address. Most datagrams go to such an address, so the other kinds are tried only afterwards.
         let mut number = Addresses::short(to.ip());
         let receivers = match self.plan.owner_of(number) {
             Some(owner) => Receivers::One(owner),
@@ -90,17 +91,20 @@ impl Core {
                     self.offer(Path { from: host, to: other }, parcel.clone());
                 }
             }
+            // A datagram to an address that a host has given up is lost without an error, as in a real network. An address that no host ever had is most likely
+            // a mistake of the test.
             Receivers::Nobody if self.plan.was_given(to.ip()) => {}
             Receivers::Nobody => return refuse(io::ErrorKind::HostUnreachable, self.plan.unknown(to.ip())),
         }
-        // A packet that arrives at once and is read or lost counts no more.
+        // The check comes after the sending: a packet that arrives at once and is read or lost is not held any more.
         if self.wire.held.is_too_much() {
             self.fail_for(self.sockets.get(id).name());
         }
         Ok(())
     }
 
-    /// The receivers of a datagram of that host to an address that no host has. `number` becomes that of the address which is written on it.
+    /// Returns the receivers of a datagram from `host` to an address that no host has. Sets `number` to the address on the packet, which differs for the
+    /// unspecified address.
     #[inline(never)]
     fn other_receivers(&self, host: NodeId, to: &SocketAddr, number: &mut u32) -> io::Result<Receivers> {
         let ip = to.ip();
@@ -118,8 +122,8 @@ impl Core {
         Ok(if ip == IpAddr::V4(Ipv4Addr::BROADCAST) { Receivers::All } else { Receivers::Nobody })
     }
 
-    /// The address from which a socket that is bound at `at`, or to all addresses, reaches the one of that number, as a program said it `to`. All are as
-    /// [`Addresses::short`].
+    /// Returns the source address of a socket that sends to the address `number`, given by the program as `to`. `at` is the address at which the socket is
+    /// bound, `None` for all addresses. `at`, `number` and the result are as [`Addresses::short`].
     #[inline]
     pub(super) fn source(&self, host: NodeId, at: Option<u32>, number: u32, to: &SocketAddr) -> io::Result<u32> {
         match at {
@@ -129,7 +133,7 @@ impl Core {
         }
     }
 
-    /// Fails if a socket that is bound to one address does not reach another one.
+    /// Checks that a socket bound to the address `at` can send to the address `number`.
     #[inline(never)]
     fn check_source(&self, host: NodeId, at: u32, number: u32, to: &SocketAddr) -> io::Result<()> {
         let (addresses, bound) = (self.plan.of(host), Addresses::long(at, to.is_ipv6()));
@@ -144,7 +148,7 @@ impl Core {
         Ok(())
     }
 
-    /// Hands a packet to its link.
+    /// Hands a packet to its link, and delivers the packets that arrive at once.
     #[inline(always)]
     pub(super) fn offer(&mut self, path: Path, parcel: Box<Parcel>) {
         if self.wire.offer(path, parcel) == Ok(true) {
@@ -154,12 +158,12 @@ impl Core {
 }
 
 impl Core {
-    /// Deals with what has come out of the links.
+    /// Delivers the packets that have come out of the links, until none is left.
     #[cfg_attr(not(feature = "tcp"), expect(clippy::never_loop, reason = "only TCP has packets that do not leave their host"))]
     pub(super) fn take_arrivals(&mut self) {
         loop {
             while let Some(parcel) = self.wire.poll() {
-                // Part by part: a whole that was written in parts a moment ago is read late by a processor, which took a twentieth of the time of a datagram.
+                // The parts are copied one by one. A processor that loads a value whole shortly after the value was stored in parts has to wait for the stores.
                 let Arrival { packet: PacketName { path: Path { from, to }, sequence, copy }, at, is_cut, .. } = parcel.arrival;
                 let path = Path { from, to };
                 let end = if is_cut { Err(Lost::Cut) } else { self.arrive(path, parcel) };
@@ -173,14 +177,14 @@ impl Core {
         }
     }
 
-    /// Hands a packet that does not leave its host to its socket.
+    /// Delivers a packet that does not leave its host, at the present instant.
     pub(super) fn hand_over(&mut self, host: NodeId, mut parcel: Box<Parcel>) {
         (parcel.arrival.at, parcel.arrival.marked) = (self.now(), false);
-        // Loopback tells of no end: it is not the network.
+        // Fates of packets are recorded for links only. Loopback is not part of the network.
         let _ = self.arrive(Path { from: host, to: host }, parcel);
     }
 
-    /// Hands a packet that has arrived to its socket.
+    /// Delivers an arrived packet to its socket, or returns why the packet is lost.
     #[inline(always)]
     #[cfg_attr(not(feature = "tcp"), expect(unused_mut, reason = "only a segment is taken out of its parcel"))]
     fn arrive(&mut self, path: Path, mut parcel: Box<Parcel>) -> Result<(), Lost> {
@@ -192,7 +196,7 @@ impl Core {
         }
         let Some(id) = self.socket_for(path.to, &parcel.addresses) else { return Err(self.lose(path, &parcel)) };
         let socket = self.sockets.get_mut(id);
-        // Only a connected socket is told that nobody is there, as with Linux: another one could not know of whom it speaks.
+        // As with Linux, only a connected socket gets the error. An unconnected socket could not tell which of its peers refused.
         if parcel.addresses.kind == Kind::Unreachable {
             socket.refuse(parcel.addresses.from(), &mut self.woken);
             return Ok(());
@@ -200,8 +204,8 @@ impl Core {
         socket.keep(parcel, (self.settings.receive_buffer, &mut self.wire.held), &mut self.woken)
     }
 
-    /// The socket of a host for which a packet is: one that is connected to its sender before one that is not, one that is bound to its address before one that
-    /// is bound to all.
+    /// Returns the socket of `host` that receives the packet. A socket connected to the sender comes before an unconnected socket, then a socket bound to the
+    /// address before a socket bound to all addresses, then the socket that was bound last.
     #[inline(always)]
     fn socket_for(&self, host: NodeId, ends: &Ends) -> Option<SocketId> {
         if !self.has_address(host, ends) {
@@ -219,13 +223,13 @@ impl Core {
         best.map(|(_, id)| id)
     }
 
-    /// Whether a host has the address to which a packet goes.
+    /// Returns whether `host` has the address to which the packet goes.
     #[inline(always)]
     fn has_address(&self, host: NodeId, ends: &Ends) -> bool {
         self.plan.number(host) == ends.to || ends.is_to_any_host()
     }
 
-    /// Why a packet is lost that no socket takes. A host that is down has none.
+    /// Returns why a packet without a receiving socket is lost. A host that is down has no sockets. If the host is up, the sender of a datagram is told.
     #[inline(never)]
     fn lose(&mut self, path: Path, parcel: &Parcel) -> Lost {
         let ends = &parcel.addresses;
@@ -241,10 +245,10 @@ impl Core {
         Lost::NoSocket
     }
 
-    /// Tells the sender of a datagram that nobody is at that port.
+    /// Tells the sender of a datagram that no socket is bound to the port.
     fn tell_unreachable(&mut self, path: Path, parcel: &Parcel) {
-        // As long as that of ICMP (RFC 792): its header, and the header and the first eight bytes of what could not be delivered. The addresses say all that is
-        // needed here.
+        // The length is that of an ICMP message (RFC 792): IP header, ICMP header, and the header and the first eight bytes of the datagram. The content is not
+        // needed, because the receiver of the message looks at the addresses only.
         let addresses = parcel.addresses.back(Kind::Unreachable);
         let answer = self.spare.copied(addresses, &[0; 36], false);
         let Path { from: sender, to: host } = path;

@@ -1,11 +1,11 @@
-//! How tasks get at the state machine.
+//! Access of tasks to the state machine.
 //!
-//! While a run goes on, its state lies with the thread that polls its tasks, and a call borrows the state there: [`Shared::with`] is the only way to it. A borrow takes a few
-//! instructions, where a mutex takes two atomic operations, and a datagram borrows three times: to be sent, to be received, and when its reader waits again. Other
-//! threads have no part in a run: see [`elsewhere`](super::elsewhere).
+//! During a run the state lies with the thread that polls the tasks, and each call borrows the state there. [`Shared::with`] is the only way to the state. A
+//! borrow takes a few instructions and no atomic operation, where a mutex takes two, and each datagram borrows three times: when it is sent, when it is
+//! received, and when its reader waits again. Other threads have no part in a run: see [`elsewhere`](super::elsewhere).
 //!
-//! Before and after the run the state lies behind a mutex, in `home`. The state of a run that others look at stays there all the time: the watchdog looks at the record while a
-//! task has the thread.
+//! Before and after the run the state lies behind the mutex `home`. If other threads read the state during the run, the state stays in `home` all the time: the
+//! watchdog reads the record while a task occupies the thread of the run.
 
 use std::cell::{Cell, RefCell};
 use std::mem::ManuallyDrop;
@@ -23,42 +23,42 @@ use crate::names::Names;
 use crate::wire::Recorded;
 
 thread_local! {
-    /// The state of the run whose tasks this thread polls. Nothing is to be dropped with the thread, so that no access asks whether that was done: [`Stay`] has taken
-    /// the state away before.
+    /// State of the run whose tasks this thread polls. `ManuallyDrop`, because a thread-local value that needs no drop is accessed without a check whether it
+    /// was dropped. [`Stay`] takes the state away before the thread ends.
     static HERE: RefCell<ManuallyDrop<Option<Box<Core>>>> = const { RefCell::new(ManuallyDrop::new(None)) };
-    /// The run whose state lies here, at the time of its clock; 0 if there is none.
+    /// Number of the run whose state lies in `HERE` at the time of its clock; 0 if there is no such run.
     static AT_HAND: Cell<u64> = const { Cell::new(0) };
 }
 
-/// The state machine, and how what belongs to tasks gets at it.
+/// Owner of the state machine. The values of tasks, such as sockets, reach the state through this type.
 pub(crate) struct Shared {
-    /// The state while it does not lie with the thread of the run.
+    /// The state, while it does not lie with the thread of the run.
     home: Mutex<Option<Box<Core>>>,
-    /// Acts that other threads have left for the thread of the run.
+    /// Acts left by other threads for the thread of the run.
     pub(super) elsewhere: Elsewhere,
-    /// The run is over: a value of the run, such as a socket, may lock the state from any thread to be let go.
+    /// Whether the run is over. From then on any thread may lock the state, so that a socket or another value of the run can be dropped there.
     has_ended: AtomicBool,
     names: Arc<Names>,
-    /// Which run it is of.
+    /// Number of the run, from 1 on.
     run: u64,
-    /// Whether the state stays in `home`, where other threads see it.
+    /// Whether the state stays in `home` during the run, because other threads read the state.
     stays: bool,
-    /// Whether the time is that of the clock, so that it need not be asked. Tokio's clock is asked unless the executor of this crate polls: then only a task of its own could
-    /// move it.
+    /// Whether the time of the state is that of the clock, so that the clock need not be asked. Always true with the clock of this crate. Tokio's clock must be
+    /// asked, except while the executor of this crate polls tasks: tokio's clock could then be moved only by a task itself.
     #[cfg(feature = "tokio")]
     is_synced: AtomicBool,
     clock: Clock,
     face: Arc<Face>,
 }
 
-/// The source of the time.
+/// Source of the time.
 pub(crate) enum Clock {
-    /// The executor of this crate, by [`Core::pass`].
+    /// The executor of this crate, which calls [`Core::pass`].
     Own,
     /// Tokio's paused clock.
     #[cfg(feature = "tokio")]
     Tokio {
-        /// Its time at [`Instant::ZERO`].
+        /// Reading of tokio's clock at [`Instant::ZERO`].
         origin: tokio::time::Instant,
     },
 }
@@ -82,24 +82,24 @@ impl Shared {
         }
     }
 
-    /// Whether this thread has the state for itself, at the time of its clock: until the executor goes on, nothing happens but by this thread.
+    /// Returns whether the state lies with this thread, at the time of its clock. Until the executor goes on, only this thread changes the state.
     #[inline]
     pub(crate) fn is_at_hand(&self) -> bool {
         AT_HAND.get() == self.run
     }
 
-    /// The number of the run.
+    /// Returns the number of the run.
     #[inline]
     pub(crate) const fn run(&self) -> u64 {
         self.run
     }
 
-    /// The names of the hosts.
+    /// Returns the names of the hosts.
     pub(crate) const fn names(&self) -> &Arc<Names> {
         &self.names
     }
 
-    /// The run is over, and its tasks are gone.
+    /// Notes that the run is over and its tasks are dropped.
     pub(crate) fn end(&self) {
         self.has_ended.store(true, Ordering::Release);
     }
@@ -116,19 +116,20 @@ impl Shared {
         true
     }
 
-    /// The time.
+    /// Returns the time of the run.
     #[inline]
     pub(crate) fn now(&self) -> Instant {
         if self.is_synced() { self.face.now() } else { self.asked_now() }
     }
 
-    /// The time of a clock that must be asked.
+    /// Returns the time of the run after asking the clock.
     #[inline(never)]
     fn asked_now(&self) -> Instant {
         self.with(|core| core.now())
     }
 
-    /// Follows tokio's clock, and then not until the guard is dropped. `moved` is where the clock stands, if that is known: to ask it takes four atomic operations.
+    /// Brings the state to the time of tokio's clock. Until the guard is dropped the clock is not asked again. `moved` is the reading of the clock if the
+    /// caller knows the reading; asking takes four atomic operations.
     #[cfg(feature = "tokio")]
     pub(crate) fn sync(&self, moved: Option<Instant>) -> Synced<'_> {
         if moved.is_none() {
@@ -156,17 +157,18 @@ impl Shared {
         self.face.count_poll()
     }
 
-    /// The time, unless the state is held: for a look from another thread.
+    /// Returns the time for a look from another thread, or `None` if the state is held.
     pub(crate) fn try_now(&self) -> Option<Instant> {
         if self.stays { self.try_home(|core| core.now()) } else { Some(self.face.now()) }
     }
 
-    /// What was recorded so far, unless the state is held.
+    /// Returns the record of the run so far, or `None` if the state is held.
     pub(crate) fn try_recorded(&self) -> Option<Recorded> {
         if self.stays { self.try_home(Core::recorded) } else { Some(Recorded { ended: self.face.now(), ..Recorded::default() }) }
     }
 
-    /// Tries for half a second of the wall clock: a loop of tokio takes the state again and again, each time for a moment, on a thread that may have to wait for a processor.
+    /// Tries to lock the state, for about half a second of the wall clock. A loop of tokio takes the state again and again, each time for a moment, on a thread
+    /// that may have to wait for a processor.
     fn try_home<T>(&self, look: impl Fn(&Core) -> T) -> Option<T> {
         for _ in 0..500 {
             let home = match self.home.try_lock() {
@@ -178,29 +180,30 @@ impl Shared {
                 return Some(look(core));
             }
             drop(home);
-            // Nobody wakes the thread that watches: it looks again after a millisecond at least.
+            // No thread wakes the watching thread, so it tries again after a millisecond.
             std::thread::park_timeout(Duration::from_millis(1));
         }
         None
     }
 
-    /// Asks the state at this instant. Tasks that are to be woken are woken when it has answered.
+    /// Asks the state, at the present instant. Tasks that the question wakes are woken after the answer, when the borrow has ended.
     ///
     /// # Panics
     ///
-    /// On another thread while the run goes on; if the state is asked while it answers.
+    /// On another thread while the run goes on, or if `ask` itself asks the state.
     #[inline(always)]
     pub(crate) fn with<T>(&self, ask: impl FnOnce(&mut Core) -> T) -> T {
         self.ask(if self.is_at_hand() { None } else { Some(self.visit()) }, ask)
     }
 
-    /// Asks the state, which is at hand or has come for a visit.
+    /// Asks the state, which is at hand or here for a visit.
     #[inline(always)]
     pub(super) fn ask<T>(&self, visit: Option<Visit<'_>>, ask: impl FnOnce(&mut Core) -> T) -> T {
         let (outcome, woken) = HERE.with_borrow_mut(|here| {
             let core = here.as_mut().expect("it was brought here");
             (ask(core), core.woken.take())
         });
+        // The state goes home before the wakers run: a waker may ask the state.
         if let Some(visit) = visit {
             drop(visit);
         }
@@ -210,17 +213,17 @@ impl Shared {
         outcome
     }
 
-    /// Whether [`Shared::with`] may be called: not on another thread while the run goes on, nor while a state answers on this one.
+    /// Returns whether [`Shared::with`] may be called. It may not on another thread while the run goes on, nor while a state answers on this thread.
     pub(super) fn may_be_asked(&self) -> bool {
         (self.is_at_hand() || self.may_be_had()) && HERE.with(|here| here.try_borrow().is_ok())
     }
 
-    /// As [`Shared::with`]; `None` if it may not be called.
+    /// Like [`Shared::with`], but returns `None` if the state may not be asked.
     pub(crate) fn try_with<T>(&self, ask: impl FnOnce(&mut Core) -> T) -> Option<T> {
         self.may_be_asked().then(|| self.with(ask))
     }
 
-    /// Brings the state here for one question, unless it lies here, and lets time pass to that of the clock.
+    /// Brings the state to this thread for one question, unless the state lies here, and lets time pass until the time of the clock.
     #[inline(never)]
     #[expect(clippy::panic, reason = "a misuse, and the way out")]
     pub(super) fn visit(&self) -> Visit<'_> {
@@ -238,14 +241,15 @@ impl Shared {
         visit
     }
 
-    /// Lets time pass up to that of tokio's clock, unless the state is at its time.
+    /// Lets time pass until the time of tokio's clock, unless the state is at that time.
     #[cfg_attr(not(feature = "tokio"), expect(unused_variables, reason = "no other clock moves by itself"))]
     fn follow(&self, core: &mut Core) {
         match self.clock {
             Clock::Own => {}
             #[cfg(feature = "tokio")]
             Clock::Tokio { origin } => {
-                // By its end this thread may have the clock of another test bed, and after `block_on` tokio's clock is that of the machine.
+                // After the end of the run this thread may have the clock of another test bed, and after `block_on` tokio's clock is that of the machine. Both
+                // clocks would move the state to a wrong time.
                 if !self.is_synced() && !self.has_ended() && tokio::runtime::Handle::try_current().is_ok() {
                     core.pass_until(Instant::ZERO + origin.elapsed());
                 }
@@ -257,7 +261,8 @@ impl Shared {
         self.home.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// This thread polls the tasks of the run until the guard is dropped: the state lies with it, unless others look at the state.
+    /// Declares that this thread polls the tasks of the run until the guard is dropped. The state lies with this thread for so long, unless other threads read
+    /// the state.
     pub(crate) fn stay(&self) -> Stay<'_> {
         if !self.stays {
             let core = self.lock_home().take();
@@ -270,18 +275,18 @@ impl Shared {
     }
 }
 
-/// Wakes tasks that could not be woken while the state was asked.
+/// Wakes the tasks that could not be woken while the state was asked.
 #[cold]
 #[inline(never)]
 fn wake(woken: Vec<Waker>) {
     woken.into_iter().for_each(Waker::wake);
 }
 
-/// The state is here for one question, until this is dropped.
+/// Guard of one question: the state is on this thread until the guard is dropped.
 pub(super) struct Visit<'a> {
-    /// Where the state goes back to; `None` if it stays here.
+    /// Lock of the place to which the state returns; `None` if the state stays here.
     home: Option<MutexGuard<'a, Option<Box<Core>>>>,
-    /// The state of another run, which lay here: a task may drop a socket of a run that has ended.
+    /// State of another run that lay here before. This happens when a task drops a socket of a run that has ended.
     other: Option<Box<Core>>,
 }
 
@@ -294,7 +299,7 @@ impl Drop for Visit<'_> {
     }
 }
 
-/// The state lies with this thread until this is dropped.
+/// Guard of a run: the state lies with this thread until the guard is dropped.
 pub(crate) struct Stay<'a>(&'a Shared);
 
 impl Drop for Stay<'_> {
@@ -306,7 +311,7 @@ impl Drop for Stay<'_> {
     }
 }
 
-/// The time is that of tokio's clock until this is dropped.
+/// Guard of a time: the state is at the time of tokio's clock until the guard is dropped.
 #[cfg(feature = "tokio")]
 pub(crate) struct Synced<'a>(&'a Shared);
 

@@ -1,4 +1,4 @@
-//! A socket in the words of messages.
+//! Description of a socket for messages.
 
 use std::net::SocketAddr;
 
@@ -6,19 +6,19 @@ use cohaptic_wan::NodeId;
 
 use crate::address::AddressPlan;
 
-/// Name of a socket in messages.
+/// Socket as named in messages.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SocketName {
-    /// The protocol, and perhaps what the socket does.
+    /// Protocol, and in some messages the role of the socket.
     pub(crate) kind: &'static str,
     pub(crate) host: NodeId,
     pub(crate) local: SocketAddr,
-    /// The other end of a stream.
+    /// Other end of a stream; `None` for sockets without one.
     pub(crate) peer: Option<SocketAddr>,
 }
 
 impl SocketName {
-    /// In words: ``the UDP socket 0.0.0.0:7 of host `a` ``.
+    /// Returns the description, such as ``the UDP socket 0.0.0.0:7 of host `a` ``.
     pub(super) fn words(&self, plan: &AddressPlan) -> String {
         let Self { kind, host, local, peer } = self;
         let to = peer.map_or_else(String::new, |peer| format!(" to {peer}"));

@@ -1,4 +1,4 @@
-//! Sockets: where they are bound, what lies in their buffers, and the tasks that wait.
+//! UDP sockets: the ports to which they are bound, the datagrams in their buffers, and the tasks that wait for datagrams.
 
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
@@ -15,20 +15,20 @@ use crate::address::Addresses;
 use crate::trace::Lost;
 use crate::wire::{Held, Where};
 
-/// A datagram, for its readers.
+/// Access of the readers to a received datagram.
 impl Parcel {
     #[inline]
     pub(crate) fn from(&self) -> SocketAddr {
         self.addresses.from()
     }
 
-    /// The address to which it was sent.
+    /// Returns the address to which the datagram was sent.
     #[cfg(feature = "quinn")]
     pub(crate) fn to(&self) -> IpAddr {
         self.addresses.to().ip()
     }
 
-    /// Copies what fits into a buffer; gives the length.
+    /// Copies the datagram into `buffer`, cut to the length of the buffer. Returns the number of bytes copied.
     #[inline]
     pub(crate) fn copy_to(&self, buffer: &mut [u8]) -> usize {
         let len = self.bytes.len().min(buffer.len());
@@ -40,22 +40,24 @@ impl Parcel {
 #[derive(Debug)]
 pub(crate) struct SocketState {
     pub(super) host: NodeId,
-    /// The address at which it is bound, as [`Addresses::short`]; `None` if it hears all addresses of its host.
+    /// Address to which the socket is bound, as [`Addresses::short`]; `None` if the socket is bound to all addresses of its host.
     pub(super) at: Option<u32>,
     pub(super) port: Port,
     pub(super) peer: Option<SocketAddr>,
     pub(super) inbox: Ring<Box<Parcel>>,
-    /// The bytes of the datagrams in `inbox`.
+    /// Bytes of all datagrams in `inbox`, without overhead.
     pub(super) held: usize,
     readers: Waiters,
-    /// What IP told about something that was sent, until the program is told.
+    /// Whether IP has refused a datagram that was sent, and the program has not been told.
     pub(super) refused: bool,
     pub(super) may_broadcast: bool,
+    /// Instant at which the host crashed or its program was killed; `None` while the socket lives.
     pub(super) died: Option<Instant>,
 }
 
 impl SocketState {
-    /// Takes a datagram into the buffer, which holds this number of bytes.
+    /// Puts a datagram into the buffer. `room` is the size of the buffer \[bytes\]; `all` counts the bytes of the whole run. A datagram that does not fit is
+    /// lost.
     #[inline(always)]
     pub(super) fn keep(&mut self, parcel: Box<Parcel>, (room, all): (usize, &mut Held), woken: &mut Woken) -> Result<(), Lost> {
         let len = parcel.bytes.len();
@@ -70,7 +72,7 @@ impl SocketState {
         Ok(())
     }
 
-    /// Lets go of all datagrams in the buffer.
+    /// Drops all datagrams in the buffer.
     fn clear(&mut self, all: &mut Held) {
         all.remove(Where::Buffers, self.held as u64 + self.inbox.len() as u64 * Held::cost(0));
         self.inbox.clear();
@@ -81,14 +83,14 @@ impl SocketState {
         SocketName { kind: "UDP", host: self.host, local: self.local(), peer: None }
     }
 
-    /// Whether the next call gives an error.
+    /// Returns whether the next call returns an error.
     #[inline]
     pub(super) const fn has_error(&self) -> bool {
-        // Both are looked at, where a branch for each would cost more.
+        // `|` evaluates both operands: one branch is cheaper than two.
         self.died.is_some() | self.refused
     }
 
-    /// The address at which it is bound.
+    /// Returns the local address of the socket.
     pub(super) fn local(&self) -> SocketAddr {
         let (is_six, number) = (self.port.is_six(), self.port.number());
         let ip = match self.at {
@@ -99,7 +101,7 @@ impl SocketState {
         SocketAddr::new(ip, number)
     }
 
-    /// IP says that nobody is at a port of that address.
+    /// Handles the message of IP that no socket is bound to the port `by`. A socket that is not connected to `by` ignores the message.
     #[inline(never)]
     pub(super) fn refuse(&mut self, by: SocketAddr, woken: &mut Woken) {
         if self.peer == Some(by) {
@@ -118,8 +120,9 @@ impl SocketState {
 /// All sockets that have not been closed.
 #[derive(Debug, Default)]
 pub(super) struct Sockets {
-    /// In boxes, so that a place is found by a shift.
+    /// State of each socket, indexed by [`SocketId`]; `None` at free indices. Boxed, so that an index becomes an address by a shift.
     places: Vec<Option<Box<SocketState>>>,
+    /// Indices of `places` that are free.
     free: Vec<usize>,
 }
 
@@ -148,11 +151,11 @@ impl Sockets {
     }
 }
 
-/// The first of the ports that are given to sockets that ask for none (RFC 6335).
+/// First of the dynamic ports (RFC 6335), which are given to sockets that ask for no particular port.
 pub(super) const FIRST_DYNAMIC: u16 = 49_152;
 
 impl Core {
-    /// Binds a socket of a host that is up.
+    /// Binds a socket of a host, which must be up. Port 0 of `wanted` stands for any free dynamic port.
     pub(crate) fn bind(&mut self, host: NodeId, wanted: SocketAddr) -> io::Result<SocketId> {
         let ip = wanted.ip();
         self.check_owned(host, ip)?;
@@ -172,7 +175,7 @@ impl Core {
         Ok(id)
     }
 
-    /// Fails if a socket of the host cannot be bound to that address.
+    /// Checks that a socket of `host` can be bound to the address `ip`.
     pub(super) fn check_owned(&self, host: NodeId, ip: IpAddr) -> io::Result<()> {
         if !ip.is_unspecified() && !ip.is_loopback() && !self.plan.of(host).has(ip) {
             let text = format!("{ip} is no address of host `{}`, which has {}", self.plan.names()[host.index()], self.plan.of(host).like(ip));
@@ -182,12 +185,14 @@ impl Core {
     }
 
     fn is_taken(&self, host: NodeId, ip: IpAddr, port: u16) -> bool {
+        // A socket bound to all addresses conflicts with every socket of the port.
         let mut bound = self.hosts[host.index()].bound.at(Port::new(ip.is_ipv6(), port));
         bound.any(|id| ip.is_unspecified() || self.sockets.get(id).at.is_none_or(|other| other == Addresses::short(ip)))
     }
 
     fn free_port(&mut self, host: NodeId, ip: IpAddr) -> io::Result<u16> {
         let count = u16::MAX - FIRST_DYNAMIC + 1;
+        // Ports are given in turn, so that a port is not reused soon after its socket was closed.
         for _ in 0..count {
             let port = FIRST_DYNAMIC + self.hosts[host.index()].next_port;
             self.hosts[host.index()].next_port = (self.hosts[host.index()].next_port + 1) % count;
@@ -199,7 +204,7 @@ impl Core {
         Err(io::Error::new(io::ErrorKind::AddrInUse, text))
     }
 
-    /// The socket is closed: its port is free.
+    /// Closes the socket. Its port is free afterwards.
     pub(crate) fn close(&mut self, id: SocketId) {
         let Some(mut state) = self.sockets.places[id.0].take() else { return };
         state.clear(&mut self.wire.held);
@@ -207,7 +212,7 @@ impl Core {
         self.hosts[state.host.index()].bound.remove(state.port, id);
     }
 
-    /// Fails if the socket died with its host.
+    /// Checks that the socket lives. A socket dies when its host crashes, or when the program of its host is killed.
     #[inline]
     pub(crate) fn check_alive(&self, id: SocketId) -> io::Result<()> {
         let socket = self.sockets.get(id);
@@ -233,7 +238,7 @@ impl Core {
         self.sockets.get(id).peer
     }
 
-    /// From now on the socket hears that peer only. What lies in its buffer already stays, as it does with Linux.
+    /// Connects the socket: from now on it receives datagrams of `peer` only. As with Linux, datagrams already in the buffer stay.
     pub(crate) fn connect(&mut self, id: SocketId, peer: SocketAddr) -> io::Result<()> {
         self.check_alive(id)?;
         let local = self.sockets.get(id).local();
@@ -247,7 +252,7 @@ impl Core {
         Ok(())
     }
 
-    /// A line for each socket that a task waits for.
+    /// Returns a line for each socket that a task waits for.
     pub(crate) fn waits(&self) -> Vec<String> {
         let waiting = self.sockets.places.iter().flatten().filter(|socket| !socket.readers.is_empty());
         let lines = waiting.map(|socket| format!("host `{}`: UDP {} waits for a datagram", self.plan.names()[socket.host.index()], socket.local()));
@@ -256,7 +261,7 @@ impl Core {
         lines.collect()
     }
 
-    /// Returns the things that a task with that waker waits for, in words; empty if sockets and timers do not know the task.
+    /// Returns descriptions of the things that the task with the waker `waker` waits for. Empty if sockets and timers do not know the task.
     pub(crate) fn awaited_by(&self, waker: &Waker) -> Vec<String> {
         let sockets = self.sockets.places.iter().flatten().filter(|socket| socket.readers.has(waker));
         let mut awaited: Vec<String> = sockets.map(|socket| format!("a datagram at UDP {}", socket.local())).collect();
@@ -270,7 +275,7 @@ impl Core {
         &mut self.sockets.get_mut(id).may_broadcast
     }
 
-    /// Looks at the next datagram, which is taken out unless it is only peeked at. If there is none, the waker is woken when there is one.
+    /// Calls `look` on the next datagram, and removes the datagram unless `PEEK`. If there is no datagram, `waker` is woken when one arrives.
     #[inline]
     pub(crate) fn receive<const PEEK: bool, T>(
         &mut self,
@@ -299,7 +304,7 @@ impl Core {
         Poll::Ready(Ok(seen))
     }
 
-    /// As [`Core::receive`], for a program that does not wait.
+    /// Like [`Core::receive`], but returns [`io::ErrorKind::WouldBlock`] in place of waiting.
     pub(crate) fn try_receive<const PEEK: bool, T>(&mut self, id: SocketId, look: impl FnOnce(&Parcel) -> T) -> io::Result<T> {
         self.note_call(|core| core.sockets.get(id).name());
         match self.receive::<PEEK, _>(id, None, look) {
@@ -308,7 +313,7 @@ impl Core {
         }
     }
 
-    /// The error that a socket has, which is taken out.
+    /// Returns the pending error of the socket. A refusal is reported once; the death of the socket is reported by every call.
     #[cold]
     pub(super) fn error_of(&mut self, id: SocketId) -> io::Error {
         if let Err(died) = self.check_alive(id) {
@@ -318,18 +323,18 @@ impl Core {
         io::Error::new(io::ErrorKind::ConnectionRefused, "connection refused: no socket at the port of the peer")
     }
 
-    /// Whether [`Core::receive`] has something to say.
+    /// Returns whether [`Core::receive`] would return a datagram or an error.
     pub(crate) fn is_readable(&self, id: SocketId) -> bool {
         let socket = self.sockets.get(id);
         socket.has_error() || !socket.inbox.is_empty()
     }
 
-    /// Takes an error out.
+    /// Takes the pending refusal out of the socket.
     pub(crate) fn take_error(&mut self, id: SocketId) -> Option<io::Error> {
         std::mem::take(&mut self.sockets.get_mut(id).refused).then(|| io::ErrorKind::ConnectionRefused.into())
     }
 
-    /// Ready when [`Core::receive`] has something to say; else the waker is woken when it has.
+    /// Returns whether [`Core::receive`] would return a datagram or an error. If not, `waker` is woken when it would.
     pub(crate) fn poll_readable(&mut self, id: SocketId, waker: &Waker) -> Poll<()> {
         if self.is_readable(id) {
             return Poll::Ready(());

@@ -1,4 +1,4 @@
-//! Timers, in the order in which they go off: by deadline, then by when they were set.
+//! Timers, sorted by deadline. Timers of equal deadlines go off in the order in which they were set.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::task::Waker;
@@ -8,34 +8,36 @@ use cohaptic_units::Instant;
 use super::waking::Woken;
 use crate::wire::earlier;
 
-/// A timer: its deadline, and a number that makes it different from others with the same one.
+/// Deadline of a timer, and its number, which orders timers of equal deadlines.
 pub(crate) type TimerId = (Instant, u64);
 
-/// All timers.
+/// All timers of a run.
 ///
-/// Most are set in the order in which they go off, or nearly so: as programs do that all wait for the same span, and one that waits for all of them. These lie in a
-/// queue, in which a timer is set and goes off in a few steps; a tree alone took a hundred instructions more for each.
+/// Most timers are set in the order in which they go off, or nearly so: many programs wait for the same span, and another task waits for all these programs.
+/// Such timers lie in a queue, where setting and firing take a few steps. Only timers set far out of order lie in a tree.
 #[derive(Debug, Default)]
 pub(crate) struct Timers {
-    /// In order. The first one was not cancelled.
+    /// Queue of timers, sorted by [`TimerId`]. The waker is `None` if the timer was cancelled. The first timer is not cancelled.
     ordered: VecDeque<(TimerId, Option<Waker>)>,
-    /// How many of these were cancelled: they have no waker.
+    /// Number of cancelled timers in `ordered`.
     cancelled: usize,
-    /// Those that were set too early for the queue.
+    /// Timers whose deadline was too early for the queue when they were set.
     others: BTreeMap<TimerId, Waker>,
+    /// Number of timers set so far.
     set: u64,
 }
 
-/// Before how many timers of the queue another one is set at most.
+/// Number of later timers in the queue before which a new timer is inserted at most. A timer with more later timers goes to the tree.
 const FEW: usize = 4;
 
-/// How many cancelled timers the queue holds without being cleaned.
+/// Number of cancelled timers up to which the queue is not cleaned.
 const CANCELLED: usize = 32;
 
 impl Timers {
     pub(crate) fn set(&mut self, deadline: Instant, waker: Waker) -> TimerId {
         let id = (deadline, self.set);
         self.set += 1;
+        // One more than `FEW` is counted, to see whether the limit is exceeded.
         let later = self.ordered.iter().rev().take(FEW + 1).take_while(|((other, _), _)| *other > deadline).count();
         if later > FEW {
             self.others.insert(id, waker);
@@ -45,7 +47,7 @@ impl Timers {
         id
     }
 
-    /// Sees to it that another one is woken.
+    /// Replaces the waker of a timer. Does nothing if the timer has gone off.
     pub(crate) fn renew(&mut self, id: TimerId, waker: &Waker) {
         let known = match self.place(id) {
             Some(place) => self.ordered[place].1.as_mut(),
@@ -71,7 +73,7 @@ impl Timers {
         self.ordered.binary_search_by_key(&id, |(id, _)| *id).ok()
     }
 
-    /// Drops those that were cancelled: at both ends at once, in between when there are more of them than others.
+    /// Removes cancelled timers: always at both ends of the queue, and in between if they are more than half of the queue and more than [`CANCELLED`].
     fn clean(&mut self) {
         let is_cancelled = |timer: Option<&(TimerId, Option<Waker>)>| timer.is_some_and(|(_, waker)| waker.is_none());
         while is_cancelled(self.ordered.front()) {
@@ -94,7 +96,7 @@ impl Timers {
         earlier(self.ordered.front().map(|(id, _)| deadline(id)), self.others.first_key_value().map(|(id, _)| deadline(id)))
     }
 
-    /// Returns the first deadline for which a task with that waker waits.
+    /// Returns the earliest deadline for which the task with the waker `waker` waits.
     pub(super) fn deadline_of(&self, waker: &Waker) -> Option<Instant> {
         let is_of = |other: Option<&Waker>| other.is_some_and(|other| other.will_wake(waker));
         let ordered = self.ordered.iter().find(|(_, other)| is_of(other.as_ref())).map(|((deadline, _), _)| *deadline);
@@ -102,7 +104,7 @@ impl Timers {
         earlier(ordered, other)
     }
 
-    /// Takes out those that are due.
+    /// Fires all timers whose deadline is not after `now`.
     #[inline]
     pub(crate) fn fire(&mut self, now: Instant, woken: &mut Woken) {
         while self.next().is_some_and(|next| next <= now) {
@@ -110,7 +112,7 @@ impl Timers {
         }
     }
 
-    /// The first timer goes off.
+    /// Fires the timer with the earliest deadline.
     fn fire_first(&mut self, woken: &mut Woken) {
         let first_other = self.others.first_entry();
         if let Some(other) = first_other
@@ -136,7 +138,7 @@ mod tests {
 
     use super::*;
 
-    /// Notes which timer has gone off.
+    /// Waker that notes the number of its timer when it is woken.
     struct Note(u64, Arc<Mutex<Vec<u64>>>);
 
     impl Wake for Note {
@@ -146,7 +148,7 @@ mod tests {
     }
 
     proptest! {
-        /// Each act is a span after which a timer is to go off, how often time passes to the next one afterwards, and which of the timers is cancelled or renewed.
+        /// Each act holds the span until the new timer goes off, how often time passes to the next timer afterwards, and which timer is cancelled or renewed.
         #[test]
         fn they_go_off_as_in_a_tree(acts in prop::collection::vec((0_u64..40, 0_u8..3, prop::option::of((any::<prop::sample::Index>(), any::<bool>()))), 1..300)) {
             let gone_off: Arc<Mutex<Vec<u64>>> = Arc::default();
@@ -190,7 +192,7 @@ mod tests {
     fn timers_that_were_cancelled_take_no_memory_for_long() {
         let mut timers = Timers::default();
         let set = |timers: &mut Timers, nanos| timers.set(Instant::from_nanos(nanos), Waker::noop().clone());
-        // Between two that stay, so that none of the others is at an end.
+        // The timers lie between two timers that stay, so that none of the cancelled ones is at an end of the queue.
         let _stay = [0, 20_000].map(|nanos| set(&mut timers, nanos));
         for nanos in 1..10_000 {
             let id = set(&mut timers, nanos);

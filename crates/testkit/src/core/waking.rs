@@ -1,25 +1,27 @@
-//! Tasks that wait, and how they are woken.
+//! Tasks that wait, and the order and time of their waking.
 
 use std::task::{RawWakerVTable, Waker};
 
-/// A waker, by the addresses of its parts. They are those of no other waker as long as it is kept.
+/// Identity of a waker: the addresses of its data and of its table. No other waker has the same identity while this waker is kept.
 pub(crate) type Registered = [usize; 2];
 
 pub(crate) fn registered(waker: &Waker) -> Registered {
     [waker.data().addr(), std::ptr::from_ref(waker.vtable()).addr()]
 }
 
-/// The wakers of tasks that wait for one thing.
+/// Wakers of the tasks that wait for the same thing, such as a datagram at a socket.
 #[derive(Debug, Default)]
 pub(super) struct Waiters {
-    /// Whether the first one waits. It is kept when it was woken: most often the same task waits again, and then nothing is moved.
+    /// Whether the task of `first` waits. `first` is kept after it was woken: most often the same task waits again, and its waker need not be cloned.
     first_waits: bool,
+    /// Waker of the first waiting task. If `first_waits` is false, a waker that was woken before, or `None`.
     first: Option<Waker>,
+    /// Further waiting tasks, in the order in which they came. Empty while `first_waits` is false.
     others: Vec<Waker>,
 }
 
 impl Waiters {
-    /// A task waits, once.
+    /// Adds a waiting task. A task that waits already is not added twice.
     #[inline]
     pub(super) fn wait(&mut self, waker: &Waker) {
         if self.first.as_ref().is_some_and(|first| first.will_wake(waker)) {
@@ -34,7 +36,7 @@ impl Waiters {
         if self.others.iter().any(|waiting| waiting.will_wake(waker)) {
             return;
         }
-        // They are woken in the order in which they came: others wait only while the first one does.
+        // The tasks are woken in the order in which they came. `others` may be filled only while the first task waits.
         if self.first_waits {
             self.others.push(waker.clone());
         } else {
@@ -46,7 +48,7 @@ impl Waiters {
         !self.first_waits && self.others.is_empty()
     }
 
-    /// Returns whether that task waits.
+    /// Returns whether the task with the waker `waker` waits.
     pub(super) fn has(&self, waker: &Waker) -> bool {
         let first = self.first.as_ref().filter(|_| self.first_waits);
         first.into_iter().chain(&self.others).any(|waiting| waiting.will_wake(waker))
@@ -58,7 +60,7 @@ impl Waiters {
         self.others.clear();
     }
 
-    /// All go on.
+    /// Wakes all waiting tasks.
     #[inline]
     pub(super) fn wake(&mut self, woken: &mut Woken) {
         if std::mem::take(&mut self.first_waits)
@@ -77,21 +79,23 @@ impl Waiters {
     }
 }
 
-/// Tasks to be woken. A waker may run anything, what asks for the state included, so that it waits here until nobody holds that. Those of the executor of this crate
-/// only note which task goes on.
+/// Wakers to call after the borrow of the state ends. A foreign waker may run any code, which may ask the state. A waker of the executor of this crate only
+/// notes which task goes on, and is called at once.
 #[derive(Debug, Default)]
 pub(crate) struct Woken {
+    /// Foreign wakers that were not called yet.
     later: Vec<Waker>,
+    /// Table of the wakers of the executor of this crate.
     own: Option<&'static RawWakerVTable>,
 }
 
 impl Woken {
-    /// Wakers like this one only wake.
+    /// Declares that wakers with the table of `waker` only note a task, so that they may be called during a borrow of the state.
     pub(crate) fn trust(&mut self, waker: &Waker) {
         self.own = Some(waker.vtable());
     }
 
-    /// Wakes now if it may.
+    /// Calls the waker now if it is trusted, otherwise after the borrow.
     #[inline]
     pub(super) fn wake_by_ref(&mut self, waker: &Waker) {
         if self.own.is_some_and(|own| std::ptr::eq(own, waker.vtable())) {
@@ -106,7 +110,7 @@ impl Woken {
         self.later.push(waker.clone());
     }
 
-    /// Wakes now if it may.
+    /// Calls the waker now if it is trusted, otherwise after the borrow.
     pub(super) fn wake(&mut self, waker: Waker) {
         if self.own.is_some_and(|own| std::ptr::eq(own, waker.vtable())) {
             waker.wake();
@@ -115,13 +119,13 @@ impl Woken {
         }
     }
 
-    /// Whether some wait for that.
+    /// Returns whether wakers are to be called after the borrow.
     #[cfg(feature = "tokio")]
     pub(crate) const fn is_any(&self) -> bool {
         !self.later.is_empty()
     }
 
-    /// Those that are to be woken once nobody holds the state, if there are any.
+    /// Takes the wakers to call after the borrow, or returns `None` if there are none.
     #[inline]
     pub(super) fn take(&mut self) -> Option<Vec<Waker>> {
         (!self.later.is_empty()).then(|| std::mem::take(&mut self.later))

@@ -1,4 +1,4 @@
-//! Hosts that crash, and programs that are killed.
+//! TCP of hosts that crash, and of programs that are killed.
 
 use cohaptic_tcp::Connection;
 use cohaptic_units::Instant;
@@ -15,7 +15,7 @@ impl Core {
         self.tcp.listeners.iter().filter(|(_, listener)| listener.host == host).map(|(place, _)| ListenId(place)).collect()
     }
 
-    /// The host is gone with all that it knows: no segment tells of it.
+    /// Crashes the TCP of a host. All connections and listeners are forgotten without a segment to the peers.
     pub(in crate::core) fn crash_tcp(&mut self, host: NodeId) {
         let gone = Gone { at: self.now(), is_killed: false };
         for id in self.listeners_of(host) {
@@ -26,6 +26,7 @@ impl Core {
             let hold = listener.hold;
             self.tcp.ports.release(hold);
         }
+        // A connection stays in memory while a program holds its handle, so that the next call of the program can return the error.
         for id in self.connections_of(host) {
             let end = self.tcp.end_mut(id);
             end.gone.get_or_insert(gone);
@@ -45,7 +46,7 @@ impl Core {
         self.tcp.loopback.retain(|(of, _)| *of != host);
     }
 
-    /// The program of the host is gone: what it held is closed, as when it is dropped.
+    /// Closes the connections and listeners that the killed program held, as if the program had dropped them.
     pub(in crate::core) fn kill_tcp(&mut self, host: NodeId) {
         let gone = Gone { at: self.now(), is_killed: true };
         for id in self.listeners_of(host) {
@@ -69,7 +70,7 @@ impl Core {
     }
 }
 
-/// Ends a connection without a word.
+/// Ends a connection without a segment to the peer: the segments of the abort are taken out and dropped.
 fn silence(machine: &mut Connection, now: Instant) {
     machine.close(now);
     machine.abort();

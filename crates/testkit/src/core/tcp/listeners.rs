@@ -1,4 +1,4 @@
-//! Connections are opened and taken.
+//! Opening and accepting of TCP connections.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::io;
@@ -14,7 +14,7 @@ use super::{ConnId, Core, HoldId, LOOPBACK_MTU, ListenId, Listener, SocketName};
 use crate::address::Addresses;
 use crate::trace::Lost;
 
-/// What connections inherit of their listener: the constants, and the time to linger when they are dropped.
+/// Settings that connections inherit from their listener: the constants of TCP, and the time to linger when the stream is dropped.
 pub(crate) type Inherited = (TcpConfig, Option<Duration>);
 
 fn refuse<T>(kind: io::ErrorKind, text: String) -> io::Result<T> {
@@ -22,7 +22,7 @@ fn refuse<T>(kind: io::ErrorKind, text: String) -> io::Result<T> {
 }
 
 impl Core {
-    /// Listens at a port that is held. `backlog`: one connection more than that may wait.
+    /// Listens at a port that is held. Up to `backlog` + 1 connections may wait to be accepted.
     pub(crate) fn listen(
         &mut self,
         host: NodeId,
@@ -47,7 +47,7 @@ impl Core {
         Ok(id)
     }
 
-    /// A SYN leaves. `bound`: the port that is held, and the address of that socket. On failure it is held still.
+    /// Opens a connection: its SYN leaves. `bound` is the held port with the local address, or `None` for any free port. After an error the port is still held.
     pub(crate) fn connect_tcp(
         &mut self,
         host: NodeId,
@@ -87,6 +87,7 @@ impl Core {
             let text = format!("host `{}` has a connection from {local} to {remote} already", self.plan.names()[host.index()]);
             return refuse(io::ErrorKind::AddrNotAvailable, text);
         }
+        // A segment on loopback may be as long as the loopback interface permits.
         if self.is_own(host, remote.ip()) {
             config.mtu = LOOPBACK_MTU;
         }
@@ -100,18 +101,18 @@ impl Core {
         Ok(id)
     }
 
-    /// Whether an address is one of the host's own, loopback included.
+    /// Returns whether `ip` is an address of the host, loopback included.
     pub(super) fn is_own(&self, host: NodeId, ip: IpAddr) -> bool {
         ip.is_loopback() || self.plan.of(host).has(ip)
     }
 
-    /// Fails if more connections wait than the backlog says: Linux drops a SYN then, and the ACK that would end a handshake.
+    /// Fails if more connections wait than the backlog permits. Linux then drops a SYN, and the ACK that would complete a handshake.
     pub(super) fn check_backlog(&self, id: ListenId) -> Result<(), Lost> {
         let listener = self.tcp.listeners.get(id.0);
         if listener.waiting.len() > listener.backlog { Err(Lost::BacklogFull) } else { Ok(()) }
     }
 
-    /// A SYN has come to a listener.
+    /// Handles a SYN that has arrived at a listener: a connection is created whose handshake has begun.
     pub(super) fn take_syn(&mut self, id: ListenId, syn: &Segment<'_>) -> Result<(), Lost> {
         self.check_backlog(id)?;
         let listener = self.tcp.listeners.get(id.0);
@@ -129,7 +130,7 @@ impl Core {
         Ok(())
     }
 
-    /// A connection has come through the handshake: it can be taken.
+    /// Moves a connection whose handshake is complete to the queue of the listener. Does nothing for a connection that is in the queue already.
     pub(super) fn wait_to_be_taken(&mut self, id: ListenId, conn: ConnId) {
         let listener = self.tcp.listeners.get_mut(id.0);
         if listener.half_open.remove(&conn) {
@@ -138,7 +139,7 @@ impl Core {
         }
     }
 
-    /// Takes the connection that has waited longest.
+    /// Accepts the connection that has waited longest. Returns `None` if no connection waits.
     pub(crate) fn accept(&mut self, id: ListenId) -> io::Result<Option<(ConnId, SocketAddr)>> {
         self.note_call(|core| core.tcp.listeners.get(id.0).name());
         self.check_listener(id)?;
@@ -149,7 +150,7 @@ impl Core {
         Ok(Some((conn, end.machine.peer_addr())))
     }
 
-    /// A task wants to be woken when there is a connection to take.
+    /// Registers a task that waits for a connection to accept.
     pub(crate) fn wait_to_accept(&mut self, id: ListenId, waker: &Waker) {
         self.tcp.listeners.get_mut(id.0).wakers.wait(waker);
     }
@@ -158,7 +159,7 @@ impl Core {
         self.tcp.listeners.get(id.0).local
     }
 
-    /// The constants of the connections that a listener takes.
+    /// Returns the constants of the connections that the listener will accept.
     pub(crate) fn listener_config(&mut self, id: ListenId) -> &mut TcpConfig {
         &mut self.tcp.listeners.get_mut(id.0).config
     }
@@ -168,13 +169,14 @@ impl Core {
         self.check_gone(listener.gone, listener.host, listener.local)
     }
 
-    /// The listener is dropped.
+    /// Closes the listener, because the program has dropped it.
     pub(crate) fn close_listener(&mut self, id: ListenId) {
         self.stop_listening(id);
         self.tcp.listeners.remove(id.0);
     }
 
-    /// No connection is taken any more: those that wait are reset, and those whose handshake is not over are forgotten, so that their next segment is refused.
+    /// Ends the acceptance of connections. Waiting connections are reset. Connections whose handshake is not complete are forgotten, so that their next segment
+    /// is refused.
     pub(super) fn stop_listening(&mut self, id: ListenId) {
         let listener = self.tcp.listeners.get_mut(id.0);
         let (half_open, waiting) = (std::mem::take(&mut listener.half_open), std::mem::take(&mut listener.waiting));

@@ -1,7 +1,7 @@
-//! TCP: the connections and listeners of all hosts, around the state machines of [`cohaptic_tcp`].
+//! TCP of a run: the connections and listeners of all hosts, around the state machines of [`cohaptic_tcp`].
 //!
-//! A packet touches one connection, and what may leave leaves within the call that permits it. At one instant packets arrive, then the timers of TCP go off,
-//! by host and connection, then those of programs.
+//! Each packet touches one connection, and segments leave within the call that permits them. At one instant packets arrive first, then the timers of TCP go
+//! off, sorted by host and connection, and then the timers of programs.
 
 mod faults;
 mod listeners;
@@ -30,74 +30,78 @@ use slots::Slots;
 pub(crate) use listeners::Inherited;
 pub(crate) use ports::HoldId;
 
-/// The label of the stream from which initial sequence numbers come.
+/// Label of the random stream of initial sequence numbers.
 const LABEL: &[u8] = b"initial sequence numbers of a test bed";
 
-/// The greatest MTU, which the loopback interface has \[byte\].
+/// MTU of the loopback interface, the greatest MTU \[byte\].
 const LOOPBACK_MTU: usize = 65_536;
 
-/// A connection, until its stream is dropped and it is over.
+/// Index of an end of a connection. Valid until the stream is dropped and the connection is over.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) struct ConnId(usize);
 
-/// A listener, until it is dropped.
+/// Index of a listener. Valid until the listener is dropped.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) struct ListenId(usize);
 
-/// By which a packet finds its connection: the host, its port and address, and the other end. The port comes first, so that those of one port lie together.
+/// Key by which a packet finds its connection: host, local port, local address, remote address. The port precedes the address, so that all connections of a
+/// port are adjacent.
 type Route = (NodeId, u16, IpAddr, SocketAddr);
 
-/// All of TCP.
+/// State of TCP of all hosts.
 #[derive(Debug)]
 pub(super) struct Tcp {
-    /// By host.
+    /// Constants of new connections, indexed by host.
     configs: Vec<TcpConfig>,
+    /// Source of initial sequence numbers.
     entropy: ByHost,
     connections: Slots<Box<End>>,
     listeners: Slots<Listener>,
+    /// Connections that packets can find.
     routes: BTreeMap<Route, ConnId>,
     ports: ports::Ports,
+    /// Deadlines of connections; at most one entry per connection.
     timers: BTreeSet<(Instant, NodeId, ConnId)>,
-    /// Connections in TIME-WAIT, about in the order in which it ends. Nothing is seen of its end, so it is no event.
+    /// Connections in TIME-WAIT, roughly sorted by its end. The end has no visible effect, and so is no event.
     time_waits: VecDeque<(Instant, ConnId)>,
-    /// Packets that do not leave their host.
+    /// Packets that do not leave their host, with the host, in the order of sending.
     loopback: VecDeque<(NodeId, Bytes)>,
-    /// How often programs have called: an answer about a window counts until the next call.
+    /// Number of calls by programs so far. An answer to a probe of a window counts until the next call: see [`Core::is_stuck`].
     calls: u64,
 }
 
-/// One end of a connection, and the tasks that wait for it.
+/// One end of a connection, and the tasks that wait for the end.
 #[derive(Debug)]
 struct End {
     host: NodeId,
     machine: Connection,
     readers: Waiters,
     writers: Waiters,
-    /// A stream of a program is this end.
+    /// Whether a stream of a program holds this end.
     is_held: bool,
-    /// The last write found the buffer full, or the handshake is not over.
+    /// Whether the last write found the send buffer full, or the handshake is not complete.
     is_write_blocked: bool,
-    /// What the program has set, of which only zero acts.
+    /// Linger time set by the program. Only zero has an effect: the connection is reset when its stream is dropped.
     linger: Option<Duration>,
-    /// The listener at which it waits.
+    /// Listener at which the connection waits to be accepted; `None` for other connections.
     listener: Option<ListenId>,
-    /// The port that its socket was bound to.
+    /// Port to which the socket of the connection was bound.
     hold: Option<HoldId>,
-    /// Where it stands among the timers.
+    /// Deadline of the entry in [`Tcp::timers`], if there is an entry.
     timer: Option<Instant>,
     is_in_time_wait: bool,
     gone: Option<Gone>,
-    /// How many bytes of it are in the count of what the run holds.
+    /// Bytes of this end in [`Held`](crate::wire::Held).
     counted: u64,
-    /// The call at which it was looked at, and its deadline then: see [`Core::is_stuck`].
+    /// Number of calls at the last look, and the deadline then: see [`Core::is_stuck`].
     looked_at: (u64, Option<Instant>),
 }
 
-/// When and why a socket went with its host.
+/// Instant and cause of the end of a socket whose host crashed or whose program was killed.
 #[derive(Clone, Copy, Debug)]
 struct Gone {
     at: Instant,
-    /// The program alone was killed, and not the host.
+    /// Whether only the program was killed. If false, the host has crashed.
     is_killed: bool,
 }
 
@@ -106,13 +110,16 @@ struct Gone {
 struct Listener {
     host: NodeId,
     local: SocketAddr,
-    /// What its connections inherit.
+    /// Constants that connections inherit.
     config: TcpConfig,
     linger: Option<Duration>,
     backlog: usize,
+    /// Connections whose handshake is not complete.
     half_open: BTreeSet<ConnId>,
+    /// Connections to accept, in the order in which their handshakes were completed.
     waiting: VecDeque<ConnId>,
     wakers: Waiters,
+    /// Port at which the listener listens.
     hold: HoldId,
     gone: Option<Gone>,
 }
@@ -141,7 +148,7 @@ impl Tcp {
         self.connections.get_mut(id.0)
     }
 
-    /// Takes a connection in.
+    /// Adds a connection of `host`.
     fn insert(&mut self, host: NodeId, machine: Connection) -> ConnId {
         let route = route(host, machine.local_addr(), machine.peer_addr());
         let id = ConnId(self.connections.insert(Box::new(End {
@@ -164,10 +171,11 @@ impl Tcp {
         id
     }
 
-    /// Packets find it no more.
+    /// Removes the route of a connection, so that packets no longer find the connection.
     fn unroute(&mut self, id: ConnId) {
         let end = self.end(id);
         let route = route(end.host, end.machine.local_addr(), end.machine.peer_addr());
+        // The route may belong to a newer connection with the same addresses by now.
         if self.routes.get(&route) == Some(&id) {
             self.routes.remove(&route);
         }
@@ -177,7 +185,7 @@ impl Tcp {
         u32::from_le_bytes(self.entropy.of(Some(host), names).bytes())
     }
 
-    /// Returns whether any connection has drawn a number.
+    /// Returns whether any connection has drawn an initial sequence number.
     pub(super) fn has_drawn(&self) -> bool {
         self.entropy.was_asked()
     }
@@ -200,7 +208,7 @@ impl Listener {
 }
 
 impl Core {
-    /// Forgets an end.
+    /// Removes an end with its route, timer and port.
     fn remove_connection(&mut self, id: ConnId) {
         self.tcp.unroute(id);
         self.tcp.set_timer(id, None);
@@ -209,25 +217,26 @@ impl Core {
         end.hold.into_iter().for_each(|hold| self.tcp.ports.release(hold));
     }
 
-    /// Counts what an end holds now.
+    /// Updates the count of bytes held by an end.
     fn recount(&mut self, id: ConnId) {
         let end = self.tcp.connections.get_mut(id.0);
         let held = end.machine.held() as u64;
+        // The new number is added first: the count never falls below the sum of the other parts.
         self.wire.held.add(Where::Streams, held);
         self.wire.held.remove(Where::Streams, std::mem::replace(&mut end.counted, held));
     }
 
-    /// Sets the constants of the connections that a host opens or takes from now on.
+    /// Sets the constants of the connections that `host` opens or accepts from now on.
     pub(crate) fn set_tcp(&mut self, host: NodeId, config: TcpConfig) {
         self.tcp.configs[host.index()] = config;
     }
 
-    /// The constants of connections of a host.
+    /// Returns the constants of connections of `host`.
     pub(crate) fn tcp_config(&self, host: NodeId) -> &TcpConfig {
         &self.tcp.configs[host.index()]
     }
 
-    /// All ends that are not over, by host, address and peer.
+    /// Returns all ends that packets can find, sorted by host, port, address and peer.
     pub(crate) fn connections(&self) -> impl Iterator<Item = (NodeId, &Connection)> {
         self.tcp.routes.values().map(|id| self.tcp.end(*id)).map(|end| (end.host, &end.machine))
     }

@@ -1,4 +1,4 @@
-//! The way of a segment.
+//! Way of a TCP segment, from its connection to the link and from the link to a connection.
 
 use bytes::Bytes;
 use cohaptic_tcp::{Ecn, Flags, Segment, State};
@@ -9,7 +9,7 @@ use crate::core::{Ends, Kind};
 use crate::trace::{Happening, Lost, PacketName};
 
 impl Core {
-    /// A packet has come to a host.
+    /// Handles a packet that has arrived at `host`. `marked` tells whether a queue marked the packet.
     pub(in crate::core) fn arrive_segment(&mut self, host: NodeId, packet: &Bytes, marked: bool) -> Result<(), Lost> {
         if !self.is_up(host) {
             return Err(Lost::HostDown);
@@ -22,6 +22,7 @@ impl Core {
             segment.ecn = Ecn::Congestion;
         }
         self.forget_old();
+        // Only an opening segment may find a listener.
         let listener = if is_first(&segment) { self.listener_at(host, segment.destination) } else { None };
         let route = super::route(host, segment.destination, segment.source);
         if let Some(id) = self.tcp.routes.get(&route).copied() {
@@ -35,6 +36,7 @@ impl Core {
                 self.settle(id);
                 return Ok(());
             }
+            // A connection in TIME-WAIT gives way to the new connection of the same addresses.
             self.tcp.unroute(id);
             self.settle(id);
         }
@@ -47,27 +49,29 @@ impl Core {
         Err(Lost::NoSocket)
     }
 
-    /// A segment leaves a connection, or answers one of no connection. It arrives when [`Core::take_arrivals`] is next called, however short its way.
+    /// Sends a segment of a connection, or of no connection, such as a refusal. The segment arrives when [`Core::take_arrivals`] is next called, even if its
+    /// way takes no time.
     fn emit(&mut self, host: NodeId, connection: Option<ConnId>, segment: &Segment<'_>) {
         let (from, to) = (segment.source.ip(), segment.destination.ip());
         if self.is_own(host, to) {
             self.tcp.loopback.push_back((host, segment.to_packet().into()));
             return;
         }
-        // From an address that the host does not have any more, or to one that nobody has any more, nothing gets through.
+        // The segment is lost if its source is an address that the host has given up, or if no host has its destination any more.
         let Some(receiver) = self.plan.owner_node(to).filter(|_| self.plan.of(host).has(from)) else { return };
         let path = Path { from: host, to: receiver };
         let packet = self.wire.next_packet(path);
         let addresses = Ends::new(segment.source, segment.destination, Kind::Segment);
         let parcel = self.spare.wrapped(addresses, segment.to_packet().into(), segment.ecn != Ecn::NotCapable);
-        // Over a way that is cut it is lost, as others are.
+        // A segment over a path that is cut is lost like any other packet.
         let _ = self.wire.offer(path, parcel);
         if self.wire.recording().traces {
             self.note_segment(packet, connection, segment);
         }
     }
 
-    /// Notes a segment with numbers that count from its SYN, as its connection knows them, or that of the peer. Where neither is left they count from zero.
+    /// Records a segment with relative numbers. The numbers count from the initial sequence numbers as the connection knows them, or the connection of the peer
+    /// if there is no own one; without either the numbers count from zero.
     fn note_segment(&mut self, packet: PacketName, connection: Option<ConnId>, segment: &Segment<'_>) {
         let (first, peers_first, shift) = if let Some(id) = connection {
             let machine = &self.tcp.end(id).machine;
@@ -78,7 +82,7 @@ impl Core {
             let (peers, own) = peer.map_or((0, None), |id| self.tcp.end(*id).machine.initial_sequences());
             (own.unwrap_or(0), peers, 0)
         };
-        // No window is scaled on a SYN (RFC 7323, section 2.2).
+        // The window of a SYN is never scaled (RFC 7323, section 2.2).
         let shift = if segment.flags.has(Flags::SYN) { 0 } else { shift };
         self.wire.note(Happening::Segment {
             packet,
@@ -91,15 +95,15 @@ impl Core {
         });
     }
 
-    /// Hands over the next packet that does not leave its host; says whether there was one.
+    /// Delivers the next packet that does not leave its host. Returns whether there was one.
     pub(in crate::core) fn take_from_loopback(&mut self) -> bool {
         let Some((host, packet)) = self.tcp.loopback.pop_front() else { return false };
-        // Loopback tells of no end: it is not the network.
+        // Fates of packets are recorded for links only. Loopback is not part of the network.
         let _ = self.arrive_segment(host, &packet, false);
         true
     }
 
-    /// After anything that has happened to a connection: what may leave leaves, tasks that can go on are woken, and its timer is set.
+    /// Follows up any change of a connection: segments leave, tasks that can go on are woken, and the timer of the connection is set.
     pub(super) fn settle(&mut self, id: ConnId) {
         let now = self.now();
         let host = self.tcp.end(id).host;
@@ -116,6 +120,7 @@ impl Core {
             end.writers.wake(&mut self.woken);
         }
         let (state, listener) = (end.machine.state(), end.listener);
+        // The end of TIME-WAIT has no visible effect, so TIME-WAIT has no timer.
         let due = if state == State::TimeWait { None } else { end.machine.poll_timeout() };
         if state == State::TimeWait && !end.is_in_time_wait {
             end.is_in_time_wait = true;
@@ -127,14 +132,15 @@ impl Core {
             if state.is_synchronised() {
                 self.wait_to_be_taken(listener, id);
             } else if state == State::Closed && self.tcp.listeners.get_mut(listener.0).half_open.remove(&id) {
-                // A handshake that has failed is nobody's; what waits to be taken can be taken still.
+                // A connection whose handshake has failed belongs to no listener any more. A connection in the queue of the listener stays there even if it is
+                // closed by now.
                 self.tcp.end_mut(id).listener = None;
             }
         }
         self.forget_if_over(id);
     }
 
-    /// A connection that is over is not found by packets any more, and forgotten when nobody holds it.
+    /// Takes a connection that is over out of the routes, and removes the connection when neither a stream nor a listener holds it.
     pub(super) fn forget_if_over(&mut self, id: ConnId) {
         let end = self.tcp.end(id);
         if !end.machine.is_finished() {
@@ -144,7 +150,7 @@ impl Core {
     }
 }
 
-/// Whether a segment opens a connection.
+/// Returns whether a segment opens a connection.
 fn is_first(segment: &Segment<'_>) -> bool {
     segment.flags.has(Flags::SYN) && !segment.flags.has(Flags::ACK) && !segment.flags.has(Flags::RST)
 }

@@ -1,4 +1,4 @@
-//! Ports of TCP, apart from those of UDP.
+//! Ports of TCP. They are independent of the ports of UDP.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -9,22 +9,24 @@ use cohaptic_wan::NodeId;
 use super::{Core, ListenId, route};
 use crate::core::sockets::FIRST_DYNAMIC;
 
-/// How many ports are given to sockets that ask for none.
+/// Number of dynamic ports.
 const COUNT: u16 = u16::MAX - FIRST_DYNAMIC + 1;
 
-/// A port that a socket is bound to, until it is released.
+/// Port to which a socket is bound, until the port is released. Several sockets may share a port, so `number` tells the sockets apart.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct HoldId {
     key: (NodeId, bool, u16),
     number: u64,
 }
 
+/// Binding of a socket to a port.
 #[derive(Debug)]
 struct Hold {
     number: u64,
     ip: IpAddr,
-    /// `SO_REUSEADDR`.
+    /// Whether the socket has set `SO_REUSEADDR`.
     is_shared: bool,
+    /// Listener of the socket, once the socket listens.
     listener: Option<ListenId>,
 }
 
@@ -34,13 +36,14 @@ impl Hold {
     }
 }
 
-/// The ports that sockets are bound to.
+/// Bound ports of all hosts.
 #[derive(Debug)]
 pub(super) struct Ports {
-    /// By host, version (6 or not) and port.
+    /// Bindings, by host, version of IP (true for 6) and port. No list is empty.
     holds: BTreeMap<(NodeId, bool, u16), Vec<Hold>>,
+    /// Number of bindings made so far.
     numbers: u64,
-    /// By host: the port that is given next, counted from the first.
+    /// Offset from [`FIRST_DYNAMIC`] of the dynamic port to try next, indexed by host.
     next: Vec<u16>,
 }
 
@@ -69,7 +72,7 @@ impl Ports {
         }
     }
 
-    /// The ports from which one is chosen, those given longest ago first.
+    /// Returns the dynamic ports in the order in which they are tried. Ports given longest ago come first.
     fn turn(&self, host: NodeId) -> impl Iterator<Item = u16> + use<> {
         let first = self.next[host.index()];
         (0..COUNT).map(move |step| FIRST_DYNAMIC + (first + step) % COUNT)
@@ -81,7 +84,8 @@ impl Ports {
 }
 
 impl Core {
-    /// Binds a socket of a host that is up to a port, not to listen yet. `is_shared`: others that share it may be bound to it too (`SO_REUSEADDR`).
+    /// Binds a socket to a port of a host, which must be up. `is_shared` is the option `SO_REUSEADDR`: other sockets with the option may be bound to the port
+    /// as well. The socket does not listen yet.
     pub(crate) fn hold_port(&mut self, host: NodeId, wanted: SocketAddr, is_shared: bool) -> io::Result<(HoldId, SocketAddr)> {
         self.check_owned(host, wanted.ip())?;
         let (ip, port) = (wanted.ip(), wanted.port());
@@ -89,6 +93,7 @@ impl Core {
             let free = self.tcp.ports.turn(host).find(|port| self.tcp.ports.at(host, ip, *port).is_empty() && !self.has_connections(host, *port));
             free.ok_or_else(|| self.no_port(host, io::ErrorKind::AddrInUse))?
         } else {
+            // A listener excludes every other socket, even if both share the port.
             let is_taken =
                 self.tcp.ports.at(host, ip, port).iter().any(|hold| hold.overlaps(ip) && (hold.listener.is_some() || !(hold.is_shared && is_shared)));
             if is_taken || (!is_shared && self.has_connections(host, port)) {
@@ -107,26 +112,26 @@ impl Core {
         self.tcp.ports.release(hold);
     }
 
-    /// Fails if another socket than that one listens at an address.
+    /// Checks that no socket other than `id` listens at `address`.
     pub(super) fn check_alone(&self, host: NodeId, address: SocketAddr, id: HoldId) -> io::Result<()> {
         let holds = self.tcp.ports.at(host, address.ip(), address.port());
         let is_taken = holds.iter().any(|hold| hold.number != id.number && hold.listener.is_some() && hold.overlaps(address.ip()));
         if is_taken { Err(self.taken(host, address)) } else { Ok(()) }
     }
 
-    /// The socket that holds a port listens from now on.
+    /// Notes that the socket of a held port listens from now on.
     pub(super) fn listen_at(&mut self, id: HoldId, listener: ListenId) {
         let holds = self.tcp.ports.holds.get_mut(&id.key).into_iter().flatten();
         holds.filter(|hold| hold.number == id.number).for_each(|hold| hold.listener = Some(listener));
     }
 
-    /// The listener of a host at an address: one that is bound to it before one that is bound to all.
+    /// Returns the listener of `host` for connections to `address`. A listener bound to the address comes before a listener bound to all addresses.
     pub(super) fn listener_at(&self, host: NodeId, address: SocketAddr) -> Option<ListenId> {
         let holds = self.tcp.ports.at(host, address.ip(), address.port()).iter().filter(|hold| hold.listener.is_some());
         holds.filter(|hold| hold.overlaps(address.ip())).max_by_key(|hold| !hold.ip.is_unspecified())?.listener
     }
 
-    /// A port from which a connection to `remote` can be opened.
+    /// Returns a free dynamic port from which a connection to `remote` can be opened.
     pub(super) fn port_to(&mut self, host: NodeId, from: IpAddr, remote: SocketAddr) -> io::Result<u16> {
         let is_free = |port: &u16| {
             self.tcp.ports.at(host, from, *port).is_empty() && !self.tcp.routes.contains_key(&route(host, SocketAddr::new(from, *port), remote))
@@ -137,6 +142,7 @@ impl Core {
         Ok(port)
     }
 
+    // Routes are sorted by host, then by port: the first route from the smallest address of the port on tells whether there is any.
     fn has_connections(&self, host: NodeId, port: u16) -> bool {
         self.tcp
             .routes

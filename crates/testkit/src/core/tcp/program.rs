@@ -1,4 +1,4 @@
-//! What programs ask of a connection.
+//! Calls of programs on connections.
 
 use std::io::{self, IoSlice, IoSliceMut};
 use std::net::SocketAddr;
@@ -12,7 +12,7 @@ use cohaptic_wan::NodeId;
 use super::{ConnId, Core, End, Gone};
 
 impl End {
-    /// An error as programs see it.
+    /// Converts an error of the state machine to an error for programs.
     fn explain(&self, error: Error) -> io::Error {
         let kind = match error {
             Error::WouldBlock => return io::ErrorKind::WouldBlock.into(),
@@ -28,7 +28,7 @@ impl End {
 }
 
 impl Core {
-    /// Fails if the socket went with its host, or with the program of it.
+    /// Checks that the socket lives. It does not after a crash of its host, or after the program of the host was killed.
     pub(super) fn check_gone(&self, gone: Option<Gone>, host: NodeId, local: SocketAddr) -> io::Result<()> {
         let Some(Gone { at, is_killed }) = gone else { return Ok(()) };
         let name = &self.plan.names()[host.index()];
@@ -42,12 +42,12 @@ impl Core {
         self.check_gone(end.gone, end.host, end.machine.local_addr())
     }
 
-    /// The state machine of a connection.
+    /// Returns the state machine of a connection.
     pub(crate) fn connection(&self, id: ConnId) -> &Connection {
         &self.tcp.end(id).machine
     }
 
-    /// Changes a connection, and sees to what follows.
+    /// Applies `change` to a connection, and follows up the change.
     pub(crate) fn change_connection<T>(&mut self, id: ConnId, change: impl FnOnce(Instant, &mut Connection) -> T) -> io::Result<T> {
         self.check_connection(id)?;
         let now = self.now();
@@ -56,14 +56,14 @@ impl Core {
         Ok(value)
     }
 
-    /// After a program has called: what may leave leaves, and what arrives at once arrives.
+    /// Follows up a call of a program: segments leave, and packets that need no time arrive.
     pub(super) fn after_call(&mut self, id: ConnId) {
         self.tcp.calls += 1;
         self.settle(id);
         self.take_arrivals();
     }
 
-    /// Whether the handshake is over, and how.
+    /// Returns the outcome of the handshake, or `None` while the handshake is under way.
     pub(crate) fn is_settled(&mut self, id: ConnId) -> Option<io::Result<()>> {
         if let Err(gone) = self.check_connection(id) {
             return Some(Err(gone));
@@ -78,7 +78,7 @@ impl Core {
         }
     }
 
-    /// Reads what has arrived, into one buffer after the other.
+    /// Reads received bytes into the buffers of `to`, one after the other. Returns the number of bytes read.
     pub(crate) fn read(&mut self, id: ConnId, to: &mut [IoSliceMut<'_>]) -> io::Result<usize> {
         self.note_call(|core| core.tcp.end(id).name());
         self.check_connection(id)?;
@@ -86,6 +86,7 @@ impl Core {
         let mut count = 0;
         let mut outcome = Ok(0);
         for buffer in to.iter_mut().filter(|buffer| !buffer.is_empty()) {
+            // A further read of an empty receive buffer would turn success into `WouldBlock`.
             if count > 0 && machine.info().unread == 0 {
                 break;
             }
@@ -98,7 +99,7 @@ impl Core {
         outcome.map(|_| count).map_err(|error| self.tcp.end(id).explain(error))
     }
 
-    /// Reads without taking.
+    /// Copies received bytes to `to` without taking the bytes out.
     pub(crate) fn peek_connection(&mut self, id: ConnId, to: &mut [u8]) -> io::Result<usize> {
         self.note_call(|core| core.tcp.end(id).name());
         self.check_connection(id)?;
@@ -106,7 +107,7 @@ impl Core {
         end.machine.peek(to).map_err(|error| end.explain(error))
     }
 
-    /// Writes one buffer after the other, as much as the send buffer takes.
+    /// Writes the buffers of `from`, one after the other, until the send buffer is full. Returns the number of bytes written.
     pub(crate) fn write(&mut self, id: ConnId, from: &[IoSlice<'_>]) -> io::Result<usize> {
         self.note_call(|core| core.tcp.end(id).name());
         self.check_connection(id)?;
@@ -130,23 +131,23 @@ impl Core {
         }
     }
 
-    /// Whether [`Core::read`] and [`Core::write`] have something to say.
+    /// Returns whether [`Core::read`] and [`Core::write`] would do other than wait.
     pub(crate) fn is_ready(&self, id: ConnId) -> [bool; 2] {
         let end = self.tcp.end(id);
         if end.gone.is_some() { [true; 2] } else { [end.machine.is_readable(), !end.is_write_blocked] }
     }
 
-    /// A task wants to be woken when the connection can be read.
+    /// Registers a task that waits until the connection can be read.
     pub(crate) fn wait_to_read_from(&mut self, id: ConnId, waker: &Waker) {
         self.tcp.end_mut(id).readers.wait(waker);
     }
 
-    /// A task wants to be woken when the connection can be written, or is established.
+    /// Registers a task that waits until the connection can be written, or is established.
     pub(crate) fn wait_to_write_to(&mut self, id: ConnId, waker: &Waker) {
         self.tcp.end_mut(id).writers.wait(waker);
     }
 
-    /// The error that the next call would give otherwise.
+    /// Takes the error that the next call would otherwise return.
     pub(crate) fn take_error_of(&mut self, id: ConnId) -> io::Result<Option<io::Error>> {
         self.check_connection(id)?;
         let end = self.tcp.end_mut(id);
@@ -154,18 +155,19 @@ impl Core {
         Ok(error.map(|error| end.explain(error)))
     }
 
-    /// How long a program would wait for data to leave when it drops the stream, of which only zero acts.
+    /// Returns the linger time of the stream. Only zero has an effect.
     pub(crate) fn linger(&mut self, id: ConnId) -> &mut Option<std::time::Duration> {
         &mut self.tcp.end_mut(id).linger
     }
 
-    /// The stream is dropped.
+    /// Releases the stream, because the program has dropped it.
     pub(crate) fn drop_connection(&mut self, id: ConnId) {
         let now = self.now();
         let end = self.tcp.end_mut(id);
         end.is_held = false;
         end.readers.clear();
         end.writers.clear();
+        // The crash has ended the connection already. After a kill the connection still has to say goodbye to its peer.
         if end.gone.is_some_and(|gone| !gone.is_killed) {
             self.remove_connection(id);
             return;

@@ -1,6 +1,6 @@
-//! Places that are used again.
+//! Array of values with stable indices, which are used again after a removal.
 
-/// Values at places, whose numbers stay as long as the value is there.
+/// Values with indices. The index of a value stays the same until the value is removed.
 #[derive(Debug)]
 pub(super) struct Slots<T> {
     places: Vec<Option<T>>,
@@ -31,7 +31,7 @@ impl<T> Slots<T> {
         self.places[place].as_mut().expect("a value is there as long as its number is held")
     }
 
-    /// What may have been removed.
+    /// Returns the value at `place`, or `None` if the value was removed.
     pub(super) fn find(&self, place: usize) -> Option<&T> {
         self.places.get(place)?.as_ref()
     }
@@ -44,7 +44,7 @@ impl<T> Slots<T> {
         value
     }
 
-    /// The places that are taken, in their order.
+    /// Returns index and value of each entry, in ascending order of indices.
     pub(super) fn iter(&self) -> impl Iterator<Item = (usize, &T)> {
         self.places.iter().enumerate().filter_map(|(place, value)| Some((place, value.as_ref()?)))
     }

@@ -1,4 +1,4 @@
-//! Timers of connections, and the end of TIME-WAIT.
+//! Timers of connections, and the removal of connections whose TIME-WAIT has ended.
 
 use cohaptic_tcp::State;
 use cohaptic_units::Instant;
@@ -23,26 +23,28 @@ impl Tcp {
 }
 
 impl Core {
-    /// The next event, if that is when the network and the timers of programs want to be woken.
+    /// Returns the next event. `others` is the next event of the network and of the timers of programs.
     pub(in crate::core) fn with_tcp_timers(&mut self, others: Option<Instant>) -> Option<Instant> {
         let first = self.tcp.timers.first().map(|(at, ..)| *at);
+        // Only probes of stuck connections are left. They would let time pass for ever, so the run counts as having no event.
         match (first, others) {
             (Some(_), None) if self.is_stuck() => None,
             _ => crate::wire::earlier(first, others),
         }
     }
 
-    /// Whether no packet is on its way, no program waits for time, and all that connections do is to ask for windows that programs keep closed, or whether a peer
-    /// is there: each has been answered since a program last called.
+    /// Returns whether no connection can make progress by itself. The caller has checked that no packet is on its way and no program waits for time. A
+    /// connection is stuck if its only timers probe a window that the program of the peer keeps closed, or ask whether the peer is there, and the peer has
+    /// answered since a program last called.
     ///
-    /// It looks twice at each connection: what a deadline was that has moved since was answered.
+    /// A connection must have been seen twice with a different deadline since the last call: the deadline moves when a probe was answered.
     fn is_stuck(&mut self) -> bool {
         let calls = self.tcp.calls;
         let Tcp { timers, connections, .. } = &mut self.tcp;
         let mut is_stuck = true;
         for (at, _, id) in &*timers {
             let end = connections.get_mut(id.0);
-            // What no program holds is given up by itself.
+            // A connection that no program holds gives up by itself, so it is not stuck.
             let is_answered = end.is_held && (end.machine.is_held_by_window() || end.machine.is_only_kept_alive());
             if !is_answered || end.looked_at.0 != calls {
                 end.looked_at = (calls, Some(*at));
@@ -55,13 +57,13 @@ impl Core {
         is_stuck
     }
 
-    /// The timers that are due go off, in the order of hosts and connections.
+    /// Fires the timers that are due, sorted by time, host and connection.
     pub(in crate::core) fn fire_tcp_timers(&mut self) {
         let now = self.now();
         if self.tcp.timers.first().is_none_or(|(at, ..)| *at > now) {
             return;
         }
-        // Tokio's clock may have jumped to a timer of its own: connections that are stuck stay so until a program calls.
+        // Tokio's clock may have jumped to a timer that the test bed does not know. Connections that are stuck stay so until a program calls.
         if self.wire.next().is_none() && self.timers.next().is_none() && self.is_stuck() {
             return;
         }
@@ -73,14 +75,15 @@ impl Core {
         }
     }
 
-    /// Forgets connections whose TIME-WAIT is over: nothing is seen of it, so that it is done when others come.
+    /// Removes connections whose TIME-WAIT has ended. The end of TIME-WAIT has no visible effect, so no timer is needed: removal takes place when a new
+    /// connection comes.
     pub(super) fn forget_old(&mut self) {
         let now = self.now();
         while let Some((_, id)) = self.tcp.time_waits.front().copied().filter(|(ends, _)| *ends <= now) {
             self.tcp.time_waits.pop_front();
             let Some(end) = self.tcp.connections.find(id.0) else { continue };
             match end.machine.time_wait_ends().filter(|_| end.is_in_time_wait) {
-                // A FIN that came again has made it longer.
+                // A repeated FIN has restarted TIME-WAIT.
                 Some(ends) if ends > now => self.tcp.time_waits.push_back((ends, id)),
                 Some(_) => {
                     self.tcp.end_mut(id).machine.handle_timeout(now);

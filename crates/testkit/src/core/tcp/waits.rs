@@ -1,4 +1,4 @@
-//! What sockets wait for, in words: for programs that wait for ever.
+//! Descriptions of what tasks wait for at TCP sockets. Reported when programs wait for ever.
 
 use std::task::Waker;
 
@@ -7,7 +7,7 @@ use cohaptic_tcp::State;
 use super::Core;
 
 impl Core {
-    /// Returns the sockets of TCP that a task with that waker waits for, in words.
+    /// Returns descriptions of the TCP sockets for which the task with the waker `waker` waits.
     pub(in crate::core) fn tcp_awaited_by(&self, waker: &Waker) -> impl Iterator<Item = String> {
         let listeners = self.tcp.listeners.iter().map(|(_, listener)| listener).filter(|listener| listener.wakers.has(waker));
         let listeners = listeners.map(|listener| format!("a connection at the TCP listener {}", listener.local));
@@ -16,7 +16,7 @@ impl Core {
         listeners.chain(ends)
     }
 
-    /// A line for each socket of TCP that a task waits for, or whose data waits for the program of the peer.
+    /// Returns a line for each TCP socket for which a task waits, or whose data waits for the program of the peer to read.
     pub(in crate::core) fn tcp_waits(&self) -> impl Iterator<Item = String> {
         let names = self.plan.names();
         let listeners = self.tcp.listeners.iter().map(|(_, listener)| listener).filter(|listener| !listener.wakers.is_empty());
