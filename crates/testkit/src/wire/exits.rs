@@ -1,4 +1,4 @@
-//! The far ends of links on which packets are hit: where they are delayed, copied, damaged and held back.
+//! Far ends of links on which laws hit packets. Here packets are delayed, copied, damaged, and held back after other packets.
 
 use std::collections::BTreeMap;
 
@@ -8,32 +8,33 @@ use cohaptic_wan::{DropCause, Fate, Network, PacketEvent, PacketRecord, Path};
 use super::parcel::{Octets, Parcel};
 use crate::hit::Verdict;
 
-/// What comes out of a link. Its copies are counted as the links of a network without access lines count them: 0, 1, 2.
+/// Event at the far end of a link. Copies are numbered as by the links of a network without access lines: 0, 1, 2.
 pub(super) type Out<A> = PacketEvent<Box<Parcel<A>>, Path>;
 
-/// The packets that were hit and have not arrived.
+/// Packets that were hit and have not arrived.
 #[derive(Clone)]
 pub(super) struct Exits<A> {
-    /// The packets that are in their links, by path and number.
+    /// Packets inside their links or copied here, by path and sequence number.
     hit: BTreeMap<(Path, u64), Hit>,
-    /// Those that are to arrive, in the order of a network among packets of one instant: so that a replay of the fates has the same order.
+    /// Packets that are to arrive. Sorted like the events of a network, so that a replay of the fates has the same order at each instant.
     late: BTreeMap<Key, Out<A>>,
-    /// By path, those that wait for others, and for how many.
+    /// Packets that wait for further arrivals on their path, each with the number of arrivals that it still waits for.
     behind: BTreeMap<Path, Vec<(u32, Out<A>)>>,
 }
 
-/// When a packet arrives, from where to where, its number, and that of its copy.
+/// Instant of arrival, path, sequence number, and number of the copy.
 type Key = (Instant, Path, u64, u8);
 
 #[derive(Clone, Debug)]
+/// State of a packet that was hit.
 enum Hit {
-    /// It has not come out.
+    /// The packet has not come out of its link.
     Inside {
         verdict: Verdict,
-        /// The copies that the link has made of it so far.
+        /// Highest number of a copy that the link has made of the packet so far.
         copies: u8,
     },
-    /// It was copied here, and the copy has this number.
+    /// The packet was copied here, and the copy has this number.
     Copied(u8),
 }
 
@@ -44,17 +45,17 @@ impl<A> Default for Exits<A> {
 }
 
 impl<A: Clone> Exits<A> {
-    /// A packet that goes into its link is hit.
+    /// Notes a packet that is hit when it enters its link.
     pub(super) fn expect(&mut self, path: Path, number: u64, verdict: Verdict) {
         self.hit.insert((path, number), Hit::Inside { verdict, copies: 0 });
     }
 
-    /// When the next one arrives that was made late.
+    /// Returns the instant of the next arrival of a delayed packet.
     pub(super) fn next(&self) -> Option<Instant> {
         self.late.first_key_value().map(|((at, ..), _)| *at)
     }
 
-    /// What comes out next by now, of the links and of what was kept here.
+    /// Returns the next event that is due at `now`, of the links or of the packets kept here.
     pub(super) fn poll_with(&mut self, network: &mut Network<Box<Parcel<A>>>, now: Instant) -> Option<Out<A>> {
         while let Some(event) = network.poll_event() {
             let out = self.take(counted(event));
@@ -65,18 +66,18 @@ impl<A: Clone> Exits<A> {
         self.late.first_entry().filter(|first| first.key().0 <= now).map(|first| first.remove())
     }
 
-    /// The packets of a path that wait for others which have not come.
+    /// Returns sequence number and number of missing arrivals of each packet of `path` that waits for others.
     pub(super) fn waiting(&self, path: Path) -> impl Iterator<Item = (u64, u32)> {
         self.behind.get(&path).into_iter().flatten().map(|(left, out)| (out.sequence, *left))
     }
 
-    /// Takes what comes out of a link, and gives it back if it is no arrival.
+    /// Handles an event of a link. Returns the event if it is no arrival; an arrival is kept here until it is due.
     fn take(&mut self, mut out: Out<A>) -> Option<Out<A>> {
         let key = (out.path, out.sequence);
         let verdict = match self.hit.get_mut(&key) {
             None => Verdict::Pass,
             Some(Hit::Copied(copy)) => {
-                // One that the link makes later has the number behind.
+                // The copy made here has taken the number, so a later copy of the link gets the next number.
                 out.record.copy += u8::from(out.copy >= *copy);
                 Verdict::Pass
             }
@@ -84,6 +85,7 @@ impl<A: Clone> Exits<A> {
                 *copies = (*copies).max(out.copy);
                 Verdict::Pass
             }
+            // The verdict concerns the packet itself. Copies made by the link pass.
             Some(Hit::Inside { .. }) if out.copy > 0 => Verdict::Pass,
             Some(Hit::Inside { verdict, .. }) => *verdict,
         };
@@ -115,14 +117,14 @@ impl<A: Clone> Exits<A> {
         None
     }
 
-    /// A packet is to arrive then.
+    /// Schedules the arrival of a packet at the instant `at`.
     fn arrives(&mut self, mut out: Out<A>, at: Instant) {
         out.record.at = at;
         out.record.fate = Fate::Delivered(at);
         self.late.insert((at, out.path, out.sequence, out.copy), out);
     }
 
-    /// Something of a path arrives: those who waited for it come behind, a nanosecond later, so that a replay has the same order.
+    /// Counts an arrival on a path. Packets that have waited for this arrival arrive a nanosecond later: at the same instant a replay could have another order.
     pub(super) fn arrived(&mut self, path: Path, at: Instant) {
         let Some(waiting) = self.behind.get_mut(&path) else { return };
         waiting.iter_mut().for_each(|(left, _)| *left -= 1);
@@ -132,7 +134,7 @@ impl<A: Clone> Exits<A> {
         come.into_iter().for_each(|(_, out)| self.arrives(out, at.saturating_add_nanos(1)));
     }
 
-    /// Gives up those that wait for others: their end, as the record has it.
+    /// Drops the packets that still wait for others, as the record shows their end.
     pub(super) fn abandon(&mut self, now: Instant) -> impl Iterator<Item = Out<A>> {
         std::mem::take(&mut self.behind).into_values().flatten().map(move |(_, mut out)| {
             out.record.at = now.max(out.at);
@@ -142,18 +144,18 @@ impl<A: Clone> Exits<A> {
     }
 }
 
-/// Without access lines the only copy is that of the link, whose number in a network is 2.
+/// Renumbers a copy. Without access lines the only copy is that of the link, whose number in a network is 2.
 #[inline]
 pub(super) fn counted<A>(mut event: Out<A>) -> Out<A> {
     event.record.copy >>= 1;
     event
 }
 
-/// Flips a bit, unless there is none.
+/// Flips the bit `bit` of the content, modulo the number of bits. Does nothing to an empty packet.
 fn flip<A>(out: &mut Out<A>, bit: u64) {
     let bits = out.payload.bytes.len() as u64 * 8;
     let Some(bit) = bit.checked_rem(bits) else { return };
-    // A copy of it may be on its way still, undamaged.
+    // A copy that shares these bytes may still be under way, undamaged.
     let mut bytes = Vec::from(std::mem::take(&mut out.payload.bytes));
     if let Some(byte) = usize::try_from(bit / 8).ok().and_then(|place| bytes.get_mut(place)) {
         *byte ^= 1 << (bit % 8);

@@ -1,27 +1,27 @@
-//! How many bytes a run holds, and how many it may hold.
+//! Number of bytes that a run holds, and its limit.
 
 use std::fmt;
 
-/// How many bytes a run may hold unless the test says another number: a gibibyte.
+/// Default limit of the bytes that a run may hold: a gibibyte.
 pub(crate) const BYTE_LIMIT: u64 = 1 << 30;
 
-/// Memory of a packet besides its content \[byte\]: its box, its allocation, and its places in the queues of events and of sockets, which have up to
-/// twice as many places as packets. So packets without a byte count too.
+/// Memory of a packet besides its content \[byte\]: its box, its allocation, and its entries in the queues of events and of sockets, which have up to twice as
+/// many entries as packets. Hence packets without content count as well.
 pub(crate) const PACKET_COST: u64 = 200;
 
-/// The bytes that a run holds: those that were sent, and were neither read nor lost. Each is counted in one of the three numbers, by the part that holds it.
+/// Bytes that a run holds: bytes that were sent, and were neither read nor lost. Each byte is counted in exactly one of the three parts.
 #[derive(Debug)]
 pub(crate) struct Held {
-    /// On links, with their queues: counted by the [`Wire`](super::Wire) alone.
+    /// Bytes on links, with the queues of the links. Counted by the [`Wire`](super::Wire) only.
     links: u64,
-    /// In the buffers of sockets, or handed to a node and not taken yet.
+    /// Bytes in the buffers of sockets, or handed to a node and not taken yet.
     buffers: u64,
-    /// In streams of TCP, at both ends: written and not acknowledged, or arrived and not read.
+    /// Bytes in TCP streams, at both ends: written and not acknowledged, or arrived and not read.
     streams: u64,
     limit: u64,
 }
 
-/// Where bytes lie.
+/// Part of a run that holds bytes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Where {
     Links,
@@ -35,7 +35,7 @@ impl Held {
         Self { links: 0, buffers: 0, streams: 0, limit }
     }
 
-    /// Returns the bytes that a packet with a content of `len` bytes counts.
+    /// Returns the bytes counted for a packet with a content of `len` bytes.
     #[inline(always)]
     pub(crate) const fn cost(len: usize) -> u64 {
         len as u64 + PACKET_COST
@@ -67,17 +67,17 @@ impl Held {
         self.links + self.buffers + self.streams
     }
 
-    /// Whether the run holds more than it may.
+    /// Returns whether the run holds more than its limit.
     #[inline(always)]
     pub(crate) const fn is_too_much(&self) -> bool {
         self.total() > self.limit
     }
 
-    /// Fails the run, which holds [too much](Held::is_too_much): `sender` has sent last.
+    /// Fails the run, which holds [too much](Held::is_too_much). `sender` is the sender of the last bytes.
     ///
     /// # Panics
     ///
-    /// Unless this thread panics already: a value that is dropped while it unwinds may send again.
+    /// Always, except while this thread panics already: a value that is dropped during the unwinding may send again.
     #[cold]
     #[inline(never)]
     #[expect(clippy::panic, reason = "the run would take all memory; names the sender, and the way out")]

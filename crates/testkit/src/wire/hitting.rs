@@ -1,4 +1,4 @@
-//! Packets that laws hit, in a run.
+//! Laws of a run, which hit packets.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -17,47 +17,49 @@ use crate::hit::Segment;
 use crate::hit::{Laws, PacketLaw, Seen, SentPacket, Verdict};
 use crate::trace::PacketName;
 
-/// The laws of a run, and what they do.
+/// The laws of a run, and what they have done.
 pub(super) struct Hitting<A> {
     paths: BTreeMap<Path, OnPath>,
     pub(super) exits: Exits<A>,
-    /// Whether the packet that is offered is to be dropped: what the filters of the links ask.
+    /// Whether to drop the packet being offered. Read by the filters of the links.
     drops: Arc<AtomicBool>,
 }
 
-/// The laws of a path.
+/// The laws of a path, and their counts.
 struct OnPath {
     from: String,
     to: String,
     laws: Vec<Running>,
     seen: Seen,
-    /// How many packets were judged.
+    /// Number of packets judged.
     judged: u64,
-    /// How many of them were hit.
+    /// Number of packets hit.
     hit: u64,
 }
 
+/// A law of a path, in the order in which the laws were given.
 struct Running {
     name: String,
     law: Box<dyn PacketLaw + Send>,
+    /// Random stream of the law.
     stream: Stream,
     hit: u64,
 }
 
-/// What a law did in a run.
+/// Report of what a law did in a run.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct HitCount {
     pub(crate) from: String,
     pub(crate) to: String,
-    /// The law: its words, or where it was given.
+    /// Name of the law: its words, or the place where the test gave the law.
     pub(crate) name: String,
     pub(crate) hit: u64,
-    /// How many packets it was asked about.
+    /// Number of packets about which the law was asked.
     pub(crate) judged: u64,
 }
 
 impl HitCount {
-    /// In words: `client -> server: drop first SYN: hit 1 of 12 packets`.
+    /// Returns the report in words: `client -> server: drop first SYN: hit 1 of 12 packets`.
     pub(crate) fn words(&self) -> String {
         let Self { from, to, name, hit, judged } = self;
         let hit = if *hit == 0 { "nothing".to_owned() } else { hit.to_string() };
@@ -66,12 +68,13 @@ impl HitCount {
 }
 
 impl<A: Clone + Send + Sync + 'static> Hitting<A> {
-    /// The laws as they begin, and the network with them; `None` if there are none.
+    /// Returns the laws in their initial state, and the network with the filters of the laws. `None` if there are no laws.
     pub(super) fn new(laws: &Laws, names: &[String], seed: u64, network: Network<Box<Parcel<A>>>) -> (Option<Box<Self>>, Network<Box<Parcel<A>>>) {
         let mut hitting = Self { paths: BTreeMap::new(), exits: Exits::default(), drops: Arc::default() };
         let mut network = network;
         for given in laws.iter() {
             let Path { from, to } = given.path;
+            // A path needs only one filter for all its laws: the verdict is passed through `drops`.
             if !hitting.paths.contains_key(&given.path) {
                 let drops = Arc::clone(&hitting.drops);
                 network = network.with_filter(from, to, move |_| drops.load(Ordering::Relaxed)).expect("the hosts of laws are checked");
@@ -80,7 +83,7 @@ impl<A: Clone + Send + Sync + 'static> Hitting<A> {
                 let [from, to] = [from, to].map(|host| names[host.index()].clone());
                 OnPath { from, to, laws: Vec::new(), seen: Seen::default(), judged: 0, hit: 0 }
             });
-            // Names of links have no blanks, and so no such label.
+            // Names of links contain no blanks, so no link has this label.
             let label = format!("law {} of {}->{}", on_path.laws.len(), on_path.from, on_path.to);
             let stream = Stream::new(seed, label.as_bytes());
             on_path.laws.push(Running { name: given.name.clone(), law: given.fresh(), stream, hit: 0 });
@@ -90,7 +93,7 @@ impl<A: Clone + Send + Sync + 'static> Hitting<A> {
 }
 
 impl<A: Clone> Hitting<A> {
-    /// Asks the laws about a packet before it is offered to its link.
+    /// Asks the laws about a packet before the packet is offered to its link. The first verdict other than `Pass` counts.
     pub(super) fn judge(&mut self, packet: PacketName, at: Instant, bytes: &[u8]) -> Verdict {
         let Some(on_path) = self.paths.get_mut(&packet.path) else { return Verdict::Pass };
         #[cfg(feature = "tcp")]
@@ -115,7 +118,7 @@ impl<A: Clone> Hitting<A> {
         };
         let mut verdict = Verdict::Pass;
         on_path.judged += 1;
-        // All are asked, so that each that counts has met every packet.
+        // Every law is asked, so that a law that counts has seen every packet.
         for running in &mut on_path.laws {
             let said = running.law.judge(&sent, &mut running.stream.packet(packet.sequence).draws(Purpose::Loss));
             if said != Verdict::Pass && verdict == Verdict::Pass {
@@ -131,12 +134,12 @@ impl<A: Clone> Hitting<A> {
         verdict
     }
 
-    /// How many packets of a path were hit.
+    /// Returns how many packets of `path` were hit.
     pub(super) fn hits(&self, path: Path) -> u64 {
         self.paths.get(&path).map_or(0, |on_path| on_path.hit)
     }
 
-    /// What each law did.
+    /// Returns what each law has done so far.
     pub(super) fn counts(&self) -> Vec<HitCount> {
         let of = |(path, on_path): (&Path, &OnPath)| {
             let mut waiting = String::new();

@@ -1,7 +1,7 @@
-//! The wire between the hosts of a run: one network with its faults, its changes, and the record of its packets.
+//! The network between the hosts of a run, with its faults, its changes, and the record of its packets.
 //!
-//! Sockets ([`core`](crate::core)) and state machines ([`node`](crate::node)) hand packets in with [`Wire::offer`] and take those that arrive with
-//! [`Wire::poll`], until it gives `None`, after each packet and whenever time has passed.
+//! Sockets ([`core`](crate::core)) and state machines ([`node`](crate::node)) hand packets in with [`Wire::offer`]. They take arrived packets with
+//! [`Wire::poll`], until the result is `None`, after each packet and whenever time has passed.
 
 mod exits;
 mod held;
@@ -30,7 +30,7 @@ use crate::seed::hash;
 use crate::settings::Settings;
 use crate::trace::{Happening, Lost, PacketName};
 
-/// The earlier of two instants that may not be there.
+/// Returns the earlier of two optional instants.
 #[inline]
 pub(crate) fn earlier(one: Option<Instant>, other: Option<Instant>) -> Option<Instant> {
     match (one, other) {
@@ -42,15 +42,15 @@ pub(crate) fn earlier(one: Option<Instant>, other: Option<Instant>) -> Option<In
 pub(crate) struct Wire<A> {
     now: Instant,
     network: Network<Box<Parcel<A>>>,
-    /// Links that become other ones, in order of time.
+    /// Changes of links that are still to come, sorted by time.
     changes: VecDeque<LinkChange>,
-    /// The ways that are cut.
+    /// Paths that are cut.
     cut: BTreeSet<Path>,
-    /// Bytes that the run holds, on links and with sockets and nodes.
+    /// Bytes that the run holds, on links and at sockets and nodes.
     pub(crate) held: Held,
-    /// Whether packets are hit or recorded.
+    /// Whether packets are hit by laws or recorded.
     is_watched: bool,
-    /// Where packets are hit.
+    /// State of the laws that hit packets; `None` if there are no laws.
     hitting: Option<Box<Hitting<A>>>,
     recording: Recording,
     /// Effects of chance so far.
@@ -89,21 +89,21 @@ impl<A: Clone> Wire<A> {
         self.now
     }
 
-    /// Sets the time, which does not go back, and says whether it has moved.
+    /// Sets the time, which never goes back. Returns whether the time has moved.
     pub(crate) fn set_now(&mut self, now: Instant) -> bool {
         let has_moved = now > self.now;
         self.now = self.now.max(now);
         has_moved
     }
 
-    /// When the network must be woken, or a link changes.
+    /// Returns the next instant at which the network has an event, a link changes, or a delayed packet arrives.
     pub(crate) fn next(&self) -> Option<Instant> {
         let change = self.changes.front().map(|change| change.at);
         let late = self.hitting.as_ref().and_then(|hitting| hitting.exits.next());
         earlier(earlier(self.network.poll_timeout(), change), late)
     }
 
-    /// Changes the next link that is to change by now, and says whether there was one.
+    /// Performs the next change of a link that is due. Returns whether there was one.
     pub(crate) fn change_next(&mut self) -> bool {
         if self.changes.front().is_none_or(|change| change.at > self.now) {
             return false;
@@ -113,7 +113,7 @@ impl<A: Clone> Wire<A> {
         true
     }
 
-    /// Lets the events happen that are due on the links, and says whether there were any.
+    /// Lets the due events of the links happen. Returns whether there were any, or delayed packets are due.
     pub(crate) fn pass(&mut self) -> bool {
         let is_due = self.network.poll_timeout().is_some_and(|at| at <= self.now);
         if is_due {
@@ -123,12 +123,12 @@ impl<A: Clone> Wire<A> {
         is_due || self.hitting.as_ref().and_then(|hitting| hitting.exits.next()).is_some_and(|at| at <= self.now)
     }
 
-    /// The name of the next packet that is offered to a link.
+    /// Returns the name that the next packet offered to the link of `path` will have.
     pub(crate) fn next_packet(&self, path: Path) -> PacketName {
         PacketName { path, sequence: self.network.offered(path.from, path.to).unwrap_or(0), copy: 0 }
     }
 
-    /// Hands a packet to its link, and says whether [`Wire::poll`] may give something. It fails if the way is cut.
+    /// Hands a packet to its link. Returns whether [`Wire::poll`] may have a packet now. Fails if the path is cut.
     #[inline(always)]
     pub(crate) fn offer(&mut self, path: Path, parcel: Box<Parcel<A>>) -> Result<bool, Lost> {
         if self.is_watched || !self.cut.is_empty() {
@@ -138,16 +138,16 @@ impl<A: Clone> Wire<A> {
         let info = PacketInfo { size: cohaptic_units::Bytes::new(parcel.bytes.len() as u64), ecn_capable: parcel.ecn_capable };
         let offered = self.network.handle_packet_timed(self.now, path, info, parcel);
         debug_assert!(offered.is_ok(), "hosts are checked, and time does not go back");
-        // All that was due has been polled: only this packet may have come out.
+        // Everything that was due before has been polled, so only this packet can have come out of its link.
         Ok(self.is_watched || !matches!(offered, Ok(Some(at)) if at > self.now))
     }
 
-    /// Notes that a packet is offered to its link, and judges it. It fails if its way is cut.
+    /// Records that a packet is offered to its link, and asks the laws about the packet. Fails if the path is cut.
     #[inline(never)]
     fn note_offer(&mut self, path: Path, parcel: &Parcel<A>) -> Result<(), Lost> {
         let packet = self.next_packet(path);
         if self.cut.contains(&path) {
-            // It does not reach the link, so that it uses up none of the link's numbers.
+            // The packet does not reach the link, so it uses up none of the link's sequence numbers.
             self.note(Happening::Lost { packet, why: Lost::Cut });
             return Err(Lost::Cut);
         }
@@ -164,11 +164,11 @@ impl<A: Clone> Wire<A> {
         Ok(())
     }
 
-    /// The next packet that has arrived. What becomes of it is told by [`Wire::ends`].
+    /// Returns the next arrived packet. The caller reports the end of the packet with [`Wire::ends`].
     #[inline(always)]
     pub(crate) fn poll(&mut self) -> Option<Box<Parcel<A>>> {
         if !self.is_watched {
-            // Of a packet that can only arrive its network tells less, and faster: what else it tells of each takes a fifth of the time of a datagram.
+            // Nothing is watched, so a packet that can only arrive needs no full event, which costs more to make.
             let Self { network, cut, held, .. } = self;
             let arrived = network.take_mere_arrival(|event| {
                 let (path, sequence, at, mut parcel) = (event.path, event.sequence, event.at, event.payload);
@@ -184,7 +184,7 @@ impl<A: Clone> Wire<A> {
         self.poll_event()
     }
 
-    /// As [`Wire::poll`], of packets to which more may happen than that they arrive, or of which more is recorded.
+    /// Like [`Wire::poll`], for packets that can have fates other than an arrival, or that are recorded.
     #[inline(never)]
     fn poll_event(&mut self) -> Option<Box<Parcel<A>>> {
         loop {
@@ -192,6 +192,7 @@ impl<A: Clone> Wire<A> {
             let packet = PacketName { path: event.path, sequence: event.sequence, copy: event.copy };
             self.recording.keep(&event);
             let cost = Held::cost(event.payload.bytes.len());
+            // An event that is no end is a copy: the run then holds one more packet.
             if event.fate.is_end() {
                 self.held.remove(Where::Links, cost)
             } else {
@@ -205,7 +206,7 @@ impl<A: Clone> Wire<A> {
                     let (marked, is_cut) = (event.marked, self.cut.contains(&event.path));
                     let mut parcel = event.payload;
                     if let Some(damage) = &event.damage {
-                        // A copy of it may be on its way still, undamaged.
+                        // A copy that shares these bytes may still be under way, undamaged.
                         let mut bytes = Vec::from(std::mem::take(&mut parcel.bytes));
                         damage.apply(&mut bytes);
                         parcel.bytes = Octets::Own(bytes);
@@ -224,14 +225,14 @@ impl<A: Clone> Wire<A> {
         }
     }
 
-    /// What comes out next of the links, and of what was kept behind them.
+    /// Returns the next event of the links, or of the packets kept after their links.
     #[inline]
     fn poll_out(&mut self) -> Option<Out<A>> {
         let Some(hitting) = &mut self.hitting else { return self.network.poll_event().map(counted) };
         hitting.exits.poll_with(&mut self.network, self.now)
     }
 
-    /// Notes whether a packet that its link has delivered has reached a program.
+    /// Records whether a packet delivered by its link has reached a program.
     pub(crate) fn ends(&mut self, packet: PacketName, at: Instant, end: Result<(), Lost>) {
         let what = match end {
             Ok(()) => Happening::Arrived { packet },
@@ -240,11 +241,11 @@ impl<A: Clone> Wire<A> {
         self.recording.note(at, what);
     }
 
-    /// Makes a link another one.
+    /// Replaces the link of `path` from the instant `at` on.
     pub(crate) fn set_link(&mut self, at: Instant, path: Path, link: LinkModel) {
         let changed = self.network.set_link(at, path.from, path.to, link);
         debug_assert_eq!(changed, Ok(()), "hosts are checked, and time does not go back");
-        // Random numbers of the new link are not in the words with which the run began.
+        // The new link draws random numbers that the words at the beginning of the run do not describe.
         self.drawn.has_drawn = true;
         self.recording.note(at, Happening::Relinked(path));
     }
@@ -260,7 +261,7 @@ impl<A: Clone> Wire<A> {
         std::mem::take(&mut self.cut).into_iter().for_each(|path| self.note(Happening::Mended(path)));
     }
 
-    /// `None` if both are one host.
+    /// Returns the statistics of a link, or `None` if both ends are the same host.
     pub(crate) fn link_stats(&self, path: Path) -> Option<LinkStats> {
         self.network.link_stats(path.from, path.to)
     }
@@ -274,19 +275,19 @@ impl<A: Clone> Wire<A> {
         &self.recording
     }
 
-    /// How many packets of a path were hit.
+    /// Returns how many packets of `path` were hit by laws.
     pub(crate) fn hits(&self, path: Path) -> u64 {
         self.hitting.as_ref().map_or(0, |hitting| hitting.hits(path))
     }
 
-    /// What was recorded so far. Packets that are on their way are followed to their end, in the fates alone, as if nothing more were sent.
+    /// Returns the record of the run so far. Packets under way are followed to their end, for the fates only, as if nothing more were sent.
     pub(crate) fn recorded(&self) -> Recorded {
         let exits = self.hitting.as_ref().map(|hitting| hitting.exits.clone()).unwrap_or_default();
         let (packets, ended) = (self.recording.followed_through(&self.network, exits, self.now), self.now);
         Recorded { trace: self.recording.trace().clone(), packets, ended, hits: self.hit_counts(), drawn: self.drawn.clone() }
     }
 
-    /// What each law did.
+    /// Returns what each law has done so far.
     pub(crate) fn hit_counts(&self) -> Vec<HitCount> {
         self.hitting.as_ref().map(|hitting| hitting.counts()).unwrap_or_default()
     }

@@ -1,4 +1,4 @@
-//! What travels, in memory that is used again.
+//! Packets of a run, in memory that is reused.
 
 use std::ops::Deref;
 
@@ -8,26 +8,26 @@ use cohaptic_wan::{NodeId, Path};
 
 use crate::trace::PacketName;
 
-/// What travels: bytes, and the addresses that their owner writes on them. It is in a box that goes from the sender through its link and the buffer of the other socket to the
-/// program that reads, so that one word is moved.
+/// Packet: bytes, and the addresses that the sender writes on the packet. A parcel is boxed on its whole way, from the sender through the link and the buffer
+/// of the receiving socket to the reading program, so that only a pointer is moved.
 #[derive(Clone, Debug)]
 pub(crate) struct Parcel<A> {
     pub(crate) addresses: A,
     pub(crate) bytes: Octets,
-    /// Whether its sender understands marks.
+    /// Whether the sender understands congestion marks.
     pub(crate) ecn_capable: bool,
-    /// Of a parcel that its link has delivered; else whatever was there before.
+    /// Report of the link. Valid only for a parcel that its link has delivered.
     pub(crate) arrival: Arrival,
 }
 
-/// What a link says of a packet that it has delivered.
+/// Report of a link about a packet that it has delivered.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Arrival {
     pub(crate) packet: PacketName,
     pub(crate) at: Instant,
-    /// Whether an active queue marked it.
+    /// Whether an active queue marked the packet.
     pub(crate) marked: bool,
-    /// Whether the way of the packet is cut, so that it is lost here.
+    /// Whether the path of the packet is cut, so that the packet is lost on arrival.
     pub(crate) is_cut: bool,
 }
 
@@ -38,12 +38,12 @@ impl<A> Parcel<A> {
     }
 }
 
-/// What a packet carries.
+/// Content of a packet.
 #[derive(Clone, Debug)]
 pub(crate) enum Octets {
-    /// Of a datagram that a socket sent: the memory goes back to [`Spare`] when it was read.
+    /// Content of a datagram that a socket sent. Its memory goes back to [`Spare`] when the datagram was read.
     Own(Vec<u8>),
-    /// Of anything else.
+    /// Content of every other packet.
     Shared(Bytes),
 }
 
@@ -90,7 +90,7 @@ impl From<Octets> for Vec<u8> {
 }
 
 impl Octets {
-    /// Makes them a copy of others, in their own memory if they have some.
+    /// Replaces the content with a copy of `bytes`, in memory of its own if it has some.
     #[inline]
     fn refill(&mut self, bytes: &[u8]) {
         match self {
@@ -104,7 +104,7 @@ impl Octets {
     }
 }
 
-/// Parcels that were read, with their memory.
+/// Parcels that were read, kept with their memory for later packets.
 #[derive(Debug)]
 pub(crate) struct Spare<A>(Vec<Box<Parcel<A>>>);
 
@@ -115,21 +115,22 @@ impl<A> Default for Spare<A> {
 }
 
 impl<A: Default> Spare<A> {
-    /// The largest number that is kept, and the longest \[bytes\]: a megabyte at most.
+    /// Largest number of parcels kept.
     const MOST: usize = 512;
+    /// Largest capacity of the content of a kept parcel \[bytes\]. With [`MOST`](Self::MOST) this limits the kept memory to a megabyte.
     const LONGEST: usize = 2048;
 
-    /// A parcel with a copy of what a program sends.
+    /// Returns a parcel with a copy of `bytes`.
     #[inline(always)]
     pub(crate) fn copied(&mut self, addresses: A, bytes: &[u8], ecn_capable: bool) -> Box<Parcel<A>> {
-        // The addresses are given to no call, so that they are written once, in their place.
+        // The addresses are stored directly, and passed to no further call, so that they are written only once.
         let mut parcel = self.0.pop().unwrap_or_else(empty);
         (parcel.addresses, parcel.ecn_capable) = (addresses, ecn_capable);
         parcel.bytes.refill(bytes);
         parcel
     }
 
-    /// A parcel of anything else.
+    /// Returns a parcel that shares `bytes`.
     #[cfg(feature = "tcp")]
     pub(crate) fn wrapped(&mut self, addresses: A, bytes: Bytes, ecn_capable: bool) -> Box<Parcel<A>> {
         let mut parcel = self.0.pop().unwrap_or_else(empty);
@@ -137,7 +138,7 @@ impl<A: Default> Spare<A> {
         parcel
     }
 
-    /// What was read.
+    /// Takes back a parcel that was read. Drops the parcel if enough are kept, and its content if it is shared or too long.
     #[inline]
     pub(crate) fn put(&mut self, mut parcel: Box<Parcel<A>>) {
         if self.0.len() >= Self::MOST {
@@ -150,7 +151,7 @@ impl<A: Default> Spare<A> {
     }
 }
 
-/// A new parcel, of which all is to be written.
+/// Returns a new parcel, all of whose fields the caller sets.
 #[cold]
 #[inline(never)]
 fn empty<A: Default>() -> Box<Parcel<A>> {

@@ -1,4 +1,4 @@
-//! The record of a run.
+//! Record of a run.
 
 use std::sync::Arc;
 
@@ -12,32 +12,34 @@ use crate::again::Drawn;
 use crate::names::Names;
 use crate::trace::{Happening, Trace};
 
-/// The record of a run, as far as it is asked for.
+/// Record of a run: the trace and the packets, each only if asked for.
 #[derive(Debug)]
 pub(crate) struct Recording {
     trace: Trace,
     packets: Vec<Seen>,
+    /// Whether happenings are recorded.
     pub(crate) traces: bool,
+    /// Whether the trace holds digests of the contents of packets.
     pub(super) digests: bool,
     keeps_packets: bool,
 }
 
-/// What became of a packet on its link, with its bytes.
+/// Fate of a packet on its link, with the content of the packet.
 pub(crate) type Seen = PacketEvent<Bytes, Path>;
 
-/// What was recorded of a run.
+/// Copy of the record of a run.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Recorded {
     pub(crate) trace: Trace,
     pub(crate) packets: Vec<Seen>,
-    /// When the run ended.
+    /// Instant of the end of the run.
     pub(crate) ended: Instant,
     /// What each law did.
     pub(crate) hits: Vec<HitCount>,
     pub(crate) drawn: Drawn,
 }
 
-/// No link holds a packet for longer than this many of its events.
+/// Bound for following packets to their ends: after this many events of the network a packet is taken to be stuck.
 const MOST_EVENTS: u32 = 10_000_000;
 
 impl Recording {
@@ -46,7 +48,7 @@ impl Recording {
         Self { trace: Trace::new(hosts), packets: Vec::new(), traces, digests, keeps_packets }
     }
 
-    /// Whether anything is recorded.
+    /// Returns whether anything is recorded.
     #[inline]
     pub(super) const fn is_on(&self) -> bool {
         self.traces || self.keeps_packets
@@ -66,12 +68,12 @@ impl Recording {
         }
     }
 
-    /// What happened so far.
+    /// Returns the trace so far.
     pub(crate) const fn trace(&self) -> &Trace {
         &self.trace
     }
 
-    /// The packets that have been recorded, and the ends of those that are in this network and behind it, from `now` on.
+    /// Returns the recorded packets. Appends the ends of the packets that are still in `network` or in `exits`, from `now` on.
     pub(super) fn followed_through<A: Clone>(&self, network: &Network<Box<Parcel<A>>>, mut exits: Exits<A>, mut now: Instant) -> Vec<Seen> {
         let mut packets = self.packets.clone();
         if !self.keeps_packets {
@@ -96,7 +98,7 @@ impl Recording {
     }
 }
 
-/// What a link says of a packet, as the row of its log.
+/// Converts an event of a link to a row of the packet log.
 fn seen<A>(out: &Out<A>) -> Seen {
     PacketEvent { record: out.record, payload: out.payload.bytes.clone().into(), damage: out.damage.clone() }
 }
