@@ -1,4 +1,4 @@
-//! Runs that are given up: nothing will ever happen, or the run does not end.
+//! Ends of runs that are given up: nothing will ever happen, or the run does not end.
 
 use std::fmt::Write as _;
 
@@ -8,7 +8,7 @@ use crate::core::{Core, Shared};
 use crate::settings::Reached;
 use crate::task::Tasks;
 
-/// Lines of a kind that a message has at most.
+/// Maximum number of lines of each kind in a message.
 const SHOWN: usize = 8;
 
 fn write_lines<T: std::fmt::Display>(text: &mut String, what: &str, lines: impl ExactSizeIterator<Item = T>) {
@@ -22,7 +22,8 @@ fn write_lines<T: std::fmt::Display>(text: &mut String, what: &str, lines: impl 
     }
 }
 
-/// Returns a line for each task with the things that the task waits for, and since when; then a line for each socket that a task waits for.
+/// Returns a line for each waiting task, with the things that the task waits for and the instant since which it waits. A line for each socket that a task waits
+/// for follows.
 fn who_waits(core: &Core, tasks: &Tasks) -> String {
     let mut text = String::new();
     write_lines(&mut text, "", tasks.waiting().iter().map(|task| task.waits(core)));
@@ -30,7 +31,7 @@ fn who_waits(core: &Core, tasks: &Tasks) -> String {
     text
 }
 
-/// Tells that nothing will ever happen any more.
+/// Fails the run, because nothing will ever happen any more.
 ///
 /// # Panics
 ///
@@ -44,7 +45,7 @@ pub(super) fn nothing_will_happen(shared: &Shared, tasks: &Tasks) -> ! {
     );
 }
 
-/// Tells that a run does not end.
+/// Fails the run, because the run does not end. `limit` is the limit that was reached.
 ///
 /// # Panics
 ///

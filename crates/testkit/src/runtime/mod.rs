@@ -1,4 +1,4 @@
-//! The executors: they poll tasks and let time pass.
+//! Executors: they poll tasks and let time pass.
 
 mod limits;
 #[cfg(feature = "tokio")]

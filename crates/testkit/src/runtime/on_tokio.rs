@@ -1,7 +1,7 @@
-//! Tokio as the executor, with packets that arrive to the nanosecond.
+//! Tokio as the executor of a run. Packets arrive to the nanosecond all the same.
 //!
-//! Tokio's paused clock jumps to the next of its timers whenever all tasks wait, and its timers are counted in whole milliseconds since the runtime was built. So
-//! the clock must be moved by hand within a millisecond, and back to a whole one before tokio is left to jump:
+//! Tokio's paused clock jumps to the next of tokio's timers whenever all tasks wait. Tokio's timers count whole milliseconds since the runtime was built. Hence
+//! the clock must be moved by hand within a millisecond, and to a whole millisecond before tokio may jump:
 //!
 //! ```text
 //!   all wait ──► something due within this millisecond? ── yes ─► advance to it
@@ -11,8 +11,9 @@
 //!                let tokio jump: a timer of ours stands at the millisecond in which the next event is
 //! ```
 //!
-//! That all wait, tokio tells by the hook that it calls before it parks its thread. The hook moves the clock, from event to event as long as none of them
-//! wakes a task; so tokio does not park then. Where tokio is to jump, the hook wakes a task of ours, the pump, which sets the timer.
+//! Tokio calls a hook before it parks its thread, which means that all tasks wait. The hook moves the clock from event to event, as long as none of the events
+//! wakes a task, so tokio does not park meanwhile. If tokio is to jump, the hook wakes a task of this module, the pump, which sets the timer to which tokio
+//! jumps.
 
 use std::cell::RefCell;
 use std::future::{Future, poll_fn};
@@ -37,33 +38,34 @@ use crate::task::{JoinHandle, Tasks};
 use crate::watch::Watched;
 use crate::wire::Recorded;
 
-/// A millisecond \[ns\]: what tokio's timers are counted in.
+/// Unit of tokio's timers: a millisecond \[ns\].
 const TICK: u64 = 1_000_000;
 
-/// If tokio has jumped so far because there was nothing else to jump to, nothing will ever happen.
+/// Distance of the timer that is set when there is no next event. If tokio jumps that far, nothing will ever happen.
 const NEVER: Duration = Duration::from_secs(365 * 24 * 3600);
 
-/// Stands for no instant at all: never.
+/// Value of an atomic instant that stands for no instant.
 const NO_INSTANT: u64 = u64::MAX;
 
-/// How many tasks are polled before tokio goes on: as many as it polls of a `LocalSet`.
+/// Maximum number of tasks polled before tokio goes on. Equal to the number that tokio polls of a `LocalSet`.
 const POLLS: u32 = 61;
 
-/// What the hook and the pump share.
+/// State shared by the hook and the pump.
 struct Idle {
-    /// The instant for which the pump has set its timer \[ns\].
+    /// Instant for which the pump has set its timer \[ns\], or [`NO_INSTANT`].
     armed: AtomicU64,
-    /// The pump is to set its timer anew.
+    /// Whether the pump must set its timer anew.
     is_wanted: AtomicBool,
-    /// Where the hook has left the clock \[ns\], if nothing runs between it and the executor that could move it; else [`NO_INSTANT`].
+    /// Reading at which the hook has left the clock \[ns\], if nothing that could move the clock runs between the hook and the executor; otherwise
+    /// [`NO_INSTANT`].
     moved: AtomicU64,
-    /// The last instant of the run.
+    /// Last instant of the run: its time limit.
     until: Instant,
-    /// The time when tokio parked last \[ns\].
+    /// Instant at which tokio last parked its thread \[ns\].
     parked: AtomicU64,
-    /// Tokio jumps to where nothing will ever have happened: in several jumps, since its timers do not reach so far.
+    /// Whether tokio is jumping to an instant at which nothing will ever have happened. Tokio's timers do not reach that far, so this takes several jumps.
     is_idle: AtomicBool,
-    /// Wakes the pump, and the executor.
+    /// Wakes the pump and the executor, which share a task.
     main: Mutex<Option<Waker>>,
 }
 
@@ -80,7 +82,7 @@ impl Idle {
         }
     }
 
-    /// Wakes the executor, which is polled next: tokio polls the future of its `block_on` before tasks.
+    /// Wakes the executor. It is polled next, because tokio polls the future of `block_on` before its tasks. `now` is the reading of the clock.
     fn wake(&self, now: Instant) {
         self.moved.store(now.as_nanos(), Ordering::Relaxed);
         if let Some(main) = &*self.main.lock().unwrap_or_else(PoisonError::into_inner) {
@@ -88,20 +90,21 @@ impl Idle {
         }
     }
 
-    /// Returns whether the run is beyond its time limit: tasks of tokio alone may keep it going, which the executor does not see.
+    /// Returns whether the run is beyond its time limit. Tasks of tokio alone may keep the run going, and the executor does not see such tasks.
     fn must_end(&self, core: &mut Core) -> bool {
         let (parked, now) = (self.parked.load(Ordering::Relaxed), core.now());
         self.parked.store(now.as_nanos(), Ordering::Relaxed);
         if now <= self.until {
             return false;
         }
+        // A jump of this length has no other cause than the timer for "no event". The run is then reported as waiting for ever, not as beyond its limit.
         if now.saturating_duration_since(Instant::from_nanos(parked)) > NEVER / 2 && core.next_event().is_none() {
             self.is_idle.store(true, Ordering::Relaxed);
         }
         !self.is_idle.load(Ordering::Relaxed)
     }
 
-    /// Tokio is about to park its thread: all wait.
+    /// Called when tokio is about to park its thread, because all tasks wait.
     fn notice(&self, shared: &Shared) {
         let is_left_something = shared.is_left_something();
         if let Some(now) = shared.with(|core| self.move_clock(core, is_left_something)) {
@@ -109,20 +112,20 @@ impl Idle {
         }
     }
 
-    /// Moves the clock, from event to event as long as none of them wakes a task. Gives the time if the executor is to be woken.
+    /// Moves the clock from event to event, as long as none of the events wakes a task. Returns the time if the executor must be woken.
     fn move_clock(&self, core: &mut Core, is_left_something: bool) -> Option<Instant> {
         if self.must_end(core) || is_left_something {
             return Some(core.now());
         }
         loop {
             let (now, next) = (core.now(), core.next_event());
-            // Tokio has jumped over it, or it was moved to.
+            // The event is due if tokio has jumped over it, or the clock was moved to it below.
             let is_due = next.is_some_and(|next| next <= now);
             if is_due {
                 core.pass(now);
             }
             if is_any_ready() {
-                // What woke one has woken the executor.
+                // The waker of the task has woken the executor as well.
                 self.moved.store(core.now().as_nanos(), Ordering::Relaxed);
                 return None;
             }
@@ -135,7 +138,7 @@ impl Idle {
             let Some(to) = step(now, next) else { break };
             advance(to.saturating_duration_since(now));
             if floor(to) == to {
-                // What tokio has for this millisecond goes off first.
+                // Tokio's own timers of this millisecond go off first.
                 return Some(to);
             }
             core.pass(to);
@@ -148,17 +151,17 @@ impl Idle {
     }
 }
 
-/// The whole millisecond in which an instant lies.
+/// Returns the whole millisecond at or before an instant.
 const fn floor(at: Instant) -> Instant {
     Instant::from_nanos(at.as_nanos() / TICK * TICK)
 }
 
-/// For when the pump sets its timer if that is the next event.
+/// Returns the instant for which the pump sets its timer \[ns\] if `next` is the next event.
 fn armed(next: Option<Instant>) -> u64 {
     next.map_or(NO_INSTANT, |next| floor(next).as_nanos())
 }
 
-/// Up to when the clock is to be moved by hand; `None` if tokio may jump.
+/// Returns the instant to which the clock must be moved by hand, or `None` if tokio may jump.
 fn step(now: Instant, next: Option<Instant>) -> Option<Instant> {
     let whole = floor(now).saturating_add_nanos(TICK);
     match next {
@@ -207,7 +210,7 @@ where
         .build()
         .unwrap_or_else(|error| panic!("tokio cannot be started: {error}"));
     let guard = runtime.enter();
-    // The clock stands still, so this is the instant from which tokio counts milliseconds.
+    // The clock stands still, so this is the instant from which tokio counts its milliseconds.
     let origin_of_time = tokio::time::Instant::now();
     let executor = Executor::new();
     let mut core = core;
@@ -220,7 +223,8 @@ where
     let _recorder = Recorder { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks), recorded };
     let _ = known.set(Arc::clone(&shared));
     runtime.block_on(async {
-        // Tasks that the program starts with tokio's `spawn_local` live in this set. It is polled when it is woken, which `run_until` does each time.
+        // Tasks that the program starts with tokio's `spawn_local` live in this set. `drive` polls the set whenever the set was woken, as `LocalSet::run_until`
+        // does.
         let mut set = LocalSet::new();
         let _local = set.enter();
         let _here = shared.stay();
@@ -235,7 +239,7 @@ where
     })
 }
 
-/// Polls tasks until the program is over. It is not generic as [`run`] is, so that it is compiled once, with the test kit.
+/// Polls tasks until the program is over. Unlike [`run`], this function is not generic, so that it is compiled only once, with the test kit.
 async fn drive(
     executor: &Executor,
     shared: &Shared,
@@ -259,7 +263,7 @@ async fn drive(
         let moved = idle.moved.swap(NO_INSTANT, Ordering::Relaxed);
         idle.is_idle.store(false, Ordering::Relaxed);
         let synced = shared.sync((moved != NO_INSTANT).then(|| Instant::from_nanos(moved)));
-        // Time does not pass before the end of the turn.
+        // Time does not pass before the end of this turn.
         let now = shared.now();
         let mut left = POLLS;
         let all_wait = executor.run_some(now, || {
@@ -275,9 +279,9 @@ async fn drive(
             return Poll::Ready(());
         }
         if all_wait {
-            // The task never ends.
+            // The pump is a future that never ends.
             let _: Poll<()> = pump.as_mut().poll(cx);
-            // Messages of other threads and tasks of tokio have not been looked at yet where no task was polled.
+            // `attend` runs after each polled task. If no task was polled, acts of other threads and of tasks of tokio have not been looked at yet.
             if left == POLLS {
                 shared.attend();
             }
@@ -289,7 +293,7 @@ async fn drive(
         }
         drop(synced);
         if woken.is_woken.swap(false, Ordering::Relaxed) {
-            // Without tasks it is over, until there is one.
+            // A set without tasks is ready; it is polled again once it has a task.
             let _: Poll<()> = Pin::new(&mut *set).poll(&mut Context::from_waker(&Arc::clone(woken).into()));
         }
         Poll::Pending
@@ -297,7 +301,7 @@ async fn drive(
     poll_fn(|cx| __rust_begin_short_backtrace(|| turn(cx))).await;
 }
 
-/// Wakes the executor, which polls the set then.
+/// Waker of the set of local tasks: marks the set and wakes the executor, which then polls the set.
 struct SetWaker {
     is_woken: AtomicBool,
     main: Waker,
@@ -314,14 +318,14 @@ impl Wake for SetWaker {
     }
 }
 
-/// Sets the timer to which tokio may jump, and tells when nothing will ever happen.
+/// Sets the timer to which tokio may jump. Fails the run when nothing will ever happen.
 async fn pump(shared: &Shared, tasks: &Tasks, idle: &Idle, origin: tokio::time::Instant) {
     let mut timer = pin!(tokio::time::sleep_until(origin + NEVER));
-    // When the timer goes off, since the run began.
+    // Deadline of the timer, since the beginning of the run.
     let mut due = NEVER;
     poll_fn(|cx| {
         let since = Duration::from_nanos(shared.now().as_nanos());
-        // Most often the hook moves the clock by hand, and the timer stands where it did.
+        // Most often the hook has moved the clock by hand, and the timer need not be changed.
         if !idle.is_wanted.load(Ordering::Relaxed) && since < due {
             return Poll::Pending;
         }
@@ -336,7 +340,8 @@ async fn pump(shared: &Shared, tasks: &Tasks, idle: &Idle, origin: tokio::time::
             if next.is_none() {
                 nothing_will_happen(shared, tasks);
             }
-            // The millisecond of the next event has come, or one before it; the hook does the rest. The timer is not to go off again.
+            // The clock has reached the millisecond of the next event, or an earlier one; the hook moves it on. The timer is set far away, so that it does not
+            // go off again.
             due = NEVER;
             timer.as_mut().reset(origin + NEVER);
             let _ = timer.as_mut().poll(cx);
@@ -346,9 +351,9 @@ async fn pump(shared: &Shared, tasks: &Tasks, idle: &Idle, origin: tokio::time::
     .await
 }
 
-/// Moves tokio's clock, now. Tokio does not park before it has looked at its timers.
+/// Moves tokio's clock by `span` at once. Tokio looks at its timers before it parks.
 fn advance(span: Duration) {
-    // It moves the clock when it is polled first, and then only lets others go first.
+    // The first poll of `advance` moves the clock. Further polls would only let other tasks run first, so they are not needed.
     let mut moved = pin!(tokio::time::advance(span));
     let _: Poll<()> = Pin::as_mut(&mut moved).poll(&mut Context::from_waker(Waker::noop()));
 }

@@ -1,7 +1,7 @@
-//! The executor of this crate: one thread, and a clock that jumps to the next event, to the nanosecond.
+//! Executor of this crate: one thread, and a clock that jumps to the next event, to the nanosecond.
 //!
-//! All tasks that can go on are polled, in the order in which they were woken, until none can. Then time jumps to the next arrival or timer. At one instant
-//! packets arrive first, then timers go off, in the order in which they were set.
+//! The executor polls all tasks that can go on, in the order in which the tasks were woken, until no task can. Then time jumps to the next arrival or timer. At
+//! one instant packets arrive first, then timers go off, in the order in which they were set.
 
 use std::cell::{Cell, RefCell};
 use std::ops::Deref;
@@ -26,15 +26,15 @@ thread_local! {
     static HERE: Here = const { Here { executor: Cell::new(0), ready: RefCell::new(Vec::new()), main: RefCell::new(None), waits: Cell::new(false) } };
 }
 
-/// What the executor that runs on a thread has there.
+/// State of a thread for the executor that runs on the thread.
 struct Here {
-    /// Its number.
+    /// Number of the executor; 0 if none has run here.
     executor: Cell<u64>,
-    /// The tasks that can go on.
+    /// Indices of the tasks that can go on, in the order in which they were woken.
     ready: RefCell<Vec<usize>>,
-    /// Wakes the executor, where it is itself a task of another one.
+    /// Wakes the executor if it is itself a task of another executor.
     main: RefCell<Option<Waker>>,
-    /// Whether it waits to be woken.
+    /// Whether the executor waits to be woken.
     waits: Cell<bool>,
 }
 
@@ -56,23 +56,25 @@ impl Here {
     }
 }
 
-/// Whether a task can go on of the executor that runs on this thread.
+/// Returns whether a task of the executor of this thread can go on.
 #[cfg(feature = "tokio")]
 pub(crate) fn is_any_ready() -> bool {
     HERE.with(|here| !here.ready.borrow().is_empty())
 }
 
-/// The tasks that other threads have woken.
+/// Tasks that other threads have woken.
 #[derive(Default)]
 struct Elsewhere {
+    /// Whether `woken` may hold tasks. Read without the lock.
     is_any: AtomicBool,
     woken: Mutex<WokenElsewhere>,
 }
 
 #[derive(Default)]
 struct WokenElsewhere {
+    /// Indices of the woken tasks.
     numbers: Vec<usize>,
-    /// Wakes the executor, where it is itself a task of another one.
+    /// Wakes the executor if it is itself a task of another executor.
     main: Option<Waker>,
 }
 
@@ -82,9 +84,10 @@ impl Elsewhere {
     }
 }
 
-/// Where a task is.
+/// Waker of a task: the index of the task, and the executor to which the task belongs.
 struct Place {
     number: usize,
+    /// Whether the task is in a queue already. A task is queued at most once.
     is_queued: AtomicBool,
     executor: u64,
     elsewhere: Arc<Elsewhere>,
@@ -99,7 +102,7 @@ impl Wake for Place {
     fn wake_by_ref(self: &Arc<Self>) {
         let is_here = HERE.try_with(|here| {
             let is_here = here.executor.get() == self.executor;
-            // What another thread does meanwhile to the mark polls the task once in vain, and not too seldom.
+            // Another thread may set the mark between these two lines. The task is then polled once too often; no wake-up is lost.
             if is_here && !self.is_queued.load(Ordering::Relaxed) {
                 self.is_queued.store(true, Ordering::Relaxed);
                 here.push(self.number);
@@ -113,7 +116,7 @@ impl Wake for Place {
 }
 
 impl Place {
-    /// Wakes from another thread. It is a function of its own, so that a task that is woken from this one saves no registers for it.
+    /// Wakes the task from another thread. Not inlined, so that waking on the thread of the executor saves no registers for this path.
     #[inline(never)]
     fn wake_elsewhere(&self) {
         if self.is_queued.swap(true, Ordering::Relaxed) {
@@ -129,26 +132,31 @@ impl Place {
     }
 }
 
-/// The executor.
+/// Executor with its tasks.
 #[derive(Clone)]
 pub(crate) struct Executor(Rc<Inner>);
 
 pub(crate) struct Inner {
+    /// Number of the executor, from 1 on.
     number: u64,
     elsewhere: Arc<Elsewhere>,
+    /// Tasks, by index; `None` at free indices.
     slots: RefCell<Vec<Option<Rc<Slot>>>>,
+    /// Free indices of `slots`.
     free: RefCell<Vec<usize>>,
+    /// Index of the task that was polled last.
     last: Cell<usize>,
-    /// An empty one, for its memory.
+    /// Empty batch, kept for its memory.
     #[cfg(feature = "tokio")]
     batch: Cell<Batch>,
 }
 
-/// The tasks that are polled before those that are woken meanwhile. They are taken from the thread at once: to look there for each took a third of a poll's instructions.
+/// Tasks that are polled before the tasks that are woken meanwhile. The batch is taken out of the thread-local queue as a whole, so that not every poll looks
+/// there.
 #[derive(Default)]
 struct Batch {
     numbers: Vec<usize>,
-    /// The place of the next one.
+    /// Index in `numbers` of the next task.
     next: usize,
 }
 
@@ -160,7 +168,7 @@ impl Batch {
         Some(number)
     }
 
-    /// Gives back those that were not polled: they come first again, and [`is_any_ready`] sees them.
+    /// Puts the tasks that were not polled back to the front of the queue, where [`is_any_ready`] sees them.
     #[cfg(feature = "tokio")]
     fn give_back(&mut self) {
         let left = self.numbers.drain(..).skip(std::mem::take(&mut self.next));
@@ -217,23 +225,23 @@ impl Executor {
         Arc::new(Place { number, is_queued: AtomicBool::new(false), executor: self.number, elsewhere: Arc::clone(&self.elsewhere) })
     }
 
-    /// A waker as tasks have: it only notes that a task goes on, and calls nothing.
+    /// Returns a waker of the kind that tasks have. Such a waker only notes that a task goes on, and calls no foreign code.
     pub(crate) fn waker(&self) -> Waker {
         Waker::from(self.place(usize::MAX))
     }
 
-    /// Polls tasks and lets time pass until `is_over`, which is asked when a task is over.
+    /// Polls tasks and lets time pass until `is_over` returns true. `is_over` is called whenever a task is over.
     ///
     /// # Panics
     ///
-    /// If nothing will ever happen any more, if time cannot pass because tasks are polled again and again, or at a limit of the run.
+    /// If nothing will ever happen any more, if time cannot pass because tasks are polled again and again, or if a limit of the run is reached.
     pub(crate) fn run(&self, shared: &Shared, tasks: &Tasks, is_over: impl Fn() -> bool) {
         let (patience, limits) = shared.with(|core| (core.settings.patience, core.settings.limits));
         let (mut polls, mut steps, mut batch) = (0, 0, Batch::default());
         let (mut now, until) = (shared.now(), limits.until());
         self.begin(None);
         loop {
-            // A task that is polled tells by itself that the executor does not stand.
+            // Each poll reports to the watchdog by itself. Where no task was polled, `tasks.turns` reports below.
             if let Some(polled) = self.poll_one(&mut batch, now) {
                 shared.attend();
                 polls += 1;
@@ -265,9 +273,10 @@ impl Executor {
         }
     }
 
-    /// Runs on this thread from now on. `main` wakes it, where it is itself a task of another executor.
+    /// Makes this executor the one of this thread. `main` wakes the executor if it is itself a task of another executor.
     pub(crate) fn begin(&self, main: Option<&Waker>) {
         HERE.with(|here| {
+            // Tasks of another executor, such as of an earlier run, are of no use here.
             if here.executor.replace(self.number) != self.number {
                 here.ready.borrow_mut().clear();
             }
@@ -279,7 +288,7 @@ impl Executor {
         }
     }
 
-    /// Polls tasks until none can go on, or `goes_on` says no after one of them; says whether none can.
+    /// Polls tasks until none can go on, or until `goes_on` returns false after a poll. Returns whether no task can go on.
     #[cfg(feature = "tokio")]
     pub(crate) fn run_some(&self, now: Instant, mut goes_on: impl FnMut() -> bool) -> bool {
         let mut batch = self.batch.take();
@@ -298,20 +307,20 @@ impl Executor {
         all_wait
     }
 
-    /// The task that was polled last, unless it is over.
+    /// Returns the task that was polled last, or `None` if that task is over.
     pub(crate) fn last(&self) -> Option<Rc<Task>> {
         self.slots.borrow().get(self.last.get()).and_then(Option::as_ref).map(|slot| Rc::clone(&slot.task))
     }
 
-    /// Polls the task that has waited longest, if there is one; says whether it is over.
+    /// Polls the first task of the batch. Returns whether the task is over, or `None` if no task can go on.
     #[inline(always)]
     fn poll_one(&self, batch: &mut Batch, now: Instant) -> Option<Poll<()>> {
         let number = batch.take().or_else(|| self.next_batch(batch))?;
         self.last.set(number);
-        // The task may start others while it is polled, which get other places.
+        // The borrow ends before the poll: the polled task may start further tasks, which get other indices.
         let Some(slot) = self.slots.borrow().get(number).and_then(Clone::clone) else { return Some(Poll::Pending) };
         slot.place.is_queued.store(false, Ordering::Relaxed);
-        // A place that was given to another task wakes that one in vain, once.
+        // A waker of an earlier task with the same index wakes the present task once in vain.
         let polled = slot.task.poll(now, &mut Context::from_waker(&slot.waker));
         if polled.is_ready() {
             self.forget(number);
@@ -319,15 +328,16 @@ impl Executor {
         Some(polled)
     }
 
-    /// A task is over: its place is free.
+    /// Removes a task that is over. Its index is free afterwards.
     #[inline(never)]
     fn forget(&self, number: usize) {
         let over = self.slots.borrow_mut()[number].take();
+        // Dropped after the borrow has ended: dropping a task may start further tasks.
         drop(over);
         self.free.borrow_mut().push(number);
     }
 
-    /// Takes all tasks that were woken since this was last asked, and gives the first.
+    /// Takes all tasks that were woken since the last call. Returns the first task.
     #[inline(never)]
     fn next_batch(&self, batch: &mut Batch) -> Option<usize> {
         batch.numbers.clear();
@@ -341,7 +351,7 @@ impl Executor {
         batch.take()
     }
 
-    /// Gives up, because time does not pass.
+    /// Fails the run, because time does not pass.
     #[cold]
     fn give_up(&self, shared: &Shared, polls: u64) -> ! {
         time_stands_still(shared, polls, self.last().as_deref())
@@ -368,12 +378,12 @@ where
     let tasks = Rc::new(Tasks::new(Box::new(executor.clone()), hosts, Arc::clone(&watched.pulse)));
     watched.is_of(&shared);
     let _entered = Running { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks) }.enter();
-    // The run has ended when the recorder is dropped: the state is back by then, where other threads find it.
+    // The drop of the recorder ends the run. By then the guard below has put the state back, where other threads find it.
     let _recorder = Recorder { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks), recorded };
-    // After it is known that no other one runs on this thread.
+    // After `enter`, which has checked that no other test bed runs on this thread.
     let _here = shared.stay();
     let outcome = Rc::new(RefCell::new(None));
-    // In a box: a program may hold arrays, and without optimisation each call that a future is handed to has a copy of it on the stack.
+    // Boxed, because a program may hold arrays, and without optimisation each call to which a future is passed keeps a copy on the stack.
     let (future, slot) = (Box::pin(program(Arc::clone(&shared))), Rc::clone(&outcome));
     let _main = tasks.spawn(None, origin, async move {
         let came_out = future.await;
@@ -383,7 +393,7 @@ where
     outcome.take().expect("the executor runs until the program is over")
 }
 
-/// Tells that time does not pass, because tasks are polled again and again.
+/// Fails the run, because tasks are polled again and again and time does not pass. `last` is the task that was polled last.
 ///
 /// # Panics
 ///

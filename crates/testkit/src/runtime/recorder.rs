@@ -1,4 +1,4 @@
-//! What was recorded of a run, when it ends.
+//! Record of a run at its end.
 
 use std::rc::Rc;
 use std::sync::Arc;
@@ -7,7 +7,7 @@ use crate::core::Shared;
 use crate::task::Tasks;
 use crate::wire::Recorded;
 
-/// Takes what was recorded out of a run that ends, however it ends.
+/// Stores the record of a run when the run ends, however it ends.
 pub(crate) struct Recorder<'a> {
     pub(crate) shared: Arc<Shared>,
     pub(crate) tasks: Rc<Tasks>,
@@ -17,7 +17,7 @@ pub(crate) struct Recorder<'a> {
 impl Drop for Recorder<'_> {
     fn drop(&mut self) {
         *self.recorded = Some(self.shared.with(|core| core.recorded()));
-        // Tasks hold the state, and the state their wakers.
+        // Tasks hold the state, and the state holds wakers of tasks. Stopping the tasks breaks this cycle.
         self.tasks.stop_all();
         self.shared.end();
     }
