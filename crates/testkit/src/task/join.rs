@@ -1,4 +1,4 @@
-//! The outcome of a task.
+//! Outcome of a task, and the handle that waits for the outcome.
 
 use std::cell::RefCell;
 use std::fmt;
@@ -9,13 +9,13 @@ use std::task::{Context, Poll, Waker};
 
 use super::Task;
 
-/// Waits for the outcome of a task. A task goes on when its handle is dropped.
+/// Handle of a task: a future of the outcome of the task. Dropping the handle does not stop the task.
 pub struct JoinHandle<T> {
     state: Rc<RefCell<State<T>>>,
     task: Weak<Task>,
 }
 
-/// The task was stopped before it was over: by [`JoinHandle::abort`], or because its host crashed.
+/// Error of a task that was stopped before it was over, by [`JoinHandle::abort`] or because its host crashed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct TaskStopped;
 
@@ -38,14 +38,14 @@ impl<T> JoinHandle<T> {
         Self { state, task }
     }
 
-    /// Stops the task: it is dropped where it waits.
+    /// Stops the task. Its future is dropped at the point at which it waits.
     pub fn abort(&self) {
         if let Some(task) = self.task.upgrade() {
             task.stop();
         }
     }
 
-    /// Whether the task is over or was stopped.
+    /// Returns whether the task is over or was stopped.
     #[must_use]
     pub fn is_finished(&self) -> bool {
         self.task.upgrade().is_none_or(|task| task.is_over())
@@ -63,7 +63,7 @@ impl<T> Future for JoinHandle<T> {
 
     /// # Panics
     ///
-    /// If it is polled again after it gave the outcome.
+    /// If the handle is polled again after it has returned the outcome.
     fn poll(self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Self::Output> {
         let mut state = self.state.borrow_mut();
         if let Some(outcome) = state.outcome.take() {
@@ -77,7 +77,7 @@ impl<T> Future for JoinHandle<T> {
 /// A program that leaves what comes out of a future in a state.
 pub(crate) fn joined<F: Future>(future: F) -> (impl Future<Output = ()>, Rc<RefCell<State<F::Output>>>) {
     let state = Rc::new(RefCell::new(State { outcome: None, waker: None }));
-    // Whatever becomes of the program, the waiting task is told.
+    // The guard tells the waiting task of the end, even if the program is dropped before its end.
     let told = Told(Rc::clone(&state));
     let program = async move {
         let outcome = future.await;
@@ -87,6 +87,7 @@ pub(crate) fn joined<F: Future>(future: F) -> (impl Future<Output = ()>, Rc<RefC
     (program, state)
 }
 
+/// Guard that stores [`TaskStopped`] if there is no outcome, and wakes the waiting task.
 struct Told<T>(Rc<RefCell<State<T>>>);
 
 impl<T> Drop for Told<T> {

@@ -1,4 +1,4 @@
-//! Tasks: futures that live on hosts, with any executor.
+//! Tasks: futures that live on hosts. Any executor can poll them.
 
 mod join;
 
@@ -21,21 +21,22 @@ use crate::core::Core;
 use crate::current;
 use crate::watch::{Pulse, Runner};
 
-/// What a task runs.
+/// Future of a task.
 pub(crate) type Program = Pin<Box<dyn Future<Output = ()>>>;
 
-/// A task.
+/// A task of a run.
 pub(crate) struct Task {
     runner: Runner,
     pulse: Arc<Pulse>,
-    /// What the pulse knows it by.
+    /// Number by which the pulse knows the task.
     number: usize,
     program: RefCell<Option<Program>>,
-    /// Instant of the last poll: since then the task waits.
+    /// Future of the task; `None` once the task is over or was stopped.
+    /// Instant of the last poll. The task waits since then.
     polled: Cell<Instant>,
-    /// It was stopped while it was polled.
+    /// Whether the task was stopped, perhaps while it was being polled.
     is_doomed: Cell<bool>,
-    /// Its waker, the same in each poll.
+    /// Waker of the task. Every poll uses the same waker.
     waker: RefCell<Option<Waker>>,
 }
 
@@ -53,12 +54,12 @@ impl Task {
         })
     }
 
-    /// Gives it its waker.
+    /// Stores the waker of the task.
     pub(crate) fn is_woken_by(&self, waker: Waker) {
         *self.waker.borrow_mut() = Some(waker);
     }
 
-    /// Polls the program at that instant; ready when it is over, or was stopped.
+    /// Polls the program at the instant `now`. Ready when the program is over or was stopped.
     #[inline]
     pub(crate) fn poll(&self, now: Instant, cx: &mut Context<'_>) -> Poll<()> {
         self.polled.set(now);
@@ -76,16 +77,16 @@ impl Task {
         Poll::Ready(())
     }
 
-    /// Drops the program as one of its host.
+    /// Drops the program as a task of its host, so that destructors act on that host.
     #[inline(never)]
     fn drop_there(&self, program: Option<Program>) {
         current::on_host(self.runner.host, || drop(program));
     }
 
-    /// Drops the program; a task that stops itself is dropped when it next waits.
+    /// Stops the task: drops its program. The program of a task that stops itself is dropped when its poll returns.
     pub(crate) fn stop(&self) {
         self.is_doomed.set(true);
-        // A program that is being polled is in use.
+        // The program is borrowed while it is being polled. `poll` then drops it, because the task is doomed.
         let Ok(mut program) = self.program.try_borrow_mut() else { return };
         let over = program.take();
         drop(program);
@@ -100,34 +101,35 @@ impl Task {
         self.program.try_borrow().is_ok_and(|program| program.is_none())
     }
 
-    /// Returns the task in words, with the instant since which the task waits, and the things that it waits for.
+    /// Returns a description of the task, with the instant since which the task waits and the things that it waits for.
     pub(crate) fn waits(&self, core: &Core) -> String {
         let awaited = self.waker.borrow().as_ref().map(|waker| core.awaited_by(waker)).unwrap_or_default();
         let awaited = if awaited.is_empty() { "another task, or something that is not of the test bed".to_owned() } else { awaited.join(", or ") };
         format!("{} waits since {} s for {awaited}", self.words(core.plan.names()), Seconds(self.polled.get()))
     }
 
-    /// The task in words: see [`Runner::words`].
+    /// Returns the name of the task in messages: see [`Runner::words`].
     pub(crate) fn words(&self, hosts: &[String]) -> String {
         self.runner.words(hosts)
     }
 }
 
-/// An executor.
+/// Executor, as far as starting of tasks needs it.
 pub(crate) trait Spawner {
-    /// Polls a task from now on, until it is over.
+    /// Starts polling a task, until the task is over.
     fn start(&self, task: Rc<Task>);
 }
 
-/// What starts a host's program anew.
+/// Function that makes the program of a host anew.
 type Factory = Rc<dyn Fn() -> Program>;
 
 /// All tasks of a test bed.
 pub(crate) struct Tasks {
     pulse: Arc<Pulse>,
     spawner: Box<dyn Spawner>,
+    /// Tasks started so far, some of which may be over.
     known: RefCell<Vec<Weak<Task>>>,
-    /// By host: its program, and where it was given.
+    /// Program of each host with the place where it was given, indexed by host.
     factories: RefCell<Vec<Option<(Factory, &'static Location<'static>)>>>,
 }
 
@@ -136,13 +138,13 @@ impl Tasks {
         Self { pulse, spawner, known: RefCell::new(Vec::new()), factories: RefCell::new(vec![None; hosts]) }
     }
 
-    /// Starts a task on a host.
+    /// Starts a task on `host`, or on no host.
     pub(crate) fn spawn<F>(&self, host: Option<NodeId>, origin: &'static Location<'static>, future: F) -> JoinHandle<F::Output>
     where
         F: Future + 'static,
         F::Output: 'static,
     {
-        // The future in a box of its own: without optimisation the program around it would be copied on the stack as well.
+        // The future is boxed by itself, because without optimisation the program around it would also be copied on the stack.
         let (program, state) = joined(Box::pin(future));
         let task = self.start(host, origin, Box::pin(program));
         JoinHandle::new(state, Rc::downgrade(&task))
@@ -151,7 +153,7 @@ impl Tasks {
     fn start(&self, host: Option<NodeId>, origin: &'static Location<'static>, program: Program) -> Rc<Task> {
         let task = Task::new(Runner { host, origin }, program, &self.pulse);
         let mut known = self.known.borrow_mut();
-        // Now and then those that are over are forgotten: so that they are never more than twice those that run.
+        // Tasks that are over are forgotten whenever the array is full, so that the array stays proportional to the number of live tasks.
         if known.len() == known.capacity() {
             known.retain(|task| task.upgrade().is_some_and(|task| !task.is_over()));
         }
@@ -161,13 +163,13 @@ impl Tasks {
         task
     }
 
-    /// Starts the program of a host, and keeps it for [`Tasks::restart`].
+    /// Starts the program of a host, and keeps `factory` for [`Tasks::restart`].
     pub(crate) fn set_program(&self, host: NodeId, origin: &'static Location<'static>, factory: Factory) {
         self.factories.borrow_mut()[host.index()] = Some((factory, origin));
         self.restart(host);
     }
 
-    /// Starts the program of a host again, if it has one.
+    /// Starts the program of a host again. Does nothing if the host has no program.
     pub(crate) fn restart(&self, host: NodeId) {
         let factory = self.factories.borrow()[host.index()].clone();
         if let Some((factory, origin)) = factory {
@@ -178,12 +180,12 @@ impl Tasks {
 
     /// Stops all tasks of a host.
     pub(crate) fn stop_all_of(&self, host: NodeId) {
-        // Dropping a program may spawn and stop others.
+        // The tasks are collected first, because dropping a program may spawn and stop tasks, which borrows the list.
         let of_host: Vec<Rc<Task>> = self.known.borrow().iter().filter_map(Weak::upgrade).filter(|task| task.runner.host == Some(host)).collect();
         of_host.iter().for_each(|task| task.stop());
     }
 
-    /// Stops all tasks.
+    /// Stops all tasks, and the tasks that are spawned while others are dropped.
     pub(crate) fn stop_all(&self) {
         loop {
             let all: Vec<Rc<Task>> = self.known.borrow_mut().drain(..).filter_map(|task| task.upgrade()).collect();
@@ -194,24 +196,24 @@ impl Tasks {
         }
     }
 
-    /// The executor does something else: it does not stand.
+    /// Tells the watchdog that the executor is at work outside of tasks.
     #[inline]
     pub(crate) fn turns(&self) {
         self.pulse.turns();
     }
 
-    /// The task that is being polled, in words.
+    /// Returns the name of the task that is being polled.
     pub(crate) fn current(&self, hosts: &[String]) -> String {
         let host = current::host();
         match (self.pulse.running(), host.and_then(|host| hosts.get(host.index()))) {
-            // A task that lives on no host may do this as one of a host: see `Host::scope`.
+            // A task without a host may act as a task of a host: see `Host::scope`.
             (Some(runner), _) => Runner { host: runner.host.or(host), ..runner }.words(hosts),
             (None, Some(host)) => format!("a task on host `{host}` that the test bed has not spawned"),
             (None, None) => "a task that the test bed has not spawned, or the function that makes the program".to_owned(),
         }
     }
 
-    /// The tasks that are not over.
+    /// Returns the tasks that are not over.
     pub(crate) fn waiting(&self) -> Vec<Rc<Task>> {
         self.known.borrow().iter().filter_map(Weak::upgrade).filter(|task| !task.is_over()).collect()
     }
