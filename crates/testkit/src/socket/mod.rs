@@ -1,4 +1,4 @@
-//! The virtual UDP socket.
+//! Virtual UDP socket.
 
 mod options;
 mod receiving;
@@ -18,22 +18,23 @@ use crate::resolve::ToSocketAddrs;
 /// Name of this kind of socket in messages.
 const KIND: &str = "a UDP socket";
 
-/// A UDP socket of a host of the running test bed: the methods of tokio's, with the same meaning.
+/// UDP socket of a host of the running test bed, with the methods of tokio's `UdpSocket` in the same meaning.
 ///
-/// What differs, or is worth knowing:
+/// Differences to tokio's socket, and further properties:
 ///
-/// - It is bound on the host of the task that binds it; [`Host::bind`](crate::Host::bind) names another one. To be bound, connected or dropped takes no time.
-/// - Sending never waits: what the link cannot take it drops, as a network does. [`UdpSocket::try_send`] never gives `WouldBlock`.
-/// - A datagram counts in its link with the bytes that it carries. Headers are counted where the link's `overhead` (the second word of `rate`) says so.
-/// - A datagram that finds the buffer of the socket full is lost: see [`Testbed::receive_buffer`](crate::Testbed::receive_buffer). One that is longer than the
-///   buffer given to receive it is cut off, as with Linux.
-/// - If no socket is at the port of the peer, a connected socket gets [`io::ErrorKind::ConnectionRefused`], once the answer has come back over the
-///   link: by the next call, or by the call that waits to receive.
-/// - A socket at `[::]` hears IPv6 only.
-/// - When its host crashes, every method gives [`io::ErrorKind::ConnectionAborted`], with the way out. So does every method once the run of its test bed has
-///   ended, also within the run of another test bed: a task or a destructor may outlive the run. To bind a socket where there is no host is a fault of the
-///   test, and panics.
-/// - It belongs to the thread that runs the test bed. On another thread every method gives [`io::ErrorKind::Unsupported`], and the run fails.
+/// - The socket is bound on the host of the task that calls `bind`; [`Host::bind`](crate::Host::bind) names another host. Binding, connecting and dropping take
+/// no time.
+/// - Sending never waits: the link drops a packet that it cannot take, as a network does. [`UdpSocket::try_send`] never returns `WouldBlock`.
+/// - The size of a datagram on its link is its number of bytes. Headers count only if the `overhead` of the link (the second word of `rate`) says so.
+/// - A datagram is lost if the buffer of the receiving socket is full: see [`Testbed::receive_buffer`](crate::Testbed::receive_buffer). As with Linux, a
+/// datagram is cut off if it is longer than the buffer passed to receive it.
+/// - If no socket is bound to the port of the peer, a connected socket gets [`io::ErrorKind::ConnectionRefused`] after the answer has come back over the link:
+/// from the next call, or from the call that waits to receive.
+/// - A socket at `[::]` receives over IPv6 only.
+/// - After its host has crashed, every method returns [`io::ErrorKind::ConnectionAborted`], with the way out. The same error comes from every method after the
+/// run of the test bed has ended, also within the run of another test bed: a task or a destructor may outlive the run. Binding a socket where there is no host
+/// is a fault of the test, and panics.
+/// - The socket belongs to the thread that runs the test bed. On another thread every method returns [`io::ErrorKind::Unsupported`], and the run fails.
 pub struct UdpSocket {
     shared: Arc<Shared>,
     host: NodeId,
@@ -42,12 +43,12 @@ pub struct UdpSocket {
 }
 
 impl UdpSocket {
-    /// Binds a socket on the host of the task that is running. `0.0.0.0` and `[::]` hear all addresses of the host, port 0 is given a free one: from 49152 on, in
-    /// turn.
+    /// Binds a socket on the host of the running task. `0.0.0.0` and `[::]` stand for all addresses of the host. Port 0 stands for a free port; such ports are
+    /// given in turn from 49152 on.
     ///
     /// # Errors
     ///
-    /// As tokio's: the address is taken, or is not the host's.
+    /// As with tokio: the address is taken, or is no address of the host.
     ///
     /// # Panics
     ///
@@ -62,7 +63,7 @@ impl UdpSocket {
     }
 
     pub(crate) fn bind_on(shared: Arc<Shared>, host: NodeId, address: impl ToSocketAddrs) -> io::Result<Self> {
-        // The host is asked before the address is looked up: a name means nothing, or another host, where this one may not be used.
+        // The socket is checked before the address is looked up: on another thread, or after the run, a name means nothing or names another host.
         shared.check_open(host, KIND)?;
         let address = address.to_socket_addr()?;
         let id = shared.with(|core| {
@@ -72,11 +73,11 @@ impl UdpSocket {
         Ok(Self { shared, host, id, options: options::Options::default() })
     }
 
-    /// Asks the state.
+    /// Asks the state about the socket.
     ///
     /// # Errors
     ///
-    /// If the run has ended, this is another thread, or the host of the socket has crashed.
+    /// If the run has ended, on a thread that does not run the test bed, or if the host of the socket has crashed.
     fn open<T>(&self, ask: impl FnOnce(&mut Core) -> T) -> io::Result<T> {
         self.shared.open(self.host, KIND, |core| {
             core.check_alive(self.id)?;
@@ -84,29 +85,29 @@ impl UdpSocket {
         })?
     }
 
-    /// The address at which it is bound.
+    /// Returns the address to which the socket is bound.
     ///
     /// # Errors
     ///
-    /// If its host has crashed.
+    /// If the host of the socket has crashed.
     pub fn local_addr(&self) -> io::Result<SocketAddr> {
         self.open(|core| core.local_of(self.id))
     }
 
-    /// The peer to which it is connected.
+    /// Returns the peer to which the socket is connected.
     ///
     /// # Errors
     ///
-    /// [`io::ErrorKind::NotConnected`] if it is not.
+    /// [`io::ErrorKind::NotConnected`] if the socket is not connected.
     pub fn peer_addr(&self) -> io::Result<SocketAddr> {
         self.open(|core| core.peer_of(self.id))?.ok_or_else(|| io::ErrorKind::NotConnected.into())
     }
 
-    /// From now on it sends to that peer and hears nobody else. What has come before stays in its buffer.
+    /// Connects the socket: from now on it sends to `peer`, and receives from no other address. Datagrams that have arrived before stay in the buffer.
     ///
     /// # Errors
     ///
-    /// If the peer is of the other version of IP, or is no address.
+    /// If `peer` is of the other version of IP, or is no address.
     #[expect(clippy::unused_async, reason = "as tokio's")]
     pub async fn connect(&self, peer: impl ToSocketAddrs) -> io::Result<()> {
         self.shared.check_open(self.host, KIND)?;
@@ -114,29 +115,29 @@ impl UdpSocket {
         self.shared.with(|core| core.connect(self.id, peer))
     }
 
-    /// Whether it may send to 255.255.255.255, which reaches all other hosts.
+    /// Returns whether the socket may send to 255.255.255.255, which reaches all other hosts.
     ///
     /// # Errors
     ///
-    /// If its host has crashed.
+    /// If the host of the socket has crashed.
     pub fn broadcast(&self) -> io::Result<bool> {
         self.open(|core| *core.may_broadcast(self.id))
     }
 
-    /// Lets it send to 255.255.255.255, or not.
+    /// Sets whether the socket may send to 255.255.255.255.
     ///
     /// # Errors
     ///
-    /// If its host has crashed.
+    /// If the host of the socket has crashed.
     pub fn set_broadcast(&self, on: bool) -> io::Result<()> {
         self.open(|core| *core.may_broadcast(self.id) = on)
     }
 
-    /// Takes out the error that the next call would give otherwise.
+    /// Takes the error that the next call would otherwise return.
     ///
     /// # Errors
     ///
-    /// If its host has crashed.
+    /// If the host of the socket has crashed.
     pub fn take_error(&self) -> io::Result<Option<io::Error>> {
         self.open(|core| core.take_error(self.id))
     }

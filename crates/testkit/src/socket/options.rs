@@ -1,4 +1,4 @@
-//! The options of a socket, and the ways of tokio's that wait for readiness.
+//! Options of a socket, and tokio's methods that wait for readiness.
 
 use std::io;
 use std::net::{Ipv4Addr, Ipv6Addr};
@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use super::KIND;
 use super::UdpSocket;
 
-/// Options that are kept and told. Of these, only the two lowest bits of a type of service do anything: see [`UdpSocket::set_tos_v4`].
+/// Options that are stored and returned. Only the two lowest bits of the type of service have an effect: see [`UdpSocket::set_tos_v4`].
 #[derive(Debug)]
 pub(super) struct Options {
     ttl: AtomicU32,
@@ -18,14 +18,14 @@ pub(super) struct Options {
 }
 
 impl Default for Options {
-    /// As Linux gives them.
+    /// Returns the defaults of Linux.
     fn default() -> Self {
         Self { ttl: 64.into(), type_of_service: 0.into(), multicast_ttl: 1.into(), multicast_loop: 1.into() }
     }
 }
 
 impl Options {
-    /// Whether datagrams sent may be marked in place of being dropped: the two bits of ECN (RFC 3168) are not both zero.
+    /// Returns whether sent datagrams may be marked in place of being dropped: at least one of the two bits of ECN is set (RFC 3168).
     pub(super) fn is_ecn_capable(&self) -> bool {
         self.type_of_service.load(Ordering::Relaxed) & 0b11 != 0
     }
@@ -55,11 +55,11 @@ impl UdpSocket {
         set(option(&self.options), value, allowed)
     }
 
-    /// The time to live, which nothing counts down here: there are no routers.
+    /// Returns the time to live. It has no effect, because a test bed has no routers that count it down.
     ///
     /// # Errors
     ///
-    /// If its host has crashed.
+    /// If the host of the socket has crashed.
     pub fn ttl(&self) -> io::Result<u32> {
         self.option(|options| &options.ttl)
     }
@@ -68,145 +68,147 @@ impl UdpSocket {
     ///
     /// # Errors
     ///
-    /// If it is none, or its host has crashed.
+    /// If `ttl` is out of range, or the host of the socket has crashed.
     pub fn set_ttl(&self, ttl: u32) -> io::Result<()> {
         self.set_option(|options| &options.ttl, ttl, 1..=255)
     }
 
-    /// The type of service of IPv4.
+    /// Returns the type of service of IPv4.
     ///
     /// # Errors
     ///
-    /// If its host has crashed.
+    /// If the host of the socket has crashed.
     pub fn tos_v4(&self) -> io::Result<u32> {
         self.option(|options| &options.type_of_service)
     }
 
-    /// Sets the type of service of IPv4. If its two lowest bits are not zero, an active queue marks a datagram where it would drop it otherwise (RFC 3168).
+    /// Sets the type of service of IPv4, from 0 to 255. If one of the two lowest bits is set, an active queue marks a datagram that it would otherwise drop
+    /// (RFC 3168).
     ///
     /// # Errors
     ///
-    /// If its host has crashed.
+    /// If `tos` is out of range, or the host of the socket has crashed.
     pub fn set_tos_v4(&self, tos: u32) -> io::Result<()> {
         self.set_option(|options| &options.type_of_service, tos, 0..=255)
     }
 
-    /// The traffic class of IPv6.
+    /// Returns the traffic class of IPv6. IPv4 and IPv6 share the value.
     ///
     /// # Errors
     ///
-    /// If its host has crashed.
+    /// If the host of the socket has crashed.
     pub fn tclass_v6(&self) -> io::Result<u32> {
         self.tos_v4()
     }
 
-    /// Sets the traffic class of IPv6: as [`UdpSocket::set_tos_v4`].
+    /// Sets the traffic class of IPv6: see [`UdpSocket::set_tos_v4`].
     ///
     /// # Errors
     ///
-    /// If its host has crashed.
+    /// If `class` is out of range, or the host of the socket has crashed.
     pub fn set_tclass_v6(&self, class: u32) -> io::Result<()> {
         self.set_tos_v4(class)
     }
 
-    /// The time to live of multicast.
+    /// Returns the time to live of multicast. It has no effect, because a test bed has no multicast groups.
     ///
     /// # Errors
     ///
-    /// If its host has crashed.
+    /// If the host of the socket has crashed.
     pub fn multicast_ttl_v4(&self) -> io::Result<u32> {
         self.option(|options| &options.multicast_ttl)
     }
 
-    /// Sets the time to live of multicast.
+    /// Sets the time to live of multicast, from 0 to 255.
     ///
     /// # Errors
     ///
-    /// If it is none, or its host has crashed.
+    /// If `ttl` is out of range, or the host of the socket has crashed.
     pub fn set_multicast_ttl_v4(&self, ttl: u32) -> io::Result<()> {
         self.set_option(|options| &options.multicast_ttl, ttl, 0..=255)
     }
 
-    /// Whether it would hear its own multicast.
+    /// Returns whether the socket would receive its own multicast over IPv4.
     ///
     /// # Errors
     ///
-    /// If its host has crashed.
+    /// If the host of the socket has crashed.
     pub fn multicast_loop_v4(&self) -> io::Result<bool> {
         Ok(self.option(|options| &options.multicast_loop)? != 0)
     }
 
-    /// Lets it hear its own multicast, or not.
+    /// Sets whether the socket would receive its own multicast over IPv4.
     ///
     /// # Errors
     ///
-    /// If its host has crashed.
+    /// If the host of the socket has crashed.
     pub fn set_multicast_loop_v4(&self, on: bool) -> io::Result<()> {
         self.set_option(|options| &options.multicast_loop, on.into(), 0..=1)
     }
 
-    /// Whether it would hear its own multicast.
+    /// Returns whether the socket would receive its own multicast over IPv6.
     ///
     /// # Errors
     ///
-    /// If its host has crashed.
+    /// If the host of the socket has crashed.
     pub fn multicast_loop_v6(&self) -> io::Result<bool> {
         self.multicast_loop_v4()
     }
 
-    /// Lets it hear its own multicast, or not.
+    /// Sets whether the socket would receive its own multicast over IPv6.
     ///
     /// # Errors
     ///
-    /// If its host has crashed.
+    /// If the host of the socket has crashed.
     pub fn set_multicast_loop_v6(&self, on: bool) -> io::Result<()> {
         self.set_multicast_loop_v4(on)
     }
 
-    /// Would join a group: a test bed has none.
+    /// Fails: a test bed has no multicast groups to join.
     ///
     /// # Errors
     ///
-    /// [`io::ErrorKind::Unsupported`].
+    /// Always [`io::ErrorKind::Unsupported`].
     pub fn join_multicast_v4(&self, _group: Ipv4Addr, _interface: Ipv4Addr) -> io::Result<()> {
         no_groups()
     }
 
-    /// Would join a group: a test bed has none.
+    /// Fails: a test bed has no multicast groups to join.
     ///
     /// # Errors
     ///
-    /// [`io::ErrorKind::Unsupported`].
+    /// Always [`io::ErrorKind::Unsupported`].
     pub fn join_multicast_v6(&self, _group: &Ipv6Addr, _interface: u32) -> io::Result<()> {
         no_groups()
     }
 
-    /// Would leave a group: a test bed has none.
+    /// Fails: a test bed has no multicast groups to leave.
     ///
     /// # Errors
     ///
-    /// [`io::ErrorKind::Unsupported`].
+    /// Always [`io::ErrorKind::Unsupported`].
     pub fn leave_multicast_v4(&self, _group: Ipv4Addr, _interface: Ipv4Addr) -> io::Result<()> {
         no_groups()
     }
 
-    /// Would leave a group: a test bed has none.
+    /// Fails: a test bed has no multicast groups to leave.
     ///
     /// # Errors
     ///
-    /// [`io::ErrorKind::Unsupported`].
+    /// Always [`io::ErrorKind::Unsupported`].
     pub fn leave_multicast_v6(&self, _group: &Ipv6Addr, _interface: u32) -> io::Result<()> {
         no_groups()
     }
 
-    /// Waits until it can do one of these: to send, it always can.
+    /// Waits until the socket is ready for one of the interests. A socket is always ready to send.
     ///
     /// # Errors
     ///
-    /// None: an error of the socket is given by the next call.
+    /// If the run has ended, or on a thread that does not run the test bed. The next call returns an error of the socket itself.
     #[cfg(feature = "tokio-net")]
     pub async fn ready(&self, interest: tokio::io::Interest) -> io::Result<tokio::io::Ready> {
         use tokio::io::Ready;
+        // Sending never waits, so only an interest in reading alone can wait.
         if interest.is_readable() && !interest.is_writable() {
             self.readable().await?;
         }
@@ -215,11 +217,11 @@ impl UdpSocket {
         Ok(if interest.is_writable() { readable | Ready::WRITABLE } else { readable })
     }
 
-    /// Tries an operation of one's own, such as [`UdpSocket::try_recv`].
+    /// Tries an operation of the caller, such as [`UdpSocket::try_recv`].
     ///
     /// # Errors
     ///
-    /// Those of the operation; [`io::ErrorKind::WouldBlock`] if it is to read and there is nothing.
+    /// Errors of the operation; [`io::ErrorKind::WouldBlock`] if `interest` is reading and nothing can be read.
     #[cfg(feature = "tokio-net")]
     pub fn try_io<R>(&self, interest: tokio::io::Interest, operation: impl FnOnce() -> io::Result<R>) -> io::Result<R> {
         let is_readable = self.shared.open(self.host, KIND, |core| core.is_readable(self.id))?;
@@ -229,17 +231,17 @@ impl UdpSocket {
         operation()
     }
 
-    /// Does an operation of one's own, again whenever it would have blocked and something can be read.
+    /// Performs an operation of the caller, and repeats it whenever it would have blocked and something can be read.
     ///
     /// # Errors
     ///
-    /// Those of the operation, but for [`io::ErrorKind::WouldBlock`].
+    /// Errors of the operation, except [`io::ErrorKind::WouldBlock`].
     #[cfg(feature = "tokio-net")]
     pub async fn async_io<R>(&self, interest: tokio::io::Interest, mut operation: impl FnMut() -> io::Result<R>) -> io::Result<R> {
         loop {
             self.ready(interest).await?;
             match operation() {
-                // Sending never blocks, so it waits for something to read.
+                // Sending never blocks, so the operation must have tried to read.
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => self.readable().await?,
                 outcome => return outcome,
             }

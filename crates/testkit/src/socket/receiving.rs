@@ -1,4 +1,4 @@
-//! What a socket receives.
+//! Receiving of datagrams.
 
 use std::future::{Future, poll_fn};
 use std::io;
@@ -12,16 +12,16 @@ use super::{KIND, UdpSocket};
 use crate::core::Parcel;
 
 impl UdpSocket {
-    /// Receives a datagram from any sender; gives its length.
+    /// Receives a datagram from any sender. Returns the number of bytes received.
     ///
     /// # Errors
     ///
-    /// [`io::ErrorKind::ConnectionRefused`] if the peer has told that nobody is at its port.
+    /// [`io::ErrorKind::ConnectionRefused`] if the socket is connected and no socket is bound to the port of the peer.
     pub fn recv<'a>(&'a self, buffer: &'a mut [u8]) -> impl Future<Output = io::Result<usize>> + 'a {
         self.look::<false, _>(move |datagram| datagram.copy_to(buffer))
     }
 
-    /// Receives a datagram; gives its length and its sender.
+    /// Receives a datagram. Returns the number of bytes received, and the sender.
     ///
     /// # Errors
     ///
@@ -30,7 +30,7 @@ impl UdpSocket {
         self.look::<false, _>(move |datagram| (datagram.copy_to(buffer), datagram.from()))
     }
 
-    /// Receives a datagram into the free room of a buffer; gives its length.
+    /// Receives a datagram into the free space of `buffer`. Returns the number of bytes received.
     ///
     /// # Errors
     ///
@@ -39,7 +39,7 @@ impl UdpSocket {
         self.look::<false, _>(move |datagram| datagram.put_into(buffer))
     }
 
-    /// Receives a datagram into the free room of a buffer; gives its length and its sender.
+    /// Receives a datagram into the free space of `buffer`. Returns the number of bytes received, and the sender.
     ///
     /// # Errors
     ///
@@ -48,7 +48,7 @@ impl UdpSocket {
         self.look::<false, _>(move |datagram| (datagram.put_into(buffer), datagram.from()))
     }
 
-    /// Receives a datagram; gives its length, its sender, and when it arrived, to the nanosecond.
+    /// Receives a datagram. Returns the number of bytes received, the sender, and the instant of arrival, to the nanosecond.
     ///
     /// # Errors
     ///
@@ -57,7 +57,7 @@ impl UdpSocket {
         self.look::<false, _>(move |datagram| (datagram.copy_to(buffer), datagram.from(), datagram.arrival.at))
     }
 
-    /// Looks at the next datagram and leaves it; gives its length.
+    /// Copies the next datagram without taking it from the socket. Returns the number of bytes copied.
     ///
     /// # Errors
     ///
@@ -66,7 +66,7 @@ impl UdpSocket {
         self.look::<true, _>(move |datagram| datagram.copy_to(buffer))
     }
 
-    /// Looks at the next datagram and leaves it; gives its length and its sender.
+    /// Copies the next datagram without taking it from the socket. Returns the number of bytes copied, and the sender.
     ///
     /// # Errors
     ///
@@ -75,7 +75,7 @@ impl UdpSocket {
         self.look::<true, _>(move |datagram| (datagram.copy_to(buffer), datagram.from()))
     }
 
-    /// The sender of the next datagram, which is left.
+    /// Returns the sender of the next datagram, which stays in the socket.
     ///
     /// # Errors
     ///
@@ -84,16 +84,16 @@ impl UdpSocket {
         self.look::<true, _>(Parcel::from)
     }
 
-    /// Receives a datagram if there is one.
+    /// Receives a datagram if there is one. Returns the number of bytes received.
     ///
     /// # Errors
     ///
-    /// As [`UdpSocket::recv`]; [`io::ErrorKind::WouldBlock`] if there is none.
+    /// As [`UdpSocket::recv`]; [`io::ErrorKind::WouldBlock`] if there is no datagram.
     pub fn try_recv(&self, buffer: &mut [u8]) -> io::Result<usize> {
         self.try_look::<false, _>(|datagram| datagram.copy_to(buffer))
     }
 
-    /// Receives a datagram if there is one.
+    /// Receives a datagram if there is one. Returns the number of bytes received, and the sender.
     ///
     /// # Errors
     ///
@@ -102,7 +102,7 @@ impl UdpSocket {
         self.try_look::<false, _>(|datagram| (datagram.copy_to(buffer), datagram.from()))
     }
 
-    /// Receives a datagram into the free room of a buffer if there is one.
+    /// Receives a datagram into the free space of `buffer` if there is one. Returns the number of bytes received.
     ///
     /// # Errors
     ///
@@ -111,7 +111,7 @@ impl UdpSocket {
         self.try_look::<false, _>(|datagram| datagram.put_into(buffer))
     }
 
-    /// Receives a datagram into the free room of a buffer if there is one.
+    /// Receives a datagram into the free space of `buffer` if there is one. Returns the number of bytes received, and the sender.
     ///
     /// # Errors
     ///
@@ -120,7 +120,7 @@ impl UdpSocket {
         self.try_look::<false, _>(|datagram| (datagram.put_into(buffer), datagram.from()))
     }
 
-    /// Looks at the next datagram if there is one.
+    /// Copies the next datagram, if there is one, without taking it from the socket. Returns the number of bytes copied.
     ///
     /// # Errors
     ///
@@ -129,7 +129,7 @@ impl UdpSocket {
         self.try_look::<true, _>(|datagram| datagram.copy_to(buffer))
     }
 
-    /// Looks at the next datagram if there is one.
+    /// Copies the next datagram, if there is one, without taking it from the socket. Returns the number of bytes copied, and the sender.
     ///
     /// # Errors
     ///
@@ -138,7 +138,7 @@ impl UdpSocket {
         self.try_look::<true, _>(|datagram| (datagram.copy_to(buffer), datagram.from()))
     }
 
-    /// The sender of the next datagram if there is one.
+    /// Returns the sender of the next datagram, if there is one. The datagram stays in the socket.
     ///
     /// # Errors
     ///
@@ -147,7 +147,7 @@ impl UdpSocket {
         self.try_look::<true, _>(Parcel::from)
     }
 
-    /// Receives a datagram, or sees to it that the task is woken when there is one.
+    /// Receives a datagram. If there is none, the task is woken when one arrives.
     ///
     /// # Errors
     ///
@@ -157,7 +157,7 @@ impl UdpSocket {
         self.poll_recv_from(cx, buffer).map_ok(drop)
     }
 
-    /// Receives a datagram, or sees to it that the task is woken when there is one; gives its sender.
+    /// Receives a datagram, and returns the sender. If there is no datagram, the task is woken when one arrives.
     ///
     /// # Errors
     ///
@@ -167,7 +167,7 @@ impl UdpSocket {
         self.poll_look::<false, _>(cx, |datagram| datagram.fill(buffer))
     }
 
-    /// Looks at the next datagram, or sees to it that the task is woken when there is one; gives its sender.
+    /// Copies the next datagram without taking it from the socket, and returns the sender. If there is no datagram, the task is woken when one arrives.
     ///
     /// # Errors
     ///
@@ -177,7 +177,7 @@ impl UdpSocket {
         self.poll_look::<true, _>(cx, |datagram| datagram.fill(buffer))
     }
 
-    /// Looks at the sender of the next datagram, or sees to it that the task is woken when there is one.
+    /// Returns the sender of the next datagram, which stays in the socket. If there is no datagram, the task is woken when one arrives.
     ///
     /// # Errors
     ///
@@ -186,16 +186,16 @@ impl UdpSocket {
         self.poll_look::<true, _>(cx, Parcel::from)
     }
 
-    /// Waits until something can be received.
+    /// Waits until a datagram, or an error of the socket, can be received.
     ///
     /// # Errors
     ///
-    /// If the run has ended, or this is another thread. An error of the socket is given by the next call.
+    /// If the run has ended, or on a thread that does not run the test bed. The next call returns an error of the socket itself.
     pub async fn readable(&self) -> io::Result<()> {
         poll_fn(|cx| self.poll_recv_ready(cx)).await
     }
 
-    /// Ready when something can be received.
+    /// Returns ready when a datagram, or an error of the socket, can be received.
     ///
     /// # Errors
     ///
@@ -205,12 +205,13 @@ impl UdpSocket {
         polled.map_or_else(|error| Poll::Ready(Err(error)), |ready| ready.map(Ok))
     }
 
-    /// A view of a datagram, if there is one.
+    /// Calls `look` on the next datagram, if there is one.
     pub(crate) fn try_look<const PEEK: bool, T>(&self, look: impl FnOnce(&Parcel) -> T) -> io::Result<T> {
         self.shared.open(self.host, KIND, |core| core.try_receive::<PEEK, _>(self.id, look))?
     }
 
-    /// A view of the next datagram. It gives the future that is polled, and no other around it: each that is there for a datagram takes 20 instructions.
+    /// Calls `look` on the next datagram. Returns the polled future itself, without an `async` block around it, because every wrapping future costs
+    /// instructions per datagram.
     #[inline]
     fn look<'a, const PEEK: bool, T>(&'a self, mut look: impl FnMut(&Parcel) -> T + 'a) -> impl Future<Output = io::Result<T>> + 'a {
         poll_fn(move |cx| self.poll_look::<PEEK, _>(cx, &mut look))

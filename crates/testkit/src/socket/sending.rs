@@ -1,4 +1,4 @@
-//! What a socket sends.
+//! Sending of datagrams.
 
 use std::future::{Future, poll_fn};
 use std::io;
@@ -10,17 +10,18 @@ use crate::core::Outgoing;
 use crate::resolve::ToSocketAddrs;
 
 impl UdpSocket {
-    /// Sends to the peer; gives the length.
+    /// Sends a datagram to the peer. Returns the number of bytes sent.
     ///
     /// # Errors
     ///
-    /// [`io::ErrorKind::NotConnected`] without a peer, `ConnectionRefused` if the peer has told that nobody is at its port, `InvalidInput` if it is too long.
+    /// [`io::ErrorKind::NotConnected`] without a peer, `ConnectionRefused` if no socket is bound to the port of the peer, `InvalidInput` if the datagram is too
+    /// long.
     #[expect(clippy::unused_async, reason = "as tokio's")]
     pub async fn send(&self, bytes: &[u8]) -> io::Result<usize> {
         self.try_send(bytes)
     }
 
-    /// Sends to the peer; gives the length.
+    /// Sends a datagram to the peer. Returns the number of bytes sent.
     ///
     /// # Errors
     ///
@@ -29,17 +30,17 @@ impl UdpSocket {
         self.send_now(None, bytes, false)
     }
 
-    /// Sends to an address; gives the length.
+    /// Sends a datagram to an address. Returns the number of bytes sent.
     ///
     /// # Errors
     ///
-    /// As [`UdpSocket::send`]; [`io::ErrorKind::HostUnreachable`] if no host ever had that address.
+    /// As [`UdpSocket::send`]; [`io::ErrorKind::HostUnreachable`] if no host ever had the address.
     #[inline]
     pub fn send_to<'a>(&'a self, bytes: &'a [u8], to: impl ToSocketAddrs + 'a) -> impl Future<Output = io::Result<usize>> + 'a {
         poll_fn(move |_| Poll::Ready(self.send_to_now(&to, bytes)))
     }
 
-    /// Sends to an address; gives the length.
+    /// Sends a datagram to an address. Returns the number of bytes sent.
     ///
     /// # Errors
     ///
@@ -48,7 +49,7 @@ impl UdpSocket {
         self.send_now(Some(&to), bytes, false)
     }
 
-    /// Sends to the peer; ready at once.
+    /// Sends a datagram to the peer. Always ready.
     ///
     /// # Errors
     ///
@@ -57,7 +58,7 @@ impl UdpSocket {
         Poll::Ready(self.try_send(bytes))
     }
 
-    /// Sends to an address; ready at once.
+    /// Sends a datagram to an address. Always ready.
     ///
     /// # Errors
     ///
@@ -70,7 +71,7 @@ impl UdpSocket {
     fn send_to_now(&self, to: &impl ToSocketAddrs, bytes: &[u8]) -> io::Result<usize> {
         match to.to_socket_addr() {
             Ok(to) => self.send_now(Some(&to), bytes, false),
-            // A name means nothing where the socket may not be used, which is the better reason.
+            // A name cannot be looked up outside of the run. If the socket may not be used, that is the more useful error.
             Err(error) => self.shared.check_open(self.host, KIND).and(Err(error)),
         }
     }
@@ -83,17 +84,17 @@ impl UdpSocket {
         Ok(bytes.len())
     }
 
-    /// Waits until something can be sent: not at all.
+    /// Returns at once, because sending never waits.
     ///
     /// # Errors
     ///
-    /// If the run has ended, or this is another thread.
+    /// If the run has ended, or on a thread that does not run the test bed.
     #[expect(clippy::unused_async, reason = "as tokio's")]
     pub async fn writable(&self) -> io::Result<()> {
         self.shared.check_open(self.host, KIND)
     }
 
-    /// Always ready: sending never waits.
+    /// Always ready, because sending never waits.
     ///
     /// # Errors
     ///
