@@ -1,4 +1,4 @@
-//! Parts of a test bed with which a run is the same again.
+//! Parts of a test bed that a printed test needs to repeat a run.
 
 use std::panic::Location;
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use crate::settings::{Limits, Settings};
 use crate::setup::RECEIVE_BUFFER;
 
 impl Testbed {
-    /// Returns the parts of the test bed with which a run is the same again.
+    /// Returns the parts of the test bed that a printed test needs to repeat a run.
     pub(super) fn again(&self, seed: &Seed, place: &'static Location<'static>) -> Again {
         let Settings { receive_buffer, limits, said, laws, .. } = &self.setup.settings;
         let default = Limits::default();

@@ -1,10 +1,11 @@
-//! Packets that a test bed hits.
+//! Laws of a test bed, which hit packets.
 
 use super::Testbed;
 use crate::hit::{Hits, PacketLaw, SentPacket, Verdict};
 
 impl Testbed {
-    /// Asks a function what becomes of every packet that is offered to the link from one host to another: see [`hit`](crate::hit). Every run begins with a clone of it.
+    /// Asks a function for the fate of every packet offered to the link from one host to another: see [`hit`](crate::hit). Every run begins with a clone of the
+    /// function.
     ///
     /// ```
     /// use cohaptic_testkit::{Testbed, hit::{Flags, Verdict}};
@@ -19,40 +20,40 @@ impl Testbed {
     ///
     /// # Panics
     ///
-    /// If there is no such host, or both are the same.
+    /// If there is no such host, or both hosts are the same.
     #[track_caller]
     pub fn on_packet(mut self, from: &str, to: &str, judge: impl FnMut(&SentPacket<'_>) -> Verdict + Clone + Send + 'static) -> Self {
         self.setup.add_function([from, to], judge);
         self
     }
 
-    /// Asks a law what becomes of every packet that is offered to the link from one host to another: see [`PacketLaw`].
+    /// Asks a law for the fate of every packet offered to the link from one host to another: see [`PacketLaw`].
     ///
     /// # Panics
     ///
-    /// If there is no such host, or both are the same.
+    /// If there is no such host, or both hosts are the same.
     #[track_caller]
     pub fn law(mut self, from: &str, to: &str, law: impl PacketLaw + Clone + Send + 'static) -> Self {
         self.setup.add_law([from, to], law);
         self
     }
 
-    /// Hits packets from one host to another, in words such as `drop first SYN; delay 30ms packets 3 8`: see [`hit`](crate::hit).
+    /// Hits packets from one host to another, as words such as `drop first SYN; delay 30ms packets 3 8` say: see [`hit`](crate::hit).
     ///
     /// # Panics
     ///
-    /// If there is no such host, both are the same, or the words make no sense, with the place.
+    /// If there is no such host, both hosts are the same, or the words make no sense. The message names the place.
     #[track_caller]
     pub fn hit(mut self, from: &str, to: &str, words: &str) -> Self {
         self.setup.add_words([from, to], words);
         self
     }
 
-    /// Hits packets as a value says that a strategy has drawn, or that was pasted back.
+    /// Hits packets as a value says. A strategy has drawn the value, or a printed test contains it.
     ///
     /// # Panics
     ///
-    /// If it names a host that there is not.
+    /// If `hits` names a host that the test bed does not have.
     #[track_caller]
     pub fn hits(mut self, hits: &Hits) -> Self {
         self.setup.add_hits(&hits.all);

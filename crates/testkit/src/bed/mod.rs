@@ -1,4 +1,4 @@
-//! The test bed: what it is made of, and its run.
+//! Test bed: its parts, and its run.
 
 mod again;
 mod hitting;
@@ -36,7 +36,7 @@ use crate::trace::Trace;
 use crate::watch::{Kind, Watched};
 use crate::wire::Recorded;
 
-/// Hosts, the links between them, and a program that is run on them in virtual time.
+/// Test bed: hosts, the links between the hosts, and the settings of a run. A program runs on the hosts in virtual time.
 ///
 /// ```
 /// use std::time::Duration;
@@ -60,7 +60,7 @@ use crate::wire::Recorded;
 #[must_use = "a test bed does nothing until it is run"]
 pub struct Testbed {
     setup: Setup,
-    /// By host, where they are not Linux's.
+    /// Constants of TCP of the hosts whose constants are not the defaults of Linux.
     #[cfg(feature = "tcp")]
     tcp: BTreeMap<NodeId, TcpConfig>,
     #[cfg(feature = "tokio")]
@@ -68,11 +68,11 @@ pub struct Testbed {
 }
 
 impl Testbed {
-    /// Hosts of these names, with ideal links between them.
+    /// Creates a test bed with hosts of these names, and ideal links between them.
     ///
     /// # Panics
     ///
-    /// If there is no host or more than 23,170, a name is empty or there twice, or has one of the characters that an address is written with (`:`, `[`, `]`,
+    /// If there is no host or more than 23,170, or if a name is empty, occurs twice, or contains a character with which an address is written (`:`, `[`, `]`,
     /// white space).
     pub fn new<N: Into<String>>(hosts: impl IntoIterator<Item = N>) -> Self {
         let names: Names = hosts.into_iter().collect();
@@ -86,11 +86,11 @@ impl Testbed {
         }
     }
 
-    /// The hosts and the links between them that a file says: see [`LinkFile`].
+    /// Creates a test bed with the hosts and links of a file: see [`LinkFile`].
     ///
     /// # Panics
     ///
-    /// If the file cannot be read or makes no sense, with the path, the place and the line.
+    /// If the file cannot be read or makes no sense. The message names the path, the place and the line.
     #[expect(clippy::panic, reason = "a test that says nonsense is to fail, with the place")]
     #[track_caller]
     pub fn from_file(path: impl AsRef<std::path::Path>) -> Self {
@@ -100,33 +100,33 @@ impl Testbed {
         }
     }
 
-    /// The names of the hosts.
+    /// Returns the names of the hosts.
     #[must_use]
     pub fn hosts(&self) -> &[String] {
         &self.setup.names
     }
 
-    /// What every link is that is not named by [`Testbed::link`], before or after: a model, or words of `tc-netem`.
+    /// Sets all links that no call of [`Testbed::link`] names, whether before or after this call. A link is a model, or words of `tc-netem`.
     ///
     /// # Panics
     ///
-    /// If the words are none.
+    /// If the words describe no link.
     pub fn links(mut self, link: impl ToLink) -> Self {
         self.setup.set_every(link);
         self
     }
 
-    /// What the link from one host to another is; the way back is a link of its own.
+    /// Sets the link from one host to another. The link back is separate.
     ///
     /// # Panics
     ///
-    /// If there is no such host, both are the same, or the words are none.
+    /// If there is no such host, if both hosts are the same, or if the words describe no link.
     pub fn link(mut self, from: &str, to: &str, link: impl ToLink) -> Self {
         self.setup.set_link(from, to, link);
         self
     }
 
-    /// What the links in both directions between two hosts are. Each has random numbers of its own.
+    /// Sets the links in both directions between two hosts. Each link draws random numbers of its own.
     ///
     /// # Panics
     ///
@@ -135,95 +135,100 @@ impl Testbed {
         self.link(one, other, &link).link(other, one, &link)
     }
 
-    /// The seed of all chance in the links, unless the environment says another one ([`SEED_VARIABLE`](crate::SEED_VARIABLE)). Without it, the seed is made of
-    /// the file in which the bed is run and the function in which the program stands. So it does not depend on threads, and is the same with `--test-threads=1` and with
-    /// nextest; to edit other functions, or to move this one within its file, does not change it, and to rename it does. Two beds of one function have one seed.
+    /// Sets the seed of all chance in the links. The environment variable [`SEED_VARIABLE`](crate::SEED_VARIABLE) takes precedence. Without either, the seed is
+    /// derived from the file in which the bed is run and the function that contains the program. So the seed does not depend on threads, and is the same with
+    /// `--test-threads=1` and with nextest. Editing other functions or moving this function within its file does not change the seed; renaming the function
+    /// does. Two beds of one function have the same seed.
     pub const fn seed(mut self, seed: u64) -> Self {
         self.setup.seed = Some(seed);
         self
     }
 
-    /// How many bytes of datagrams a socket holds that nobody has read; what comes beyond is lost. 212,992 if it is not said, as with Linux.
+    /// Sets the size of the receive buffer of a socket \[bytes\]. Datagrams beyond this size are lost until the program reads. The default is 212,992, as with
+    /// Linux.
     pub const fn receive_buffer(mut self, bytes: usize) -> Self {
         self.setup.settings.receive_buffer = bytes;
         self
     }
 
-    /// How often tasks may be polled at one instant before the run is given up, because time does not pass; a million if it is not said.
+    /// Sets how often tasks may be polled at one instant. Beyond this number the run fails, because time does not pass. The default is a million.
     pub const fn patience(mut self, polls: u64) -> Self {
         self.setup.settings.patience = polls;
         self
     }
 
-    /// Until when the program may run, in its own time; an hour if it is not said. A run that goes on is given up, with the network, each task, and what the
-    /// task waits for since when: a program that asks again and again over a network that answers nothing would never end. [`Duration::MAX`] is no limit.
+    /// Sets the time limit of the program, in virtual time. The default is an hour. A run that goes on beyond the limit fails, and the message names the
+    /// network, each waiting task, the things that the task waits for, and since when. Without a limit a program that repeats a request over a network without
+    /// answers would never end. [`Duration::MAX`] stands for no limit.
     pub const fn time_limit(mut self, limit: Duration) -> Self {
         self.setup.settings.limits.time = limit;
         self
     }
 
-    /// Limit of the polls of all tasks of a run; twenty million if it is not said, which takes some seconds. A run that goes on is given up as with
-    /// [`Testbed::time_limit`]. `u64::MAX` is no limit.
+    /// Sets the limit of the polls of all tasks of a run. The default is twenty million polls, which take some seconds. A run that goes on beyond the limit
+    /// fails as with [`Testbed::time_limit`]. `u64::MAX` stands for no limit.
     pub const fn step_limit(mut self, polls: u64) -> Self {
         self.setup.settings.limits.steps = polls;
         self
     }
 
-    /// How many bytes the run may hold that were sent and neither read nor lost, on links, in buffers of sockets and in streams of TCP; a gibibyte if it is not
-    /// said. Each packet counts 200 bytes more than its content, for its places in queues. A run that comes to hold more fails, and names the host, the
-    /// socket and the task that sent last: a loop that only sends would take all memory otherwise. `u64::MAX` is no limit.
+    /// Sets how many bytes the run may hold that were sent and neither read nor lost: on links, in buffers of sockets, and in streams of TCP. The default is a
+    /// gibibyte. Each packet counts 200 bytes more than its content, for its entries in queues. A run that holds more fails, and the message names the host,
+    /// the socket and the task that sent last. Without a limit a loop that only sends would take all memory. `u64::MAX` stands for no limit.
     pub const fn byte_limit(mut self, bytes: u64) -> Self {
         self.setup.settings.byte_limit = bytes;
         self
     }
 
-    /// For how long by the wall clock a task may run without returning to the executor, a minute if it is not said. Then the process ends, after the task, its host, the
-    /// time of the run and the seed have been told on standard error, and what happened has been written where [`Testbed::artefacts`] says: a loop without an `.await`
-    /// cannot be stopped otherwise. Tasks of tokio's own that wake each other without letting time pass are found too. [`STALL_VARIABLE`](crate::STALL_VARIABLE)
-    /// says it for all tests of a process; [`Duration::MAX`] is never. On Linux a process under a debugger is left alone.
+    /// Sets how long a task may run without returning to the executor, by the wall clock. The default is a minute. After that time the process ends, because a
+    /// loop without an `.await` cannot be stopped otherwise. Before, the task, its host, the time of the run and the seed are printed on standard error, and
+    /// the record of the run is written where [`Testbed::artefacts`] says. Tasks of tokio that wake each other without letting time pass are found as well. The
+    /// environment variable [`STALL_VARIABLE`](crate::STALL_VARIABLE) sets the limit for all tests of a process; [`Duration::MAX`] stands for no limit. On
+    /// Linux a process under a debugger is left alone.
     pub const fn stall_limit(mut self, limit: Duration) -> Self {
         self.setup.stall_limit = limit;
         self
     }
 
-    /// Leaves what packets carry out of what [`Testbed::run_twice`] compares: for protocols whose keys are random. The times, the sizes and the ends of all
-    /// packets are compared still.
+    /// Leaves the contents of packets out of the comparison of [`Testbed::run_twice`], for protocols with random keys. The times, the sizes and the ends of all
+    /// packets are still compared.
     pub const fn without_digests(mut self) -> Self {
         self.setup.settings.digests = false;
         self
     }
 
-    /// Records what happens, for [`Bed::trace`].
+    /// Records the events of the run, for [`Bed::trace`].
     pub const fn traced(mut self) -> Self {
         self.setup.settings.traces = true;
         self
     }
 
-    /// If the run fails, what happened is written into this folder: see [`Record::write`]. [`ARTEFACTS_VARIABLE`](crate::ARTEFACTS_VARIABLE) asks for it without
-    /// the test.
+    /// Sets the folder into which a failing run writes its record: see [`Record::write`]. The environment variable
+    /// [`ARTEFACTS_VARIABLE`](crate::ARTEFACTS_VARIABLE) does the same without a change of the test.
     pub fn artefacts(mut self, folder: impl Into<PathBuf>) -> Self {
         self.setup.artefacts = Some(folder.into());
         self
     }
 
-    /// Runs the program on tokio, whose clock is paused: for programs that use tokio's timers and tasks. Otherwise an executor of this crate runs it.
+    /// Runs the program on tokio with a paused clock, for programs that use tokio's timers and tasks. Without this call an executor of this crate runs the
+    /// program.
     ///
-    /// Packets arrive, and [`time`](crate::time) goes off, to the nanosecond all the same. Tokio's own timers are rounded up to the next millisecond since the run
-    /// began, as they are with tokio's paused clock elsewhere: a `tokio::time::sleep` of 2.5 ms is over after 3 ms. `tokio::select!` without `biased` chooses
-    /// at random, and so two runs differ.
+    /// Packets and [`time`](crate::time) still have a resolution of a nanosecond. Tokio's own timers are rounded up to the next millisecond since the beginning
+    /// of the run, as always with tokio's paused clock: a `tokio::time::sleep` of 2.5 ms ends after 3 ms. `tokio::select!` without `biased` chooses at random,
+    /// so that two runs differ.
     #[cfg(feature = "tokio")]
     pub const fn on_tokio(mut self) -> Self {
         self.is_tokio = true;
         self
     }
 
-    /// Runs a program until it is over, and gives what came out. Tasks that run on then are dropped.
+    /// Runs a program until it is over, and returns its output. Tasks that are still running are then dropped.
     ///
     /// # Panics
     ///
-    /// If the program or one of its tasks does, with the task and the seed on standard error; if nothing will ever happen any more, time does not pass, the run
-    /// goes on beyond [`Testbed::time_limit`] or [`Testbed::step_limit`], or more than [`Testbed::byte_limit`] is on its way; if another thread uses a socket
-    /// of the run; inside another test bed or runtime.
+    /// If the program or one of its tasks panics, with the task and the seed on standard error. If nothing will ever happen any more, time does not pass, the
+    /// run goes on beyond [`Testbed::time_limit`] or [`Testbed::step_limit`], or holds more than [`Testbed::byte_limit`]. If another thread uses a socket of
+    /// the run. If the call is made inside the run of another test bed or, on tokio, inside another runtime.
     #[track_caller]
     pub fn run<T, F>(self, program: impl FnOnce(Bed) -> F) -> T
     where
@@ -234,7 +239,7 @@ impl Testbed {
         self.run_once(&seed, program, Location::caller()).0
     }
 
-    /// Runs a program as [`Testbed::run`] does, and gives what happened too.
+    /// Runs a program like [`Testbed::run`], and returns its output and the record of the run.
     ///
     /// # Panics
     ///
@@ -250,7 +255,7 @@ impl Testbed {
         self.run_once(&seed, program, Location::caller())
     }
 
-    /// Runs a program twice, and gives what came out first, if all that happened was the same to the nanosecond: every packet, with what it carried.
+    /// Runs a program twice, compares every event of the two runs to the nanosecond, with the content of every packet, and returns the first output.
     ///
     /// # Panics
     ///
@@ -306,7 +311,7 @@ impl Testbed {
             crate::runtime::own::run(core, names.len(), |shared| program(Bed::new(shared)), origin, &watched, &mut recorded)
         };
         let outcome = catch_unwind(AssertUnwindSafe(|| failure::__rust_begin_short_backtrace(run)));
-        // While a panic is reported nothing is watched any more.
+        // The watchdog ends here: the report of a panic may take long.
         let panicked = watched.pulse.running().map(|runner| runner.words(&names));
         drop(watched);
         let mut recorded = recorded.unwrap_or_else(|| Recorded { trace: Trace::new(Arc::clone(&names)), ..Recorded::default() });
@@ -321,7 +326,8 @@ impl Testbed {
                 (outcome, record)
             }
             Err(panic) => {
-                // A test whose seed or links it does not get from elsewhere fails again as it stands.
+                // A test with its own links fails again as it stands if its seed is that of its place, or if it has no chance. Otherwise, or if a strategy drew
+                // the links, the report prints a test.
                 let differs = failure::is_searching() || !seed.is_of_place && again.has_chance();
                 failure::report(Box::new(move || {
                     let test = if differs { again.test(&drawn, true) } else { String::new() };

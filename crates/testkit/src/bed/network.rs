@@ -1,4 +1,4 @@
-//! Test beds with the networks that strategies draw.
+//! Test beds with networks drawn by strategies.
 
 use cohaptic_wan::{LinkModel, Path};
 
@@ -7,11 +7,12 @@ use crate::link::ToLink;
 use crate::strategies::{ImpairedLink, ImpairedNetwork};
 
 impl Testbed {
-    /// The links of a network that a strategy has drawn, or that was pasted back: its first host is the first one of this test bed, and so on.
+    /// Sets the links to those of a network that a strategy has drawn, or that a printed test contains. Host number n of the network is host number n of this
+    /// test bed.
     ///
     /// # Panics
     ///
-    /// If it has not as many hosts as the test bed.
+    /// If the numbers of hosts differ.
     pub fn network(mut self, network: &ImpairedNetwork) -> Self {
         let hosts = self.setup.names.len();
         assert!(network.hosts() == hosts, "a network of {} hosts for a test bed of {hosts}: expected as many", network.hosts());
