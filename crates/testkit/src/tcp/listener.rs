@@ -1,4 +1,4 @@
-//! The virtual listener.
+//! Virtual TCP listener.
 
 use std::fmt;
 use std::future::poll_fn;
@@ -14,21 +14,21 @@ use crate::context::Call;
 use crate::core::{Core, HoldId, Inherited, ListenId, Shared};
 use crate::resolve::ToSocketAddrs;
 
-/// How many connections may wait at a listener that does not say it; Linux lets one more wait.
+/// Default backlog. Linux lets one more connection wait.
 const BACKLOG: usize = 128;
 
-/// A TCP listener of a host of the running test bed: the methods of tokio's, with the same meaning.
+/// TCP listener of a host of the running test bed, with the methods of tokio's `TcpListener` in the same meaning.
 ///
-/// What differs, or is worth knowing:
+/// Differences to tokio's listener, and further properties:
 ///
-/// - It is bound on the host of the task that binds it; [`Host::listen`](crate::Host::listen) names another one.
-/// - 129 connections wait to be accepted ([`TcpSocket::listen`](super::TcpSocket::listen) has another number). A SYN beyond that is dropped without an answer, as
-///   Linux does it, so that its sender tries again after 1, 3, 7 … s.
+/// - The listener is bound on the host of the task that calls `bind`; [`Host::listen`](crate::Host::listen) names another host.
+/// - At most 129 connections wait to be accepted; [`TcpSocket::listen`](super::TcpSocket::listen) takes another number. As with Linux, a SYN beyond that number
+/// is dropped without an answer, so that its sender tries again after 1, 3, 7 … s.
 /// - A connection that is reset while it waits is accepted all the same, and reading from it fails.
-/// - A listener at `[::]` hears IPv6 only.
-/// - When its host crashes, every method gives [`io::ErrorKind::ConnectionAborted`], with the way out. So does every method once the run of its test bed has
-///   ended, also within the run of another test bed.
-/// - It belongs to the thread that runs the test bed. On another thread every method gives [`io::ErrorKind::Unsupported`], and the run fails.
+/// - A listener at `[::]` accepts connections over IPv6 only.
+/// - After its host has crashed, every method returns [`io::ErrorKind::ConnectionAborted`], with the way out. The same error comes from every method after the
+/// run of the test bed has ended, also within the run of another test bed.
+/// - The listener belongs to the thread that runs the test bed. On another thread every method returns [`io::ErrorKind::Unsupported`], and the run fails.
 pub struct TcpListener {
     shared: Arc<Shared>,
     host: NodeId,
@@ -36,11 +36,12 @@ pub struct TcpListener {
 }
 
 impl TcpListener {
-    /// Listens on the host of the task that is running. `0.0.0.0` and `[::]` hear all addresses of the host, port 0 is given a free one: from 49152 on, in turn.
+    /// Listens on the host of the running task. `0.0.0.0` and `[::]` stand for all addresses of the host. Port 0 stands for a free port; such ports are given
+    /// in turn from 49152 on.
     ///
     /// # Errors
     ///
-    /// As tokio's: the address is taken by another listener, or is not the host's.
+    /// As with tokio: the address is taken by another listener, or is no address of the host.
     ///
     /// # Panics
     ///
@@ -65,7 +66,7 @@ impl TcpListener {
         Self::listen(shared, host, held, BACKLOG, (config, None))
     }
 
-    /// Listens at a port that is held, and releases it if that fails.
+    /// Listens at a port that is held. If that fails, the port is released.
     pub(super) fn listen(shared: Arc<Shared>, host: NodeId, held: (HoldId, SocketAddr), backlog: usize, inherited: Inherited) -> io::Result<Self> {
         let id = shared.open(host, KIND, |core| {
             let listening = core.listen(host, held, backlog, inherited);
@@ -77,11 +78,11 @@ impl TcpListener {
         Ok(Self { shared, host, id })
     }
 
-    /// Asks the state.
+    /// Asks the state about the listener.
     ///
     /// # Errors
     ///
-    /// If the run has ended, this is another thread, or the host of the listener has crashed.
+    /// If the run has ended, on a thread that does not run the test bed, or if the host of the listener has crashed.
     fn open<T>(&self, ask: impl FnOnce(&mut Core) -> T) -> io::Result<T> {
         self.shared.open(self.host, KIND, |core| {
             core.check_listener(self.id)?;
@@ -89,16 +90,16 @@ impl TcpListener {
         })?
     }
 
-    /// Waits for a connection; gives it and the address of its other end.
+    /// Waits for a connection. Returns the connection and the address of its other end.
     ///
     /// # Errors
     ///
-    /// If its host has crashed.
+    /// If the host of the listener has crashed.
     pub async fn accept(&self) -> io::Result<(TcpStream, SocketAddr)> {
         poll_fn(|cx| self.poll_accept(cx)).await
     }
 
-    /// Takes a connection, or sees to it that the task is woken when there is one.
+    /// Accepts a connection. If there is none, the task is woken when one can be accepted.
     ///
     /// # Errors
     ///
@@ -117,29 +118,29 @@ impl TcpListener {
         }
     }
 
-    /// The address at which it listens.
+    /// Returns the address at which the listener listens.
     ///
     /// # Errors
     ///
-    /// If its host has crashed.
+    /// If the host of the listener has crashed.
     pub fn local_addr(&self) -> io::Result<SocketAddr> {
         self.open(|core| core.listener_address(self.id))
     }
 
-    /// The time to live of packets of the connections that it takes, which nothing counts down here: there are no routers.
+    /// Returns the time to live of packets of accepted connections. It has no effect, because a test bed has no routers that count it down.
     ///
     /// # Errors
     ///
-    /// If its host has crashed.
+    /// If the host of the listener has crashed.
     pub fn ttl(&self) -> io::Result<u32> {
         self.open(|core| core.listener_config(self.id).ttl.into())
     }
 
-    /// Sets that time to live, from 1 to 255.
+    /// Sets the time to live of packets of accepted connections, from 1 to 255.
     ///
     /// # Errors
     ///
-    /// If it is none, or its host has crashed.
+    /// If `ttl` is out of range, or the host of the listener has crashed.
     pub fn set_ttl(&self, ttl: u32) -> io::Result<()> {
         self.open(|core| {
             core.listener_config(self.id).ttl = super::options::ttl(ttl)?;

@@ -1,8 +1,8 @@
-//! TCP: halves of streams, and what connections are made of.
+//! TCP: halves of streams, and the types of connections.
 //!
-//! [`TcpListener`], [`TcpStream`] and [`TcpSocket`] have the methods of tokio's on a real TCP
-//! ([`cohaptic_tcp`]), whose segments are packets on the emulated links. On its link a packet counts with its whole length, headers of IP and TCP included; a datagram
-//! of UDP counts with what it carries. The module [`net`](crate::net) has the names of `tokio::net`, so that one changed import makes a program run here.
+//! [`TcpListener`], [`TcpStream`] and [`TcpSocket`] have the methods of tokio's types, on a real TCP ([`cohaptic_tcp`]) whose segments are packets on the
+//! emulated links. The size of such a packet on its link is its whole length, headers of IP and TCP included; a UDP datagram counts with its content only. The
+//! module [`net`](crate::net) has the names of `tokio::net`, so that a program runs here after changing one import.
 
 mod listener;
 mod options;
@@ -31,16 +31,16 @@ pub use listener::TcpListener;
 pub use socket::TcpSocket;
 pub use stream::TcpStream;
 
-/// One end of a connection: see [`Bed::connections`](crate::Bed::connections).
+/// State of one end of a connection: see [`Bed::connections`](crate::Bed::connections).
 #[derive(Clone, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub struct ConnectionInfo {
-    /// The host.
+    /// Name of the host.
     pub host: String,
-    /// The address of this end.
+    /// Address of this end.
     pub local: SocketAddr,
-    /// The address of the other end.
+    /// Address of the other end.
     pub peer: SocketAddr,
-    /// Figures.
+    /// Figures of the connection, such as round trips and retransmissions.
     pub info: Info,
 }

@@ -1,11 +1,11 @@
-//! The options of a stream.
+//! Options of a stream.
 
 use std::io;
 use std::time::Duration;
 
 use super::{Keepalive, TcpStream};
 
-/// Checks a time to live.
+/// Converts a time to live, which must be from 1 to 255.
 pub(super) fn ttl(ttl: u32) -> io::Result<u8> {
     u8::try_from(ttl)
         .ok()
@@ -14,75 +14,76 @@ pub(super) fn ttl(ttl: u32) -> io::Result<u8> {
 }
 
 impl TcpStream {
-    /// Whether small segments leave while others are unanswered (`TCP_NODELAY`).
+    /// Returns whether small segments leave while earlier segments are not acknowledged (`TCP_NODELAY`).
     ///
     /// # Errors
     ///
-    /// If its host has crashed.
+    /// If the host of the stream has crashed.
     pub fn nodelay(&self) -> io::Result<bool> {
         self.open_alive(|core| core.connection(self.id).nodelay())
     }
 
-    /// Lets small segments leave while others are unanswered, or holds them back by Nagle's algorithm. What was held back leaves.
+    /// Sets whether small segments leave while earlier segments are not acknowledged. If not, Nagle's algorithm holds them back. Turning the option on sends
+    /// the segments that were held back.
     ///
     /// # Errors
     ///
-    /// If its host has crashed.
+    /// If the host of the stream has crashed.
     pub fn set_nodelay(&self, nodelay: bool) -> io::Result<()> {
         self.change(|_, connection| connection.set_nodelay(nodelay))
     }
 
-    /// Whether acknowledgements leave at once now (`TCP_QUICKACK`).
+    /// Returns whether acknowledgements leave at once now (`TCP_QUICKACK`).
     ///
     /// # Errors
     ///
-    /// If its host has crashed.
+    /// If the host of the stream has crashed.
     pub fn quickack(&self) -> io::Result<bool> {
         self.open_alive(|core| core.connection(self.id).quickack())
     }
 
-    /// Acknowledges at once from now on, or lets acknowledgements wait. As in Linux, it does not stay so.
+    /// Sets whether acknowledgements leave at once from now on. As in Linux, TCP may change this by itself later.
     ///
     /// # Errors
     ///
-    /// If its host has crashed.
+    /// If the host of the stream has crashed.
     pub fn set_quickack(&self, quickack: bool) -> io::Result<()> {
         self.change(|_, connection| connection.set_quickack(quickack))
     }
 
-    /// What [`TcpStream::set_linger`] has set.
+    /// Returns the time set by [`TcpStream::set_linger`].
     ///
     /// # Errors
     ///
-    /// If its host has crashed.
+    /// If the host of the stream has crashed.
     pub fn linger(&self) -> io::Result<Option<Duration>> {
         self.open_alive(|core| *core.linger(self.id))
     }
 
-    /// With zero, the connection is reset when the stream is dropped. Another time is kept and does nothing: to drop a stream takes no time here. Rounded down to
-    /// seconds, as with Linux.
+    /// Sets the linger time, rounded down to seconds as with Linux. With zero, the connection is reset when the stream is dropped. Another time is stored
+    /// without effect, because dropping a stream takes no time here.
     ///
     /// # Errors
     ///
-    /// If its host has crashed.
+    /// If the host of the stream has crashed.
     pub fn set_linger(&self, linger: Option<Duration>) -> io::Result<()> {
         self.open_alive(|core| *core.linger(self.id) = linger.map(|linger| Duration::from_secs(linger.as_secs())))
     }
 
-    /// Lets the connection be reset when the stream is dropped.
+    /// Makes the connection be reset when the stream is dropped.
     ///
     /// # Errors
     ///
-    /// If its host has crashed.
+    /// If the host of the stream has crashed.
     pub fn set_zero_linger(&self) -> io::Result<()> {
         self.set_linger(Some(Duration::ZERO))
     }
 
-    /// The time to live, which nothing counts down here: there are no routers.
+    /// Returns the time to live. It has no effect, because a test bed has no routers that count it down.
     ///
     /// # Errors
     ///
-    /// If its host has crashed.
+    /// If the host of the stream has crashed.
     pub fn ttl(&self) -> io::Result<u32> {
         self.open_alive(|core| core.connection(self.id).config().ttl.into())
     }
@@ -91,18 +92,18 @@ impl TcpStream {
     ///
     /// # Errors
     ///
-    /// If it is none, or its host has crashed.
+    /// If `ttl` is out of range, or the host of the stream has crashed.
     pub fn set_ttl(&self, ttl: u32) -> io::Result<()> {
         let ttl = self::ttl(ttl)?;
         self.change(|_, connection| connection.set_ttl(ttl))
     }
 
-    /// Probes the peer while nothing is sent, at these times, or does not (`SO_KEEPALIVE`, `TCP_KEEPIDLE`, `TCP_KEEPINTVL`, `TCP_KEEPCNT`): with tokio this takes
-    /// `socket2`.
+    /// Sets the times of keep-alive probes, which are sent while no data is sent (`SO_KEEPALIVE`, `TCP_KEEPIDLE`, `TCP_KEEPINTVL`, `TCP_KEEPCNT`). `None` turns
+    /// probing off. With tokio these options need `socket2`.
     ///
     /// # Errors
     ///
-    /// If a time is zero, or its host has crashed.
+    /// If a time is zero, or the host of the stream has crashed.
     pub fn set_keepalive_times(&self, keepalive: Option<Keepalive>) -> io::Result<()> {
         if keepalive.is_some_and(|keepalive| keepalive.idle.is_zero() || keepalive.interval.is_zero()) {
             return Err(io::Error::new(io::ErrorKind::InvalidInput, "a time of keep-alive probes is zero; expected one above zero"));
@@ -110,12 +111,12 @@ impl TcpStream {
         self.change(|now, connection| connection.set_keepalive(now, keepalive))
     }
 
-    /// How long written data may stay unanswered before the connection is given up (`TCP_USER_TIMEOUT`, RFC 5482); `None`: as
-    /// [`TcpConfig::retries`](super::TcpConfig::retries) says.
+    /// Sets how long written data may stay unacknowledged before the connection is given up (`TCP_USER_TIMEOUT`, RFC 5482). With `None`,
+    /// [`TcpConfig::retries`](super::TcpConfig::retries) decides.
     ///
     /// # Errors
     ///
-    /// If its host has crashed.
+    /// If the host of the stream has crashed.
     pub fn set_user_timeout(&self, timeout: Option<Duration>) -> io::Result<()> {
         self.change(|_, connection| connection.set_user_timeout(timeout))
     }

@@ -1,4 +1,4 @@
-//! Halves with a life of their own.
+//! Owned halves of a stream.
 
 use std::fmt;
 use std::io::{self, IoSlice, IoSliceMut};
@@ -12,11 +12,11 @@ use tokio::io::ReadBuf;
 use super::TcpStream;
 use super::split::{both, reading, writing};
 
-/// The half of a stream that reads: see [`TcpStream::into_split`].
+/// Owned half of a stream that reads: see [`TcpStream::into_split`].
 #[derive(Debug)]
 pub struct OwnedReadHalf(Arc<TcpStream>);
 
-/// The half of a stream that writes: see [`TcpStream::into_split`]. Dropped, it shuts its direction.
+/// Owned half of a stream that writes: see [`TcpStream::into_split`]. Dropping this half sends FIN.
 #[derive(Debug)]
 pub struct OwnedWriteHalf {
     stream: Arc<TcpStream>,
@@ -36,7 +36,7 @@ fn reunite(read: OwnedReadHalf, write: OwnedWriteHalf) -> Result<TcpStream, Reun
     Ok(Arc::into_inner(read.0).expect("a stream has two halves, and one is gone"))
 }
 
-/// The two halves are not of one stream.
+/// Error of joining halves of different streams.
 #[derive(Debug)]
 pub struct ReuniteError(pub OwnedReadHalf, pub OwnedWriteHalf);
 
@@ -49,11 +49,11 @@ impl fmt::Display for ReuniteError {
 impl std::error::Error for ReuniteError {}
 
 impl OwnedReadHalf {
-    /// Makes a stream of both halves again.
+    /// Joins both halves to a stream again.
     ///
     /// # Errors
     ///
-    /// Both halves, if they are not of one stream.
+    /// Both halves, if they belong to different streams.
     pub fn reunite(self, other: OwnedWriteHalf) -> Result<TcpStream, ReuniteError> {
         reunite(self, other)
     }
@@ -66,16 +66,16 @@ impl OwnedReadHalf {
 }
 
 impl OwnedWriteHalf {
-    /// Makes a stream of both halves again.
+    /// Joins both halves to a stream again.
     ///
     /// # Errors
     ///
-    /// Both halves, if they are not of one stream.
+    /// Both halves, if they belong to different streams.
     pub fn reunite(self, other: OwnedReadHalf) -> Result<TcpStream, ReuniteError> {
         reunite(other, self)
     }
 
-    /// Drops it without shutting its direction.
+    /// Drops this half without sending FIN.
     pub fn forget(mut self) {
         self.shuts_when_dropped = false;
         drop(self);

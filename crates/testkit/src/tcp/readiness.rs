@@ -1,4 +1,4 @@
-//! The ways of tokio's that wait for readiness, and those that do not wait.
+//! Methods of streams that wait for readiness, and methods that do not wait.
 
 use std::future::poll_fn;
 use std::io::{self, IoSlice, IoSliceMut};
@@ -9,16 +9,16 @@ use bytes::BufMut;
 use super::TcpStream;
 
 impl TcpStream {
-    /// Waits until something can be read, or the connection is over.
+    /// Waits until bytes can be read, or the connection is over.
     ///
     /// # Errors
     ///
-    /// If the run has ended, or this is another thread. An error of the connection is given by the next call.
+    /// If the run has ended, or on a thread that does not run the test bed. The next call returns an error of the connection itself.
     pub async fn readable(&self) -> io::Result<()> {
         poll_fn(|cx| self.poll_read_ready(cx)).await
     }
 
-    /// Ready when something can be read, or the connection is over.
+    /// Returns ready when bytes can be read, or the connection is over.
     ///
     /// # Errors
     ///
@@ -33,16 +33,16 @@ impl TcpStream {
         })?
     }
 
-    /// Waits until something can be written, or the connection is over.
+    /// Waits until bytes can be written, or the connection is over.
     ///
     /// # Errors
     ///
-    /// If the run has ended, or this is another thread. An error of the connection is given by the next call.
+    /// If the run has ended, or on a thread that does not run the test bed. The next call returns an error of the connection itself.
     pub async fn writable(&self) -> io::Result<()> {
         poll_fn(|cx| self.poll_write_ready(cx)).await
     }
 
-    /// Ready when something can be written, or the connection is over.
+    /// Returns ready when bytes can be written, or the connection is over.
     ///
     /// # Errors
     ///
@@ -57,16 +57,16 @@ impl TcpStream {
         })?
     }
 
-    /// Reads what has arrived.
+    /// Reads received bytes. Returns the number of bytes read; 0 is the end of the stream.
     ///
     /// # Errors
     ///
-    /// [`io::ErrorKind::WouldBlock`] if nothing has; why the connection is gone.
+    /// [`io::ErrorKind::WouldBlock`] if there are no received bytes; the error that ended the connection.
     pub fn try_read(&self, buffer: &mut [u8]) -> io::Result<usize> {
         self.try_read_vectored(&mut [IoSliceMut::new(buffer)])
     }
 
-    /// Reads what has arrived, into one buffer after the other.
+    /// Reads received bytes into one buffer after the other. Returns the number of bytes read.
     ///
     /// # Errors
     ///
@@ -75,13 +75,13 @@ impl TcpStream {
         self.open(|core| core.read(self.id, buffers))?
     }
 
-    /// Reads what has arrived into the free room of a buffer.
+    /// Reads received bytes into the free space of a buffer. Returns the number of bytes read.
     ///
     /// # Errors
     ///
     /// As [`TcpStream::try_read`].
     pub fn try_read_buf<B: BufMut>(&self, buffer: &mut B) -> io::Result<usize> {
-        // As much as a buffer that grows would be given by tokio.
+        // The same space that tokio would use of a buffer that grows.
         let room = buffer.chunk_mut().len().min(buffer.remaining_mut());
         let unread = self.open(|core| core.connection(self.id).info().unread)?;
         let mut read = vec![0; room.min(unread.max(1))];
@@ -90,16 +90,16 @@ impl TcpStream {
         Ok(count)
     }
 
-    /// Writes as much as the send buffer takes.
+    /// Writes as many bytes as the send buffer takes. Returns the number of bytes written.
     ///
     /// # Errors
     ///
-    /// [`io::ErrorKind::WouldBlock`] if that is nothing; why the connection is gone.
+    /// [`io::ErrorKind::WouldBlock`] if the send buffer is full; the error that ended the connection.
     pub fn try_write(&self, buffer: &[u8]) -> io::Result<usize> {
         self.try_write_vectored(&[IoSlice::new(buffer)])
     }
 
-    /// Writes one buffer after the other, as much as the send buffer takes.
+    /// Writes one buffer after the other, until the send buffer is full. Returns the number of bytes written.
     ///
     /// # Errors
     ///
@@ -108,11 +108,11 @@ impl TcpStream {
         self.open(|core| core.write(self.id, buffers))?
     }
 
-    /// Waits until it can do one of these.
+    /// Waits until the stream is ready for one of the interests.
     ///
     /// # Errors
     ///
-    /// If the run has ended, or this is another thread. An error of the connection is given by the next call.
+    /// If the run has ended, or on a thread that does not run the test bed. The next call returns an error of the connection itself.
     #[cfg(feature = "tokio-net")]
     pub async fn ready(&self, interest: tokio::io::Interest) -> io::Result<tokio::io::Ready> {
         poll_fn(|cx| {
@@ -133,7 +133,7 @@ impl TcpStream {
         .await
     }
 
-    /// What of these it can do now.
+    /// Returns the interests for which the stream is ready now.
     #[cfg(feature = "tokio-net")]
     fn readiness(&self, interest: tokio::io::Interest) -> io::Result<tokio::io::Ready> {
         use tokio::io::Ready;
@@ -147,11 +147,11 @@ impl TcpStream {
         })
     }
 
-    /// Tries an operation of one's own, such as [`TcpStream::try_read`].
+    /// Tries an operation of the caller, such as [`TcpStream::try_read`].
     ///
     /// # Errors
     ///
-    /// Those of the operation; [`io::ErrorKind::WouldBlock`] if it can do none of these now.
+    /// Errors of the operation; [`io::ErrorKind::WouldBlock`] if the stream is ready for none of the interests.
     #[cfg(feature = "tokio-net")]
     pub fn try_io<R>(&self, interest: tokio::io::Interest, operation: impl FnOnce() -> io::Result<R>) -> io::Result<R> {
         if self.readiness(interest)?.is_empty() {
@@ -160,11 +160,11 @@ impl TcpStream {
         operation()
     }
 
-    /// Does an operation of one's own, again whenever it would have blocked and one of these can be done.
+    /// Performs an operation of the caller, and repeats it whenever it would have blocked and the stream is ready again.
     ///
     /// # Errors
     ///
-    /// Those of the operation, but for [`io::ErrorKind::WouldBlock`].
+    /// Errors of the operation, except [`io::ErrorKind::WouldBlock`].
     #[cfg(feature = "tokio-net")]
     pub async fn async_io<R>(&self, interest: tokio::io::Interest, mut operation: impl FnMut() -> io::Result<R>) -> io::Result<R> {
         loop {
@@ -176,7 +176,7 @@ impl TcpStream {
         }
     }
 
-    /// Reads without taking, or sees to it that the task is woken when there is something; gives how much.
+    /// Copies received bytes without taking them from the stream, and returns their number. If there are none, the task is woken when bytes arrive.
     ///
     /// # Errors
     ///

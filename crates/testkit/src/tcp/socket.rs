@@ -1,4 +1,4 @@
-//! The virtual socket that is not connected yet.
+//! Virtual TCP socket that is not connected yet.
 
 use std::fmt;
 use std::io;
@@ -12,10 +12,10 @@ use super::{KIND, TcpConfig, TcpListener, TcpStream};
 use crate::context::Call;
 use crate::core::{HoldId, Shared};
 
-/// A TCP socket that is neither connected nor listening: the methods of tokio's, with the same meaning.
+/// TCP socket that neither is connected nor listens, with the methods of tokio's `TcpSocket` in the same meaning.
 ///
-/// It belongs to the host of the task that makes it. `from_std_stream` and the methods with devices are missing. `SO_REUSEPORT` is stored: connections are not
-/// distributed to listeners of one port.
+/// The socket belongs to the host of the task that makes it. `from_std_stream` and the methods about network devices are missing. `SO_REUSEPORT` is stored
+/// without effect: connections are not distributed to listeners of one port.
 pub struct TcpSocket {
     shared: Arc<Shared>,
     host: NodeId,
@@ -33,13 +33,13 @@ struct Settings {
     type_of_service: u32,
 }
 
-/// Twice the least that Linux gives to a buffer \[byte\].
+/// Twice the least size of a buffer in Linux \[byte\].
 const LEAST_BUFFER: u32 = 4608;
 /// Twice `net.core.rmem_max` and `wmem_max` \[byte\].
 const GREATEST_BUFFER: u32 = 425_984;
 
 fn doubled(size: u32) -> usize {
-    // Linux counts its own overhead as another half, and tells it.
+    // Linux reserves as much again for its own overhead, and reports the sum.
     size.saturating_mul(2).clamp(LEAST_BUFFER, GREATEST_BUFFER) as usize
 }
 
@@ -48,7 +48,7 @@ fn told(size: usize) -> u32 {
 }
 
 impl TcpSocket {
-    /// A socket of version 4 on the host of the task that is running.
+    /// Creates a socket for IPv4 on the host of the running task.
     ///
     /// # Errors
     ///
@@ -62,7 +62,7 @@ impl TcpSocket {
         Self::new(Call::here("TcpSocket::new_v4"), false)
     }
 
-    /// A socket of version 6 on the host of the task that is running.
+    /// Creates a socket for IPv6 on the host of the running task.
     ///
     /// # Errors
     ///
@@ -91,13 +91,13 @@ impl TcpSocket {
         self.settings.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Binds it. Port 0 is given a free one.
+    /// Binds the socket. Port 0 stands for a free port.
     ///
     /// # Errors
     ///
-    /// [`io::ErrorKind::AddrInUse`] if another socket has the port and not both are [shared](TcpSocket::set_reuseaddr), or another one listens there;
-    /// [`io::ErrorKind::AddrNotAvailable`] if the address is not the host's; [`io::ErrorKind::InvalidInput`] if it is bound already, or the address is of the other
-    /// version.
+    /// [`io::ErrorKind::AddrInUse`] if another socket has the port and not both sockets are [shared](TcpSocket::set_reuseaddr), or if another socket listens
+    /// there; [`io::ErrorKind::AddrNotAvailable`] if the host does not have the address; [`io::ErrorKind::InvalidInput`] if the socket is bound already, or the
+    /// address is of the other version of IP.
     pub fn bind(&self, address: SocketAddr) -> io::Result<()> {
         let mut settings = self.settings();
         if settings.bound.is_some() || address.is_ipv6() != self.is_six {
@@ -116,11 +116,11 @@ impl TcpSocket {
         })?
     }
 
-    /// Opens a connection, and waits until it is there.
+    /// Opens a connection, and waits until the connection is established.
     ///
     /// # Errors
     ///
-    /// As [`TcpStream::connect`]; [`io::ErrorKind::InvalidInput`] if the address is of the other version.
+    /// As [`TcpStream::connect`]; [`io::ErrorKind::InvalidInput`] if the address is of the other version of IP.
     pub async fn connect(self, address: SocketAddr) -> io::Result<TcpStream> {
         if address.is_ipv6() != self.is_six {
             return Err(io::Error::new(io::ErrorKind::InvalidInput, format!("{address} is of the other version of IP")));
@@ -128,7 +128,7 @@ impl TcpSocket {
         let stream = {
             let mut settings = self.settings();
             let stream = TcpStream::connect_on(Arc::clone(&self.shared), self.host, settings.bound, address, settings.config.clone())?;
-            // The port is the connection's now.
+            // The port belongs to the connection now, so dropping the socket must not release it.
             settings.bound = None;
             stream.set_linger(settings.linger)?;
             stream
@@ -136,11 +136,11 @@ impl TcpSocket {
         stream.established().await
     }
 
-    /// Listens. `backlog`: one connection more than that may wait to be accepted, as with Linux. A socket that is not bound is given a free port.
+    /// Listens. As with Linux, `backlog` + 1 connections may wait to be accepted. A socket that is not bound gets a free port.
     ///
     /// # Errors
     ///
-    /// [`io::ErrorKind::AddrInUse`] if another socket listens at that address.
+    /// [`io::ErrorKind::AddrInUse`] if another socket listens at the address.
     pub fn listen(self, backlog: u32) -> io::Result<TcpListener> {
         let mut settings = self.settings();
         let held = match settings.bound.take() {
@@ -151,40 +151,40 @@ impl TcpSocket {
         TcpListener::listen(Arc::clone(&self.shared), self.host, held, usize::try_from(backlog).unwrap_or(usize::MAX), inherited)
     }
 
-    /// The address at which it is bound; one of zeros if it is not.
+    /// Returns the address to which the socket is bound, or the unspecified address with port 0 if it is not bound.
     ///
     /// # Errors
     ///
-    /// If the run has ended, or this is another thread.
+    /// If the run has ended, or on a thread that does not run the test bed.
     pub fn local_addr(&self) -> io::Result<SocketAddr> {
         self.shared.check_open(self.host, KIND)?;
         Ok(self.settings().bound.map_or_else(|| self.any(), |(_, address)| address))
     }
 
-    /// The address of a socket that is not bound.
+    /// Returns the unspecified address with port 0.
     fn any(&self) -> SocketAddr {
         if self.is_six { SocketAddr::from(([0; 16], 0)) } else { SocketAddr::from(([0; 4], 0)) }
     }
 
-    /// The error of the socket: there is none before it is connected.
+    /// Returns the error of the socket: always `None`, because only a connection can have an error.
     ///
     /// # Errors
     ///
-    /// If the run has ended, or this is another thread.
+    /// If the run has ended, or on a thread that does not run the test bed.
     pub fn take_error(&self) -> io::Result<Option<io::Error>> {
         self.shared.check_open(self.host, KIND)?;
         Ok(None)
     }
 }
 
-/// An option that is stored: its getter and its setter.
+/// Getter and setter of an option that is stored.
 macro_rules! option {
     ($get:ident, $set:ident, $kind:ty, $what:literal, |$settings:ident| $read:expr, |$to:ident, $value:ident| $write:expr) => {
         #[doc = $what]
         ///
         /// # Errors
         ///
-        /// If the run has ended, or this is another thread.
+        /// If the run has ended, or on a thread that does not run the test bed.
         pub fn $get(&self) -> io::Result<$kind> {
             self.shared.check_open(self.host, KIND)?;
             let $settings = self.settings();
@@ -195,7 +195,7 @@ macro_rules! option {
         ///
         /// # Errors
         ///
-        /// If the run has ended, or this is another thread.
+        /// If the run has ended, or on a thread that does not run the test bed.
         pub fn $set(&self, $value: $kind) -> io::Result<()> {
             self.shared.check_open(self.host, KIND)?;
             let $to = &mut *self.settings();
@@ -267,7 +267,7 @@ impl TcpSocket {
         |to, linger| to.linger = linger.map(|linger| Duration::from_secs(linger.as_secs()))
     );
 
-    /// Lets the connection be reset when the stream is dropped.
+    /// Makes the connection be reset when the stream is dropped.
     ///
     /// # Errors
     ///

@@ -9,7 +9,7 @@ use tokio::io::ReadBuf;
 
 use super::TcpStream;
 
-/// What both kinds of halves that read have.
+/// Methods of both kinds of reading halves.
 macro_rules! reading {
     () => {
         /// As [`TcpStream::peek`].
@@ -68,7 +68,7 @@ macro_rules! reading {
     };
 }
 
-/// What both kinds of halves that write have.
+/// Methods of both kinds of writing halves.
 macro_rules! writing {
     () => {
         /// As [`TcpStream::writable`].
@@ -100,7 +100,7 @@ macro_rules! writing {
     };
 }
 
-/// What all halves have.
+/// Methods of all halves.
 macro_rules! both {
     () => {
         /// As [`TcpStream::ready`].
@@ -113,7 +113,7 @@ macro_rules! both {
             self.stream().ready(interest).await
         }
 
-        /// The address of the other end: as [`TcpStream::peer_addr`].
+        /// Returns the address of the other end: see [`TcpStream::peer_addr`].
         ///
         /// # Errors
         ///
@@ -122,7 +122,7 @@ macro_rules! both {
             self.stream().peer_addr()
         }
 
-        /// The address of this end: as [`TcpStream::local_addr`].
+        /// Returns the address of this end: see [`TcpStream::local_addr`].
         ///
         /// # Errors
         ///
@@ -135,11 +135,11 @@ macro_rules! both {
 
 pub(super) use {both, reading, writing};
 
-/// The half of a stream that reads: see [`TcpStream::split`].
+/// Borrowed half of a stream that reads: see [`TcpStream::split`].
 #[derive(Debug)]
 pub struct ReadHalf<'a>(pub(super) &'a TcpStream);
 
-/// The half of a stream that writes: see [`TcpStream::split`]. Dropped, it shuts nothing.
+/// Borrowed half of a stream that writes: see [`TcpStream::split`]. Dropping this half sends nothing.
 #[derive(Debug)]
 pub struct WriteHalf<'a>(pub(super) &'a TcpStream);
 

@@ -1,4 +1,4 @@
-//! The virtual stream.
+//! Virtual TCP stream.
 
 use std::fmt;
 use std::future::poll_fn;
@@ -16,21 +16,24 @@ use crate::context::Call;
 use crate::core::{ConnId, Core, HoldId, Shared};
 use crate::resolve::ToSocketAddrs;
 
-/// A TCP connection of a host of the running test bed: the methods of tokio's, with the same meaning.
+/// TCP connection of a host of the running test bed, with the methods of tokio's `TcpStream` in the same meaning.
 ///
-/// What differs, or is worth knowing:
+/// Differences to tokio's stream, and further properties:
 ///
-/// - It is opened from the host of the task that connects; [`Host::connect`](crate::Host::connect) names another one. Ports are counted from 49152 on, apart from
-///   those of UDP.
-/// - Dropped, it sends what was written, then FIN. If octets were not read, or after [`TcpStream::set_zero_linger`], it sends RST in place of that.
-/// - An error of the connection is told once, after all that had arrived was read; then reads give 0 and writes [`io::ErrorKind::BrokenPipe`], as with Linux.
-/// - A host that crashes tells nobody. Its peers hear of it when they write: after [`TcpConfig::retries`] if it stays away (15 minutes), or by a RST if it is back.
+/// - A connection is opened from the host of the task that calls `connect`; [`Host::connect`](crate::Host::connect) names another host. Its port is given in
+/// turn from 49152 on, independently of the ports of UDP.
+/// - A stream that is dropped sends the bytes written so far, then FIN. If received bytes were not read, or after [`TcpStream::set_zero_linger`], the stream
+/// sends RST instead.
+/// - As with Linux, an error of the connection is reported once, after all received bytes were read. Afterwards reads return 0 and writes
+/// [`io::ErrorKind::BrokenPipe`].
+/// - A host that crashes tells nobody. Its peers notice when they write: after [`TcpConfig::retries`] (15 minutes) if the host stays down, or by a RST if it is
+/// up again.
 /// - A host with new addresses loses its connections: both ends are silent, and time out when they write.
-/// - [`TcpStream::set_linger`] acts with zero only: to drop a stream takes no time.
-/// - `from_std`, `into_std` and `AsFd` are missing: there is no socket of the system.
-/// - When its host crashes, every method gives [`io::ErrorKind::ConnectionAborted`], with the way out. So does every method once the run of its test bed has
-///   ended, also within the run of another test bed.
-/// - It belongs to the thread that runs the test bed. On another thread every method gives [`io::ErrorKind::Unsupported`], and the run fails.
+/// - [`TcpStream::set_linger`] has an effect with zero only, because dropping a stream takes no time.
+/// - `from_std`, `into_std` and `AsFd` are missing, because there is no socket of the operating system.
+/// - After its host has crashed, every method returns [`io::ErrorKind::ConnectionAborted`], with the way out. The same error comes from every method after the
+/// run of the test bed has ended, also within the run of another test bed.
+/// - The stream belongs to the thread that runs the test bed. On another thread every method returns [`io::ErrorKind::Unsupported`], and the run fails.
 pub struct TcpStream {
     pub(super) shared: Arc<Shared>,
     host: NodeId,
@@ -42,20 +45,20 @@ impl TcpStream {
         Self { shared, host, id }
     }
 
-    /// Asks the state.
+    /// Asks the state about the connection. Works after a crash of the host as well.
     ///
     /// # Errors
     ///
-    /// If the run has ended, or this is another thread.
+    /// If the run has ended, or on a thread that does not run the test bed.
     pub(super) fn open<T>(&self, ask: impl FnOnce(&mut Core) -> T) -> io::Result<T> {
         self.shared.open(self.host, KIND, ask)
     }
 
-    /// Asks the state what a connection without a host cannot answer.
+    /// Asks the state about the connection, and fails after a crash of the host.
     ///
     /// # Errors
     ///
-    /// As [`TcpStream::open`]; if the host has crashed.
+    /// As [`TcpStream::open`]; also if the host has crashed.
     pub(super) fn open_alive<T>(&self, ask: impl FnOnce(&mut Core) -> T) -> io::Result<T> {
         self.open(|core| {
             core.check_connection(self.id)?;
@@ -63,7 +66,7 @@ impl TcpStream {
         })?
     }
 
-    /// Changes the connection.
+    /// Changes the connection with `change`, which gets the present instant.
     ///
     /// # Errors
     ///
@@ -72,12 +75,12 @@ impl TcpStream {
         self.open(|core| core.change_connection(self.id, change))?
     }
 
-    /// Opens a connection from the host of the task that is running, and waits until it is there.
+    /// Opens a connection from the host of the running task, and waits until the connection is established.
     ///
     /// # Errors
     ///
-    /// [`io::ErrorKind::ConnectionRefused`] if nobody listens there, a round trip later; [`io::ErrorKind::TimedOut`] after 127 s without an answer;
-    /// [`io::ErrorKind::HostUnreachable`] if no host ever had that address.
+    /// [`io::ErrorKind::ConnectionRefused`] after a round trip if nobody listens there; [`io::ErrorKind::TimedOut`] after 127 s without an answer;
+    /// [`io::ErrorKind::HostUnreachable`] if no host ever had the address.
     ///
     /// # Panics
     ///
@@ -93,7 +96,7 @@ impl TcpStream {
         }
     }
 
-    /// Sends the SYN. `bound`: the port that is held, and the address of that socket.
+    /// Sends the SYN. `bound` is the held port with the local address, or `None` for any free port.
     pub(crate) fn connect_on(
         shared: Arc<Shared>,
         host: NodeId,
@@ -108,7 +111,7 @@ impl TcpStream {
         Ok(Self { shared, host, id })
     }
 
-    /// Waits until the handshake is over.
+    /// Waits until the handshake is over, and returns its error if it failed.
     pub(crate) async fn established(self) -> io::Result<Self> {
         poll_fn(|cx| {
             self.open(|core| match core.is_settled(self.id) {
@@ -123,20 +126,20 @@ impl TcpStream {
         Ok(self)
     }
 
-    /// The address of this end.
+    /// Returns the address of this end.
     ///
     /// # Errors
     ///
-    /// If its host has crashed.
+    /// If the host of the stream has crashed.
     pub fn local_addr(&self) -> io::Result<SocketAddr> {
         self.open_alive(|core| core.connection(self.id).local_addr())
     }
 
-    /// The address of the other end.
+    /// Returns the address of the other end.
     ///
     /// # Errors
     ///
-    /// [`io::ErrorKind::NotConnected`] once the connection is gone.
+    /// [`io::ErrorKind::NotConnected`] before the connection is established and after it is over.
     pub fn peer_addr(&self) -> io::Result<SocketAddr> {
         let (state, peer) = self.open_alive(|core| {
             let connection = core.connection(self.id);
@@ -150,35 +153,36 @@ impl TcpStream {
         }
     }
 
-    /// Figures of the connection: its state, round trips, timeout, congestion window and retransmissions; once the run has ended, those of its end.
+    /// Returns the figures of the connection: its state, round trips, timeout, congestion window and retransmissions. After the end of the run the figures are
+    /// those of the end.
     ///
     /// # Panics
     ///
-    /// On another thread than that of the run.
+    /// On a thread that does not run the test bed, while the run goes on.
     #[must_use]
     pub fn info(&self) -> Info {
         self.shared.with(|core| core.connection(self.id).info())
     }
 
-    /// Takes out the error that the next call would give otherwise.
+    /// Takes the error that the next call would otherwise return.
     ///
     /// # Errors
     ///
-    /// If its host has crashed.
+    /// If the host of the stream has crashed.
     pub fn take_error(&self) -> io::Result<Option<io::Error>> {
         self.open(|core| core.take_error_of(self.id))?
     }
 
-    /// Reads what has arrived and leaves it; waits until something has.
+    /// Copies received bytes without taking them from the stream. Waits until there are any.
     ///
     /// # Errors
     ///
-    /// Why the connection is gone.
+    /// The error that ended the connection.
     pub async fn peek(&self, buffer: &mut [u8]) -> io::Result<usize> {
         poll_fn(|cx| self.poll_peek_into(cx, buffer)).await
     }
 
-    /// Does something, or waits until it can be done.
+    /// Performs `act`, or registers the task with `wait` if `act` would block.
     fn poll_with(
         &self,
         cx: &Context<'_>,
@@ -208,7 +212,7 @@ impl TcpStream {
         self.poll_with(cx, |core| core.write(self.id, buffers), Core::wait_to_write_to)
     }
 
-    /// A FIN follows what was written. On a connection that is gone it does nothing, as tokio's.
+    /// Sends FIN after the bytes written so far. As with tokio, nothing happens to a connection that is over.
     #[cfg_attr(not(feature = "tokio"), allow(dead_code, reason = "tokio's traits ask for it"))]
     pub(super) fn shut_write_half(&self) -> io::Result<()> {
         self.change(|_, connection| connection.shutdown())
@@ -216,11 +220,11 @@ impl TcpStream {
 }
 
 impl TcpStream {
-    /// A FIN follows what was written, once the thread of the run has time: for a half that is dropped.
+    /// Sends FIN after the bytes written so far, for a half that is dropped. On another thread this is left to the thread of the run.
     #[cfg(feature = "tokio")]
     pub(super) fn let_write_half_go(&self) {
         let id = self.id;
-        // A connection that went with its host has nothing to shut.
+        // The call fails for a connection whose host has crashed. Such a connection needs no FIN.
         self.shared.release(move |core| drop(core.change_connection(id, |_, connection| connection.shutdown())));
     }
 }

@@ -1,4 +1,4 @@
-//! Tokio's traits.
+//! Implementations of tokio's traits.
 
 use std::io::{self, IoSlice};
 use std::pin::Pin;
@@ -13,12 +13,12 @@ impl TcpStream {
         self.poll_read_into(cx, buffer.initialize_unfilled()).map_ok(|count| buffer.advance(count))
     }
 
-    /// Splits it into a half that reads and one that writes.
+    /// Splits the stream into a reading half and a writing half, which borrow the stream.
     pub const fn split(&mut self) -> (ReadHalf<'_>, WriteHalf<'_>) {
         (ReadHalf(self), WriteHalf(self))
     }
 
-    /// Splits it into a half that reads and one that writes, each with a life of its own.
+    /// Splits the stream into a reading half and a writing half, which own the stream together.
     #[must_use]
     pub fn into_split(self) -> (OwnedReadHalf, OwnedWriteHalf) {
         super::owned::split(self)
