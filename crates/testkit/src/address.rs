@@ -1,4 +1,4 @@
-//! Names and addresses: which host has which.
+//! Names and addresses of the hosts of a test bed.
 
 use std::fmt::{self, Write as _};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
@@ -8,29 +8,29 @@ use cohaptic_wan::NodeId;
 
 use crate::names::{Names, SHOWN};
 
-/// Which host has which name and which addresses.
+/// Names and present addresses of all hosts.
 ///
-/// The n-th host, counted from 1, has 10.0.0.n (beyond 255 it goes on with 10.0.1.0, like any number in four bytes) and `fd00::n`. Addresses that are given out later,
-/// by [`Host::change_addresses`](crate::Host::change_addresses), come after those of all hosts.
+/// Host number n, counted from 1, has the addresses 10.0.0.n and `fd00::n`. Beyond 255 the addresses go on with 10.0.1.0, as numbers of four bytes do.
+/// Addresses given out later, by [`Host::change_addresses`](crate::Host::change_addresses), follow the addresses of all hosts.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct AddressPlan {
     names: Arc<Names>,
-    /// By host: the number of the addresses that it has.
+    /// Number of the present addresses of each host, indexed by host.
     current: Vec<u32>,
-    /// By number, from 1: the host that has the addresses of that number. Those behind the last one no host has had.
+    /// Host that has the addresses of number `index + 1`; `None` after the host has got new addresses. Numbers beyond the end were never given.
     owners: Vec<Option<NodeId>>,
 }
 
-/// The addresses of one host.
+/// Addresses of one host.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Addresses {
-    /// Version 4.
+    /// Address of IPv4.
     pub v4: Ipv4Addr,
-    /// Version 6.
+    /// Address of IPv6.
     pub v6: Ipv6Addr,
 }
 
-/// The addresses of number 0.
+/// Addresses of number 0, which no host has.
 const FIRST: (u32, u128) = (Ipv4Addr::new(10, 0, 0, 0).to_bits(), 0xfd00 << 112);
 
 impl Addresses {
@@ -38,8 +38,8 @@ impl Addresses {
         Self { v4: Ipv4Addr::from_bits(FIRST.0.wrapping_add(number)), v6: Ipv6Addr::from_bits(FIRST.1 + u128::from(number)) }
     }
 
-    /// An address among those of its version, in 32 bits: its distance to the address of number 0. That of an address of a host is its number, the same in both
-    /// versions. Of version 6 the loopback address has 0, and all that can be no host's have the last number.
+    /// Returns the address in 32 bits: its distance to the address of number 0 of the same version. For the addresses of hosts this is their number, equal in
+    /// both versions. In IPv6 the loopback address becomes 0, and every address that no host can have becomes `u32::MAX`.
     #[inline]
     pub(crate) const fn short(address: IpAddr) -> u32 {
         match address {
@@ -58,7 +58,7 @@ impl Addresses {
         }
     }
 
-    /// The address of which that is [short](Self::short); another one that is no host's for the last number of version 6.
+    /// Returns the address whose [short](Self::short) form is `short`. For `u32::MAX` in IPv6 the result is an address that no host has, not the original one.
     #[inline]
     pub(crate) fn long(short: u32, is_six: bool) -> IpAddr {
         match (is_six, short) {
@@ -68,14 +68,14 @@ impl Addresses {
         }
     }
 
-    /// Whether the address of which that is short is one of loopback.
+    /// Returns whether the address with the short form `short` is a loopback address.
     #[inline]
     pub(crate) const fn is_loopback(short: u32, is_six: bool) -> bool {
         let bits = short.wrapping_add(FIRST.0);
         if is_six { short == 0 } else { bits >> 24 == 127 }
     }
 
-    /// The one of the same version as `other`.
+    /// Returns the address of the same version as `other`.
     #[must_use]
     pub const fn like(&self, other: IpAddr) -> IpAddr {
         match other {
@@ -84,7 +84,7 @@ impl Addresses {
         }
     }
 
-    /// Whether it is one of the two.
+    /// Returns whether `address` is one of the two.
     #[must_use]
     pub fn has(&self, address: IpAddr) -> bool {
         self.like(address) == address
@@ -106,7 +106,7 @@ impl AddressPlan {
         u32::try_from(self.owners.len()).unwrap_or(u32::MAX)
     }
 
-    /// Gives a host addresses that nobody has had. Those that it had belong to nobody from now on.
+    /// Gives a host addresses that no host has had. Its former addresses belong to no host from now on.
     pub(crate) fn change(&mut self, host: NodeId) -> Addresses {
         let before = Self::place(self.number(host));
         self.owners.iter_mut().skip(before).take(1).for_each(|owner| *owner = None);
@@ -114,7 +114,7 @@ impl AddressPlan {
         self.of(host)
     }
 
-    /// The names of the hosts, in the order in which they were given.
+    /// Returns the names of the hosts, in the order in which they were given.
     #[must_use]
     pub fn names(&self) -> &[String] {
         &self.names
@@ -124,24 +124,24 @@ impl AddressPlan {
         &self.names
     }
 
-    /// The addresses of a host; `None` if there is none of that name.
+    /// Returns the addresses of the host named `name`, or `None` if there is no such host.
     #[must_use]
     pub fn addresses(&self, name: &str) -> Option<Addresses> {
         self.names.find(name).map(|host| self.of(host))
     }
 
-    /// The name of the host that has this address now.
+    /// Returns the name of the host that has this address now.
     #[must_use]
     pub fn owner(&self, address: IpAddr) -> Option<&str> {
         self.owner_node(address).map(|host| &*self.names[host.index()])
     }
 
-    /// Whether any host has or had that address.
+    /// Returns whether any host has or had the address.
     pub(crate) fn was_given(&self, address: IpAddr) -> bool {
         Self::place(Addresses::short(address)) < self.owners.len()
     }
 
-    /// Says that no host has an address, and which hosts have which.
+    /// Returns the message that no host has an address, with the addresses of the hosts.
     pub(crate) fn unknown(&self, address: IpAddr) -> String {
         let mut text = format!("no host has the address {address}; the hosts are\n");
         // Writing to a `String` cannot fail.
@@ -152,7 +152,7 @@ impl AddressPlan {
         text
     }
 
-    /// A line for each of the first hosts.
+    /// Writes a line for each of the first `count` hosts.
     fn write_lines(&self, to: &mut impl fmt::Write, count: usize) -> fmt::Result {
         self.names.iter().zip(&self.current).take(count).try_for_each(|(name, number)| {
             let Addresses { v4, v6 } = Addresses::numbered(*number);
@@ -164,19 +164,19 @@ impl AddressPlan {
         self.owner_of(Addresses::short(address))
     }
 
-    /// The host that has the addresses of that number.
+    /// Returns the host that has the addresses of number `number`.
     #[inline]
     pub(crate) fn owner_of(&self, number: u32) -> Option<NodeId> {
         self.owners.get(Self::place(number)).copied().flatten()
     }
 
-    /// Where addresses stand among the owners; behind them all if nobody can have had them.
+    /// Returns the index in `owners` of the addresses of number `number`. For number 0, which no host has, the index wraps beyond the end.
     #[inline]
     const fn place(number: u32) -> usize {
         number.wrapping_sub(1) as usize
     }
 
-    /// The number of the addresses that a host has.
+    /// Returns the number of the present addresses of a host.
     #[inline]
     pub(crate) fn number(&self, host: NodeId) -> u32 {
         self.current[host.index()]
@@ -189,7 +189,7 @@ impl AddressPlan {
 }
 
 impl fmt::Display for AddressPlan {
-    /// A line a host: `server 10.0.0.2 fd00::2`.
+    /// Writes a line per host, such as `server 10.0.0.2 fd00::2`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.write_lines(f, usize::MAX)
     }

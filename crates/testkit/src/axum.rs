@@ -1,7 +1,7 @@
-//! Unmodified services of axum: [`TcpListener`] is a listener of `axum::serve`.
+//! Unmodified services of axum: [`TcpListener`] implements the trait of listeners of `axum::serve`.
 //!
-//! `axum::serve` starts tasks with `tokio::spawn`: run it [on tokio](crate::Testbed::on_tokio). They live on no host: a crash of the host does not drop them, but
-//! resets what they hold. Responses have a `Date` header, which reads the time of day: two runs differ by it, unless a layer sets the header.
+//! `axum::serve` starts tasks with `tokio::spawn`: run it [on tokio](crate::Testbed::on_tokio). Such tasks live on no host: a crash of the host does not drop
+//! the tasks, but resets their connections. Responses have a `Date` header, which reads the time of day: two runs differ by the header, unless a layer sets it.
 
 use std::io;
 use std::net::SocketAddr;
@@ -12,7 +12,7 @@ use axum::serve::{IncomingStream, Listener};
 
 use crate::{Host, JoinHandle, TcpListener, TcpStream, ToSocketAddrs};
 
-/// Listens on a host, and serves there from now on: until the host crashes or its program is killed, or the handle aborts it.
+/// Listens on a host and serves connections, until the host crashes, its program is killed, or the handle aborts the service.
 ///
 /// # Errors
 ///
@@ -34,7 +34,7 @@ impl Listener for TcpListener {
     async fn accept(&mut self) -> (TcpStream, SocketAddr) {
         match Self::accept(self).await {
             Ok(accepted) => accepted,
-            // Its host has crashed, and this listener with it.
+            // The host of the listener has crashed, so no connection will come.
             Err(_) => std::future::pending().await,
         }
     }
@@ -44,7 +44,7 @@ impl Listener for TcpListener {
     }
 }
 
-/// The address of a client: what `into_make_service_with_connect_info` takes in place of `SocketAddr`, which only tokio's own listeners give.
+/// Address of a client, for `into_make_service_with_connect_info`. It takes the place of `SocketAddr`, which only tokio's own listeners give.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct ClientAddress(pub SocketAddr);
 

@@ -1,4 +1,4 @@
-//! The test bed that runs on this thread, which a program finds around it.
+//! The test bed that runs on the present thread, through which programs reach its state.
 
 use std::cell::RefCell;
 use std::io;
@@ -16,20 +16,22 @@ thread_local! {
     static RUNNING: RefCell<Option<Running>> = const { RefCell::new(None) };
 }
 
-/// A test bed that runs.
+/// Running test bed.
 #[derive(Clone)]
 pub(crate) struct Running {
     pub(crate) shared: Arc<Shared>,
     pub(crate) tasks: Rc<Tasks>,
 }
 
-/// Makes a test bed the one that runs on this thread, until it is dropped.
+/// Guard: a test bed runs on this thread until the guard is dropped.
 pub(crate) struct Entered(());
 
 impl Running {
+    /// Makes this test bed the one that runs on this thread.
+    ///
     /// # Panics
     ///
-    /// If another one runs on this thread.
+    /// If another test bed runs on this thread.
     #[expect(clippy::panic, reason = "a misuse, and the way out")]
     pub(crate) fn enter(self) -> Entered {
         RUNNING.with_borrow_mut(|running| {
@@ -52,31 +54,31 @@ impl Drop for Entered {
     }
 }
 
-/// The test bed that runs on this thread.
+/// Returns the test bed that runs on this thread.
 pub(crate) fn running() -> Option<Running> {
     RUNNING.with_borrow(Clone::clone)
 }
 
-/// Its state.
+/// Returns the state of the test bed that runs on this thread.
 pub(crate) fn shared() -> Option<Arc<Shared>> {
     RUNNING.with_borrow(|running| running.as_ref().map(|running| Arc::clone(&running.shared)))
 }
 
-/// The test bed that runs on this thread.
+/// Returns the test bed that runs on this thread. `what` completes the message of the panic.
 ///
 /// # Panics
 ///
-/// If there is none.
+/// If no test bed runs on this thread.
 #[expect(clippy::panic, reason = "a misuse, and the way out")]
 pub(crate) fn expect_running(what: &str) -> Running {
     running().unwrap_or_else(|| panic!("{}", outside_text(what)))
 }
 
-/// Asks the state of the test bed that runs on this thread.
+/// Asks the state of the test bed that runs on this thread. `what` completes the message of the panic.
 ///
 /// # Panics
 ///
-/// If there is none.
+/// If no test bed runs on this thread.
 #[expect(clippy::panic, reason = "a misuse, and the way out")]
 pub(crate) fn ask<T>(what: &str, question: impl FnOnce(&Arc<Shared>) -> T) -> T {
     RUNNING.with_borrow(|running| match running {
@@ -85,7 +87,7 @@ pub(crate) fn ask<T>(what: &str, question: impl FnOnce(&Arc<Shared>) -> T) -> T 
     })
 }
 
-/// A call that makes a socket, where a test has written it. The call needs a running test bed and a host.
+/// Call that makes a socket, with its place in the test. The call needs a running test bed and a host.
 #[derive(Clone, Copy)]
 pub(crate) struct Call {
     name: &'static str,
@@ -107,11 +109,11 @@ impl Call {
         call
     }
 
-    /// Returns the running test bed, and the host on which the task lives that is being polled. `how` a task that lives on no host does the same.
+    /// Returns the running test bed, and the host of the task that is being polled. `how` tells in the message what a task without a host must do.
     ///
     /// # Panics
     ///
-    /// If there is no test bed or no host. An error would be swallowed by a program that tries again until it succeeds.
+    /// If there is no test bed or no host. A panic, because a program that retries until it succeeds would swallow an error.
     #[track_caller]
     #[expect(clippy::panic, reason = "a misuse, and the way out")]
     pub(crate) fn host(self, how: &str) -> (Arc<Shared>, NodeId) {
@@ -121,7 +123,7 @@ impl Call {
         }
         let Self { name, place } = self;
         let text = format!("`{name}` at {place} is called by a task that lives on no host: spawn the task with `Host::spawn`, or {how}");
-        // Tokio catches the panic of its own tasks, and the run is to fail all the same.
+        // Tokio catches the panic of its own tasks. The noted fault fails the run nevertheless.
         shared.note_fault(&text);
         panic!("{text}");
     }
@@ -134,7 +136,7 @@ impl Call {
     }
 }
 
-/// The error of what works only inside a test bed.
+/// Returns the error of a call that works only inside a test bed.
 pub(crate) fn outside(what: &str) -> io::Error {
     io::Error::new(io::ErrorKind::NotFound, outside_text(what))
 }

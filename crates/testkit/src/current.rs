@@ -1,4 +1,4 @@
-//! What runs on this thread: a run, the task of it that is being polled, and the host on which the task lives.
+//! State of the present thread: the run, the task that is being polled, and the host on which the task lives.
 
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
@@ -8,41 +8,42 @@ use cohaptic_wan::NodeId;
 thread_local! {
     /// Number of the run; 0 if there is none.
     static RUN: Cell<u64> = const { Cell::new(0) };
+    /// Host of the task that is being polled; `None` for a task without a host.
     static HOST: Cell<Option<NodeId>> = const { Cell::new(None) };
-    /// Says in words which task of the run is being polled.
+    /// Function that describes the task that is being polled.
     static TASK: RefCell<Option<Rc<dyn Fn() -> String>>> = const { RefCell::new(None) };
 }
 
-/// A run begins on this thread: its number, and what says which task is being polled.
+/// Begins a run on this thread. `task` describes the task that is being polled.
 pub(crate) fn begin(run: u64, task: Rc<dyn Fn() -> String>) {
     RUN.set(run);
     TASK.set(Some(task));
 }
 
-/// The run is over.
+/// Ends the run of this thread.
 pub(crate) fn end() {
     RUN.set(0);
     drop(TASK.take());
 }
 
-/// The number of the run of this thread; 0 if there is none. A value may ask that is dropped while the thread ends.
+/// Returns the number of the run of this thread, or 0 if there is none. May be called by a value that is dropped while the thread ends.
 #[inline]
 pub(crate) fn run() -> u64 {
     RUN.get()
 }
 
-/// The task that is being polled on this thread, in words; `None` outside of a run.
+/// Returns a description of the task that is being polled on this thread, or `None` outside of a run.
 pub(crate) fn task() -> Option<String> {
     let task = TASK.with_borrow(Clone::clone)?;
     Some(task())
 }
 
-/// The host on which the task that is being polled lives.
+/// Returns the host of the task that is being polled.
 pub(crate) fn host() -> Option<NodeId> {
     HOST.get()
 }
 
-/// Does something as a task of that host.
+/// Calls `act` as a task of `host`. The former host is set again afterwards, also after a panic.
 pub(crate) fn on_host<T>(host: Option<NodeId>, act: impl FnOnce() -> T) -> T {
     struct Back(Option<NodeId>);
     impl Drop for Back {

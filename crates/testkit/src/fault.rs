@@ -1,11 +1,11 @@
-//! Why a text in words makes no sense, and where.
+//! Errors in texts of words, with their place.
 
 use std::fmt;
 use std::ops::Range;
 
 use cohaptic_units::Excerpt;
 
-/// Why a text says no links, and where.
+/// Error in a text that should describe links or hits, with its place.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct WordsError {
     excerpt: Excerpt,
@@ -13,19 +13,19 @@ pub struct WordsError {
 }
 
 impl WordsError {
-    /// The line, from 1.
+    /// Returns the line of the error, from 1.
     #[must_use]
     pub const fn line(&self) -> usize {
         self.excerpt.line
     }
 
-    /// The column, from 1, in characters.
+    /// Returns the column of the error, from 1, in characters.
     #[must_use]
     pub const fn column(&self) -> usize {
         self.excerpt.column
     }
 
-    /// The fault, and what was expected.
+    /// Returns the message: the fault, and what was expected.
     #[must_use]
     pub fn message(&self) -> &str {
         &self.message
@@ -35,7 +35,7 @@ impl WordsError {
 impl std::error::Error for WordsError {}
 
 impl fmt::Display for WordsError {
-    /// The place, the message, and the line with the place marked.
+    /// Writes the place, the message, and the line with the place marked.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Excerpt { line, column, .. } = self.excerpt;
         writeln!(f, "{line}:{column}: {}", self.message)?;
@@ -43,10 +43,10 @@ impl fmt::Display for WordsError {
     }
 }
 
-/// A fault in some bytes of a line.
+/// Fault in a line: the range of bytes, and the message.
 pub(crate) type Fault = (Range<usize>, String);
 
-/// Says where in a text the fault of a line is.
+/// Converts a fault of the line `line`, which is line `number` of its text.
 pub(crate) fn locate(number: usize, line: &str, (span, message): Fault) -> WordsError {
     let mut excerpt = Excerpt::new(line, span);
     excerpt.line = number;

@@ -1,4 +1,4 @@
-//! A host of a running test bed.
+//! Host of a running test bed.
 
 use std::fmt;
 use std::future::{Future, poll_fn};
@@ -19,7 +19,7 @@ use crate::resolve::ToSocketAddrs;
 use crate::socket::UdpSocket;
 use crate::task::JoinHandle;
 
-/// A host of a running test bed: its tasks and sockets live and die with it.
+/// Host of a running test bed. The tasks and sockets of a host end when the host crashes.
 #[derive(Clone)]
 pub struct Host {
     shared: Arc<Shared>,
@@ -31,19 +31,19 @@ impl Host {
         Self { shared, node }
     }
 
-    /// Its name.
+    /// Returns the name of the host.
     #[must_use]
     pub fn name(&self) -> String {
         self.shared.names()[self.node.index()].clone()
     }
 
-    /// The addresses that it has now.
+    /// Returns the present addresses of the host.
     #[must_use]
     pub fn addresses(&self) -> Addresses {
         self.shared.with(|core| core.plan.of(self.node))
     }
 
-    /// Its address of version 4.
+    /// Returns the present IPv4 address of the host.
     #[must_use]
     pub fn ip(&self) -> IpAddr {
         IpAddr::from(self.addresses().v4)
@@ -59,7 +59,8 @@ impl Host {
         &self.shared
     }
 
-    /// Starts a task that lives on this host: what it binds is bound here, and when the host crashes it is dropped where it waits.
+    /// Starts a task that lives on this host. Sockets that the task binds are bound on this host, and the task is dropped at the point at which it waits when
+    /// the host crashes.
     ///
     /// # Panics
     ///
@@ -75,7 +76,7 @@ impl Host {
         running.tasks.spawn(Some(self.node), Location::caller(), future)
     }
 
-    /// Starts a program on this host, and keeps it: [`Host::restart`] starts it anew.
+    /// Starts a program on this host and keeps the program, so that [`Host::restart`] can start it anew.
     ///
     /// # Panics
     ///
@@ -90,7 +91,7 @@ impl Host {
         running.tasks.set_program(self.node, Location::caller(), Rc::new(move || Box::pin(program())));
     }
 
-    /// Binds a socket on this host.
+    /// Binds a UDP socket on this host.
     ///
     /// # Errors
     ///
@@ -99,7 +100,7 @@ impl Host {
         UdpSocket::bind_on(Arc::clone(&self.shared), self.node, address)
     }
 
-    /// Listens on this host.
+    /// Binds a TCP listener on this host.
     ///
     /// # Errors
     ///
@@ -109,7 +110,7 @@ impl Host {
         crate::TcpListener::bind_on(Arc::clone(&self.shared), self.node, address)
     }
 
-    /// Opens a connection from this host, and waits until it is there.
+    /// Opens a connection from this host, and waits until the connection is established.
     ///
     /// # Errors
     ///
@@ -122,8 +123,8 @@ impl Host {
         crate::TcpStream::connect_on(Arc::clone(&self.shared), self.node, None, address, config)?.established().await
     }
 
-    /// Runs a future as a task of this host does: what it binds and connects, it does here. For tasks that `tokio::spawn` has started, which live on no host.
-    /// A crash does not drop them.
+    /// Runs a future as a task of this host: sockets that the future makes belong to this host. Needed for tasks started with `tokio::spawn`, which live on no
+    /// host. A crash of the host does not drop such a task.
     pub fn scope<F: Future>(&self, future: F) -> impl Future<Output = F::Output> + use<F> {
         let node = self.node;
         async move {
@@ -132,21 +133,23 @@ impl Host {
         }
     }
 
-    /// The host is gone, at once: its tasks are dropped where they wait, its sockets closed. Packets that it has sent are on their way still, those sent to it are
-    /// lost. Tasks that were not spawned by [`Host::spawn`] or [`Host::start`] (by `tokio::spawn`, say) go on, and their sockets give errors.
+    /// Crashes the host at once: its tasks are dropped at the points at which they wait, and its sockets are closed. Packets that the host has sent stay under
+    /// way; packets to the host are lost. Tasks that were not spawned by [`Host::spawn`] or [`Host::start`] (but by `tokio::spawn`, for example) go on, and
+    /// their sockets return errors.
     ///
     /// # Panics
     ///
     /// Outside the run.
     pub fn crash(&self) {
         let running = self.running("hosts crash");
-        // First the sockets: what the tasks do while they are dropped does not reach anybody.
+        // The sockets die first, so that packets sent by destructors of the tasks reach nobody.
         self.shared.with(|core| core.crash(self.node));
         running.tasks.stop_all_of(self.node);
     }
 
-    /// The program of the host is gone, at once, and the host is not, as when a process is killed: its tasks are dropped where they wait, and its sockets are closed
-    /// as if the program had dropped them, so that peers hear of it. [`Host::restart`] begins the program anew. Nothing happens to a host that is down.
+    /// Kills the program of the host at once, as a process is killed; the host itself stays up. The tasks are dropped at the points at which they wait, and the
+    /// sockets are closed as if the program had dropped them, so that peers are told. [`Host::restart`] starts the program anew. Nothing happens to a host that
+    /// is down.
     ///
     /// # Panics
     ///
@@ -154,13 +157,14 @@ impl Host {
     pub fn kill(&self) {
         let running = self.running("programs are killed");
         if self.is_up() {
-            // First the tasks, which drop what they hold; then what others hold of this host's.
+            // The tasks first, which drop the sockets that they hold; then the sockets of this host that others hold.
             running.tasks.stop_all_of(self.node);
             self.shared.with(|core| core.kill(self.node));
         }
     }
 
-    /// The host is back, with the program of [`Host::start`] begun anew if it has one. Nothing happens to a host that is up, unless its program was killed.
+    /// Brings the host up again. The program of [`Host::start`] starts anew, if there is one. Nothing happens to a host that is up, unless its program was
+    /// killed.
     ///
     /// # Panics
     ///
@@ -173,23 +177,23 @@ impl Host {
         }
     }
 
-    /// Whether it is up.
+    /// Returns whether the host is up.
     #[must_use]
     pub fn is_up(&self) -> bool {
         self.shared.with(|core| core.is_up(self.node))
     }
 
-    /// Gives the host addresses that nobody has had, as a phone gets that leaves its network. Those before belong to nobody: packets to them, also those on their way, are
-    /// lost. Sockets bound to `0.0.0.0` or `[::]` go on with the new ones, others cannot send any more.
+    /// Gives the host addresses that no host has had, like a phone that changes its network. The former addresses belong to no host from now on: packets to
+    /// them are lost, packets under way included. Sockets bound to `0.0.0.0` or `[::]` go on with the new addresses; other sockets cannot send any more.
     pub fn change_addresses(&self) -> Addresses {
         self.shared.with(|core| core.change_addresses(self.node))
     }
 
-    /// The run of this host, on its thread.
+    /// Returns the run of this host.
     ///
     /// # Panics
     ///
-    /// Outside of that run.
+    /// Outside of that run, or on another thread.
     fn running(&self, what: &str) -> Running {
         let running = context::expect_running(what);
         let is_own = Arc::ptr_eq(&running.shared, &self.shared);

@@ -1,10 +1,10 @@
 //! Unmodified clients and servers of hyper, HTTP/1 and HTTP/2.
 //!
-//! A stream in [`TokioIo`] is what hyper takes on both sides. [`Connector`] opens the connections of the client of `hyper-util`, [`Executor`]
-//! runs what hyper spawns as tasks of a host, on both runtimes.
+//! A stream wrapped in [`TokioIo`] is the connection that hyper takes on both sides. [`Connector`] opens connections for the client of `hyper-util`.
+//! [`Executor`] runs futures spawned by hyper as tasks of a host, on both runtimes.
 //!
-//! A server of HTTP/1 or 2 adds a `Date` header, which reads the time of day: two runs differ by it. Turn it off (`auto_date_header(false)`), or set the header: a
-//! response that has one keeps it.
+//! A server of HTTP/1 or 2 adds a `Date` header, which reads the time of day: two runs differ by the header. Turn the header off (`auto_date_header(false)`),
+//! or set it in the response: hyper keeps a header that is set.
 
 use std::future::Future;
 use std::io;
@@ -19,7 +19,7 @@ use hyper_util::rt::TokioIo;
 
 use crate::{Host, TcpStream};
 
-/// The client of `hyper-util` on a host, with a pool of connections from there. `B` is the body of its requests.
+/// Creates a client of `hyper-util` on a host, with a pool of connections from that host. `B` is the body of its requests.
 #[must_use]
 pub fn client<B>(host: &Host) -> Client<Connector, B>
 where
@@ -29,13 +29,13 @@ where
     Client::builder(Executor::new(host)).build(Connector::new(host))
 }
 
-/// Opens connections from a host, to the authorities of URIs: names of hosts, or addresses. Without a port it is 443 for `https`, and 80 otherwise; encryption is
-/// left to a connector around this one.
+/// Connector that opens connections from a host to the authorities of URIs, which are names of hosts or addresses. Without a port the connector uses 443 for
+/// `https`, and 80 otherwise. It does not encrypt; a connector around this one can.
 #[derive(Clone, Debug)]
 pub struct Connector(Host);
 
 impl Connector {
-    /// Connections come from that host.
+    /// Creates a connector whose connections come from `host`.
     #[must_use]
     pub fn new(host: &Host) -> Self {
         Self(host.clone())
@@ -67,12 +67,12 @@ impl Connection for TcpStream {
     }
 }
 
-/// Runs futures as tasks of a host. Those given to it while the host is down are dropped.
+/// Executor that runs futures as tasks of a host. Futures given to it while the host is down are dropped.
 #[derive(Clone, Debug)]
 pub struct Executor(Host);
 
 impl Executor {
-    /// Tasks live on that host.
+    /// Creates an executor whose tasks live on `host`.
     #[must_use]
     pub fn new(host: &Host) -> Self {
         Self(host.clone())

@@ -1,25 +1,26 @@
-//! What can be said in place of a link.
+//! Descriptions of links.
 
 use cohaptic_units::Instant;
 use cohaptic_wan::netem::Netem;
 use cohaptic_wan::{KernelNetem, LinkConfig, LinkModel, Modulated};
 
-/// What can be said in place of a link: a model, a configuration, or the words of `tc-netem`.
+/// Description of a link: a model, a configuration, or the words of `tc-netem`.
 pub trait ToLink {
-    /// The link.
+    /// Returns the model of the link.
     ///
     /// # Panics
     ///
-    /// If words say nothing that a link can do, with the place of the error.
+    /// If the words describe no link that can be emulated. The message names the place of the error.
     fn to_link(&self) -> LinkModel;
 
-    /// The words of `tc-netem` that say the same link, for the test that a failure prints; none at all for the ideal link, `None` for a link that has no words.
+    /// Returns the words of `tc-netem` for the same link, for the test that a failure prints. Empty for the ideal link, `None` for a link that words cannot
+    /// describe.
     fn words(&self) -> Option<String> {
         None
     }
 }
 
-/// A link that becomes another one.
+/// Replacement of a link at an instant of the run.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct LinkChange {
     pub(crate) at: Instant,
@@ -53,7 +54,7 @@ impl ToLink for KernelNetem {
 }
 
 impl ToLink for str {
-    /// The words of `tc-netem`, done exactly: see [`Netem::to_link_config`]. No words are the ideal link.
+    /// Parses the words of `tc-netem`, which are emulated exactly: see [`Netem::to_link_config`]. An empty text is the ideal link.
     #[expect(clippy::panic, reason = "a test that says nonsense is to fail, with the place")]
     fn to_link(&self) -> LinkModel {
         if self.trim().is_empty() {

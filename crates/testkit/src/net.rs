@@ -1,6 +1,6 @@
-//! The names of `tokio::net`: `use cohaptic_testkit::net` in place of `use tokio::net` makes a program run here.
+//! The names of `tokio::net`. A program runs on a test bed with `use cohaptic_testkit::net` in place of `use tokio::net`.
 //!
-//! There are no Unix sockets and no named pipes.
+//! Unix sockets and named pipes are missing.
 
 use std::io;
 use std::net::SocketAddr;
@@ -16,7 +16,7 @@ pub mod tcp {
     pub use crate::tcp::{OwnedReadHalf, OwnedWriteHalf, ReadHalf, ReuniteError, WriteHalf};
 }
 
-/// Looks up the address of a host.
+/// Returns the address of a host.
 ///
 /// # Errors
 ///

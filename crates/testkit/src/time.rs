@@ -1,6 +1,7 @@
-//! Virtual time to the nanosecond, for programs that do not use tokio's: what they would take from a runtime otherwise.
+//! Virtual time to the nanosecond, for programs that do not use tokio's timers.
 //!
-//! On tokio's clock (`Testbed::on_tokio`) these work too: they go off to the nanosecond where tokio's own timers are rounded up to milliseconds.
+//! The functions of this module also work on tokio's clock (`Testbed::on_tokio`). They keep their resolution of a nanosecond, while tokio's own timers are
+//! rounded up to milliseconds.
 
 use std::fmt;
 use std::future::{Future, poll_fn};
@@ -14,11 +15,11 @@ use cohaptic_units::Instant;
 use crate::context;
 use crate::core::{Registered, Shared, TimerId, registered};
 
-/// The time since the run began.
+/// Returns the time since the run began.
 ///
 /// # Panics
 ///
-/// Outside a running test bed; and if it is asked millions of times without letting time pass, as a loop does that waits for it: `sleep` instead.
+/// Outside a running test bed; and if a task asks millions of times without letting time pass, as a busy loop does: use `sleep` there.
 #[must_use]
 #[inline]
 pub fn now() -> Instant {
@@ -28,7 +29,7 @@ pub fn now() -> Instant {
     })
 }
 
-/// Waits for a span. One of zero is over at once.
+/// Waits for a span. A span of zero is over at once.
 ///
 /// # Panics
 ///
@@ -40,7 +41,7 @@ pub fn sleep(span: Duration) -> Sleep {
     Sleep { shared, deadline, timer: None }
 }
 
-/// Waits until an instant; one that has passed is over at once.
+/// Waits until an instant. A wait for an instant that has passed is over at once.
 ///
 /// # Panics
 ///
@@ -50,7 +51,7 @@ pub fn sleep_until(deadline: Instant) -> Sleep {
     Sleep { shared: context::ask("time passes", Arc::clone), deadline, timer: None }
 }
 
-/// A wait: see [`sleep`].
+/// Future of a wait: see [`sleep`].
 pub struct Sleep {
     shared: Arc<Shared>,
     deadline: Instant,
@@ -63,7 +64,7 @@ impl Sleep {
         Self { shared, deadline, timer: None }
     }
 
-    /// Sees to it that this waker is woken. It stands apart, since most often the timer has the waker already: to look took half the instructions then.
+    /// Registers the waker with the timer. Not inlined, because most often the timer has the waker already and this path is not needed.
     #[inline(never)]
     fn register(&mut self, waker: &Waker) {
         let registered = registered(waker);
@@ -79,13 +80,13 @@ impl Sleep {
         }
     }
 
-    /// When it is over.
+    /// Returns the instant at which the wait is over.
     #[must_use]
     pub const fn deadline(&self) -> Instant {
         self.deadline
     }
 
-    /// Waits until another instant from now on.
+    /// Changes the end of the wait to another instant.
     pub fn reset(&mut self, deadline: Instant) {
         if let Some((timer, _)) = self.timer.take() {
             self.shared.with(|core| core.timers.cancel(timer));
@@ -112,7 +113,8 @@ impl Future for Sleep {
             }
             return Poll::Pending;
         }
-        // The timer is gone: it goes off in the moment in which time passes to it. Without one it has not waited.
+        // The timer has gone off at the moment at which time passed to its deadline, so it need not be cancelled. Without a timer the task has not waited, and
+        // a loop of such waits would let no time pass: the call is counted.
         if this.timer.take().is_none() {
             this.shared.note_call();
         }
@@ -128,7 +130,7 @@ impl Drop for Sleep {
     }
 }
 
-/// The time was up.
+/// Error of a [`timeout`] whose time was up.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Elapsed;
 
@@ -146,7 +148,7 @@ impl From<Elapsed> for std::io::Error {
     }
 }
 
-/// Waits for a future, but no longer than a span. If both are over at the same instant, the future wins.
+/// Waits for a future, but at most for `span`. If both are over at the same instant, the future wins.
 ///
 /// # Errors
 ///
@@ -166,7 +168,7 @@ pub async fn timeout<F: Future>(span: Duration, future: F) -> Result<F::Output, 
     .await
 }
 
-/// Ticks at even distances: the first at once.
+/// Ticks at equal distances, beginning at once.
 ///
 /// # Panics
 ///
@@ -179,7 +181,7 @@ pub fn interval(period: Duration) -> Interval {
     Interval { shared, next, period }
 }
 
-/// Ticks at even distances. Ticks that were missed come at once, one after the other.
+/// Source of ticks at equal distances: see [`interval`]. Missed ticks follow at once, one after the other.
 pub struct Interval {
     shared: Arc<Shared>,
     next: Instant,
@@ -187,7 +189,7 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// Waits for the next tick, and gives its instant.
+    /// Waits for the next tick, and returns its scheduled instant.
     pub async fn tick(&mut self) -> Instant {
         let at = self.next;
         Sleep { shared: Arc::clone(&self.shared), deadline: at, timer: None }.await;
@@ -202,7 +204,7 @@ impl fmt::Debug for Interval {
     }
 }
 
-/// Lets other tasks go first that can go on now; time does not pass.
+/// Lets the other tasks that can go on now run first. Time does not pass.
 pub async fn yield_now() {
     let mut has_yielded = false;
     poll_fn(|cx| {

@@ -1,4 +1,4 @@
-//! The test bed as a running program sees it.
+//! Handle of the test bed for a running program.
 
 use std::fmt;
 use std::future::Future;
@@ -18,7 +18,7 @@ use crate::names::Names;
 use crate::task::JoinHandle;
 use crate::trace::{Happening, Trace};
 
-/// The test bed as a running program sees it.
+/// Handle of the test bed for a running program: access to hosts, links, faults and the record.
 #[derive(Clone)]
 pub struct Bed {
     shared: Arc<Shared>,
@@ -29,50 +29,50 @@ impl Bed {
         Self { shared }
     }
 
-    /// A host, by its name.
+    /// Returns the host named `name`.
     ///
     /// # Panics
     ///
-    /// If there is none of that name.
+    /// If there is no host of that name.
     #[must_use]
     pub fn host(&self, name: &str) -> Host {
         Host::new(Arc::clone(&self.shared), self.names().node(name))
     }
 
-    /// All hosts, in the order in which they were named.
+    /// Returns all hosts, in the order in which they were named.
     #[must_use]
     pub fn hosts(&self) -> Vec<Host> {
         (0..self.names().len()).map(|host| Host::new(Arc::clone(&self.shared), NodeId::new(host))).collect()
     }
 
-    /// Which host has which addresses now.
+    /// Returns the present addresses of all hosts.
     #[must_use]
     pub fn addresses(&self) -> AddressPlan {
         self.shared.with(|core| core.plan.clone())
     }
 
-    /// The name of the host that has this address now.
+    /// Returns the name of the host that has this address now.
     #[must_use]
     pub fn owner(&self, address: IpAddr) -> Option<String> {
         self.shared.with(|core| core.plan.owner(address).map(str::to_owned))
     }
 
-    /// The time since the run began.
+    /// Returns the time since the run began.
     ///
     /// # Panics
     ///
-    /// As [`time::now`](crate::time::now): if it is asked again and again without letting time pass.
+    /// As [`time::now`](crate::time::now): if a task asks again and again without letting time pass.
     #[must_use]
     pub fn now(&self) -> Instant {
         self.shared.note_call();
         self.shared.now()
     }
 
-    /// Starts a task that lives on no host: it survives all crashes, and binds sockets by [`Host::bind`].
+    /// Starts a task that lives on no host. Such a task survives all crashes, and binds sockets with [`Host::bind`].
     ///
     /// # Panics
     ///
-    /// Outside the run, also within that of another test bed.
+    /// Outside the run, also within the run of another test bed.
     #[track_caller]
     pub fn spawn<F>(&self, future: F) -> JoinHandle<F::Output>
     where
@@ -84,7 +84,7 @@ impl Bed {
         running.tasks.spawn(None, Location::caller(), future)
     }
 
-    /// Cuts the way from one host to another: packets that are sent or would arrive from now on are lost. The way back is as before.
+    /// Cuts the path from one host to another: packets that are sent or would arrive from now on are lost. The path back is not changed.
     ///
     /// # Panics
     ///
@@ -93,7 +93,7 @@ impl Bed {
         self.set_cut(from, to, true);
     }
 
-    /// Mends the way from one host to another.
+    /// Ends the cut of the path from one host to another.
     ///
     /// # Panics
     ///
@@ -102,7 +102,7 @@ impl Bed {
         self.set_cut(from, to, false);
     }
 
-    /// Cuts all ways, in both directions, between the hosts of one group and those of another.
+    /// Cuts all paths, in both directions, between the hosts of one group and the hosts of another group.
     ///
     /// # Panics
     ///
@@ -114,16 +114,16 @@ impl Bed {
         }
     }
 
-    /// Mends all ways.
+    /// Ends the cuts of all paths.
     pub fn mend_all(&self) {
         self.shared.with(|core| core.wire.mend_all());
     }
 
-    /// The link from one host to another is another one from now on. Packets in it follow the rules of [`cohaptic_wan::Link::set_model`].
+    /// Replaces the link from one host to another. Packets inside the link follow the rules of [`cohaptic_wan::Link::set_model`].
     ///
     /// # Panics
     ///
-    /// If there is no such host, both are the same, or the words are none.
+    /// If there is no such host, if both hosts are the same, or if the words describe no link.
     pub fn set_link(&self, from: &str, to: &str, link: impl ToLink) {
         let path = self.names().path(from, to);
         assert!(path.from != path.to, "host `{from}` has no link to itself");
@@ -131,7 +131,7 @@ impl Bed {
         self.shared.with(|core| core.set_link(path, link));
     }
 
-    /// What the link from one host to another has done so far.
+    /// Returns the statistics of the link from one host to another so far.
     ///
     /// # Panics
     ///
@@ -142,7 +142,7 @@ impl Bed {
         self.shared.with(|core| core.wire.link_stats(path)).unwrap_or_else(|| unreachable_link(from))
     }
 
-    /// How many packets from one host to another were [hit](crate::hit) so far.
+    /// Returns how many packets from one host to another were [hit](crate::hit) so far.
     ///
     /// # Panics
     ///
@@ -153,7 +153,7 @@ impl Bed {
         self.shared.with(|core| core.wire.hits(path))
     }
 
-    /// All ends of TCP connections that are not over, those that no program holds any more included, in the order of hosts, ports and peers.
+    /// Returns all ends of TCP connections that are not over, sorted by host, port and peer. Ends that no program holds any more are included.
     #[cfg(feature = "tcp")]
     #[must_use]
     pub fn connections(&self) -> Vec<crate::tcp::ConnectionInfo> {
@@ -166,13 +166,14 @@ impl Bed {
         self.shared.with(|core| core.connections().map(end).collect())
     }
 
-    /// Notes something in the trace: what a program computes, say, so that two runs are compared by it too.
+    /// Adds a note to the trace, such as a result of the program. [`Testbed::run_twice`](crate::Testbed::run_twice) compares notes as well.
     pub fn note(&self, text: impl fmt::Display) {
         let text = text.to_string();
         self.shared.with(|core| core.wire.note(Happening::Note(text)));
     }
 
-    /// What has happened so far, if it is recorded: in [`Testbed::run_twice`](crate::Testbed::run_twice) and with [`Testbed::traced`](crate::Testbed::traced).
+    /// Returns the trace so far. It is recorded in [`Testbed::run_twice`](crate::Testbed::run_twice) and with [`Testbed::traced`](crate::Testbed::traced), and
+    /// empty otherwise.
     #[must_use]
     pub fn trace(&self) -> Trace {
         self.shared.with(|core| core.wire.recording().trace().clone())

@@ -1,4 +1,4 @@
-//! The constants of TCP.
+//! Constants of TCP of a test bed.
 
 use cohaptic_wan::NodeId;
 
@@ -6,22 +6,22 @@ use super::Testbed;
 use crate::tcp::TcpConfig;
 
 impl Testbed {
-    /// The constants of TCP on all hosts. If it is not said they are those of Linux: [`TcpConfig::default`].
+    /// Sets the constants of TCP on all hosts. The defaults are those of Linux: [`TcpConfig::default`].
     ///
     /// # Panics
     ///
-    /// If they cannot be.
+    /// If a connection cannot have these constants.
     pub fn tcp(mut self, config: TcpConfig) -> Self {
         check_tcp(&config);
         self.tcp = (0..self.setup.names.len()).map(|host| (NodeId::new(host), config.clone())).collect();
         self
     }
 
-    /// The constants of TCP on one host, after [`Testbed::tcp`].
+    /// Sets the constants of TCP on one host. Call this after [`Testbed::tcp`], which sets all hosts.
     ///
     /// # Panics
     ///
-    /// If they cannot be, or there is no such host.
+    /// If a connection cannot have these constants, or there is no such host.
     pub fn tcp_of(mut self, host: &str, config: TcpConfig) -> Self {
         check_tcp(&config);
         self.tcp.insert(self.setup.names.node(host), config);

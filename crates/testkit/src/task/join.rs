@@ -74,7 +74,7 @@ impl<T> Future for JoinHandle<T> {
     }
 }
 
-/// A program that leaves what comes out of a future in a state.
+/// Wraps `future` into a program that stores the output of `future`. Returns the program, and the place of the output.
 pub(crate) fn joined<F: Future>(future: F) -> (impl Future<Output = ()>, Rc<RefCell<State<F::Output>>>) {
     let state = Rc::new(RefCell::new(State { outcome: None, waker: None }));
     // The guard tells the waiting task of the end, even if the program is dropped before its end.

@@ -30,8 +30,8 @@ pub(crate) struct Task {
     pulse: Arc<Pulse>,
     /// Number by which the pulse knows the task.
     number: usize,
-    program: RefCell<Option<Program>>,
     /// Future of the task; `None` once the task is over or was stopped.
+    program: RefCell<Option<Program>>,
     /// Instant of the last poll. The task waits since then.
     polled: Cell<Instant>,
     /// Whether the task was stopped, perhaps while it was being polled.
