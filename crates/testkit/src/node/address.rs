@@ -1,10 +1,11 @@
-//! Which node has which addresses: those of the hosts of a test bed.
+//! Addresses of nodes, equal to those of the hosts of a test bed.
 
 use std::net::{IpAddr, SocketAddr};
 
 use crate::address::Addresses;
 
-/// The address of the node at that place, from 0: 10.0.0.1 is that of the first. Version 6 is reached too, at `fd00::1`.
+/// Returns the IPv4 address of the node with the index `place`, from 0: 10.0.0.1 is the address of the first node. The node is also reached over IPv6, at
+/// `fd00::1`.
 ///
 /// # Panics
 ///
@@ -14,16 +15,16 @@ pub fn address(place: usize, port: u16) -> SocketAddr {
     SocketAddr::new(addresses(place).v4.into(), port)
 }
 
-/// The addresses of the node at that place.
+/// Returns the addresses of the node with the index `place`.
 pub(super) fn addresses(place: usize) -> Addresses {
     let number = u32::try_from(place).ok().filter(|place| *place < LAST).expect("there are at most 16,777,214 nodes");
     Addresses::numbered(number + 1)
 }
 
-/// As many addresses as 10.0.0.0/8 has.
+/// Number of addresses of hosts in 10.0.0.0/8.
 const LAST: u32 = (1 << 24) - 2;
 
-/// The place of the node that has the address; `None` if it is none of a node's. Whether there is a node at that place is not asked.
+/// Returns the index of the node that has the address, or `None` if the address is none of a node. Whether a node of that index exists is not checked.
 #[must_use]
 pub fn place_of(address: IpAddr) -> Option<usize> {
     let number = match address {

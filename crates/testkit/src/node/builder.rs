@@ -1,4 +1,4 @@
-//! What a run of nodes is made of.
+//! Builder of a run of nodes.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -26,43 +26,43 @@ impl Default for Nodes {
 }
 
 impl Nodes {
-    /// No nodes yet, with ideal links between those that come.
+    /// Creates a builder without nodes. Links between added nodes are ideal.
     pub fn new() -> Self {
         Self { setup: Setup::new("node", Names::default()), nodes: Vec::new() }
     }
 
-    /// One more node. The n-th, from 0, has the addresses of [`address()`](super::address()).
+    /// Adds a node. Node number n, from 0, has the addresses of [`address()`](super::address()).
     ///
     /// # Panics
     ///
-    /// If the name is empty or there already, or has one of the characters that an address is written with (`:`, `[`, `]`, white space).
+    /// If the name is empty or taken, or contains a character with which an address is written (`:`, `[`, `]`, white space).
     pub fn add(mut self, name: &str, node: impl Node) -> Self {
         self.setup.add(name);
         self.nodes.push(Box::new(node));
         self
     }
 
-    /// What every link is that is not named by [`Nodes::link`], before or after: a model, or words of `tc-netem`.
+    /// Sets all links that no call of [`Nodes::link`] names, whether before or after this call. A link is a model, or words of `tc-netem`.
     ///
     /// # Panics
     ///
-    /// If the words are none.
+    /// If the words describe no link.
     pub fn links(mut self, link: impl ToLink) -> Self {
         self.setup.set_every(link);
         self
     }
 
-    /// What the link from one node to another is, of those that have been added; the way back is a link of its own.
+    /// Sets the link from one node to another. Both nodes must have been added. The link back is separate.
     ///
     /// # Panics
     ///
-    /// If there is no such node, both are the same, or the words are none.
+    /// If there is no such node, if both nodes are the same, or if the words describe no link.
     pub fn link(mut self, from: &str, to: &str, link: impl ToLink) -> Self {
         self.setup.set_link(from, to, link);
         self
     }
 
-    /// What the links in both directions between two nodes are. Each has random numbers of its own.
+    /// Sets the links in both directions between two nodes. Each link draws random numbers of its own.
     ///
     /// # Panics
     ///
@@ -71,11 +71,11 @@ impl Nodes {
         self.link(one, other, &link).link(other, one, &link)
     }
 
-    /// All links, what becomes of them, and the seed, as a file says: see [`LinkFile`]. Its hosts are nodes that have been added.
+    /// Sets all links, their changes, and the seed as a file says: see [`LinkFile`]. The hosts of the file are nodes that have been added.
     ///
     /// # Panics
     ///
-    /// If the file cannot be read or makes no sense, with the path, the place and the line; if one of its hosts is no node.
+    /// If the file cannot be read or makes no sense, or if one of its hosts is no node. The message names the path, the place and the line.
     #[expect(clippy::panic, reason = "a test that says nonsense is to fail, with the place")]
     #[track_caller]
     pub fn links_from_file(mut self, path: impl AsRef<std::path::Path>) -> Self {
@@ -86,56 +86,57 @@ impl Nodes {
         self
     }
 
-    /// The seed of all chance in the links, unless the environment says another one ([`SEED_VARIABLE`](crate::SEED_VARIABLE)). Without it, the seed is made of
-    /// the file, the line and the column of the call of [`Nodes::start`], or as that of a [test bed](crate::Testbed::seed) in [`Nodes::run_twice`]. Nodes of the same names on the same links with the same seed meet what the hosts of a [`Testbed`](crate::Testbed) meet.
+    /// Sets the seed of all chance in the links. The environment variable [`SEED_VARIABLE`](crate::SEED_VARIABLE) takes precedence. Without either, the seed is
+    /// derived from the file, the line and the column of the call of [`Nodes::start`], or as for a [test bed](crate::Testbed::seed) in [`Nodes::run_twice`].
+    /// With the same seed, nodes on the same links see the same delays and losses as the hosts of a [`Testbed`](crate::Testbed) with the same names.
     pub const fn seed(mut self, seed: u64) -> Self {
         self.setup.seed = Some(seed);
         self
     }
 
-    /// How many packets may be sent, and packets and timers handled, at one instant before the run is given up, because time does not pass; a million if it is
-    /// not said.
+    /// Sets how many packets may be sent, and packets and timers handled, at one instant. Beyond this number the run fails, because time does not pass. The
+    /// default is a million.
     pub const fn patience(mut self, events: u64) -> Self {
         self.setup.settings.patience = events;
         self
     }
 
-    /// How many bytes the run may hold that were sent and neither read nor lost; a gibibyte if it is not said. A run that comes to hold more fails, and names the
-    /// node that sent last: see [`Testbed::byte_limit`](crate::Testbed::byte_limit).
+    /// Sets how many bytes the run may hold that were sent and neither read nor lost. The default is a gibibyte. A run that holds more fails, and the message
+    /// names the node that sent last: see [`Testbed::byte_limit`](crate::Testbed::byte_limit).
     pub const fn byte_limit(mut self, bytes: u64) -> Self {
         self.setup.settings.byte_limit = bytes;
         self
     }
 
-    /// For how long by the wall clock a node may run without returning: see [`Testbed::stall_limit`](crate::Testbed::stall_limit).
+    /// Sets how long a node may run without returning, by the wall clock: see [`Testbed::stall_limit`](crate::Testbed::stall_limit).
     pub const fn stall_limit(mut self, limit: Duration) -> Self {
         self.setup.stall_limit = limit;
         self
     }
 
-    /// Until when a run that waits for something may go on before it is given up; an hour of its own time if it is not said.
+    /// Sets the time limit of a run that waits for an end, in virtual time. The default is an hour.
     pub const fn time_limit(mut self, limit: Duration) -> Self {
         self.setup.settings.limits.time = limit;
         self
     }
 
-    /// Records what happens, for [`NodeRun::record`]: every event, and every packet with what it carries.
+    /// Records every event, and every packet with its content, for [`NodeRun::record`].
     pub const fn recorded(mut self) -> Self {
         self.setup.record();
         self
     }
 
-    /// If the test fails while the run is there, what happened is written into this folder: see [`Record::write`].
+    /// Sets the folder into which the record is written if the test fails while the run exists: see [`Record::write`].
     pub fn artefacts(mut self, folder: impl Into<PathBuf>) -> Self {
         self.setup.artefacts = Some(folder.into());
         self.recorded()
     }
 
-    /// Begins: asks every node what it wants to send at the beginning, in their order.
+    /// Starts the run: asks every node for its first packets and its deadline, in the order of the nodes.
     ///
     /// # Panics
     ///
-    /// If there is no node; if what the environment says of the seed is no number; if a node never ends to send.
+    /// If there is no node; if the environment variable of the seed is no number; if a node never stops sending.
     #[must_use]
     #[track_caller]
     pub fn start(self) -> NodeRun {
@@ -148,8 +149,8 @@ impl Nodes {
         NodeRun::new(self.setup, self.nodes, seed)
     }
 
-    /// Runs nodes twice, and gives what came out first, if all that happened was the same to the nanosecond: every packet, with what it carried. `build` makes the
-    /// nodes, anew each time.
+    /// Runs nodes twice, compares every event of the two runs to the nanosecond, with the content of every packet, and returns the first output. `build` makes
+    /// the nodes anew for each run.
     ///
     /// # Panics
     ///

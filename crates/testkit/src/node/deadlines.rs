@@ -1,15 +1,18 @@
-//! When which node wants to be woken: the least of all is known at once, and a change costs as many steps as N has bits.
+//! Deadlines of nodes. The earliest deadline of all is known at once; a change takes as many steps as the number of nodes has bits.
 
 use cohaptic_units::Instant;
 
-/// The deadlines of N nodes, as a tree in which every inner place holds the least of the two below it. Place 1 is the root, the nodes' own places are the last.
+/// Deadlines of N nodes, as a binary tree in an array: every inner entry holds the earlier of its two children. Entry 1 is the root, and the entries of the
+/// nodes are at the end.
 #[derive(Debug)]
 pub(super) struct Deadlines {
+    /// Entries of the tree. The children of entry `i` are the entries `2 * i` and `2 * i + 1`.
     least: Vec<Instant>,
+    /// Index of the entry of node 0.
     first: usize,
 }
 
-/// Stands for no deadline: to wait for the last instant there is, is to wait for ever.
+/// Stands for no deadline, because waiting for the last representable instant is waiting for ever.
 const NONE: Instant = Instant::MAX;
 
 impl Deadlines {
@@ -27,6 +30,7 @@ impl Deadlines {
         self.least[place] = deadline;
         while place > 1 {
             let least = self.least[place].min(self.least[place ^ 1]);
+            // The other child of the same parent differs in the lowest bit of its index.
             place /= 2;
             if self.least[place] == least {
                 return;
@@ -39,15 +43,15 @@ impl Deadlines {
         Some(self.least[1]).filter(|deadline| *deadline != NONE)
     }
 
-    /// The first node from `from` on whose deadline is not after `now`.
+    /// Returns the first node from `from` on whose deadline is not after `now`.
     pub(super) fn due(&self, from: usize, now: Instant) -> Option<usize> {
-        // A packet may arrive at the last instant, where those without a deadline are not due.
+        // A packet may arrive at the last instant. Nodes without a deadline must not count as due then.
         let now = now.min(Instant::from_nanos(u64::MAX - 1));
         if from >= self.first || self.least[1] > now {
             return None;
         }
         let mut place = self.first + from;
-        // Upwards and to the right, until something below is due.
+        // Goes up from a right child and right from a left one, until an entry with a due deadline below is found.
         while self.least[place] > now {
             while place % 2 == 1 {
                 place /= 2;
@@ -57,6 +61,7 @@ impl Deadlines {
             }
             place += 1;
         }
+        // Goes down to the leftmost node that is due.
         while place < self.first {
             place *= 2;
             if self.least[place] > now {

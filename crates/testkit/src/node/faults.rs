@@ -1,4 +1,4 @@
-//! What breaks while nodes run, and is mended.
+//! Faults of links and nodes during a run.
 
 use std::any::Any;
 use std::fmt;
@@ -9,7 +9,7 @@ use crate::link::ToLink;
 use crate::trace::Happening;
 
 impl NodeRun {
-    /// Cuts the way from one node to another: packets that are sent or would arrive from now on are lost. The way back is as before.
+    /// Cuts the path from one node to another: packets that are sent or would arrive from now on are lost. The path back is not changed.
     ///
     /// # Panics
     ///
@@ -18,7 +18,7 @@ impl NodeRun {
         self.set_cut(from, to, true);
     }
 
-    /// Mends the way from one node to another.
+    /// Ends the cut of the path from one node to another.
     ///
     /// # Panics
     ///
@@ -27,7 +27,7 @@ impl NodeRun {
         self.set_cut(from, to, false);
     }
 
-    /// Cuts all ways, in both directions, between the nodes of one group and those of another.
+    /// Cuts all paths, in both directions, between the nodes of one group and the nodes of another group.
     ///
     /// # Panics
     ///
@@ -39,17 +39,17 @@ impl NodeRun {
         }
     }
 
-    /// Mends all ways.
+    /// Ends the cuts of all paths.
     pub fn mend_all(&mut self) {
         self.ask_touched();
         self.wire.mend_all();
     }
 
-    /// The link from one node to another is another one from now on. Packets in it follow the rules of [`cohaptic_wan::Link::set_model`].
+    /// Replaces the link from one node to another. Packets inside the link follow the rules of [`cohaptic_wan::Link::set_model`].
     ///
     /// # Panics
     ///
-    /// If there is no such node, both are the same, or the words are none.
+    /// If there is no such node, if both nodes are the same, or if the words describe no link.
     pub fn set_link(&mut self, from: &str, to: &str, link: impl ToLink) {
         let path = self.names.path(from, to);
         assert!(path.from != path.to, "node `{from}` has no link to itself");
@@ -59,13 +59,13 @@ impl NodeRun {
         self.hand_over();
     }
 
-    /// The node is gone, at once, and given back. What it has sent is on its way still; what arrives for it is lost.
+    /// Crashes the node at once, and returns it. Packets that the node has sent stay under way; packets that arrive for it are lost.
     ///
     /// # Panics
     ///
-    /// If there is none of that name, it is down already, or of another type.
+    /// If there is no node of that name, the node is down already, or it is of another type.
     pub fn crash<T: Node>(&mut self, name: &str) -> T {
-        // First the type: a node of another one stays.
+        // The type is checked first, so that a node of another type stays in the run.
         let _: &T = self.node(name);
         let id = self.id(name);
         self.ask_touched();
@@ -79,11 +79,11 @@ impl NodeRun {
         }
     }
 
-    /// A node is there again, of whatever type, at the place and with the addresses of the one that crashed. It is asked at once what it wants.
+    /// Puts a node of any type in the place of a crashed node, with the same addresses. The node is asked at once for packets and its deadline.
     ///
     /// # Panics
     ///
-    /// If there is none of that name, or it is up.
+    /// If there is no node of that name, or it is up.
     pub fn restart(&mut self, name: &str, node: impl Node) {
         let id = self.id(name);
         assert!(!self.up[id.index()], "node `{name}` is up; `crash` it before another one takes its place");
@@ -95,17 +95,17 @@ impl NodeRun {
         self.ask_touched();
     }
 
-    /// Whether the node is up.
+    /// Returns whether the node is up.
     ///
     /// # Panics
     ///
-    /// If there is none of that name.
+    /// If there is no node of that name.
     #[must_use]
     pub fn is_up(&self, name: &str) -> bool {
         self.up[self.id(name).index()]
     }
 
-    /// Notes something in the record: what a node computes, say, so that two runs are compared by it too.
+    /// Adds a note to the record, such as a result of a node. [`Nodes::run_twice`](super::Nodes::run_twice) compares notes as well.
     pub fn note(&mut self, text: impl fmt::Display) {
         if self.wire.recording().traces {
             self.wire.note(Happening::Note(text.to_string()));

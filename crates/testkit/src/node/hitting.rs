@@ -1,21 +1,22 @@
-//! Packets that are hit between nodes.
+//! Laws between nodes, which hit packets.
 
 use super::Nodes;
 use crate::hit::{Hits, PacketLaw, SentPacket, Verdict};
 
 impl Nodes {
-    /// Asks a function what becomes of every packet that is offered to the link from one node to another: see [`hit`](crate::hit). Every run begins with a clone of it.
+    /// Asks a function for the fate of every packet offered to the link from one node to another: see [`hit`](crate::hit). Every run begins with a clone of the
+    /// function.
     ///
     /// # Panics
     ///
-    /// If there is no such node yet, or both are the same.
+    /// If there is no such node yet, or both nodes are the same.
     #[track_caller]
     pub fn on_packet(mut self, from: &str, to: &str, judge: impl FnMut(&SentPacket<'_>) -> Verdict + Clone + Send + 'static) -> Self {
         self.setup.add_function([from, to], judge);
         self
     }
 
-    /// Asks a law what becomes of every packet that is offered to the link from one node to another: see [`PacketLaw`].
+    /// Asks a law for the fate of every packet offered to the link from one node to another: see [`PacketLaw`].
     ///
     /// # Panics
     ///
@@ -26,22 +27,22 @@ impl Nodes {
         self
     }
 
-    /// Hits packets from one node to another, in [words](crate::hit).
+    /// Hits packets from one node to another, as [words](crate::hit) say.
     ///
     /// # Panics
     ///
-    /// As [`Nodes::on_packet`]; if the words make no sense, with the place.
+    /// As [`Nodes::on_packet`]; if the words make no sense. The message names the place.
     #[track_caller]
     pub fn hit(mut self, from: &str, to: &str, words: &str) -> Self {
         self.setup.add_words([from, to], words);
         self
     }
 
-    /// Hits packets as a value says that a strategy has drawn, or that was pasted back.
+    /// Hits packets as a value says. A strategy has drawn the value, or a printed test contains it.
     ///
     /// # Panics
     ///
-    /// If it names a node that there is not.
+    /// If `hits` names a node that does not exist.
     #[track_caller]
     pub fn hits(mut self, hits: &Hits) -> Self {
         self.setup.add_hits(&hits.all);

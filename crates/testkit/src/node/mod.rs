@@ -1,8 +1,8 @@
-//! Programs without input and output of their own: state machines that are told the time, on emulated links.
+//! State machines without input and output of their own, on emulated links in virtual time.
 //!
-//! Many protocols are written so that they read no clock and open no socket: they are handed packets and instants, and asked what they want to send and when to be
-//! woken (`quinn-proto`, `str0m`, `smoltcp`, many implementations of consensus). [`Nodes`] wires such state machines through a
-//! [`cohaptic_wan::Network`], in virtual time, without tasks and without sockets. A packet costs some tens of nanoseconds more than its link.
+//! Many protocols are written so that they read no clock and open no socket: the caller hands packets and instants in, and asks for packets to send and for the
+//! next deadline (`quinn-proto`, `str0m`, `smoltcp`, many implementations of consensus). [`Nodes`] connects such state machines through a
+//! [`cohaptic_wan::Network`], in virtual time, without tasks and without sockets.
 //!
 //! ```
 //! use cohaptic_testkit::Instant;
@@ -58,77 +58,78 @@ pub use address::{address, place_of};
 pub use builder::Nodes;
 pub use run::{NodeCounts, NodeRun};
 
-/// A program as a state machine: it is handed packets and the time, and asked what it wants.
+/// Program as a state machine, which is handed packets and the time, and asked for packets to send and for its next deadline.
 ///
-/// After every call of `handle_packet` and `handle_timeout`, and after the test has touched the node, [`Node::poll_transmit`] is asked until it has nothing more,
-/// and then [`Node::poll_timeout`] once. Time never goes back.
+/// After every call of `handle_packet` and `handle_timeout`, and after the test has touched the node, [`Node::poll_transmit`] is called until it returns
+/// `None`, and then [`Node::poll_timeout`] once. Time never goes back.
 pub trait Node: Any {
-    /// A packet has arrived.
+    /// Handles a packet that has arrived.
     fn handle_packet(&mut self, now: Instant, packet: Packet);
 
-    /// The instant that [`Node::poll_timeout`] named has come. Afterwards it must name a later one, or none.
+    /// Handles the instant that [`Node::poll_timeout`] has named. Afterwards `poll_timeout` must name a later instant, or none.
     fn handle_timeout(&mut self, _now: Instant) {}
 
-    /// When the node wants to be woken; `None`, or the last instant there is: when a packet arrives. An instant that has passed is now.
+    /// Returns the instant at which the node wants to be woken. `None`, like [`Instant::MAX`], stands for "when a packet arrives". An instant that has passed
+    /// counts as the present instant.
     fn poll_timeout(&mut self) -> Option<Instant> {
         None
     }
 
-    /// The next packet that the node wants to send now; `None` if there is none.
+    /// Returns the next packet that the node wants to send now, or `None` if there is none.
     fn poll_transmit(&mut self, now: Instant) -> Option<Transmit>;
 }
 
-/// A packet as it arrives.
+/// Packet that has arrived at a node.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Packet {
-    /// The sender: the address of a node, with the port that [`Transmit::from_port`] said.
+    /// Sender: the address of a node, with the port given by [`Transmit::from_port`].
     pub from: SocketAddr,
-    /// The receiver: an address of the node that gets it.
+    /// Receiver: an address of the node that gets the packet.
     pub to: SocketAddr,
-    /// What it carries. If the link damages packets, the damage is in it.
+    /// Content of the packet, with the damage done by the link, if any.
     pub bytes: Bytes,
-    /// Whether an active queue marked it: congestion experienced (RFC 3168).
+    /// Whether an active queue has marked the packet: congestion experienced (RFC 3168).
     pub marked: bool,
 }
 
 impl Packet {
-    /// A packet back to the sender, from the port at which this one arrived.
+    /// Returns a packet back to the sender, from the port at which this packet arrived.
     #[must_use]
     pub fn answer(&self, bytes: impl Into<Bytes>) -> Transmit {
         Transmit { to: self.from, from_port: self.to.port(), bytes: bytes.into(), ecn_capable: false }
     }
 
-    /// The place of the node that sent it, from 0.
+    /// Returns the index of the sending node, from 0.
     #[must_use]
     pub fn from_place(&self) -> usize {
-        // A packet that is handed to a node comes from one.
+        // Every packet that is handed to a node comes from a node.
         place_of(self.from.ip()).unwrap_or(usize::MAX)
     }
 }
 
-/// A packet that a node sends.
+/// Packet that a node sends.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Transmit {
-    /// The receiver: see [`address()`]. A packet to an address that no node has is [counted](NodeCounts::unroutable), and lost.
+    /// Receiver: see [`address()`]. A packet to an address that no node has is [counted](NodeCounts::unroutable), and lost.
     pub to: SocketAddr,
-    /// The port from which it is sent. The receiver sees it; otherwise it means nothing.
+    /// Port from which the packet is sent. The receiver sees the port; otherwise it has no effect.
     pub from_port: u16,
-    /// What it carries.
+    /// Content of the packet.
     pub bytes: Bytes,
-    /// Whether both ends understand explicit congestion notification: then an active queue marks it where it would drop another.
+    /// Whether both ends understand explicit congestion notification. An active queue then marks the packet in place of dropping it.
     pub ecn_capable: bool,
 }
 
 impl Transmit {
-    /// A packet to the node at that place, from 0, between ports 0.
+    /// Returns a packet to the node with the index `place`, from 0. Both ports are 0.
     #[must_use]
     pub fn to(place: usize, bytes: impl Into<Bytes>) -> Self {
         Self { to: address(place, 0), from_port: 0, bytes: bytes.into(), ecn_capable: false }
     }
 }
 
-/// The time of a run for libraries that want [`std::time::Instant`]: the instant that stands for the run's beginning. Which one it is does not matter, as long as
-/// all nodes take the same.
+/// Conversion between the time of a run and [`std::time::Instant`], for libraries that need the latter. The field is the instant that stands for the beginning
+/// of the run. Any instant will do, as long as all nodes use the same one.
 ///
 /// ```
 /// use cohaptic_testkit::{Instant, node::Epoch};
@@ -141,17 +142,17 @@ impl Transmit {
 pub struct Epoch(pub StdInstant);
 
 impl Epoch {
-    /// The instant in the clock of the system.
+    /// Converts an instant of the run to the clock of the system.
     ///
     /// # Panics
     ///
-    /// If the system's clock does not reach so far.
+    /// If the clock of the system does not reach that far.
     #[must_use]
     pub fn to_std(self, at: Instant) -> StdInstant {
         self.0 + at.saturating_duration_since(Instant::ZERO)
     }
 
-    /// The instant in the time of the run; its beginning if it was before.
+    /// Converts an instant of the system's clock to the time of the run. An instant before the beginning of the run becomes the beginning.
     #[must_use]
     pub fn from_std(self, at: StdInstant) -> Instant {
         Instant::ZERO.saturating_add(at.saturating_duration_since(self.0))

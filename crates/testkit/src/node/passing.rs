@@ -1,4 +1,4 @@
-//! Time passes: packets arrive, timers go off, and nodes are asked what they want.
+//! Passing of time in a run of nodes: packets arrive, timers go off, and nodes are asked for packets and deadlines.
 
 use cohaptic_units::Instant;
 use cohaptic_units::print::Seconds;
@@ -11,7 +11,7 @@ use crate::trace::{Happening, Lost};
 use crate::wire::{Arrival, Held, Parcel, Where};
 
 impl NodeRun {
-    /// Lets the events of an instant happen.
+    /// Lets the events of the instant `at` happen.
     pub(super) fn pass(&mut self, at: Instant) {
         if self.wire.set_now(at) {
             self.done = 0;
@@ -38,19 +38,20 @@ impl NodeRun {
         self.hand_over();
     }
 
-    /// Asks a node what it wants to send, and when it wants to be woken; `because` of what it is asked.
+    /// Asks a node for packets and its deadline. `because` is the cause of the question, for the message of a run that does not end.
     pub(super) fn ask(&mut self, id: NodeId, because: Does) {
         let Some(mut node) = self.nodes[id.index()].take() else { return self.deadlines.set(id.index(), None) };
         let mut sent = 0;
-        // The nodes are numbered in their order.
+        // The pulse numbers the nodes in their order, from 1.
         self.watched.pulse.begins(id.index() + 1);
         while let Some(transmit) = node.poll_transmit(self.now()) {
             sent += 1;
-            // A node that sends one packet for each that comes answers; one that, asked once, sends more than half of all events of this instant never ends to send.
+            // A node that sends a packet per arrived packet answers. A node that sends more than half of all events of this instant in one question never stops
+            // sending.
             self.count(if sent > self.patience / 2 { Does::Sends } else { because }, id);
             self.send(id, transmit);
         }
-        // Late events are due now: so that nodes are woken in their order, however late they are.
+        // A deadline that has passed counts as now, so that late nodes are woken in their order, however late they are.
         let deadline = node.poll_timeout().map(|deadline| deadline.max(self.now()));
         self.deadlines.set(id.index(), deadline);
         self.nodes[id.index()] = Some(node);
@@ -72,7 +73,7 @@ impl NodeRun {
         let parcel = Parcel::new(addresses, bytes.into(), ecn_capable);
         let path = Path { from, to };
         if to == from {
-            // It does not leave the node, and so meets no link.
+            // The packet does not leave the node, so it meets no link.
             self.arrive(path, parcel, false);
         } else {
             match self.wire.offer(path, Box::new(parcel)) {
@@ -85,7 +86,7 @@ impl NodeRun {
         }
     }
 
-    /// Deals with what has come out of the links.
+    /// Takes the packets that have come out of the links, for the later hand-over.
     pub(super) fn take_arrivals(&mut self) {
         while let Some(parcel) = self.wire.poll() {
             let Arrival { packet, at, marked, is_cut } = parcel.arrival;
@@ -114,7 +115,7 @@ impl NodeRun {
         self.arrived.push_back((to, Packet { from: address(from, ports.from), to: address(to, ports.to), bytes: bytes.into(), marked }));
     }
 
-    /// Hands over what has arrived, in its order, and what arrives at once because of it.
+    /// Hands arrived packets over, in the order of arrival, with packets that arrive at once as a consequence.
     pub(super) fn hand_over(&mut self) {
         while let Some((to, packet)) = self.arrived.pop_front() {
             self.wire.held.remove(Where::Buffers, Held::cost(packet.bytes.len()));
@@ -128,7 +129,7 @@ impl NodeRun {
         }
     }
 
-    /// Counts the events of one instant.
+    /// Counts an event of the present instant. Fails the run beyond the patience.
     #[inline]
     fn count(&mut self, does: Does, node: NodeId) {
         self.done += 1;

@@ -1,4 +1,4 @@
-//! Nodes that run: their time, the questions that they are asked, and the way of a packet.
+//! Running nodes: their time, their links, and the record of the run.
 
 use std::any::{Any, type_name};
 use std::collections::VecDeque;
@@ -23,24 +23,24 @@ use crate::setup::Setup;
 use crate::watch::{Kind, Watched};
 use crate::wire::Wire;
 
-/// Nodes that run.
+/// Running nodes.
 ///
-/// Between the steps the test looks at the nodes, changes them, and breaks the links between them. At one instant packets arrive first, in the order of the
-/// [network](cohaptic_wan::Network); then the timers go off that are due, in the order of the nodes; then packets arrive that are sent at this instant over links without
-/// delay. If the test fails while the run is there, the seed is told, and what [`Nodes::artefacts`](super::Nodes::artefacts) asked for is written.
+/// Between the steps of time the test looks at the nodes, changes the nodes, and breaks the links between them. At one instant packets arrive first, in the
+/// order of the [network](cohaptic_wan::Network). Then the timers that are due go off, in the order of the nodes. Then packets arrive that are sent at this
+/// instant over links without delay. If the test fails while the run exists, the seed is printed, and the record is written where [`Nodes::artefacts`](super::Nodes::artefacts) says.
 pub struct NodeRun {
     pub(super) names: Arc<Names>,
-    /// `None`: crashed, or being asked.
+    /// Nodes by index. `None` while a node is down or is being asked.
     pub(super) nodes: Vec<Option<Box<dyn Node>>>,
     pub(super) up: Vec<bool>,
     pub(super) wire: Wire<Ports>,
     pub(super) deadlines: Deadlines,
     pub(super) counts: Vec<NodeCounts>,
-    /// What has arrived and is not handed over yet.
+    /// Packets that have arrived and are not handed over yet, with the receiver.
     pub(super) arrived: VecDeque<(NodeId, Packet)>,
-    /// Nodes that the test has touched.
+    /// Nodes that the test has touched and that must be asked.
     touched: Vec<NodeId>,
-    /// What was done since time last passed.
+    /// Number of events since time last passed.
     pub(super) done: u64,
     pub(super) patience: u64,
     time_limit: Duration,
@@ -49,7 +49,7 @@ pub struct NodeRun {
     pub(super) watched: Arc<Watched>,
 }
 
-/// What a node does that keeps time from passing.
+/// Activity of a node that keeps time from passing.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Does {
     Sends,
@@ -57,30 +57,30 @@ pub(super) enum Does {
     Wakes,
 }
 
-/// The ports of a packet.
+/// Ports of a packet.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ports {
     pub(super) from: u16,
     pub(super) to: u16,
-    /// Whether it is of version 6 of IP.
+    /// Whether the packet is of IPv6.
     pub(super) is_six: bool,
 }
 
-/// What a node has sent and got.
+/// Counts of the packets and timers of a node.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[non_exhaustive]
 pub struct NodeCounts {
-    /// Packets that it sent, wherever they went.
+    /// Packets that the node has sent, to any address.
     pub sent: u64,
-    /// Packets that it was handed.
+    /// Packets that the node was handed.
     pub arrived: u64,
     /// Timers that went off.
     pub timeouts: u64,
-    /// Packets that it sent to an address that no node has.
+    /// Packets that the node has sent to an address that no node has.
     pub unroutable: u64,
-    /// Packets that were lost because it was down when they arrived.
+    /// Packets that were lost because the node was down when they arrived.
     pub while_down: u64,
-    /// Packets of it that were lost because the way was cut when they were sent, or would have arrived.
+    /// Packets sent by the node that were lost because the path was cut when they were sent or would have arrived.
     pub cut: u64,
 }
 
@@ -114,23 +114,23 @@ impl NodeRun {
         run
     }
 
-    /// The time since the run began.
+    /// Returns the time since the run began.
     #[must_use]
     pub const fn now(&self) -> Instant {
         self.wire.now()
     }
 
-    /// The names of the nodes, in the order in which they were added.
+    /// Returns the names of the nodes, in the order in which they were added.
     #[must_use]
     pub fn names(&self) -> &[String] {
         &self.names
     }
 
-    /// A node.
+    /// Returns the node named `name`.
     ///
     /// # Panics
     ///
-    /// If there is none of that name, it is down, or of another type.
+    /// If there is no node of that name, the node is down, or it is of another type.
     #[must_use]
     pub fn node<T: Node>(&self, name: &str) -> &T {
         let id = self.id(name);
@@ -138,7 +138,7 @@ impl NodeRun {
         node.downcast_ref().unwrap_or_else(|| is_another::<T>(name))
     }
 
-    /// A node, to be changed. What it wants to send then is sent now, and its timer is asked for anew.
+    /// Returns the node named `name`, for changes. Before time passes, the node is asked for packets and its deadline.
     ///
     /// # Panics
     ///
@@ -151,17 +151,17 @@ impl NodeRun {
         node.downcast_mut().unwrap_or_else(|| is_another::<T>(name))
     }
 
-    /// What a node has sent and got.
+    /// Returns the counts of a node.
     ///
     /// # Panics
     ///
-    /// If there is none of that name.
+    /// If there is no node of that name.
     #[must_use]
     pub fn counts(&self, name: &str) -> NodeCounts {
         self.counts[self.id(name).index()]
     }
 
-    /// What the link from one node to another has done so far.
+    /// Returns the statistics of the link from one node to another so far.
     ///
     /// # Panics
     ///
@@ -172,21 +172,21 @@ impl NodeRun {
         self.wire.link_stats(self.names.path(from, to)).unwrap_or_else(|| panic!("node `{from}` has no link to itself"))
     }
 
-    /// When something happens next; `None` if nothing will.
+    /// Returns the instant of the next event, or `None` if nothing will happen.
     ///
     /// # Panics
     ///
-    /// If a node that the test has touched never ends to send.
+    /// If a node that the test has touched never stops sending.
     pub fn next_event(&mut self) -> Option<Instant> {
         self.ask_touched();
         self.next()
     }
 
-    /// Lets happen what happens next, all that is due at that instant; says whether there was anything.
+    /// Lets time pass to the next event, and lets all events of that instant happen. Returns whether there was any.
     ///
     /// # Panics
     ///
-    /// If a node does, or time stands still: a node sends, or wants to be woken, again and again.
+    /// If a node panics, or time stands still because a node sends, or wants to be woken, again and again.
     pub fn step(&mut self) -> bool {
         self.ask_touched();
         let next = self.next();
@@ -196,11 +196,11 @@ impl NodeRun {
         next.is_some()
     }
 
-    /// Lets time pass until then, with all that happens, that instant included.
+    /// Lets time pass until `until`, with all events up to and including that instant.
     ///
     /// # Panics
     ///
-    /// As [`NodeRun::step`]; if the instant has passed.
+    /// As [`NodeRun::step`]; if `until` has passed.
     pub fn run_until(&mut self, until: Instant) {
         assert!(until >= self.now(), "{} s has passed: it is {} s", Seconds(until), Seconds(self.now()));
         self.ask_touched();
@@ -210,11 +210,11 @@ impl NodeRun {
         self.wire.set_now(until);
     }
 
-    /// Lets time pass until nothing will happen any more: no packet is on its way, and no node wants to be woken. Gives that instant.
+    /// Lets time pass until nothing will happen any more: no packet is under way, and no node wants to be woken. Returns that instant.
     ///
     /// # Panics
     ///
-    /// As [`NodeRun::step`]; if there is no end before the [time limit](super::Nodes::time_limit).
+    /// As [`NodeRun::step`]; if events go on beyond the [time limit](super::Nodes::time_limit).
     #[expect(clippy::panic, reason = "a test that waits for ever; says the way out")]
     pub fn run_until_idle(&mut self) -> Instant {
         while self.step() {
@@ -229,11 +229,11 @@ impl NodeRun {
         self.now()
     }
 
-    /// Lets time pass as long as that is so; it is asked after every instant at which something happened. Gives the instant at which it is so no more.
+    /// Lets time pass while `is_so` returns true. It is called after every instant with an event. Returns the instant at which `is_so` is false.
     ///
     /// # Panics
     ///
-    /// As [`NodeRun::step`]; if it is so still when nothing will happen any more, or at the [time limit](super::Nodes::time_limit).
+    /// As [`NodeRun::step`]; if `is_so` is still true when nothing will happen any more, or at the [time limit](super::Nodes::time_limit).
     #[expect(clippy::panic, reason = "a test that waits for what never comes; says the way out")]
     pub fn run_while(&mut self, mut is_so: impl FnMut(&Self) -> bool) -> Instant {
         while is_so(self) {
@@ -251,18 +251,18 @@ impl NodeRun {
         self.now()
     }
 
-    /// What has happened so far. Packets that are on their way are followed to their end, in the fates alone.
+    /// Returns the record so far. Packets under way are followed to their end, for the fates only.
     ///
     /// # Panics
     ///
-    /// If it is not [recorded](super::Nodes::recorded).
+    /// If the run is not [recorded](super::Nodes::recorded).
     #[must_use]
     pub fn record(&self) -> Record {
         assert!(self.wire.recording().traces, "nothing was recorded; `Nodes::recorded` asks for it");
         Record::new(self.again.seed.clone(), self.wire.recorded())
     }
 
-    /// Returns the network in words, for messages.
+    /// Returns a description of the network, for messages.
     fn network(&self) -> String {
         let lines = self.again.said.lines(&self.names);
         if lines.is_empty() { String::new() } else { format!(" The network:\n  {}", lines.join("\n  ")) }
@@ -272,7 +272,7 @@ impl NodeRun {
         self.now().saturating_duration_since(Instant::ZERO) > self.time_limit
     }
 
-    /// Asks the nodes that the test has touched.
+    /// Asks the nodes that the test has touched for packets and deadlines.
     pub(super) fn ask_touched(&mut self) {
         if self.touched.is_empty() {
             return;
