@@ -1,4 +1,4 @@
-//! The names of hosts.
+//! Names of hosts.
 
 use std::fmt::{self, Write as _};
 use std::ops::Deref;
@@ -7,23 +7,23 @@ use cohaptic_wan::{MOST_NODES, NodeId, Path};
 
 use crate::current;
 
-/// The names of hosts, in the order in which they were given, and an index of them: to look a host up takes as many steps as the number of hosts has bits.
+/// Names of hosts, in the order in which they were given, with an index sorted by name. Looking a host up takes as many steps as the number of hosts has bits.
 #[derive(Clone, PartialEq, Eq, Default)]
 pub(crate) struct Names {
     list: Vec<String>,
-    /// The places in `list`, sorted by name.
+    /// Indices into `list`, sorted by name.
     sorted: Vec<NodeId>,
 }
 
-/// How many hosts a message names at most.
+/// Maximum number of hosts that a message names.
 pub(crate) const SHOWN: usize = 16;
 
 impl Names {
-    /// Adds the name of one more host.
+    /// Adds the name of a further host.
     ///
     /// # Panics
     ///
-    /// If it is none, another host has it, or there are more hosts than a network has.
+    /// If the name is not valid, another host has it, or there are more hosts than a network can have.
     #[expect(clippy::panic, reason = "a misuse, and the way out")]
     pub(crate) fn add(&mut self, name: String) {
         let fault = name_fault(&name);
@@ -40,22 +40,22 @@ impl Names {
         self.sorted.binary_search_by(|node| (*self.list[node.index()]).cmp(name))
     }
 
-    /// The host of that name.
+    /// Returns the host named `name`, if there is one.
     pub(crate) fn find(&self, name: &str) -> Option<NodeId> {
         self.search(name).ok().map(|place| self.sorted[place])
     }
 
-    /// The host of that name.
+    /// Returns the host named `name`.
     ///
     /// # Panics
     ///
-    /// If there is none.
+    /// If there is no host of that name.
     #[expect(clippy::panic, reason = "a misuse, and the way out")]
     pub(crate) fn node(&self, name: &str) -> NodeId {
         self.find(name).unwrap_or_else(|| panic!("{}", self.unknown(name)))
     }
 
-    /// The path from one host to another.
+    /// Returns the path from one host to another.
     ///
     /// # Panics
     ///
@@ -64,7 +64,7 @@ impl Names {
         Path { from: self.node(from), to: self.node(to) }
     }
 
-    /// Says that no host has that name, which hosts there are, and which task asks.
+    /// Returns the message that no host has the name, with the names of the hosts and the task that asks.
     pub(crate) fn unknown(&self, name: &str) -> String {
         let mut text = format!("there is no host `{name}`; the hosts are {}", self.list[..self.list.len().min(SHOWN)].join(", "));
         // Writing to a `String` cannot fail.
@@ -104,7 +104,7 @@ impl<N: Into<String>> FromIterator<N> for Names {
     }
 }
 
-/// Why a text is no name of a host; `None` if it is one.
+/// Returns why a text is not a valid name of a host, or `None` if it is valid.
 pub(crate) fn name_fault(name: &str) -> Option<String> {
     let is_word =
         !name.is_empty() && !name.contains([':', '[', ']']) && !name.contains(char::is_whitespace) && name.parse::<std::net::IpAddr>().is_err();

@@ -1,4 +1,4 @@
-//! What was recorded of a run, as a test gets it.
+//! Record of a run, for tests.
 
 use std::collections::BTreeSet;
 
@@ -9,9 +9,10 @@ use crate::seed::Seed;
 use crate::trace::Trace;
 use crate::wire::{HitCount, Recorded, Seen};
 
-/// What was recorded of a run: all that happened, and what became of every packet on its link.
+/// Record of a run: the trace, and the fate of every packet on its link.
 ///
-/// Packets that were on their way when the run ended are followed to their end, as if nothing more had been sent: the fates know it, the trace ends with the run.
+/// Packets under way at the end of the run are followed to their end, as if nothing more had been sent. The fates contain these ends; the trace ends with the
+/// run.
 #[derive(Clone, Debug)]
 pub struct Record {
     seed: Seed,
@@ -23,18 +24,18 @@ impl Record {
         Self { seed, recorded }
     }
 
-    /// What each law did.
+    /// Returns what each law did.
     pub(crate) fn hits(&self) -> &[HitCount] {
         &self.recorded.hits
     }
 
-    /// All that happened, in order.
+    /// Returns the events of the run, in their order.
     #[must_use]
     pub const fn trace(&self) -> &Trace {
         &self.recorded.trace
     }
 
-    /// When the run ended.
+    /// Returns the instant at which the run ended.
     #[must_use]
     pub const fn ended(&self) -> Instant {
         self.recorded.ended
@@ -44,8 +45,8 @@ impl Record {
         &self.seed
     }
 
-    /// What became of the packets from one host to another on their link, as [`LinkModel::Replay`](cohaptic_wan::LinkModel::Replay) replays it. A packet that its
-    /// link delivered to a host that was down, or over a way that was cut, has arrived here: the trace says what became of it.
+    /// Returns the fates of the packets from one host to another on their link, in the form that [`LinkModel::Replay`](cohaptic_wan::LinkModel::Replay)
+    /// replays. A packet that its link delivered to a host that was down, or over a path that was cut, counts as delivered here; the trace tells its end.
     ///
     /// # Panics
     ///
@@ -55,7 +56,7 @@ impl Record {
         self.fates_of(self.recorded.trace.names().path(from, to))
     }
 
-    /// Every path with a packet on its link.
+    /// Returns every path with a packet on its link.
     pub(crate) fn paths(&self) -> Vec<Path> {
         let paths: BTreeSet<Path> = self.recorded.packets.iter().map(|seen| seen.path).collect();
         paths.into_iter().collect()
@@ -65,19 +66,19 @@ impl Record {
         self.recorded.packets.iter().filter(move |seen| seen.path == path)
     }
 
-    /// What became of the packets of a path.
+    /// Returns the fates of the packets of a path.
     pub(crate) fn fates_of(&self, path: Path) -> FateLog {
         complete(self.packets_of(path).map(|seen| seen.without_path()).collect())
     }
 }
 
-/// The log of all packets before the first whose end is not known. There is none of those, unless a link never lets go.
+/// Returns the log of all packets before the first packet without a known end. Only a link that never releases a packet causes such a packet.
 fn complete(mut records: Vec<PacketRecord>) -> FateLog {
     loop {
         match FateLog::new(records.iter().copied()) {
             Ok(log) => return log,
             Err(FateLogError::Missing { sequence, .. } | FateLogError::NoEnd { sequence, .. }) => records.retain(|record| record.sequence < sequence),
-            // A link does none of the other things.
+            // The other errors do not occur in records of a link.
             Err(_) => return FateLog::default(),
         }
     }

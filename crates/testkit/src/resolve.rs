@@ -1,4 +1,4 @@
-//! What can be said in place of a socket address.
+//! Descriptions of socket addresses.
 
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
@@ -6,15 +6,15 @@ use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 use crate::address::Addresses;
 use crate::context;
 
-/// What can be said in place of a socket address: the address itself, or the name of a host of the running test bed, or a literal address, with a port.
+/// Description of a socket address: the address itself, or the name of a host of the running test bed or a literal address, with a port.
 ///
-/// A name gives the address of version 4; `"[server]:80"` that of version 6.
+/// A name stands for the IPv4 address of the host; `"[server]:80"` for the IPv6 address.
 pub trait ToSocketAddrs {
-    /// The address.
+    /// Returns the socket address.
     ///
     /// # Errors
     ///
-    /// [`io::ErrorKind::InvalidInput`] if it is none, [`io::ErrorKind::NotFound`] if there is no host of that name, or no test bed is running.
+    /// [`io::ErrorKind::InvalidInput`] if the text is no address, [`io::ErrorKind::NotFound`] if there is no host of that name, or no test bed is running.
     fn to_socket_addr(&self) -> io::Result<SocketAddr>;
 }
 
@@ -95,7 +95,7 @@ fn look_up(name: &str) -> io::Result<Addresses> {
     let shared = context::shared().ok_or_else(|| context::outside(&format!("the name `{name}` of a host means something")))?;
     let found = shared.with(|core| core.plan.addresses(name));
     found.ok_or_else(|| {
-        // A program that looks a wrong name up until it is found lets no time pass.
+        // A program that looks up a wrong name again and again lets no time pass, so the call is counted.
         shared.note_call();
         io::Error::new(io::ErrorKind::NotFound, shared.names().unknown(name))
     })

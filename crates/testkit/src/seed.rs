@@ -1,28 +1,29 @@
-//! The seed of a test.
+//! Seed of a test.
 
 use std::any::type_name;
 use std::fmt;
 use std::panic::Location;
 use std::thread;
 
-/// This variable of the environment sets the seed of every test bed of a process, whatever the tests say.
+/// Name of the environment variable that sets the seed of every test bed of a process. It takes precedence over the seeds of the tests.
 pub const SEED_VARIABLE: &str = "COHAPTIC_TEST_SEED";
 
-/// The seed of a test, and where it is from.
+/// Seed of a test, and its origin.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Seed {
     pub(crate) value: u64,
     pub(crate) test: String,
-    /// The value is that of the place, so that the test that has failed fails again as it stands.
+    /// Whether the seed is derived from the place. The failed test then fails again as it stands.
     pub(crate) is_of_place: bool,
 }
 
 impl Seed {
-    /// What the environment says; what the test says; else one that is made of the place, so that it is the same in every run, and another for every test.
+    /// Chooses the seed: from the environment, otherwise from the test (`said`), otherwise from `place`. The seed of a place is the same in every run and
+    /// differs between tests.
     ///
     /// # Panics
     ///
-    /// If what the environment says is no number.
+    /// If the value of the environment variable is no number.
     pub(crate) fn choose(said: Option<u64>, place: &Place) -> Self {
         let value = std::env::var(SEED_VARIABLE).ok();
         Self::of(value.as_deref(), said, place, thread::current().name())
@@ -32,39 +33,39 @@ impl Seed {
     fn of(environment: Option<&str>, said: Option<u64>, place: &Place, thread: Option<&str>) -> Self {
         let asked =
             environment.map(|text| number(text).unwrap_or_else(|| panic!("{SEED_VARIABLE} is `{text}`; expected a number from 0 to {}", u64::MAX)));
-        // The main thread has the name of no test.
+        // The name of the main thread is not the name of a test.
         let test = thread.filter(|name| *name != "main").unwrap_or(&place.function);
         let said = asked.or(said);
         Self { value: said.unwrap_or_else(|| hash(place.to_string().as_bytes())), test: test.to_owned(), is_of_place: said.is_none() }
     }
 
-    /// What to do to see it again.
+    /// Returns the advice how to repeat the run.
     pub(crate) fn advice(&self) -> String {
         format!("test bed of `{}`: seed {}; {SEED_VARIABLE}={} runs it again", self.test, self.value, self.value)
     }
 }
 
-/// Where a test bed is run: what does not depend on threads, machines, or edits elsewhere. In words it is the file, a blank and the function, and their
-/// [`hash`] is the seed.
+/// Place at which a test bed is run. It does not depend on threads, machines, or edits elsewhere. Its text is the file, a blank and the function, and the
+/// [`hash`] of the text is the seed.
 ///
-/// The file is that of the call. The function is the path of the program's closure as [`type_name`] says it, of which only identifiers up to the first brace
-/// count, joined by `::`. So a plain function has its own path, however a compiler spells closures, brackets and generics. Line and column would be steadier against
-/// another compiler, but each edit above would change the seeds of all tests below; they count only where no closure says its function.
+/// The file is that of the call. The function is the path of the program's closure as [`type_name`] returns it: only the identifiers up to the first brace,
+/// joined by `::`. So a plain function has its own path, and the spelling of closures, brackets and generics by the compiler has no influence. Line and column
+/// would depend even less on the compiler, but each edit above would change the seeds of all tests below. They count only where no closure tells the function.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Place {
     file: String,
-    /// The function in which the program stands, by its path; or the line and the column.
+    /// Path of the function that contains the program; or file, line and column.
     function: String,
 }
 
 impl Place {
-    /// Where the caller runs this program.
+    /// Returns the place where the caller runs this program.
     #[track_caller]
     pub(crate) fn of<P>(_program: &P) -> Self {
         Self { file: file(Location::caller().file()), function: function(type_name::<P>()) }
     }
 
-    /// Where the caller stands, by line and column: where no program says its function.
+    /// Returns the place of the caller by line and column, where no program tells the function.
     #[track_caller]
     pub(crate) fn here() -> Self {
         let caller = Location::caller();
@@ -79,14 +80,15 @@ impl fmt::Display for Place {
     }
 }
 
-/// A path of a source file as it is on every machine: with slashes; of one that is not within the workspace, which begins at the machine's root, the name alone.
+/// Returns the path of a source file in a form that is equal on every machine: with slashes. Of an absolute path, which is a file outside of the workspace,
+/// only the name is kept.
 fn file(path: &str) -> String {
     let path = path.replace('\\', "/");
     let is_absolute = path.starts_with('/') || path.as_bytes().get(1) == Some(&b':');
     if is_absolute { path.rsplit('/').next().unwrap_or_default().to_owned() } else { path }
 }
 
-/// The function of a type: that in which a closure stands, or the function itself.
+/// Returns the function in the name of a type: the function that contains a closure, or the function itself.
 fn function(name: &str) -> String {
     let path = name.split('{').next().unwrap_or(name);
     let identifiers: Vec<_> =
@@ -94,12 +96,12 @@ fn function(name: &str) -> String {
     identifiers.join("::")
 }
 
-/// A seed as it is written: decimal, or hexadecimal after `0x`.
+/// Parses a seed: decimal, or hexadecimal after `0x`.
 pub(crate) fn number(text: &str) -> Option<u64> {
     text.strip_prefix("0x").map_or_else(|| text.parse().ok(), |digits| u64::from_str_radix(digits, 16).ok())
 }
 
-/// FNV-1a: the same everywhere and for ever.
+/// Computes the FNV-1a hash, which is the same on every machine and in every version.
 pub(crate) fn hash(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3))
 }
@@ -120,7 +122,7 @@ mod tests {
         assert_eq!(seed(None, Some(8), None).value, 8);
         assert_eq!(seed(None, None, Some("b")).value, hash(b"tests/x.rs x::a"));
         assert_eq!(seed(None, None, Some("main")).value, seed(None, None, Some("b")).value);
-        // FNV's own vector.
+        // A test vector of FNV's authors.
         assert_eq!(hash(b"a"), 0xaf63_dc4c_8601_ec8c);
         assert_eq!(seed(None, Some(7), Some("b")).advice(), "test bed of `b`: seed 7; COHAPTIC_TEST_SEED=7 runs it again");
         assert_eq!(seed(None, Some(7), Some("main")).test, "x::a");

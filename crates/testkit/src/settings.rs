@@ -1,4 +1,4 @@
-//! The settings of a run.
+//! Settings of a run.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -8,42 +8,42 @@ use cohaptic_units::Instant;
 use crate::again::Said;
 use crate::hit::Laws;
 
-/// The settings of a run.
+/// Settings of a run.
 #[derive(Clone, Debug)]
 pub(crate) struct Settings {
-    /// How many bytes of datagrams a socket holds that have not been read.
+    /// Size of the receive buffer of a UDP socket \[bytes\].
     pub(crate) receive_buffer: usize,
     /// Whether events are recorded.
     pub(crate) traces: bool,
-    /// Whether the events have digests of the packets' bytes.
+    /// Whether recorded events contain digests of the packets' bytes.
     pub(crate) digests: bool,
     /// Whether packets are recorded, with their bytes.
     pub(crate) keeps_packets: bool,
-    /// How often tasks may be polled, or packets and timers handled, at one instant.
+    /// Maximum number of polls of tasks, or of handled packets and timers, at one instant.
     pub(crate) patience: u64,
-    /// How many bytes the run may hold.
+    /// Maximum number of bytes that the run may hold.
     pub(crate) byte_limit: u64,
-    /// Limits beyond which a run is given up.
+    /// Limits beyond which a run fails.
     pub(crate) limits: Limits,
-    /// The network in the words of the test.
+    /// Description of the network as the test gave it.
     pub(crate) said: Arc<Said>,
-    /// Which packets are hit.
+    /// Laws that hit packets.
     pub(crate) laws: Laws,
 }
 
-/// Limits of a run, beyond which it is given up.
+/// Limits of a run, beyond which the run fails.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Limits {
-    /// Time of the run.
+    /// Limit of the virtual time of the run.
     pub(crate) time: Duration,
-    /// Polls of its tasks.
+    /// Limit of the polls of tasks.
     pub(crate) steps: u64,
 }
 
-/// Longer than any test means to run. A program that asks five times a second has asked 18,000 times by then, which takes a tenth of a second.
+/// Default time limit, longer than tests mean to run. A program that asks five times a second has asked 18,000 times by then.
 const TIME: Duration = Duration::from_secs(3600);
 
-/// A number of polls that takes some seconds by the wall clock.
+/// Default limit of polls, which take some seconds by the wall clock.
 const STEPS: u64 = 20_000_000;
 
 impl Default for Limits {
@@ -52,7 +52,7 @@ impl Default for Limits {
     }
 }
 
-/// The limit that a run has reached.
+/// Limit that a run has reached.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Reached {
     Time(Duration),
@@ -60,12 +60,12 @@ pub(crate) enum Reached {
 }
 
 impl Limits {
-    /// The last instant of a run.
+    /// Returns the last instant of a run.
     pub(crate) fn until(self) -> Instant {
         Instant::ZERO.saturating_add(self.time)
     }
 
-    /// Returns the limit that a run has reached which goes on after this number of steps.
+    /// Returns the limit that a run has reached after `steps` polls.
     pub(crate) const fn reached(self, steps: u64) -> Reached {
         if steps > self.steps { Reached::Steps(self.steps) } else { Reached::Time(self.time) }
     }

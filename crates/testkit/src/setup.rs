@@ -1,4 +1,4 @@
-//! What a run is made of: hosts, links and limits. A test bed and state machines have them alike.
+//! Parts of a run that test beds and state machines share: hosts, links and limits.
 
 use std::collections::BTreeMap;
 use std::panic::Location;
@@ -17,31 +17,32 @@ use crate::watch::LIMIT;
 use crate::wire::BYTE_LIMIT;
 use crate::words::hits_on;
 
-/// Hosts and the links between them, as the test says them.
+/// Hosts and the links between them, as the test gave them.
 #[derive(Clone, Debug)]
 pub(crate) struct Setup {
     pub(crate) names: Arc<Names>,
-    /// What the hosts are called in messages: `host` or `node`.
+    /// Word for a host in messages: `host` or `node`.
     noun: &'static str,
+    /// Link of every path that is not in `links`.
     every: LinkModel,
     links: BTreeMap<Path, LinkModel>,
-    /// In order of time.
+    /// Changes of links, sorted by time.
     pub(crate) changes: Vec<LinkChange>,
     pub(crate) seed: Option<u64>,
     pub(crate) settings: Settings,
-    /// Where a failure writes what happened.
+    /// Folder into which a failing run writes its record.
     pub(crate) artefacts: Option<PathBuf>,
     pub(crate) stall_limit: Duration,
 }
 
-/// As Linux gives a socket (`net.core.rmem_default`) \[bytes\].
+/// Default size of a receive buffer in Linux (`net.core.rmem_default`) \[bytes\].
 pub(crate) const RECEIVE_BUFFER: usize = 212_992;
 
-/// A million polls, or packets and timers, at one instant take a tenth of a second.
+/// Default patience. A million polls, or packets and timers, take a fraction of a second.
 const PATIENCE: u64 = 1_000_000;
 
 impl Setup {
-    /// Hosts of these names, with ideal links between them.
+    /// Creates a setup with hosts of these names, and ideal links between them.
     pub(crate) fn new(noun: &'static str, names: Names) -> Self {
         Self {
             names: Arc::new(names),
@@ -66,35 +67,35 @@ impl Setup {
         }
     }
 
-    /// One more host.
+    /// Adds a host.
     pub(crate) fn add(&mut self, name: &str) {
         Arc::make_mut(&mut self.names).add(name.to_owned());
     }
 
-    /// What every link is that is not named.
+    /// Sets the link of every path that is not set by itself.
     pub(crate) fn set_every(&mut self, link: impl ToLink) {
         self.every = link.to_link();
         Arc::make_mut(&mut self.settings.said).set_every(&link);
     }
 
-    /// What the link from one host to another is.
+    /// Sets the link from one host to another.
     ///
     /// # Panics
     ///
-    /// If there is no such host, both are the same, or the words are none.
+    /// If there is no such host, both hosts are the same, or the words describe no link.
     pub(crate) fn set_link(&mut self, from: &str, to: &str, link: impl ToLink) {
         let path = self.names.path(from, to);
         assert!(path.from != path.to, "{} `{from}` has no link to itself", self.noun);
         self.set_path(path, link);
     }
 
-    /// What the link of a path is.
+    /// Sets the link of a path.
     pub(crate) fn set_path(&mut self, path: Path, link: impl ToLink) {
         self.links.insert(path, link.to_link());
         Arc::make_mut(&mut self.settings.said).set(path, &link);
     }
 
-    /// All links, what becomes of them, and the seed, as a file says. The hosts of the file are there.
+    /// Sets all links, their changes, the hits and the seed as a file says. The setup must have the hosts of the file.
     pub(crate) fn read(&mut self, file: LinkFile) {
         let LinkFile { hosts, every, links, changes, hits, seed } = file;
         let nodes: Vec<NodeId> = hosts.iter().map(|host| self.names.node(host)).collect();
@@ -107,20 +108,20 @@ impl Setup {
         self.seed = seed.or(self.seed);
     }
 
-    /// The link of each path.
+    /// Returns a function from a path to its link.
     pub(crate) fn links(&self) -> impl Fn(NodeId, NodeId) -> LinkModel + Send + Sync + use<> {
         let (every, links) = (self.every.clone(), self.links.clone());
         move |from, to| links.get(&Path { from, to }).unwrap_or(&every).clone()
     }
 
-    /// Records what happens, and every packet with what it carries.
+    /// Records every event, and every packet with its content.
     pub(crate) const fn record(&mut self) {
         self.settings.traces = true;
         self.settings.keeps_packets = true;
     }
 }
 
-/// Packets that are hit.
+/// Laws that hit packets.
 impl Setup {
     #[track_caller]
     pub(crate) fn add_function(&mut self, ends: [&str; 2], judge: impl FnMut(&SentPacket<'_>) -> Verdict + Clone + Send + 'static) {
@@ -156,7 +157,7 @@ impl Setup {
     }
 }
 
-/// The name of a law that has none: where it was given.
+/// Returns the name of a law that has no words: the place where the test gave it.
 #[track_caller]
 fn place() -> String {
     format!("the law of {}", Location::caller())

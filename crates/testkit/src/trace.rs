@@ -1,4 +1,4 @@
-//! What happened in a run, event by event, and where two runs part.
+//! Trace of a run, event by event, and the first difference of two traces.
 
 use std::fmt;
 use std::sync::Arc;
@@ -10,16 +10,16 @@ use cohaptic_wan::{DropCause, NodeId, Path};
 use crate::hit::Verdict;
 use crate::names::Names;
 
-/// What happened, and when.
+/// Event of a run.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct TraceEvent {
-    /// When.
+    /// Instant of the event.
     pub at: Instant,
-    /// What.
+    /// Kind of the event, with its details.
     pub what: Happening,
 }
 
-/// What can happen in a test bed. A host is named by its place among those of the run.
+/// Kind of an event in a test bed. A host is given by its index in the list of hosts.
 #[derive(Clone, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum Happening {
@@ -27,39 +27,39 @@ pub enum Happening {
     Sent {
         /// Which one.
         packet: PacketName,
-        /// How many bytes it carries.
+        /// Number of bytes that the packet carries.
         len: usize,
-        /// FNV-1a of them, 64 bits; 0 with [`Testbed::without_digests`](crate::Testbed::without_digests).
+        /// FNV-1a hash of the bytes, 64 bits; 0 with [`Testbed::without_digests`](crate::Testbed::without_digests).
         digest: u64,
     },
-    /// The packet of the event before carries a segment of TCP.
+    /// The packet of the previous event carries a segment of TCP.
     #[cfg(feature = "tcp")]
     Segment {
-        /// Which packet.
+        /// The packet.
         packet: PacketName,
-        /// From which port to which.
+        /// Source port and destination port.
         ports: [u16; 2],
-        /// The flags.
+        /// Flags of the segment.
         flags: cohaptic_tcp::Flags,
-        /// The sequence number, counted from that of the SYN.
+        /// Sequence number, relative to the SYN.
         sequence: u32,
-        /// How many octets of data it carries.
+        /// Number of octets of data.
         octets: u32,
-        /// The octet that its sender expects next, if it says so, counted from the SYN of the peer.
+        /// Next octet that the sender of the segment expects, relative to the SYN of the peer. `None` without the flag ACK.
         acknowledges: Option<u32>,
-        /// The window \[byte\].
+        /// Window \[byte\].
         window: u32,
     },
     /// A packet lies in the buffer of a socket.
     Arrived {
-        /// Which one.
+        /// The packet.
         packet: PacketName,
     },
-    /// A packet has come to its end elsewhere.
+    /// A packet was lost.
     Lost {
-        /// Which one.
+        /// The packet.
         packet: PacketName,
-        /// Why.
+        /// Cause of the loss.
         why: Lost,
     },
     /// A link has made a copy of a packet.
@@ -82,46 +82,46 @@ pub enum Happening {
     Restarted(NodeId),
     /// A host has new addresses.
     Readdressed(NodeId),
-    /// The way from one host to another was cut.
+    /// The path from one host to another was cut.
     Cut(Path),
-    /// It was mended.
+    /// The cut of a path has ended.
     Mended(Path),
     /// The link from one host to another became another one.
     Relinked(Path),
-    /// What the program noted: see [`Bed::note`](crate::Bed::note).
+    /// The program added a note: see [`Bed::note`](crate::Bed::note).
     Note(String),
 }
 
-/// The name of a packet.
+/// Identity of a packet in a trace.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct PacketName {
-    /// From which host to which.
+    /// Sending and receiving host.
     pub path: Path,
-    /// Its number on this path, from 0.
+    /// Number of the packet on this path, from 0.
     pub sequence: u64,
-    /// Which copy of it; 0 is the packet itself.
+    /// Number of the copy; 0 is the packet itself.
     pub copy: u8,
 }
 
-/// Why a packet did not come into the buffer of a socket.
+/// Cause of the loss of a packet, which did not reach the buffer of a socket.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 #[non_exhaustive]
 pub enum Lost {
-    /// Its link took it.
+    /// The link dropped the packet.
     Link(DropCause),
-    /// The way was cut when it was sent, or when it would have arrived.
+    /// The path was cut when the packet was sent, or when it would have arrived.
     Cut,
-    /// The host was down when it arrived.
+    /// The host was down when the packet arrived.
     HostDown,
-    /// The host had another address when it arrived.
+    /// The host had another address when the packet arrived.
     NoSuchAddress,
-    /// No socket was bound to its port. The sender is told so.
+    /// No socket was bound to the port. The sender of a datagram is told.
     NoSocket,
     /// The buffer of the socket was full.
     BufferFull,
-    /// A link has damaged it, and a checksum of TCP or IP shows it.
+    /// The link has damaged the packet, and a checksum of TCP or IP reveals it.
     Checksum,
-    /// As many connections as the listener lets wait were waiting.
+    /// As many connections were waiting as the backlog of the listener permits.
     BacklogFull,
 }
 
@@ -140,7 +140,7 @@ impl fmt::Display for Lost {
     }
 }
 
-/// All that happened in a run, in order.
+/// Events of a run, in their order.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Trace {
     hosts: Arc<Names>,
@@ -156,7 +156,7 @@ impl Trace {
         self.events.push(TraceEvent { at, what });
     }
 
-    /// The names of the hosts.
+    /// Returns the names of the hosts.
     #[must_use]
     pub fn hosts(&self) -> &[String] {
         &self.hosts
@@ -166,13 +166,13 @@ impl Trace {
         &self.hosts
     }
 
-    /// The events.
+    /// Returns the events.
     #[must_use]
     pub fn events(&self) -> &[TraceEvent] {
         &self.events
     }
 
-    /// Where two runs part; `None` if they are the same.
+    /// Returns the first difference between two runs, or `None` if they are equal.
     #[must_use]
     pub fn first_difference<'a>(&'a self, other: &'a Self) -> Option<Difference<'a>> {
         let place = (0..).find(|place| {
@@ -183,24 +183,24 @@ impl Trace {
         (events != (None, None)).then_some(Difference { hosts: &self.hosts, place, events })
     }
 
-    /// An event in words: `1.024 s  client -> server  packet 17 lost: queue-full`.
+    /// Returns an event in words, such as `1.024 s  client -> server  packet 17 lost: queue-full`.
     pub fn words<'a>(&'a self, event: &'a TraceEvent) -> impl fmt::Display + 'a {
         Words { hosts: &self.hosts, event }
     }
 }
 
-/// Where two runs part.
+/// First difference between two runs.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Difference<'a> {
     hosts: &'a [String],
-    /// The number of the first event that differs, from 0.
+    /// Index of the first event that differs.
     pub place: usize,
-    /// That event in the one run and in the other; `None` if the run has ended before.
+    /// The event in the first and in the second run; `None` if the run has ended before.
     pub events: (Option<&'a TraceEvent>, Option<&'a TraceEvent>),
 }
 
 impl Difference<'_> {
-    /// When the two runs part.
+    /// Returns the instant of the difference: the earlier of the two events.
     #[must_use]
     pub fn at(&self) -> Instant {
         let (one, other) = self.events;
@@ -221,7 +221,7 @@ impl fmt::Display for Difference<'_> {
     }
 }
 
-/// An event in words.
+/// Formatter of an event in words.
 struct Words<'a> {
     hosts: &'a [String],
     event: &'a TraceEvent,

@@ -1,12 +1,13 @@
-//! Hits of several paths, as a value.
+//! Hits on several paths, as a value.
 
 use std::fmt;
 
 use super::words::Hit;
 
-/// Which packets are hit between hosts, by their names, and how: what [`Testbed::hits`](crate::Testbed::hits) takes and `strategies::any_hits` draws (feature `strategies`).
+/// Hits on packets between hosts, which are named. [`Testbed::hits`](crate::Testbed::hits) takes such a value, and `strategies::any_hits` draws one (feature
+/// `strategies`).
 ///
-/// It is a line for each path, with [words](crate::hit) after a colon. `Debug` is Rust that makes the same value.
+/// The text form has a line per path, with [words](crate::hit) after a colon. `Debug` prints Rust code that makes the same value.
 ///
 /// ```
 /// use cohaptic_testkit::hit::Hits;
@@ -19,7 +20,7 @@ pub struct Hits {
     pub(crate) all: Vec<PathHit>,
 }
 
-/// A hit on a path.
+/// Hit on a path.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct PathHit {
     pub(crate) from: String,
@@ -28,17 +29,17 @@ pub(crate) struct PathHit {
 }
 
 impl Hits {
-    /// Nothing is hit.
+    /// Creates a value without hits.
     #[must_use]
     pub const fn none() -> Self {
         Self { all: Vec::new() }
     }
 
-    /// The hits that the text says: what `Debug` prints.
+    /// Parses the text that `Debug` prints.
     ///
     /// # Panics
     ///
-    /// If it makes no sense, with the place; `text.parse::<Hits>()` gives an error instead.
+    /// If the text makes no sense, with the place. `text.parse::<Hits>()` returns an error instead.
     #[must_use]
     #[track_caller]
     #[expect(clippy::panic, reason = "documented: for text that stands in a test")]
@@ -46,13 +47,13 @@ impl Hits {
         text.parse().unwrap_or_else(|error| panic!("not the words of hits: {error}"))
     }
 
-    /// Whether nothing is hit.
+    /// Returns whether nothing is hit.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.all.is_empty()
     }
 
-    /// How many hits there are: each is an action and the packets that it is for.
+    /// Returns the number of hits. A hit is an action and the packets to which it applies.
     #[must_use]
     pub const fn len(&self) -> usize {
         self.all.len()

@@ -1,11 +1,11 @@
-//! Words as a law.
+//! Laws given in words.
 
 use cohaptic_wan::random::Draws;
 
 use super::words::{Action, Hit, Kind, Which};
 use super::{PacketLaw, SentPacket, Verdict};
 
-/// A law that words say.
+/// Law given in words.
 #[derive(Clone, Debug)]
 pub(crate) struct WordsLaw {
     hit: Hit,
@@ -21,6 +21,7 @@ impl WordsLaw {
     fn is_meant(&mut self, packet: &SentPacket<'_>) -> bool {
         match &self.hit.which {
             Which::Numbers(numbers) => numbers.iter().any(|range| range.contains(&packet.number)),
+            // Every packet of the kind counts, whether hit or not.
             Which::Nth { nth, kind, with } => {
                 if !is_of(packet, *kind) || !holds(packet.bytes, with) {
                     return false;
@@ -58,7 +59,7 @@ fn is_of(packet: &SentPacket<'_>, kind: Kind) -> bool {
     }
 }
 
-/// Whether the bytes stand somewhere in the others.
+/// Returns whether `bytes` occur in `all`.
 fn holds(all: &[u8], bytes: &[u8]) -> bool {
     bytes.is_empty() || all.windows(bytes.len()).any(|window| window == bytes)
 }

@@ -1,4 +1,4 @@
-//! The laws of a test bed, from which each run gets its own.
+//! Laws of a test bed, of which each run gets a copy in the initial state.
 
 use std::fmt;
 use std::panic::{RefUnwindSafe, UnwindSafe};
@@ -9,17 +9,17 @@ use cohaptic_wan::random::Draws;
 
 use super::{Hit, PacketLaw, SentPacket, Verdict, WordsLaw};
 
-/// The laws of a test bed, in the order in which they were given.
+/// Laws of a test bed, in the order in which they were given.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Laws(Vec<Given>);
 
-/// A law, and for which path.
+/// Law with its path.
 #[derive(Clone)]
 pub(crate) struct Given {
     pub(crate) path: Path,
-    /// Its words, or where it was given.
+    /// Words of the law, or the place where the test gave it.
     pub(crate) name: String,
-    /// The hit, if it was said in words.
+    /// Hit, if the law was given in words.
     hit: Option<Hit>,
     fresh: Arc<Fresh>,
 }
@@ -32,7 +32,7 @@ impl Laws {
         self.0.push(Given { path, name, hit: None, fresh: Arc::new(move || Box::new(lock(&law).clone())) });
     }
 
-    /// Words as a law.
+    /// Adds a hit given in words.
     pub(crate) fn add_hit(&mut self, path: Path, hit: Hit) {
         self.add(path, hit.to_string(), WordsLaw::new(hit.clone()));
         if let Some(given) = self.0.last_mut() {
@@ -40,7 +40,7 @@ impl Laws {
         }
     }
 
-    /// A function as a law.
+    /// Adds a function as a law.
     pub(crate) fn add_function(&mut self, path: Path, name: String, judge: impl FnMut(&SentPacket<'_>) -> Verdict + Clone + Send + 'static) {
         self.add(path, name, Function(judge));
     }
@@ -51,12 +51,12 @@ impl Laws {
 }
 
 impl Given {
-    /// The hit, if it was said in words.
+    /// Returns the hit, if the law was given in words.
     pub(crate) const fn words(&self) -> Option<&Hit> {
         self.hit.as_ref()
     }
 
-    /// The law as it begins.
+    /// Returns a copy of the law in its initial state.
     pub(crate) fn fresh(&self) -> Box<dyn PacketLaw + Send> {
         (self.fresh)()
     }
@@ -77,7 +77,7 @@ impl<F: FnMut(&SentPacket<'_>) -> Verdict> PacketLaw for Function<F> {
     }
 }
 
-/// Locks, also after a panic: a law is whole between two calls.
+/// Locks the mutex, also after a panic, because a law is consistent between two calls.
 fn lock<T: ?Sized>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,27 +1,28 @@
-//! A packet as a law sees it.
+//! Packet as laws see it.
 
 #[cfg(feature = "tcp")]
 use cohaptic_tcp::Segment;
 use cohaptic_units::Instant;
 use cohaptic_wan::Path;
 
-/// A packet that is offered to its link.
+/// Packet that is offered to its link.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct SentPacket<'a> {
-    /// From which host to which, by their places.
+    /// Sending and receiving host, by index.
     pub path: Path,
-    /// The name of the sender.
+    /// Name of the sender.
     pub from: &'a str,
-    /// The name of the receiver.
+    /// Name of the receiver.
     pub to: &'a str,
-    /// Its number on this path, from 0, as the trace has it.
+    /// Number of the packet on this path, from 0, equal to the number in the trace.
     pub number: u64,
-    /// When it is offered.
+    /// Instant at which the packet is offered.
     pub at: Instant,
-    /// What it carries: a datagram without headers, or of TCP the whole IP packet.
+    /// Content of the packet: for a datagram the payload without headers, for TCP the whole IP packet.
     pub bytes: &'a [u8],
-    /// Whether it was sent before: a segment of TCP some of whose sequence numbers were, or another packet with the same bytes as one before on this path.
+    /// Whether the packet was sent before: a segment of TCP some of whose sequence numbers were sent before, or another packet with the same bytes as an
+    /// earlier packet of this path.
     pub is_retransmission: bool,
     #[cfg(feature = "tcp")]
     pub(crate) segment: Option<&'a Segment<'a>>,
@@ -29,7 +30,7 @@ pub struct SentPacket<'a> {
 
 #[cfg(feature = "tcp")]
 impl<'a> SentPacket<'a> {
-    /// The segment of TCP, if that is what the bytes are: an IP packet with right lengths and checksums.
+    /// Returns the TCP segment, or `None` if the bytes are no IP packet of TCP with right lengths and checksums.
     #[must_use]
     pub const fn tcp(&self) -> Option<&'a Segment<'a>> {
         self.segment

@@ -1,4 +1,4 @@
-//! What was sent on a path before: so that retransmissions are known.
+//! Memory of the packets of a path, by which retransmissions are recognised.
 
 #[cfg(feature = "tcp")]
 use std::collections::BTreeMap;
@@ -11,10 +11,10 @@ use cohaptic_tcp::{Flags, Segment};
 
 use crate::seed::hash;
 
-/// The packets of a path so far.
+/// Packets of a path so far.
 #[derive(Debug, Default)]
 pub(crate) struct Seen {
-    /// The first sequence number that was never sent, by both ends of a connection.
+    /// First sequence number that was never sent, by source and destination.
     #[cfg(feature = "tcp")]
     next: BTreeMap<(SocketAddr, SocketAddr), u32>,
     /// Digests of the packets that are not of TCP.
@@ -22,12 +22,12 @@ pub(crate) struct Seen {
 }
 
 impl Seen {
-    /// Notes a packet that is not of TCP, and says whether a packet with the same bytes was sent before.
+    /// Notes a packet that is not of TCP. Returns whether a packet with the same bytes was sent before.
     pub(crate) fn note(&mut self, bytes: &[u8]) -> bool {
         !self.digests.insert(hash(bytes))
     }
 
-    /// Notes a segment of TCP, and says whether one of its sequence numbers was sent before.
+    /// Notes a segment of TCP. Returns whether one of its sequence numbers was sent before.
     #[cfg(feature = "tcp")]
     pub(crate) fn note_segment(&mut self, segment: &Segment<'_>) -> bool {
         let length = segment.sequence_length();
@@ -40,7 +40,7 @@ impl Seen {
             self.next.insert((segment.source, segment.destination), end);
             return false;
         };
-        // Half of all numbers are before, half behind (RFC 9293, section 3.4). A SYN of another number begins a new connection.
+        // Half of all sequence numbers count as before a number, half as after it (RFC 9293, section 3.4). A SYN with another number begins a new connection.
         let is_before = |one: u32, other: u32| other.wrapping_sub(one).cast_signed() > 0;
         let is_new = segment.flags.has(Flags::SYN) && end != *next && !is_before(end, *next);
         let is_again = is_before(first, *next) && !is_new;
@@ -86,11 +86,11 @@ mod tests {
             (segment(start.wrapping_add(1), Flags::ACK, 100), false),
             (segment(start.wrapping_add(101), Flags::ACK, 100), false),
             (segment(start.wrapping_add(1), Flags::ACK, 100), true),
-            // A part of it is new.
+            // The second half is new.
             (segment(start.wrapping_add(101), Flags::ACK, 200), true),
             (segment(start.wrapping_add(301), Flags::FIN, 0), false),
             (segment(start.wrapping_add(301), Flags::FIN, 0), true),
-            // Another connection between the same ports.
+            // A new connection between the same ports.
             (segment(start.wrapping_add(90_000), Flags::SYN, 0), false),
             (segment(start.wrapping_add(90_001), Flags::ACK, 5), false),
         ];

@@ -1,17 +1,18 @@
-//! When a run is watched, and how long it may stand.
+//! Limit of the watchdog, and the exception for debuggers.
 
 use std::time::Duration;
 
 use cohaptic_units::parse;
 
-/// This variable of the environment says for how long anything in a test bed may run without returning to it, whatever the tests say: a span such as `10min`, or `off`.
+/// Name of the environment variable that sets how long anything in a test bed may run without returning to it. It takes precedence over the limits of the
+/// tests. Its value is a span such as `10min`, or `off`.
 pub const STALL_VARIABLE: &str = "COHAPTIC_TEST_STALL";
 
-/// What the environment says; else what the test says.
+/// Returns the limit from the environment, otherwise the limit `said` by the test.
 ///
 /// # Panics
 ///
-/// If what the environment says is no span.
+/// If the value of the environment variable is no span.
 pub(crate) fn limit(said: Duration) -> Duration {
     of(std::env::var(STALL_VARIABLE).ok().as_deref(), said)
 }
@@ -29,7 +30,7 @@ fn of(environment: Option<&str>, said: Duration) -> Duration {
     }
 }
 
-/// Whether a debugger holds this process: somebody may look at it for hours. Known on Linux.
+/// Returns whether a debugger holds this process, which somebody may then inspect for hours. Works on Linux only.
 pub(super) fn is_debugged() -> bool {
     std::fs::read_to_string("/proc/self/status").is_ok_and(|status| is_traced(&status))
 }

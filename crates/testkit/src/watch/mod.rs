@@ -1,7 +1,7 @@
-//! What spins is found by the wall clock: a thread looks now and then whether what runs in test beds has returned to them.
+//! Watchdog by the wall clock: a thread that checks now and then whether tasks and nodes have returned to their test beds.
 //!
-//! A loop that asks the test bed for nothing cannot be interrupted, and so the process ends, after the task was named. A task that returns is never found here: then
-//! the limits on polls and calls at one instant count.
+//! A loop that never calls the test bed cannot be interrupted. Hence the process ends, after the task was named. The watchdog never reports a task that
+//! returns: the limits on polls and calls at one instant apply there.
 
 mod guard;
 mod thread;
@@ -22,27 +22,29 @@ use crate::seed::Seed;
 pub use guard::STALL_VARIABLE;
 pub(crate) use guard::limit;
 
-/// After which span without a return a process ends, unless another one is said.
+/// Default time without a return after which the process ends.
 pub(crate) const LIMIT: Duration = Duration::from_secs(60);
 
-/// What runs, for the thread that watches. The thread that runs writes, and the other one only reads.
+/// Activity of a run, for the watchdog. The thread of the run writes the atomics; the watchdog only reads them.
 #[derive(Debug, Default)]
 pub(crate) struct Pulse {
-    /// How often something has begun, or time has passed.
+    /// Number of polls and other turns of the executor so far.
     turns: AtomicU64,
-    /// The number of what runs now, from 1; 0 if nothing does.
+    /// Number of the runner that runs now, from 1; 0 if none runs.
     running: AtomicUsize,
+    /// Runners that have been numbered.
     known: Mutex<Runners>,
 }
 
 #[derive(Debug, Default)]
 struct Runners {
+    /// Runners; the runner with the number n has the index n - 1.
     all: Vec<Runner>,
-    /// Their numbers, by host and the address of the place.
+    /// Number of each runner, by host and address of the place.
     numbers: BTreeMap<(Option<NodeId>, usize), usize>,
 }
 
-/// The tasks of a host, or of none, that were spawned at one place.
+/// Tasks of a host, or of no host, that were spawned at the same place.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Runner {
     pub(crate) host: Option<NodeId>,
@@ -50,7 +52,7 @@ pub(crate) struct Runner {
 }
 
 impl Runner {
-    /// Returns a task in words: the place where it was spawned, and its host.
+    /// Returns the name of a task in messages: the place where the task was spawned, and its host.
     pub(crate) fn words(self, hosts: &[String]) -> String {
         match self.host.and_then(|host| hosts.get(host.index())) {
             Some(host) => format!("the task of host `{host}` that was spawned at {}", self.origin),
@@ -60,7 +62,7 @@ impl Runner {
 }
 
 impl Pulse {
-    /// The number of tasks that will run. Nodes are numbered in their order.
+    /// Returns the number of a runner, the same for equal runners. Nodes need no runner: they are numbered in their order.
     pub(crate) fn number(&self, runner: Runner) -> usize {
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
         let Runners { all, numbers } = &mut *known;
@@ -70,23 +72,23 @@ impl Pulse {
         })
     }
 
-    /// It runs from now on.
+    /// Notes that the runner `number` runs from now on.
     #[inline]
     pub(crate) fn begins(&self, number: usize) {
         self.running.store(number, Ordering::Relaxed);
         self.turns();
     }
 
-    /// It has returned.
+    /// Notes that the runner has returned.
     #[inline]
     pub(crate) fn returns(&self) {
         self.running.store(0, Ordering::Relaxed);
     }
 
-    /// Time passes, or the executor does something else.
+    /// Notes that time passes, or that the executor is at work outside of tasks.
     #[inline]
     pub(crate) fn turns(&self) {
-        // Nobody else writes: no addition that others wait for.
+        // Only this thread writes, so a load and a store suffice in place of a locked addition.
         self.turns.store(self.turns.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
     }
 
@@ -105,7 +107,7 @@ impl Pulse {
     }
 }
 
-/// A run that is watched, until it is dropped.
+/// Watched run. The watch ends when the value is dropped.
 #[derive(Debug)]
 pub(crate) struct Watched {
     pub(crate) pulse: Arc<Pulse>,
@@ -117,20 +119,20 @@ pub(crate) struct Watched {
     shared: OnceLock<Weak<Shared>>,
 }
 
-/// What has the thread while nothing is known to run.
+/// Kind of a run. It tells who has the thread while no runner is noted.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Kind {
-    /// The test, as long as it wants.
+    /// Run of nodes: the test has the thread, for as long as it wants.
     Nodes,
-    /// The function that makes the program, or a waker.
+    /// Run on the executor of this crate: the function that makes the program, or a waker.
     Own,
-    /// Tasks of tokio too.
+    /// Run on tokio: also tasks of tokio.
     #[cfg(feature = "tokio")]
     Tokio,
 }
 
 impl Watched {
-    /// Begins to watch. The limit is what the test says, unless the environment says another one.
+    /// Begins to watch. `said` is the limit that the test sets; the environment takes precedence.
     pub(crate) fn begin(kind: Kind, hosts: &Arc<Names>, said: Duration, seed: &Seed, artefacts: &Artefacts) -> Arc<Self> {
         let watched = Arc::new(Self {
             pulse: Arc::default(),
@@ -147,9 +149,9 @@ impl Watched {
         watched
     }
 
-    /// The state, for its time and its record.
+    /// Sets the state of the run, from which the watchdog reads the time and the record.
     pub(crate) fn is_of(&self, shared: &Arc<Shared>) {
-        // A run has one state.
+        // A run has only one state, so a second call cannot happen.
         let _ = self.shared.set(Arc::downgrade(shared));
     }
 }

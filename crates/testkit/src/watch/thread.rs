@@ -1,4 +1,4 @@
-//! The thread that watches, one for all test beds of a process.
+//! Thread of the watchdog, one for all test beds of a process.
 
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -12,9 +12,9 @@ use cohaptic_units::print::{Seconds, Span};
 use super::guard::is_debugged;
 use super::{Kind, STALL_VARIABLE, Watched};
 
-/// How often it looks at most.
+/// Shortest time between two looks.
 const SHORTEST: Duration = Duration::from_millis(5);
-/// How often it looks at least.
+/// Longest time between two looks.
 const LONGEST: Duration = Duration::from_millis(250);
 
 struct Watch {
@@ -22,12 +22,12 @@ struct Watch {
     has_thread: bool,
 }
 
-/// A run as it was last looked at.
+/// Run with the result of the last look.
 struct Seen {
     run: Weak<Watched>,
     turns: u64,
-    /// For how long it has stood. It is the sum of the spans between looks, and not the difference of two times: while the machine sleeps, or the process is
-    /// stopped, nobody looks.
+    /// Time for which the run has not turned. This is the sum of the times between looks, not the difference of two readings of a clock: while the machine
+    /// sleeps or the process is stopped, nothing is added.
     stood: Duration,
 }
 
@@ -39,15 +39,16 @@ pub(super) fn watch(run: &Arc<Watched>) {
     let mut watch = WATCH.lock().unwrap_or_else(PoisonError::into_inner);
     watch.runs.push(Seen { run: Arc::downgrade(run), turns: 0, stood: Duration::ZERO });
     if !watch.has_thread {
-        // A system without threads has nobody who watches.
+        // On a system without threads nothing is watched.
         watch.has_thread = thread::Builder::new().name("cohaptic-watch".to_owned()).spawn(look).is_ok();
     }
+    // The thread waits without a time-out only while there is no run.
     if watch.runs.len() == 1 {
         CHANGED.notify_one();
     }
 }
 
-/// Looks at all runs, for ever.
+/// Looks at all runs, again and again.
 fn look() {
     let mut watch = WATCH.lock().unwrap_or_else(PoisonError::into_inner);
     loop {
@@ -78,10 +79,11 @@ fn look() {
     }
 }
 
-/// Tells who has not returned, and ends the process.
+/// Prints which runner has not returned, and ends the process.
 fn end(run: &Watched, running: usize) -> ! {
     let text = run.complaint(running);
-    // What `eprintln` writes may be kept by the test that this thread was started by, and would be lost with it. Nothing can be done if it cannot be written.
+    // The text does not go through `eprintln`: the test that started this thread may capture it, and the captured text is lost when the process ends. A failed
+    // write is ignored, because nothing can be done about it.
     let _ = std::io::stderr().write_all(text.as_bytes());
     abort()
 }
@@ -96,7 +98,7 @@ impl Watched {
             (Kind::Own, None) => "the function that makes the program, or a waker,".to_owned(),
             #[cfg(feature = "tokio")]
             (Kind::Tokio, None) => {
-                // Tokio tells where a task was spawned, and which one is polled, only in its unstable build.
+                // Only the unstable build of tokio tells which task is polled and where it was spawned.
                 "no task of the test bed, but one of `tokio::spawn` or `spawn_local` (one of `Host::spawn` or `Bed::spawn` is named with its place), or the function that \
                  makes the program,"
                     .to_owned()
