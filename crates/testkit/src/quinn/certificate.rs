@@ -1,4 +1,4 @@
-//! The certificate of the servers of a test bed.
+//! Certificate of the servers of a test bed.
 //!
 //! It was made once by
 //!
@@ -10,10 +10,10 @@
 //!
 //! and is a constant, so that two runs are the same. Ed25519 makes signatures of fixed length, without random numbers (RFC 8032).
 
-/// The name that [`CERTIFICATE`] is for.
+/// Name for which [`CERTIFICATE`] is valid.
 pub const SERVER_NAME: &str = "testbed";
 
-/// A certificate that has signed itself, as PEM, valid from November 2026 to the year 9966.
+/// Self-signed certificate, as PEM, valid from November 2026 to the year 9966.
 pub const CERTIFICATE: &str = "-----BEGIN CERTIFICATE-----
 MIIBXDCCAQ6gAwIBAgIUU7KCx6p6WukTzjd5MphPjWJ/sEYwBQYDK2VwMBIxEDAO
 BgNVBAMMB3Rlc3RiZWQwIBcNMjYxMTIyMDIxODA4WhgPOTk2NjEwMjgwMjE4MDha
@@ -26,7 +26,7 @@ H/VhoBGhw3sKs1e7rXRKCQ==
 -----END CERTIFICATE-----
 ";
 
-/// Its key, as PEM: public, and so good for tests alone.
+/// Private key of [`CERTIFICATE`], as PEM. The key is public, so use it in tests only.
 pub const PRIVATE_KEY: &str = "-----BEGIN PRIVATE KEY-----
 MC4CAQAwBQYDK2VwBCIEIMa02lBnjFd01vTwFnIjux/LVZO+4foPx/OeMIpu9Bkj
 -----END PRIVATE KEY-----

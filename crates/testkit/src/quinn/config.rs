@@ -1,4 +1,4 @@
-//! Configurations that leave nothing to the system: neither random numbers nor the time of day.
+//! Configurations that take neither random numbers nor the time of day from the system.
 
 use std::sync::Arc;
 
@@ -17,19 +17,19 @@ use super::time::TestTime;
 use crate::context;
 use crate::current;
 
-/// The length of the connection ids of an endpoint, as quinn has it without further words \[byte\].
+/// Length of the connection ids of an endpoint, quinn's default \[byte\].
 const ID_LENGTH: usize = 8;
 
-/// That of the first connection id that a client makes up for its server: the longest.
+/// Length of the first connection id, which a client chooses for its server: the greatest length \[byte\].
 const FIRST_ID_LENGTH: usize = 20;
 
-/// Random bytes of the running test bed.
+/// Draws random bytes from the running test bed.
 fn draw<const N: usize>() -> [u8; N] {
     let running = context::expect_running("the numbers of an endpoint can be drawn");
     running.shared.with(|core| core.entropy(current::host()).bytes())
 }
 
-/// Connection ids from the test bed's random numbers.
+/// Generator of connection ids from the random numbers of the test bed.
 struct Ids;
 
 impl ConnectionIdGenerator for Ids {
@@ -46,7 +46,7 @@ impl ConnectionIdGenerator for Ids {
     }
 }
 
-/// What every endpoint needs, with quinn's defaults, and connection ids and a key of resets drawn from the test bed.
+/// Returns the configuration of an endpoint, with quinn's defaults. Connection ids and the key of resets are drawn from the test bed.
 ///
 /// # Panics
 ///
@@ -58,7 +58,7 @@ pub fn endpoint_config() -> EndpointConfig {
     config
 }
 
-/// A server with quinn's defaults and [`CERTIFICATE`].
+/// Returns the configuration of a server, with quinn's defaults and [`CERTIFICATE`].
 ///
 /// # Panics
 ///
@@ -72,7 +72,8 @@ pub fn server_config() -> ServerConfig {
     config
 }
 
-/// A client with quinn's defaults that trusts [`CERTIFICATE`]. It can be made anywhere, but connects inside the run.
+/// Returns the configuration of a client that trusts [`CERTIFICATE`], with quinn's defaults. The configuration can be made anywhere, but connects only inside
+/// the run.
 #[must_use]
 #[expect(clippy::missing_panics_doc, reason = "only constants are unwrapped")]
 pub fn client_config() -> ClientConfig {
@@ -82,7 +83,7 @@ pub fn client_config() -> ClientConfig {
     config
 }
 
-/// The TLS of [`server_config`], to be changed: to give it protocols (ALPN), for instance.
+/// Returns the TLS configuration of [`server_config`], for changes such as protocols (ALPN).
 #[must_use]
 #[expect(clippy::missing_panics_doc, reason = "only constants are unwrapped")]
 pub fn tls_server_config() -> TlsServer {
@@ -95,7 +96,8 @@ pub fn tls_server_config() -> TlsServer {
         .expect("the key is the certificate's")
 }
 
-/// The TLS of [`client_config`]. It resumes no session, so that a program that is run twice does not begin the second time with what it has learnt the first time.
+/// Returns the TLS configuration of [`client_config`]. It resumes no session: in a program that runs twice, the second run must not begin with sessions of the
+/// first.
 #[must_use]
 #[expect(clippy::missing_panics_doc, reason = "only constants are unwrapped")]
 pub fn tls_client_config() -> TlsClient {

@@ -1,7 +1,7 @@
-//! QUIC over emulated links: endpoints of [quinn](https://docs.rs/quinn), as they are, in virtual time.
+//! QUIC over emulated links: unmodified endpoints of [quinn](https://docs.rs/quinn) in virtual time.
 //!
-//! An [`endpoint`] has a virtual socket in place of a real one, and a runtime whose clock is that of the test bed. All the rest is quinn's: its handshake, its
-//! loss recovery, its congestion control, its migration.
+//! An [`endpoint`] has a virtual socket in place of a real one, and a runtime whose clock is that of the test bed. Handshake, loss recovery, congestion control
+//! and migration are those of quinn.
 //!
 //! ```
 //! use cohaptic_testkit::{Testbed, quinn};
@@ -38,26 +38,28 @@
 //! | TLS: randoms, key shares, tickets | [`crypto_provider`] | bytes |
 //! | TLS: signatures | an Ed25519 key, whose signatures are always 64 bytes long and never random | nothing |
 //!
-//! With the configurations of this module nothing is left to the system, and [`Testbed::run_twice`](crate::Testbed::run_twice) compares every byte. With
-//! configurations of your own, lengths and times are the same twice still, provided that the certificate's key gives signatures of fixed length (Ed25519 or RSA; those of
-//! ECDSA vary by some bytes), but not the bytes: say [`Testbed::without_digests`](crate::Testbed::without_digests). Or take the pieces:
-//! [`crypto_provider`] and [`TestTime`] go into any configuration of rustls. On links that damage packets, times depend on the bytes too: what a damaged header
-//! says is up to them. Make configurations inside the program: a client's remembers the servers that it has met.
+//! With the configurations of this module no random number comes from the system, and [`Testbed::run_twice`](crate::Testbed::run_twice) compares every byte.
+//! With other configurations lengths and times are still equal in two runs, provided that the key of the certificate gives signatures of fixed length (Ed25519
+//! or RSA; ECDSA signatures vary by some bytes). The bytes are not equal then: call [`Testbed::without_digests`](crate::Testbed::without_digests), or use the
+//! parts: [`crypto_provider`] and [`TestTime`] fit into any configuration of rustls. On links that damage packets, times also depend on the bytes, because the
+//! meaning of a damaged header does. Make configurations inside the program: the configuration of a client remembers the servers that it has met.
 //!
 //! # Which clocks are read
 //!
-//! Quinn asks its runtime for the time, and its server's time source for that of tokens; both are virtual, as is the time provider of the TLS configurations of
-//! this module. The rest are features that are not built here (`qlog`, `lock_tracking`), and rustls outside of those configurations: the validity of certificates is
-//! checked against the day's date then, and `Ticketer`s change their keys by it. None of this has a part in when a packet is sent.
+//! Quinn asks its runtime for the time, and the time source of its server for the time of tokens. Both are virtual, and so is the time provider of the TLS
+//! configurations of this module. Other clocks are read only by features that are not built here (`qlog`, `lock_tracking`), and by rustls outside of these
+//! configurations: there the validity of certificates is checked against the date of today, and `Ticketer`s change their keys by it. None of these clocks
+//! influences when a packet is sent.
 //!
 //! # What differs from a real socket
 //!
-//! - A datagram is sent alone (no segmentation offload), and never fragmented, so that quinn searches the path's MTU.
-//! - Datagrams that the host cannot send are lost without an error, as `quinn-udp` does it: to an address that no host has, or from one that it has no longer.
-//! - A packet sent as ECT(1) arrives as ECT(0): links know capable and marked, no more. Quinn sends ECT(0).
-//! - An endpoint at `[::]` hears IPv6 only.
-//! - The day is the first of 2027 when the run begins, for certificates and tokens.
-//! - When a host crashes, its endpoints are gone without a word, and their peers find out by their timeouts. Spawn what uses them on that host.
+//! - Every datagram is sent alone (no segmentation offload) and never fragmented, so that quinn searches for the MTU of the path.
+//! - A datagram that the host cannot send is lost without an error, as with `quinn-udp`. This happens if no host has the receiver's address, or if the host has
+//! given up the sender's address.
+//! - A packet sent as ECT(1) arrives as ECT(0), because links distinguish only "capable" and "marked". Quinn sends ECT(0).
+//! - An endpoint at `[::]` receives over IPv6 only.
+//! - A run begins on the first of January 2027, as far as certificates and tokens are concerned.
+//! - When a host crashes, its endpoints end without a message to their peers, which notice by their timeouts. Spawn the tasks that use an endpoint on its host.
 
 mod certificate;
 mod config;
@@ -70,7 +72,7 @@ use std::io;
 use std::panic::Location;
 use std::sync::Arc;
 
-// So that a program needs no dependency on quinn of its own.
+// Re-exported, so that a program needs no dependency on quinn of its own.
 pub use ::quinn::*;
 
 pub use certificate::{CERTIFICATE, PRIVATE_KEY, SERVER_NAME};
@@ -83,9 +85,9 @@ use crate::resolve::ToSocketAddrs;
 use runtime::OnHost;
 use socket::VirtualSocket;
 
-/// An endpoint on a host. Its tasks live on that host.
+/// Creates an endpoint on a host. The tasks of the endpoint live on that host.
 ///
-/// Two things are the test bed's whatever the configurations say: the seed of quinn's generator, and the time of day for the tokens of a server.
+/// Two settings come from the test bed, whatever the configurations say: the seed of quinn's generator, and the time of day for the tokens of a server.
 ///
 /// # Errors
 ///
@@ -107,7 +109,7 @@ pub fn endpoint(host: &Host, address: impl ToSocketAddrs, mut config: EndpointCo
     Endpoint::new_with_abstract_socket(config, server, Arc::new(socket), Arc::new(runtime))
 }
 
-/// An endpoint that accepts connections, with the configurations of this module.
+/// Creates an endpoint that accepts connections, with the configurations of this module.
 ///
 /// # Errors
 ///
@@ -121,7 +123,7 @@ pub fn server(host: &Host, address: impl ToSocketAddrs) -> io::Result<Endpoint> 
     endpoint(host, address, endpoint_config(), Some(server_config()))
 }
 
-/// An endpoint at `0.0.0.0:0` that connects, with the configurations of this module. Servers that have [`CERTIFICATE`] are called [`SERVER_NAME`].
+/// Creates an endpoint at `0.0.0.0:0` that connects, with the configurations of this module. The name of servers with [`CERTIFICATE`] is [`SERVER_NAME`].
 ///
 /// # Errors
 ///

@@ -1,6 +1,6 @@
-//! The cryptography of TLS with random numbers from the test bed.
+//! Cryptography of TLS with random numbers from the test bed.
 //!
-//! Ciphers, hashes and signatures are those of *ring*. Its key exchange draws from the system and cannot be told otherwise, so that one is `x25519-dalek`'s.
+//! Ciphers, hashes and signatures come from *ring*. The key exchange of *ring* always draws from the system, so the key exchange comes from `x25519-dalek`.
 
 use std::sync::Arc;
 
@@ -12,17 +12,17 @@ use x25519_dalek::{X25519_BASEPOINT_BYTES, x25519};
 use crate::context;
 use crate::current;
 
-/// The length of a key of X25519, secret or public \[byte\].
+/// Length of a key of X25519, secret or public \[byte\].
 const KEY: usize = 32;
 
-/// Cryptography for [`rustls`](::quinn::rustls) that draws its random numbers from the running test bed: handshakes have the same bytes in every run of the same
-/// seed. The seed is enough to read along, so it is good for tests alone.
+/// Returns cryptography for [`rustls`](::quinn::rustls) that draws its random numbers from the running test bed. Handshakes have the same bytes in every run of
+/// the same seed. Whoever knows the seed can decrypt the connection, so use this in tests only.
 #[must_use]
 pub fn crypto_provider() -> Arc<CryptoProvider> {
     Arc::new(CryptoProvider { kx_groups: vec![&Curve], secure_random: &FromTestbed, ..ring::default_provider() })
 }
 
-/// Random numbers of the test bed that runs on this thread.
+/// Source of random numbers of the test bed that runs on this thread.
 #[derive(Debug)]
 struct FromTestbed;
 
@@ -33,7 +33,7 @@ impl SecureRandom for FromTestbed {
     }
 }
 
-/// X25519 (RFC 7748).
+/// Key exchange X25519 (RFC 7748).
 #[derive(Debug)]
 struct Curve;
 
@@ -63,7 +63,7 @@ impl ActiveKeyExchange for Exchange {
     fn complete(self: Box<Self>, peer: &[u8]) -> Result<SharedSecret, Error> {
         let peer = peer.try_into().map_err(|_| PeerMisbehaved::InvalidKeyShare)?;
         let shared = x25519(self.secret, peer);
-        // A point of small order: RFC 8446, 7.4.2, has it refused.
+        // The peer has sent a point of small order, which must be refused (RFC 8446, 7.4.2).
         if shared == [0; KEY] {
             return Err(PeerMisbehaved::InvalidKeyShare.into());
         }

@@ -1,4 +1,4 @@
-//! Quinn's runtime: tasks of a host, and timers in virtual time.
+//! Runtime for quinn: tasks of a host, and timers in virtual time.
 
 use std::fmt;
 use std::future::Future;
@@ -19,11 +19,11 @@ use crate::core::Shared;
 use crate::host::Host;
 use crate::time::Sleep;
 
-/// The runtime of an endpoint that lives on a host.
+/// Runtime of an endpoint that lives on a host.
 pub(super) struct OnHost {
     shared: Arc<Shared>,
     node: NodeId,
-    /// Where the endpoint was made: what its tasks are called after.
+    /// Place where the endpoint was made. Messages name the tasks of the endpoint by this place.
     origin: &'static Location<'static>,
 }
 
@@ -38,10 +38,10 @@ impl Runtime for OnHost {
         Box::pin(Timer(Sleep::of(Arc::clone(&self.shared), from_std(at))))
     }
 
-    /// An endpoint whose driver is gone, as it is when its test bed or its host is, starts nothing; so this is called while the test bed runs.
+    /// Spawns a task. An endpoint whose test bed or host is gone has no driver and spawns nothing, so this is called only while the test bed runs.
     fn spawn(&self, future: Pin<Box<dyn Future<Output = ()> + Send>>) {
         let running = context::expect_running("an endpoint works");
-        // What a host starts while it goes down is gone with it.
+        // A task that is started while its host crashes ends with the host.
         if self.shared.with(|core| core.is_up(self.node)) {
             drop(running.tasks.spawn(Some(self.node), self.origin, future));
         }
@@ -63,7 +63,7 @@ impl fmt::Debug for OnHost {
     }
 }
 
-/// A timer of quinn's.
+/// Timer for quinn.
 #[derive(Debug)]
 struct Timer(Sleep);
 

@@ -1,4 +1,4 @@
-//! Quinn's socket: a virtual one, with marks of congestion both ways.
+//! Socket for quinn: a virtual UDP socket, with congestion marks in both directions.
 
 use std::io::{self, IoSliceMut};
 use std::net::{IpAddr, SocketAddr};
@@ -14,7 +14,7 @@ use crate::host::Host;
 use crate::resolve::ToSocketAddrs;
 use crate::socket::UdpSocket;
 
-/// The socket of an endpoint.
+/// Socket of an endpoint.
 #[derive(Debug)]
 pub(super) struct VirtualSocket {
     socket: UdpSocket,
@@ -26,7 +26,7 @@ impl VirtualSocket {
         Ok(Self { socket: host.bind(address)?, host: host.clone() })
     }
 
-    /// Whether the host may send from that address: an old one is not its own any more.
+    /// Returns whether the host may send from the address `source`. An address that the host has given up is not valid any more.
     fn may_send_from(&self, source: Option<IpAddr>) -> bool {
         source.is_none_or(|source| source.is_loopback() || self.host.addresses().has(source))
     }
@@ -42,9 +42,9 @@ impl AsyncUdpSocket for VirtualSocket {
             return Ok(());
         }
         match self.socket.send_now(Some(&transmit.destination), transmit.contents, transmit.ecn.is_some()) {
-            // The host has crashed.
+            // The host has crashed, so the endpoint must end.
             Err(error) if error.kind() == io::ErrorKind::ConnectionAborted => Err(error),
-            // As quinn's own sockets do: what cannot be sent is lost, and the protocol finds out by itself.
+            // As with the sockets of quinn itself, a datagram that cannot be sent is lost, and the protocol notices the loss.
             Ok(_) | Err(_) => Ok(()),
         }
     }
@@ -58,7 +58,7 @@ impl AsyncUdpSocket for VirtualSocket {
                     Poll::Pending => return Poll::Pending,
                 }
             } else {
-                // An error comes again with the next call.
+                // The first datagram came from `poll_look`, which registers the waker. An error here comes again with the next call.
                 let Ok(filled) = self.socket.try_look::<false, _>(|datagram| fill(buffer, datagram)) else { break };
                 filled
             };
@@ -77,7 +77,7 @@ impl AsyncUdpSocket for VirtualSocket {
     }
 }
 
-/// Copies a datagram, cut off where the buffer ends, and describes it.
+/// Copies a datagram, cut to the length of the buffer, and returns its description.
 fn fill(buffer: &mut [u8], datagram: &Parcel) -> RecvMeta {
     let len = datagram.copy_to(buffer);
     let ecn = match (datagram.arrival.marked, datagram.ecn_capable) {
@@ -88,7 +88,7 @@ fn fill(buffer: &mut [u8], datagram: &Parcel) -> RecvMeta {
     RecvMeta { addr: datagram.from(), len, stride: len, ecn, dst_ip: Some(datagram.to()) }
 }
 
-/// Sending never waits.
+/// Poller of writability, which is always ready because sending never waits.
 #[derive(Debug)]
 struct AlwaysWritable;
 

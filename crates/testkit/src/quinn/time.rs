@@ -1,4 +1,4 @@
-//! Virtual time in the words of others: the monotonic clock and the time of day.
+//! Conversions of virtual time to the monotonic clock and to the time of day.
 
 use std::sync::OnceLock;
 use std::time::{Duration, Instant as StdInstant, SystemTime, UNIX_EPOCH};
@@ -10,32 +10,32 @@ use cohaptic_units::Instant;
 
 use crate::context;
 
-/// The first of January 2027, 0:00 UTC, when every run begins \[s since 1970\].
+/// Time of day at the beginning of every run: the first of January 2027, 0:00 UTC \[s since 1970\].
 const DAY: u64 = 1_798_761_600;
 
-/// What stands for [`Instant::ZERO`] on quinn's clock.
+/// Returns the instant that stands for [`Instant::ZERO`] on quinn's clock.
 ///
-/// An instant of the standard library can be made from the clock only. Which one it is shows nowhere: quinn takes differences of instants, and compares them, and all
-/// instants that it sees are sums of this one and virtual time.
+/// An instant of the standard library can only be made from the clock. The choice has no visible effect: quinn takes differences of instants and compares
+/// instants, and all instants that it sees are sums of this instant and virtual time.
 #[expect(clippy::disallowed_methods, reason = "there is no other way to an `Instant`; only differences to it are used")]
 fn base() -> StdInstant {
     static BASE: OnceLock<StdInstant> = OnceLock::new();
     *BASE.get_or_init(StdInstant::now)
 }
 
-/// Virtual time on quinn's clock.
+/// Converts virtual time to quinn's clock.
 pub(super) fn to_std(at: Instant) -> StdInstant {
     base() + at.saturating_duration_since(Instant::ZERO)
 }
 
-/// Quinn's clock in virtual time.
+/// Converts quinn's clock to virtual time.
 pub(super) fn from_std(at: StdInstant) -> Instant {
     Instant::ZERO.saturating_add(at.saturating_duration_since(base()))
 }
 
-/// The time of day in a test bed, for tokens and certificates: every run begins on the first of January 2027, at midnight UTC.
+/// Time of day in a test bed, for tokens and certificates. Every run begins on the first of January 2027, at midnight UTC.
 ///
-/// Outside the run, [`TimeProvider`] knows no time, and for [`TimeSource`] it is that midnight.
+/// Outside the run, [`TimeProvider`] returns no time, and [`TimeSource`] returns that midnight.
 #[derive(Clone, Copy, Debug)]
 pub struct TestTime;
 
