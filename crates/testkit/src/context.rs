@@ -95,7 +95,7 @@ pub(crate) struct Call {
 }
 
 impl Call {
-    /// The call of that name at the place of the caller.
+    /// Describes the call `name` at the place of the caller.
     ///
     /// # Panics
     ///

@@ -1,9 +1,9 @@
-//! Tests of networked programs over emulated bad links, in virtual time, the same way every time.
+//! Tests of networked programs over emulated bad links, in virtual time, with equal results in every run.
 //!
 //! Use this crate if you test a program that talks over TCP, UDP or QUIC, and want every failure again from its seed.
 //!
-//! A [`Testbed`] is hosts and the [links](wan) between them. A program that is run on it has sockets with the methods of tokio's,
-//! [timers](time), and hosts that crash, come back, and lose sight of each other. Nothing waits in real time: the clock jumps to the next event.
+//! A [`Testbed`] consists of hosts and the [links](wan) between them. A program that runs on a test bed has sockets with the methods of tokio's,
+//! [timers](time), and hosts that crash, restart, and lose their connections. Nothing waits in real time: the clock jumps to the next event.
 //!
 //! ```
 //! use cohaptic_testkit::{Instant, Testbed, time};
@@ -18,18 +18,18 @@
 //! assert_eq!(took, Instant::from_nanos(24_000_000));
 //! ```
 //!
-//! Links and networks at random are a choice: tests that draw them, and shrink them to the least impaired that fails, need the feature `strategies`, which brings
-//! proptest. In `Cargo.toml`:
+//! Tests on random links and networks need the feature `strategies`, which brings proptest. Such tests shrink a network to the least impaired network on which
+//! the test still fails. In `Cargo.toml`:
 //!
 //! ```toml
 //! [dev-dependencies]
 //! cohaptic-testkit = { git = "URL of this repository", features = ["strategies"] }
 //! ```
 //!
-//! The chapter "Testing your own program over a bad network", `docs/testing.md` in the repository, begins with nothing and shows all of it by example.
+//! The chapter "Testing your own program over a bad network", `docs/testing.md` in the repository, is an introduction by examples.
 //!
-//! A failure of a property prints a whole `#[test]` that fails again, also when other hosts and links are there: its chance is kept by its seed, or replaced by
-//! [hits](hit) that name the packets that were lost.
+//! A failing property prints a whole `#[test]` that fails in the same way, even after strategies draw other hosts and links. Its chance is repeated by the
+//! seed, or replaced by [hits](hit) that name the lost packets.
 //!
 //! # Contents
 //!
@@ -156,7 +156,7 @@ pub use tcp::{TcpConfig, TcpListener, TcpSocket, TcpStream};
 pub use trace::{Difference, Happening, Lost, PacketName, Trace, TraceEvent};
 pub use watch::STALL_VARIABLE;
 
-/// Runs the code of the README.
+/// Runs the code of the README as a doc test.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

@@ -1,4 +1,4 @@
-//! Scene files as tests: what their `[expect]` says must come out.
+//! Scene files as tests of their `[expect]` tables.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -6,8 +6,8 @@ use std::path::Path;
 use cohaptic_harness::{Model, check};
 use cohaptic_scene::{Expect, Scene, scene_files};
 
-/// Runs a scene file, and fails unless all comes out that its `[expect]` says, as `cohaptic check` does. Whether the scene is stable is told by a simulation, where
-/// the program may tell it by analysis.
+/// Runs a scene file, and fails unless every result agrees with its `[expect]`, as in `cohaptic check`. The stability of the scene is always determined by a
+/// simulation, where the program may use analysis.
 ///
 /// ```no_run
 /// # fn test() {
@@ -15,12 +15,12 @@ use cohaptic_scene::{Expect, Scene, scene_files};
 /// # }
 /// ```
 ///
-/// A relative path begins in the folder in which the test runs, which `cargo test` makes that of the package.
+/// A relative path begins in the folder in which the test runs; under `cargo test` this is the folder of the package.
 ///
 /// # Panics
 ///
-/// If the file cannot be read or makes no sense, with the path, the place and the line; if it has no `[expect]`, or one that says nothing; if something else comes
-/// out, with every line of what was expected and what came.
+/// If the file cannot be read or makes no sense, with the path, the place and the line; if it has no `[expect]`, or an empty one; if a result differs, with the
+/// expected and the actual value of every such line.
 #[track_caller]
 #[expect(clippy::panic, reason = "a test that fails")]
 pub fn check_scene(path: impl AsRef<Path>) {
@@ -29,11 +29,11 @@ pub fn check_scene(path: impl AsRef<Path>) {
     }
 }
 
-/// [`check_scene`] for all scene files (`.toml`) in a folder and below it, in the order of their paths. All of them are run, whatever came out of those before.
+/// Runs [`check_scene`] for all scene files (`.toml`) in a folder and below it, in the order of their paths. Every file is run, even after failures.
 ///
 /// # Panics
 ///
-/// As [`check_scene`], with all that came out otherwise; if there is no scene file.
+/// As [`check_scene`], with all differing results; if there is no scene file.
 #[track_caller]
 #[expect(clippy::panic, reason = "a test that fails")]
 pub fn check_scenes(folder: impl AsRef<Path>) {
@@ -47,7 +47,7 @@ pub fn check_scenes(folder: impl AsRef<Path>) {
     }
 }
 
-/// Why a scene fails; `None` if it does not.
+/// Returns why a scene fails, or `None` if it does not.
 fn failure(path: &Path) -> Option<String> {
     let scene = match Scene::read(path, &[]) {
         Ok(scene) => scene,

@@ -25,7 +25,7 @@ pub struct TraceEvent {
 pub enum Happening {
     /// A host has sent a packet.
     Sent {
-        /// Which one.
+        /// The packet.
         packet: PacketName,
         /// Number of bytes that the packet carries.
         len: usize,
@@ -86,7 +86,7 @@ pub enum Happening {
     Cut(Path),
     /// The cut of a path has ended.
     Mended(Path),
-    /// The link from one host to another became another one.
+    /// The link from one host to another was replaced.
     Relinked(Path),
     /// The program added a note: see [`Bed::note`](crate::Bed::note).
     Note(String),

@@ -1,4 +1,4 @@
-//! Links in plain words: hosts and the links between them, a line each.
+//! Link files in plain words: hosts and the links between them, an entry per line.
 //!
 //! ```text
 //! # Lines that begin with # say nothing.
@@ -11,9 +11,10 @@
 //! hit client -> server: drop 2nd packet
 //! ```
 //!
-//! After the colon stand words of `tc-netem`, done exactly, or nothing, which is the ideal link, or `replay` and the file of a fate log. `all` is every link that
-//! no other line names, wherever it stands; without it they are ideal. `hosts` names the hosts and their order; without it they are those that lines name, in
-//! the order of the lines. Names are parted from the arrow by blanks. `hit` and a path, before the colon, says which of its packets are [hit](crate::hit).
+//! After the colon follow words of `tc-netem`, which are emulated exactly, or nothing, which is the ideal link, or `replay` and the file of a fate log. `all`
+//! stands for every link that no other line names, wherever the line is in the file; without `all` such links are ideal. `hosts` names the hosts and their
+//! order; without `hosts` the hosts are those named by lines, in the order of the lines. Blanks separate names from the arrow. `hit` and a path before the
+//! colon tell which packets of the path are [hit](crate::hit).
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -27,21 +28,21 @@ use crate::fault::{Fault, WordsError, locate};
 use crate::hit::{self, Hits, PathHit};
 use crate::names::{Names, name_fault};
 
-/// What a text says.
+/// Content of a link file.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub(crate) struct Words {
-    /// The hosts, at least one.
+    /// Names of the hosts, at least one.
     pub(crate) hosts: Vec<String>,
-    /// What every link is that is not in `links`.
+    /// Link of every path that is not in `links`.
     pub(crate) every: LinkModel,
-    /// By sender, then receiver.
+    /// Links by indices of sender and receiver.
     pub(crate) links: BTreeMap<(usize, usize), LinkModel>,
-    /// Which packets are hit.
+    /// Hits on packets.
     pub(crate) hits: Vec<PathHit>,
     pub(crate) seed: Option<u64>,
 }
 
-/// Reads a text. `file` reads the file of a fate log, by the path in the text.
+/// Parses a text. `file` reads the file of a fate log, by the path in the text.
 pub(crate) fn parse(text: &str, mut file: impl FnMut(&str) -> Result<String, String>) -> Result<Words, WordsError> {
     let mut reader = Reader::default();
     let mut last = (1, "");
@@ -60,7 +61,7 @@ pub(crate) fn parse(text: &str, mut file: impl FnMut(&str) -> Result<String, Str
 impl FromStr for Hits {
     type Err = WordsError;
 
-    /// Reads lines of hits alone: a path, a colon, and the words.
+    /// Parses lines of hits only: each line is a path, a colon, and the words.
     fn from_str(text: &str) -> Result<Self, WordsError> {
         let mut reader = Reader::default();
         for (number, line) in (1..).zip(text.lines()) {
@@ -70,7 +71,7 @@ impl FromStr for Hits {
     }
 }
 
-/// Reads the words of hits on one path.
+/// Parses the words of hits on one path.
 pub(crate) fn hits_on(words: &str) -> Result<Vec<hit::Hit>, WordsError> {
     hit::parse(words, 0..words.len()).map_err(|fault| locate(1, words, fault))
 }
@@ -78,7 +79,7 @@ pub(crate) fn hits_on(words: &str) -> Result<Vec<hit::Hit>, WordsError> {
 #[derive(Debug, Default)]
 struct Reader {
     hosts: Names,
-    /// Whether a line has named the hosts.
+    /// Whether a line has named the hosts. Other lines then cannot add hosts.
     is_closed: bool,
     every: Option<LinkModel>,
     links: BTreeMap<(usize, usize), LinkModel>,
@@ -138,7 +139,7 @@ impl Reader {
         self.hits.extend(hits.iter().map(|hit| PathHit { from: from.clone(), to: to.clone(), hit: hit.clone() }));
     }
 
-    /// The hosts of a path: a name, an arrow, and a name.
+    /// Returns the hosts of a path. `subject` holds a name, an arrow, and a name.
     fn pair(&mut self, line: &str, subject: &[Range<usize>]) -> Result<(usize, usize), Fault> {
         let pair = (self.host(line, &subject[0])?, self.host(line, &subject[2])?);
         if pair.0 == pair.1 {
@@ -174,7 +175,7 @@ impl Reader {
         Ok(())
     }
 
-    /// The place of a host, which is a new one unless it is known.
+    /// Returns the index of a host. A name that is not known is added, unless the list of hosts is closed.
     fn host(&mut self, line: &str, span: &Range<usize>) -> Result<usize, Fault> {
         let name = &line[span.clone()];
         if let Some(host) = self.hosts.find(name) {
@@ -194,7 +195,7 @@ impl Reader {
     }
 }
 
-/// Where a line begins and has its colon; `None` if it says nothing.
+/// Returns the beginning of a line and the position of its colon, or `None` for an empty line or a comment.
 fn colon(line: &str, example: &str) -> Result<Option<(usize, usize)>, Fault> {
     let said = line.trim();
     if said.is_empty() || said.starts_with('#') {
@@ -209,7 +210,7 @@ fn twice(span: &Range<usize>, what: &str) -> Fault {
     (span.clone(), format!("{what} is said twice: expected it once"))
 }
 
-/// What stands after the colon; the end of the line if that is nothing.
+/// Returns the span after the colon, or the end of the line if nothing follows.
 fn rest_of(line: &str, subject: &Range<usize>, rest: &[Range<usize>]) -> Range<usize> {
     match (rest.first(), rest.last()) {
         (Some(first), Some(last)) => first.start..last.end,
@@ -220,7 +221,7 @@ fn rest_of(line: &str, subject: &Range<usize>, rest: &[Range<usize>]) -> Range<u
     }
 }
 
-/// The words of a part of a line, by their places.
+/// Returns the spans of the words in a part of a line.
 fn tokens(line: &str, part: Range<usize>) -> Vec<Range<usize>> {
     let mut tokens = Vec::new();
     let mut begin = None;
@@ -235,7 +236,7 @@ fn tokens(line: &str, part: Range<usize>) -> Vec<Range<usize>> {
     tokens
 }
 
-/// What stands after the colon, as a link.
+/// Parses the words after the colon as a link.
 fn link(line: &str, words: &[Range<usize>], file: &mut impl FnMut(&str) -> Result<String, String>) -> Result<LinkModel, Fault> {
     let (Some(first), Some(last)) = (words.first(), words.last()) else { return Ok(LinkModel::default()) };
     let whole = first.start..last.end;

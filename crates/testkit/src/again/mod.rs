@@ -1,4 +1,4 @@
-//! A test that fails again: the network of a failure, its chance replaced by the packets that were lost or kept by its seed, and the program.
+//! Printed tests that repeat a failure: the network of the failed run, with chance replaced by the lost packets or repeated by the seed, and the program.
 
 mod program;
 mod said;
@@ -18,33 +18,34 @@ use crate::names::Names;
 use crate::seed::Seed;
 use crate::trace::PacketName;
 
-/// Parts of a test bed with which a run is the same again.
+/// Parts of a test bed that a printed test needs to repeat a run.
 #[derive(Clone, Debug)]
 pub(crate) struct Again {
     pub(crate) names: Arc<Names>,
     pub(crate) said: Arc<Said>,
     pub(crate) laws: Laws,
     pub(crate) seed: Seed,
-    /// Other calls of the builder, one a line.
+    /// Further calls of the builder, one per line.
     pub(crate) others: Vec<String>,
-    /// The call of the run.
+    /// Place of the call of the run.
     pub(crate) place: &'static Location<'static>,
 }
 
 /// Effects of chance in a run.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub(crate) struct Drawn {
-    /// The packets that links lost by chance, the first [`MOST_LOST`].
+    /// Packets that links have lost by chance; only the first [`MOST_LOST`] packets.
     pub(crate) lost: Vec<PacketName>,
-    /// `true` if programs or connections of TCP have drawn random numbers, or links were changed during the run.
+    /// Whether programs or connections of TCP have drawn random numbers, or links were changed during the run.
     pub(crate) has_drawn: bool,
 }
 
-/// Packets that are named at most: with more, the seed is shorter.
+/// Maximum number of packets that a printed test names. With more packets the seed is shorter.
 pub(crate) const MOST_LOST: usize = 64;
 
 impl Again {
-    /// Returns the calls of a builder that make the network, one a line: with the seed, or with the packets that chance has lost in place of chance.
+    /// Returns the calls of the builder that make the network, one per line. Chance is repeated by the seed, or replaced by hits on the packets that chance has
+    /// lost, whichever is shorter.
     pub(crate) fn network(&self, drawn: &Drawn) -> Vec<String> {
         let seeded = self.lines(None, self.needs_seed(drawn));
         let Some(lost) = self.lost(drawn) else { return seeded };
@@ -53,7 +54,8 @@ impl Again {
         if len(&hit) < len(&seeded) { hit } else { seeded }
     }
 
-    /// Returns the whole test, with the program as it stands in its source. `has_failed`: the run itself has failed, and not the test afterwards.
+    /// Returns the whole test, with the program copied from its source. `has_failed` tells whether the run itself has failed; otherwise the test has failed
+    /// afterwards.
     pub(crate) fn test(&self, drawn: &Drawn, has_failed: bool) -> String {
         let call = program::call(self.place);
         let (method, program) = match &call {
@@ -86,14 +88,14 @@ impl Again {
         std::iter::once(self.said.every()).chain(self.said.links().map(|(_, words)| words))
     }
 
-    /// Returns whether anything but the losses depends on the seed.
+    /// Returns whether anything other than losses depends on the seed.
     fn has_other_chance(&self, drawn: &Drawn) -> bool {
-        // A law may draw: one that is no words, or one that flips a bit.
+        // A law that is not given in words may draw, and so may a hit that flips a bit.
         let draws = self.laws.iter().any(|law| law.words().is_none_or(Hit::draws));
         drawn.has_drawn || draws || self.words().any(|words| words.chance() == Chance::Other)
     }
 
-    /// Returns whether links draw.
+    /// Returns whether any link draws random numbers.
     pub(crate) fn has_chance(&self) -> bool {
         self.words().any(|words| words.chance() != Chance::Nothing)
     }
@@ -102,7 +104,7 @@ impl Again {
         self.has_other_chance(drawn) || self.has_chance()
     }
 
-    /// Returns the packets that were lost, by path, if chance has done nothing else.
+    /// Returns the numbers of the lost packets by path, if chance has had no other effect.
     fn lost(&self, drawn: &Drawn) -> Option<BTreeMap<Path, Vec<u64>>> {
         let is_known = drawn.lost.len() < MOST_LOST && !self.has_other_chance(drawn) && self.needs_seed(drawn);
         is_known.then(|| {
@@ -112,7 +114,7 @@ impl Again {
         })
     }
 
-    /// Returns the calls, with these packets lost in place of chance.
+    /// Returns the calls of the builder. If `lost` is given, hits on these packets replace chance.
     fn lines(&self, lost: Option<&BTreeMap<Path, Vec<u64>>>, with_seed: bool) -> Vec<String> {
         let shown = |words: &Words| match (words, words.chance()) {
             (Words::Model, _) => None,
@@ -135,7 +137,7 @@ impl Again {
                 Some(words) => lines.push(format!(".link({from:?}, {to:?}, {words:?})")),
             }
         }
-        // Losses come before other laws, of which one might delay a packet that was lost.
+        // Losses precede the other laws, because the first verdict counts, and another law could delay a lost packet.
         for (path, numbers) in lost.into_iter().flatten() {
             lines.push(format!(".hit({:?}, {:?}, {:?})", name(path.from), name(path.to), Hit::dropping(numbers.iter().copied()).to_string()));
         }

@@ -1,16 +1,16 @@
-//! Programs of tests, as they stand in the sources of the tests.
+//! Programs of tests, read from the source files of the tests.
 
 use std::fs;
 use std::panic::Location;
 use std::path::{Path, PathBuf};
 
-/// A call of a program, in the words of its source: the method, and what stands between the parentheses.
+/// Call of a program as in its source: the method, and the text between the parentheses.
 pub(super) struct Call {
     pub(super) method: String,
     pub(super) program: String,
 }
 
-/// Returns the call at a place; `None` if the source is not there, or something else stands at that place, as in the code of a macro.
+/// Returns the call at a place. `None` if the source file is missing, or there is no such call at the place, as in the code of a macro.
 pub(super) fn call(place: &Location<'_>) -> Option<Call> {
     let text = fs::read_to_string(source(place.file())?).ok()?;
     let line = text.lines().nth((place.line() as usize).checked_sub(1)?)?;
@@ -19,14 +19,14 @@ pub(super) fn call(place: &Location<'_>) -> Option<Call> {
     read(&text[begin..])
 }
 
-/// Returns the path of a source file: the path that is known is one from the folder in which the compiler ran, that of a workspace, and a test runs in that
-/// of its package.
+/// Returns the path of a source file. `file` is relative to the folder in which the compiler ran, which is the folder of the workspace; a test runs in the
+/// folder of its package.
 fn source(file: &str) -> Option<PathBuf> {
     let here = std::env::current_dir().ok()?;
     here.ancestors().map(|folder| folder.join(Path::new(file))).find(|path| path.is_file())
 }
 
-/// Reads a call from its method on.
+/// Parses a call, from its method on.
 fn read(text: &str) -> Option<Call> {
     let (method, rest) = text.split_once('(')?;
     let method = method.trim();
@@ -35,15 +35,15 @@ fn read(text: &str) -> Option<Call> {
     }
     let (end, has_long_text) = closing(rest)?;
     let program = rest[..end].trim().trim_end_matches(',').trim_end();
-    // Within a text of several lines blanks mean something.
+    // Blanks inside a string of several lines are part of the string.
     let program = if has_long_text { program.to_owned() } else { indented(program) };
     Some(Call { method: method.to_owned(), program })
 }
 
-/// Indentation of a call in the test that is printed \[columns\].
+/// Indentation of a call in the printed test \[columns\].
 const INDENT: usize = 8;
 
-/// Returns the program with the lines after the first moved so that the outermost of them stand as deep as the call does.
+/// Returns the program with its lines after the first moved, so that the outermost of these lines are indented like the call.
 fn indented(program: &str) -> String {
     let depth = |line: &str| line.len() - line.trim_start().len();
     let least = program.lines().skip(1).filter(|line| !line.trim().is_empty()).map(depth).min().unwrap_or(0);
@@ -59,7 +59,7 @@ fn indented(program: &str) -> String {
     text
 }
 
-/// Returns the place of the parenthesis that closes the one before the text, and whether a string of several lines stands before.
+/// Returns the position of the parenthesis that closes the call, and whether a string of several lines precedes it.
 fn closing(text: &str) -> Option<(usize, bool)> {
     let bytes = text.as_bytes();
     let (mut place, mut depth, mut has_long_text) = (0, 0_usize, false);
@@ -91,7 +91,7 @@ fn closing(text: &str) -> Option<(usize, bool)> {
     None
 }
 
-/// Returns the length of a comment, within which others may stand.
+/// Returns the length of a comment, which may contain nested comments.
 fn comment(text: &str) -> Option<usize> {
     let (mut depth, mut place) = (0_usize, 0);
     loop {
@@ -125,7 +125,7 @@ fn string(text: &str) -> Option<usize> {
     None
 }
 
-/// Returns whether a raw string begins at that place, and not a name that has an `r` in it.
+/// Returns whether a raw string begins at `place`, as opposed to a name that contains an `r`.
 fn is_raw(text: &str, place: usize) -> bool {
     let before = text[..place].chars().next_back();
     let is_word = before.is_some_and(|before| before.is_alphanumeric() || before == '_') && !text[..place].ends_with('b');
@@ -140,11 +140,11 @@ fn raw_string(text: &str) -> Option<usize> {
     Some(begin + text.get(begin..)?.find(&end)? + end.len())
 }
 
-/// Returns the length of a character in quotation marks; one for the mark of a lifetime.
+/// Returns the length of a character in quotation marks, or one for the mark of a lifetime.
 fn character(text: &str) -> usize {
     let mut characters = text.char_indices().skip(1);
     match characters.next() {
-        // The character after the stroke may be a mark itself.
+        // The character after the backslash may be a quotation mark itself.
         Some((_, '\\')) => text.get(3..).and_then(|rest| rest.find('\'')).map_or(1, |end| end + 4),
         Some(_) => characters.next().filter(|(_, mark)| *mark == '\'').map_or(1, |(place, _)| place + 1),
         None => 1,

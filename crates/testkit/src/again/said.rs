@@ -1,4 +1,4 @@
-//! Networks in the words of their tests, and the part of chance in them.
+//! Networks in the words of their tests, and the part of chance in such networks.
 
 use std::collections::BTreeMap;
 
@@ -7,14 +7,14 @@ use cohaptic_wan::{NodeId, Path};
 
 use crate::link::ToLink;
 
-/// The links of a test bed in words, as far as they have words.
+/// Links of a test bed in words, as far as they have words.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Said {
     every: Words,
     links: BTreeMap<Path, Words>,
 }
 
-/// A link in the words of `tc-netem`, none of which are the ideal link; or one that has no words.
+/// Link in the words of `tc-netem`, where an empty text is the ideal link; or a link without words.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(super) enum Words {
     Known(String),
@@ -32,7 +32,7 @@ impl Words {
         link.words().map_or(Self::Model, Self::Known)
     }
 
-    /// Returns the words as messages show them.
+    /// Returns the words for messages.
     fn shown(&self) -> &str {
         match self {
             Self::Known(words) => words,
@@ -50,11 +50,11 @@ impl Words {
     }
 }
 
-/// The part of chance in a link.
+/// Part of chance in a link.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(super) enum Chance {
     Nothing,
-    /// Losses alone; the words without them.
+    /// Only losses are random. Contains the words without the losses.
     Losses(String),
     Other,
 }
@@ -65,7 +65,7 @@ impl Chance {
         let jitters = netem.delay.as_ref().and_then(|delay| delay.jitter.as_ref()).is_some_and(|jitter| !jitter.time.is_zero());
         let slots = netem.slot.as_ref().is_some_and(|slot| !matches!(slot.gap, SlotGap::Range { max: None, .. }));
         let others = [netem.corrupt.as_ref(), netem.duplicate.as_ref(), netem.reorder.as_ref().map(|reorder| &reorder.chance)];
-        // A packet that is marked in place of being lost is not lost.
+        // With `ecn` chance marks packets in place of losing them, so the list of lost packets is not the whole effect.
         if jitters || slots || netem.ecn || others.into_iter().any(happens) {
             return Self::Other;
         }
@@ -78,7 +78,7 @@ impl Chance {
 }
 
 impl Said {
-    /// Sets the words of all links that are not said by themselves.
+    /// Sets the words of all links that are not set by themselves.
     pub(crate) fn set_every(&mut self, link: &impl ToLink) {
         self.every = Words::of(link);
     }
@@ -87,7 +87,7 @@ impl Said {
         self.links.insert(path, Words::of(link));
     }
 
-    /// Sets all links, which a file has said by models.
+    /// Sets all links to models, as a link file does.
     pub(crate) fn set_models(&mut self, every_is_ideal: bool, links: impl Iterator<Item = Path>) {
         self.every = if every_is_ideal { Words::default() } else { Words::Model };
         self.links = links.map(|path| (path, Words::Model)).collect();
@@ -97,12 +97,12 @@ impl Said {
         &self.every
     }
 
-    /// The links that differ from all others, in the order of their hosts.
+    /// Returns the links that differ from the link for all others, sorted by hosts.
     pub(super) fn links(&self) -> impl Iterator<Item = (Path, &Words)> {
         self.links.iter().map(|(path, words)| (*path, words)).filter(|(_, words)| **words != self.every)
     }
 
-    /// Returns a line for each link that is not ideal, and one for all links that are not named.
+    /// Returns a line for each link that is not ideal, and a line for all links that are not named.
     pub(crate) fn lines(&self, hosts: &[String]) -> Vec<String> {
         let name = |host: NodeId| hosts.get(host.index()).map_or("?", |name| name);
         let links = self.links().map(|(path, words)| {

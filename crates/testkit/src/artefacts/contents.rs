@@ -1,4 +1,4 @@
-//! The contents of the files.
+//! Contents of the files of a record.
 
 use std::fmt::Write as _;
 
@@ -8,7 +8,7 @@ use cohaptic_wan::{DropCause, Fate};
 use super::folder::{MARK, MARKED};
 use crate::record::Record;
 
-/// The files of a record: their names and contents.
+/// Returns the names and contents of the files of a record.
 pub(super) fn files(record: &Record) -> Vec<(String, Vec<u8>)> {
     let mut files = Vec::new();
     let mut links = String::new();
@@ -55,7 +55,7 @@ pub(super) fn files(record: &Record) -> Vec<(String, Vec<u8>)> {
     files
 }
 
-/// What a link did, in words: `12 packets, 10 arrived, 1 copied, 2 lost (loss), 1 lost (queue-full)`.
+/// Returns the counts of a link in words: `12 packets, 10 arrived, 1 copied, 2 lost (loss), 1 lost (queue-full)`.
 fn counts(log: &cohaptic_wan::FateLog) -> String {
     let count = |is: &dyn Fn(Fate) -> bool| log.records().iter().filter(|record| is(record.fate)).count();
     let mut text = format!("{} packets, {} arrived", log.packets(), count(&|fate| matches!(fate, Fate::Delivered(_))));
@@ -93,7 +93,7 @@ fn capture(record: &Record, path: cohaptic_wan::Path, from: &str, to: &str) -> V
     write().unwrap_or_default()
 }
 
-/// The numbers of the packets of a path that are whole IP packets: those of TCP.
+/// Returns the numbers of the packets of a path that are whole IP packets, which are those of TCP.
 #[cfg(all(feature = "pcapng", feature = "tcp"))]
 fn segments(record: &Record, path: cohaptic_wan::Path) -> std::collections::BTreeSet<u64> {
     let number = |event: &crate::TraceEvent| {
@@ -103,16 +103,16 @@ fn segments(record: &Record, path: cohaptic_wan::Path) -> std::collections::BTre
     record.trace().events().iter().filter_map(number).collect()
 }
 
-/// The longest name of a host within that of a file.
+/// Longest part of a file's name that comes from a host's name \[characters\].
 const LONGEST: usize = 60;
 
-/// A name as part of the name of a file, on every system.
+/// Converts a name to a part of a file's name that every system permits.
 pub(super) fn file_name(name: &str) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' || c == '_' { c } else { '_' };
     name.chars().map(plain).take(2 * LONGEST).collect()
 }
 
-/// The names of hosts as parts of names of files. No two are the same, also where a system does not tell large letters from small ones.
+/// Converts names of hosts to parts of files' names. No two results are equal, also on a system that ignores the case of letters.
 fn file_names(hosts: &[String]) -> Vec<String> {
     let mut taken = std::collections::BTreeSet::new();
     let name = |(place, host): (usize, &String)| {

@@ -1,4 +1,4 @@
-//! A folder that is written as a whole.
+//! Folder that is written as a whole.
 
 use std::fs;
 use std::io;
@@ -7,16 +7,16 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::WriteError;
 
-/// The first words of the file by which a folder is known again.
+/// First words of the marked file, by which a folder of a test bed is recognised.
 pub(super) const MARK: &str = "What happened in a test bed";
 
-/// The file.
+/// Name of the marked file.
 pub(super) const MARKED: &str = "summary.txt";
 
-/// So that two tests of one process never write to the same name.
+/// Counter for temporary names, so that two tests of a process never write to the same name.
 static COUNT: AtomicU64 = AtomicU64::new(0);
 
-/// Puts files into a folder, in place of those that were written before. At every instant the folder is whole or not there.
+/// Writes files into a folder, in place of the files of an earlier run. At every instant the folder is complete or missing.
 pub(super) fn replace(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<(), WriteError> {
     let Some(name) = folder.file_name() else { return Err(WriteError::NoName { folder: folder.to_path_buf() }) };
     if !is_ours(folder) {
@@ -29,7 +29,7 @@ pub(super) fn replace(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<(), 
     let (new, old) = (beside("new"), beside("old"));
     let written = write_all(&new, files).and_then(|()| put(&new, folder, &old));
     if written.is_err() {
-        // The rest of it is of no use. The reason why it was not written is reported, and not that it cannot be removed.
+        // The incomplete folder is of no use. An error of its removal is ignored, because the error of the writing is reported.
         let _ = fs::remove_dir_all(&new);
     }
     written
@@ -44,16 +44,16 @@ fn write_all(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<(), WriteErro
     Ok(())
 }
 
-/// Renames a folder into its place, and removes what was there.
+/// Renames the folder `new` to `folder`. A folder that was there is moved to `old` and then removed.
 fn put(new: &Path, folder: &Path, old: &Path) -> Result<(), WriteError> {
     match fs::rename(folder, old) {
         Ok(()) => {
             if let Err(error) = fs::rename(new, folder) {
-                // What was there is there again, if that is possible at all.
+                // The earlier folder is restored, if possible.
                 let _ = fs::rename(old, folder);
                 return Err(failed(folder)(error));
             }
-            // It is in nobody's way.
+            // An old folder that cannot be removed does no harm.
             let _ = fs::remove_dir_all(old);
             Ok(())
         }
@@ -62,7 +62,7 @@ fn put(new: &Path, folder: &Path, old: &Path) -> Result<(), WriteError> {
     }
 }
 
-/// Whether a folder may be replaced: it is not there, empty, or one of those that are written here.
+/// Returns whether a folder may be replaced: it is missing or empty, or was written by a test bed.
 fn is_ours(folder: &Path) -> bool {
     if fs::symlink_metadata(folder).is_err() {
         return true;
@@ -112,7 +112,7 @@ mod tests {
         let error = replace(&file.join("below"), &files("one")).unwrap_err().to_string();
         assert!(error.starts_with(&file.display().to_string()), "{error}");
         assert!(matches!(replace(Path::new(".."), &files("one")), Err(WriteError::NoName { .. })));
-        // An empty one is as good as none.
+        // An empty folder may be replaced.
         let empty = base.path().join("empty");
         fs::create_dir(&empty).unwrap();
         replace(&empty, &files("one")).unwrap();
@@ -124,7 +124,7 @@ mod tests {
         let base = tempfile::tempdir().unwrap();
         let folder = base.path().join("kept");
         replace(&folder, &files("one")).unwrap();
-        // There is no such folder within the new one.
+        // The subfolder of this file does not exist.
         let error = replace(&folder, &[("no/such".to_owned(), Vec::new())]).unwrap_err();
         assert!(matches!(error, WriteError::Io { .. }));
         assert_eq!(names(base.path()), ["kept"]);

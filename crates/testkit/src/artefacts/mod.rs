@@ -1,4 +1,4 @@
-//! What a test that fails leaves behind.
+//! Files that a failing test leaves behind.
 
 mod contents;
 mod folder;
@@ -12,14 +12,14 @@ use crate::record::Record;
 use crate::seed::Seed;
 use crate::wire::HitCount;
 
-/// If this variable of the environment names a folder, every test bed that fails writes what happened into a folder below it that has the name of the test.
+/// Name of the environment variable with a folder. Every test bed that fails writes its record into a folder below it, named after the test.
 pub const ARTEFACTS_VARIABLE: &str = "COHAPTIC_TEST_ARTEFACTS";
 
-/// Why what happened is not in its folder.
+/// Error of writing a record into a folder.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum WriteError {
-    /// The folder holds something else.
+    /// The folder contains other files, and was not written by a test bed.
     NotOurs {
         /// The folder.
         folder: PathBuf,
@@ -29,11 +29,11 @@ pub enum WriteError {
         /// The path.
         folder: PathBuf,
     },
-    /// The system refuses.
+    /// The system refused an operation.
     Io {
-        /// What could not be written.
+        /// Path that could not be written.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the system.
         source: io::Error,
     },
 }
@@ -60,34 +60,35 @@ impl std::error::Error for WriteError {
 }
 
 impl Record {
-    /// Writes what happened into a folder, for people and for replays:
+    /// Writes the record into a folder, for readers and for replays:
     ///
-    /// - `summary.txt`: the seed, how to run it again, what every link did, and what every [law](crate::hit) hit;
-    /// - `trace.txt`: all that happened, in words;
-    /// - `fates-a-to-b.csv`: what became of every packet from `a` to `b` on its link, for every two hosts between which something was sent. It can be
-    ///   [read back](cohaptic_wan::FateLog::parse) and [replayed](cohaptic_wan::LinkModel::Replay);
-    /// - `packets-a-to-b.pcapng`: the same with what the packets carried, for packet analysers (feature `pcapng`, on by default);
-    /// - `links.txt`: a [file of links](crate::Testbed::from_file) that replays all of it.
+    /// - `summary.txt`: the seed, how to repeat the run, the counts of every link, and the packets that every [law](crate::hit) has hit;
+    /// - `trace.txt`: the events of the run, in words;
+    /// - `fates-a-to-b.csv`: the fate of every packet from `a` to `b` on its link, for every two hosts between which a packet was sent. The file can be
+    /// [read back](cohaptic_wan::FateLog::parse) and [replayed](cohaptic_wan::LinkModel::Replay);
+    /// - `packets-a-to-b.pcapng`: the same with the contents of the packets, for packet analysers (feature `pcapng`, on by default);
+    /// - `links.txt`: a [file of links](crate::Testbed::from_file) that replays all links.
     ///
-    /// In the names of files, characters of hosts' names other than letters, digits, `-` and `_` are `_`. A relative path is one from the folder in which the test
-    /// runs, which `cargo test` makes that of the package. The folder that an earlier run has written is replaced as a whole: nobody sees it half-written.
+    /// In the names of files, every character of a host's name other than letters, digits, `-` and `_` becomes `_`. A relative path begins in the folder in
+    /// which the test runs; under `cargo test` this is the folder of the package. A folder written by an earlier run is replaced as a whole, so that it is
+    /// never seen half-written.
     ///
     /// # Errors
     ///
-    /// [`WriteError`] if the system refuses, or there is something else at that path; then nothing was changed.
+    /// [`WriteError`] if the system refuses, or there is something else at the path; nothing was changed then.
     pub fn write(&self, folder: impl AsRef<Path>) -> Result<(), WriteError> {
         folder::replace(folder.as_ref(), &contents::files(self))
     }
 }
 
-/// Where a test that fails writes what happened.
+/// Folders into which a failing test writes its record.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub(crate) struct Artefacts {
     folders: Vec<PathBuf>,
 }
 
 impl Artefacts {
-    /// What the test has said, and what the environment says.
+    /// Collects the folder that the test has given (`said`), and the folder from the environment.
     pub(crate) fn new(said: Option<PathBuf>, seed: &Seed) -> Self {
         Self::of(std::env::var_os(ARTEFACTS_VARIABLE).as_deref(), said, seed)
     }
@@ -97,20 +98,21 @@ impl Artefacts {
         Self { folders: said.into_iter().chain(named).collect() }
     }
 
-    /// Whether anything is to be written.
+    /// Returns whether any record is to be written.
     pub(crate) const fn is_wanted(&self) -> bool {
         !self.folders.is_empty()
     }
 
-    /// The lines about a run that has failed: in which task, if a task has panicked, a test that does the same again, where what happened is, how to run it
-    /// again, and which laws hit nothing. Whatever goes wrong is told too, and no more: the test has failed for another reason.
+    /// Writes the record of a failed run, and returns the lines of its report: the task that has panicked, if any, a test that repeats the failure, the folder
+    /// of the record, how to repeat the run, and the laws that have hit nothing. A record that cannot be written is only reported, because the test has failed
+    /// for another reason.
     pub(crate) fn report(&self, task: Option<String>, again: String, record: Record) -> Vec<String> {
         let (hits, seed) = (record.hits().to_vec(), record.seed().clone());
         let task = task.map(|task| format!("{task} has panicked"));
         task.into_iter().chain((!again.is_empty()).then_some(again)).chain(self.lines(&seed, &hits, || record)).collect()
     }
 
-    /// Writes the record, and gives the lines of the report.
+    /// Writes the record, and returns the lines of the report.
     pub(crate) fn lines(&self, seed: &Seed, hits: &[HitCount], record: impl FnOnce() -> Record) -> Vec<String> {
         let mut lines = Vec::new();
         if self.is_wanted() {

@@ -1,4 +1,4 @@
-//! Report of a failure: printed once, when the smallest input of a property is found, and not for each input on the way there.
+//! Report of a failure. For a property the report is printed once, for the smallest input, and not for each input on the way there.
 
 #[cfg(feature = "strategies")]
 mod searching;
@@ -6,7 +6,7 @@ mod searching;
 #[cfg(feature = "strategies")]
 pub(crate) use searching::Searching;
 
-/// Lines about a run, made when they are printed: they may write a trace.
+/// Lines about a run. They are made only when printed, because making them may write a trace.
 pub(crate) type Lines = Box<dyn FnOnce() -> Vec<String>>;
 
 /// Returns whether this thread tries values of a strategy.
@@ -17,14 +17,14 @@ pub(crate) fn is_searching() -> bool {
     false
 }
 
-/// Reports a run that has failed: now, or once the smallest input is found.
+/// Reports a failed run: now, or after the smallest input has been found.
 pub(crate) fn report(lines: Lines) {
     #[cfg(feature = "strategies")]
     let Some(lines) = searching::keep_failed(lines) else { return };
     print("", lines);
 }
 
-/// Notes a run that has not failed: its property may fail afterwards.
+/// Notes a run that has not failed, because its property may still fail afterwards.
 #[cfg_attr(not(feature = "strategies"), expect(unused_variables, reason = "only properties look back"))]
 pub(crate) fn note_run(lines: impl FnOnce() -> Lines) {
     #[cfg(feature = "strategies")]
@@ -37,13 +37,12 @@ fn print(before: &str, lines: Lines) {
     eprint!("{before}{text}");
 }
 
-/// Runs what polls the tasks of a run. Backtraces end here: what calls this function is the test bed, proptest and the test harness, and says nothing about
-/// the program.
-/// The standard library leaves out what lies below a function of this name.
+/// Runs the function that polls the tasks of a run. The standard library cuts backtraces at a function of this name. The frames below are the test bed,
+/// proptest and the test harness, and tell nothing about the program.
 #[inline(never)]
 pub(crate) fn __rust_begin_short_backtrace<T>(act: impl FnOnce() -> T) -> T {
     let outcome = act();
-    // Otherwise the call might be compiled to a jump, and the name would not be there.
+    // Without this the compiler might turn the call into a jump, and the name would be missing in the backtrace.
     std::hint::black_box(());
     outcome
 }

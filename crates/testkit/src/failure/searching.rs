@@ -1,5 +1,5 @@
-//! Failures of properties: while a value of a [strategy](crate::strategies) may shrink, its property fails again and again. Each failure replaces the one
-//! before, and the last is printed when the search is over, before proptest says the message of the panic and the smallest input.
+//! Failures of properties. While a value of a [strategy](crate::strategies) may shrink, its property fails again and again. Each failure replaces the previous
+//! one. The last failure is printed when the search is over, before proptest prints the message of the panic and the smallest input.
 
 use std::backtrace::{Backtrace, BacktraceStatus};
 use std::cell::{Cell, RefCell};
@@ -12,16 +12,16 @@ use std::thread;
 use super::{Lines, print};
 
 thread_local! {
-    /// Number of values of strategies of this thread that may shrink.
+    /// Number of values of strategies on this thread that may still shrink.
     static SEARCHES: Cell<usize> = const { Cell::new(0) };
     static KEPT: RefCell<Kept> = const { RefCell::new(Kept::NOTHING) };
 }
 
-/// Panic and lines to be printed once a property has failed.
+/// Panic and lines to be printed after a property has failed.
 struct Kept {
     /// The last panic.
     panic: Option<Panic>,
-    /// The last run, which has not failed itself: what a property expects afterwards may fail.
+    /// Lines about the last run, which has not failed itself. The property may fail afterwards.
     last: Option<Lines>,
     failed: Option<Failed>,
 }
@@ -35,7 +35,7 @@ struct Failed {
     lines: Option<Lines>,
 }
 
-/// A panic. Proptest tells its message, unless the panic is not one of a property.
+/// Panic of a property. Proptest prints the message, except for a panic outside of a property.
 struct Panic {
     place: String,
     message: String,
@@ -53,7 +53,7 @@ impl Panic {
     fn words(&self) -> String {
         let Self { place, message, backtrace } = self;
         let mut text = if thread::panicking() {
-            // Nobody has caught the panic, as proptest does: a test keeps a value of a strategy itself.
+            // The panic was not caught, as proptest would have done: a test uses a value of a strategy by itself.
             format!("\nthread '{}' panicked at {place}:\n{message}\n", thread::current().name().unwrap_or("<unnamed>"))
         } else {
             format!("the smallest input panics at {place}\n")
@@ -65,7 +65,7 @@ impl Panic {
     }
 }
 
-/// A value of a strategy that may shrink. `Box<dyn ValueTree>` does not leave its thread, and so this does not.
+/// Guard of a value of a strategy that may shrink. Neither `Send` nor `Sync`, like `Box<dyn ValueTree>`, because the count is per thread.
 #[derive(Debug)]
 pub(crate) struct Searching(PhantomData<*const ()>);
 
@@ -76,10 +76,10 @@ impl Searching {
         Self(PhantomData)
     }
 
-    /// The property has failed with the value that was tried last.
+    /// Notes that the property has failed with the value tried last.
     pub(crate) fn failed() {
         KEPT.with_borrow_mut(|kept| {
-            // A run that has failed itself was kept before.
+            // A run that has failed itself has been kept by `keep_failed`.
             if let Some(lines) = kept.last.take() {
                 kept.failed = Some(Failed { panic: kept.panic.take(), lines: Some(lines) });
             }
@@ -99,7 +99,7 @@ impl Drop for Searching {
         SEARCHES.set(left);
         if left == 0 {
             let kept = KEPT.replace(Kept::NOTHING);
-            // A panic after the run alone tells of the failure where nothing shrinks.
+            // If nothing shrinks, a panic after the run is the only sign of the failure.
             let failed = kept.failed.or_else(|| kept.panic.map(|panic| Failed { panic: Some(panic), lines: kept.last }));
             if let Some(Failed { panic, lines }) = failed {
                 print(&panic.map(|panic| panic.words()).unwrap_or_default(), lines.unwrap_or_else(|| Box::new(Vec::new)));
@@ -113,7 +113,7 @@ pub(super) fn is_searching() -> bool {
     SEARCHES.get() > 0
 }
 
-/// Keeps the lines about a run that has failed; gives them back if they are to be printed now.
+/// Keeps the lines about a failed run. Returns the lines if they must be printed now.
 pub(super) fn keep_failed(lines: Lines) -> Option<Lines> {
     if !is_searching() {
         return Some(lines);
@@ -133,10 +133,10 @@ pub(super) fn keep_last(lines: impl FnOnce() -> Lines) {
     }
 }
 
-/// Sees to it, once in a process, that panics of this thread are kept while a value may shrink. All others go to the hook that was there before.
+/// Installs, once per process, a hook that keeps panics of a thread while a value of the thread may shrink. Other panics go to the previous hook.
 fn hold_panics_back() {
     static ONCE: Once = Once::new();
-    // A hook cannot be set while a panic unwinds; the next search does.
+    // A hook cannot be set while a panic unwinds. The next search sets the hook.
     if thread::panicking() {
         return;
     }
@@ -150,14 +150,14 @@ fn hold_panics_back() {
     });
 }
 
-/// Keeps a panic; says whether it is kept.
+/// Keeps a panic. Returns whether the panic is kept.
 fn keep(info: &PanicHookInfo<'_>) -> bool {
-    // A panic may come while the thread ends, when there is no state any more, or within a line that has the state.
+    // A panic may occur while the thread ends, when the thread-local state is gone, or while the state is borrowed.
     let keep = |kept: &RefCell<Kept>| kept.try_borrow_mut().map(|mut kept| kept.panic = Some(Panic::of(info))).is_ok();
     SEARCHES.try_with(Cell::get).is_ok_and(|searches| searches > 0) && KEPT.try_with(keep).unwrap_or(false)
 }
 
-/// The frames of a backtrace between the machinery of the panic and the executor.
+/// Returns the frames of a backtrace between the machinery of panics and the executor.
 fn trimmed(backtrace: &str) -> String {
     let is_frame = |line: &str| line.trim_start().split_once(": ").is_some_and(|(number, _)| number.parse::<u32>().is_ok());
     let mut frames: Vec<String> = Vec::new();
@@ -171,7 +171,7 @@ fn trimmed(backtrace: &str) -> String {
         }
     }
     let end = frames.iter().position(|frame| frame.contains("__rust_begin_short_backtrace")).unwrap_or(frames.len());
-    // The code below that catches panics has such names too.
+    // The code below the executor that catches panics has such names as well, so only the frames before `end` are searched.
     let is_machinery = |frame: &String| frame.contains("panicking::") || frame.contains("rust_begin_unwind");
     let begin = frames[..end].iter().rposition(is_machinery).map_or(0, |place| place + 1);
     frames[begin..end].iter().fold(String::new(), |text, frame| text + frame + "\n")

@@ -11,7 +11,7 @@ use super::{LinkFile, LinkFileError};
 use crate::link::LinkChange;
 
 impl LinkFile {
-    /// Reads the text of a relay file or, with the feature `scenes`, of a scene file. A relay file has programs.
+    /// Parses the text of a relay file or, with the feature `scenes`, of a scene file. Only a relay file has programs.
     pub(super) fn document(text: &str, path: &Path) -> Result<Self, LinkFileError> {
         #[cfg(feature = "scenes")]
         if !super::scene::is_relay(text) {

@@ -20,10 +20,10 @@ use crate::words;
 
 /// Hosts and the links between them, read from a file.
 ///
-/// A file that ends in `.toml` is a relay file, whose programs are the hosts (feature `files`), or a scene file, whose peers are (feature `scenes`): its links are as it says, also
-/// those that change while the run goes on, and its seed is that of the run. Devices, objects and expectations mean nothing here.
+/// A file whose name ends in `.toml` is a relay file, whose programs become the hosts (feature `files`), or a scene file, whose peers become the hosts (feature
+/// `scenes`). The file gives the links, their changes during the run, and the seed of the run. Devices, objects and expectations are ignored.
 ///
-/// Any other file is of plain words, a line each:
+/// Any other file consists of plain words, an entry per line:
 ///
 /// ```text
 /// # Lines that begin with # say nothing.
@@ -36,56 +36,56 @@ use crate::words;
 /// hit client -> server: drop 2nd packet
 /// ```
 ///
-/// After the colon stand words of `tc-netem`, done exactly, or nothing, which is the ideal link, or `replay` and the file of a fate log, beside the file itself. `all`
-/// is every link that no other line names; without it they are ideal. Without `hosts` those take part whom lines name, in the order of the lines. `hit` and a path says which of
-/// its packets are [hit](crate::hit).
+/// After the colon follow words of `tc-netem`, which are emulated exactly, or nothing, which is the ideal link, or `replay` and the file of a fate log,
+/// relative to the link file. `all` stands for every link that no other line names; without `all` such links are ideal. Without `hosts` the hosts are those
+/// named by lines, in the order of the lines. `hit` and a path tell which packets of the path are [hit](crate::hit).
 ///
-/// Relative paths begin in the folder in which the test runs, which `cargo test` makes that of the package.
+/// Relative paths begin in the folder in which the test runs; under `cargo test` this is the folder of the package.
 #[derive(Clone, PartialEq, Debug)]
 pub struct LinkFile {
     pub(crate) hosts: Vec<String>,
-    /// What every link is that is not in `links`.
+    /// Link of every path that is not in `links`.
     pub(crate) every: LinkModel,
-    /// By sender, then receiver.
+    /// Links by indices of sender and receiver.
     pub(crate) links: BTreeMap<(usize, usize), LinkModel>,
-    /// In order of time.
+    /// Changes of links, sorted by time.
     pub(crate) changes: Vec<LinkChange>,
-    /// Which packets are hit.
+    /// Hits on packets.
     pub(crate) hits: Vec<PathHit>,
     pub(crate) seed: Option<u64>,
 }
 
-/// Why a file says no links.
+/// Error of reading a link file.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum LinkFileError {
-    /// It cannot be read.
+    /// The file cannot be read.
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the system.
         source: io::Error,
     },
-    /// Its words make no sense.
+    /// The words of the file make no sense.
     Words {
         /// The file.
         path: PathBuf,
         /// Where, and why.
         error: WordsError,
     },
-    /// It is a scene file or a relay file, and this crate was built without them.
+    /// The file is a scene file or a relay file, and this crate was built without the feature for it.
     NoDocuments {
         /// The file.
         path: PathBuf,
     },
-    /// It makes no sense as a scene file or a relay file.
+    /// The file makes no sense as a scene file or a relay file.
     #[cfg(feature = "files")]
     Document(cohaptic_linkfile::FileError),
-    /// A scene has what links between hosts cannot stand for.
+    /// The scene contains something that links between hosts cannot represent.
     NotLinks {
         /// The file.
         path: PathBuf,
-        /// What, and what was expected.
+        /// The part of the scene, and what was expected.
         what: String,
     },
 }
@@ -126,11 +126,11 @@ impl From<cohaptic_linkfile::FileError> for LinkFileError {
 }
 
 impl LinkFile {
-    /// Reads a file.
+    /// Reads a link file.
     ///
     /// # Errors
     ///
-    /// [`LinkFileError`] if it cannot be read or makes no sense, with the place.
+    /// [`LinkFileError`] if the file cannot be read or makes no sense. The error names the place.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, LinkFileError> {
         let path = path.as_ref();
         let unreadable = |source| LinkFileError::Io { path: path.to_path_buf(), source };
@@ -144,22 +144,22 @@ impl LinkFile {
         Self::parse_with(&text, file).map_err(|error| LinkFileError::Words { path: path.to_path_buf(), error })
     }
 
-    /// Reads a text of plain words, which names no files.
+    /// Parses a text of plain words, which must not name files.
     ///
     /// # Errors
     ///
-    /// [`WordsError`] if it makes no sense, with the place.
+    /// [`WordsError`] if the text makes no sense. The error names the place.
     pub fn parse(text: &str) -> Result<Self, WordsError> {
         Self::parse_with(text, |_| Err("a text names no files: expected words of tc-netem".to_owned()))
     }
 
-    /// The names of the hosts.
+    /// Returns the names of the hosts.
     #[must_use]
     pub fn hosts(&self) -> &[String] {
         &self.hosts
     }
 
-    /// The link from one host to another at the beginning, by their places in [`LinkFile::hosts`].
+    /// Returns the link from one host to another at the beginning of the run. The hosts are given by their indices in [`LinkFile::hosts`].
     #[must_use]
     pub fn between(&self, from: usize, to: usize) -> &LinkModel {
         self.links.get(&(from, to)).unwrap_or(&self.every)

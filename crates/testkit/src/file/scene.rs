@@ -9,7 +9,7 @@ use cohaptic_scene::{ChangeKind, Scene};
 use super::{LinkFile, LinkFileError};
 use crate::link::LinkChange;
 
-/// Whether a text is a relay file. Text that is no TOML is refused as a scene, with the place.
+/// Returns whether a text is a relay file. A text that is no TOML counts as a scene file, whose parser then reports the place of the error.
 pub(super) fn is_relay(text: &str) -> bool {
     text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("programs") || table.contains_key("relay"))
 }
@@ -32,7 +32,7 @@ impl LinkFile {
                     let link = table.between(from, to).clone();
                     LinkChange { at, from, to, link }
                 })),
-                // They change the ends of the links.
+                // These changes concern the ends of the links, which a test bed does not have.
                 ChangeKind::Contact { .. }
                 | ChangeKind::Hand { .. }
                 | ChangeKind::HandTorque { .. }

@@ -81,7 +81,7 @@ impl fmt::Debug for Hits {
         if self.is_empty() {
             return f.write_str("Hits::none()");
         }
-        // A text in quotes may stand in it.
+        // The words may contain a text in quotes, which needs a raw string with `#`.
         let hashes = if self.to_string().contains('"') { "#" } else { "" };
         let r = if hashes.is_empty() { "" } else { "r" };
         write!(f, "Hits::words({r}{hashes}\"")?;

@@ -9,7 +9,7 @@ use super::{PacketLaw, SentPacket, Verdict};
 #[derive(Clone, Debug)]
 pub(crate) struct WordsLaw {
     hit: Hit,
-    /// How many of the kind there were.
+    /// Number of packets so far that are of the kind of the hit.
     met: u64,
 }
 

@@ -1,7 +1,8 @@
-//! Packets that are hit: which one, and how.
+//! Hits on single packets: which packets are hit, and the fate of each.
 //!
-//! A law is asked about every packet that is offered to a link, and says a [`Verdict`]. It is a closure ([`Testbed::on_packet`](crate::Testbed::on_packet)), words
-//! ([`Testbed::hit`](crate::Testbed::hit), lines of [link files](crate::LinkFile)), or a [`PacketLaw`] of one's own.
+//! A law is asked about every packet that is offered to a link, and returns a [`Verdict`]. A law is a closure
+//! ([`Testbed::on_packet`](crate::Testbed::on_packet)), words ([`Testbed::hit`](crate::Testbed::hit), lines of [link files](crate::LinkFile)), or an
+//! implementation of [`PacketLaw`].
 //!
 //! ```
 //! use std::time::Duration;
@@ -26,13 +27,15 @@
 //!
 //! # What happens to a packet that is hit
 //!
-//! The verdict falls when the packet is offered. One that is to be dropped goes no further: its fate is [`DropCause::Filter`](cohaptic_wan::DropCause::Filter). All others
-//! pass the link first, which may lose them, and are delayed, copied, damaged or held where they come out. So the link draws the same for every other packet, whatever is
-//! hit: to hit one packet more or less changes nothing else, which is why sets of hits shrink (`strategies::any_hits`, feature `strategies`). Copies that a link makes of a packet are not
-//! hit. Where several laws are for one path, all are asked, and the first verdict other than [`Verdict::Pass`] is the packet's.
+//! The law decides when the packet is offered. A packet to be dropped goes no further: its fate is [`DropCause::Filter`](cohaptic_wan::DropCause::Filter).
+//! Every other packet passes the link first, which may lose the packet, and is delayed, copied, damaged or held at the far end. So the link draws the same
+//! random numbers for every other packet, whatever is hit. A further hit changes nothing else, and therefore sets of hits can shrink (`strategies::any_hits`,
+//! feature `strategies`). Copies that a link makes of a packet are not hit. If a path has several laws, all laws are asked, and the first verdict other than
+//! [`Verdict::Pass`] counts.
 //!
-//! The fates of a [`Record`](crate::Record) have what hits did, so that its `links.txt` does it again without the laws; only damaged bits are not replayed. The trace has
-//! each hit ([`Happening::Hit`](crate::Happening::Hit)), [`Bed::hits`](crate::Bed::hits) their number, and a test that fails names the laws that hit nothing.
+//! The fates of a [`Record`](crate::Record) contain the effects of hits, so that its `links.txt` repeats the run without the laws; only damaged bits are not
+//! replayed. The trace contains each hit ([`Happening::Hit`](crate::Happening::Hit)), [`Bed::hits`](crate::Bed::hits) returns their number, and a failing test
+//! names the laws that have hit nothing.
 //!
 //! # Words
 //!
@@ -56,9 +59,9 @@
 //! | `first` *kind*, `2nd` *kind*, … | the n-th of a kind |
 //! | `every` *kind* | all of a kind |
 //!
-//! Kinds are `packet`, `segment` (of TCP, with data), `SYN`, `FIN` and `RST` (TCP with this flag, whatever else is set), and `retransmission`: a segment of TCP of which
-//! something was sent before, or another packet with the same bytes as one before. Packets of TCP, and the words for them, need the feature `tcp`. `with` and a text in quotes, or bytes as `0x` and two digits each, narrows them to packets
-//! in whose bytes it stands.
+//! Kinds are `packet`, `segment` (of TCP, with data), `SYN`, `FIN` and `RST` (TCP with this flag, whatever else is set), and `retransmission`: a segment of TCP
+//! some of whose data was sent before, or another packet with the same bytes as an earlier packet. Packets of TCP, and the words for such packets, need the
+//! feature `tcp`. `with` and a text in quotes, or bytes as `0x` and two digits each, restricts a kind to packets that contain these bytes.
 
 mod hits;
 mod law;
@@ -83,28 +86,29 @@ pub(crate) use words::parse;
 #[cfg(feature = "strategies")]
 pub(crate) use words::{Action, Which, push_number};
 
-/// The fate that a law wants for a packet.
+/// Fate that a law wants for a packet.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
 #[non_exhaustive]
 pub enum Verdict {
-    /// What its link does to it.
+    /// The law does not change the packet.
     #[default]
     Pass,
-    /// It is lost before its link.
+    /// The packet is lost before its link.
     Drop,
-    /// It arrives later by this.
+    /// The packet arrives later by this time.
     Delay(Duration),
-    /// It arrives twice, the second time later by this.
+    /// The packet arrives twice, the second time later by this time.
     Duplicate(Duration),
-    /// This bit is flipped; 0 is the lowest bit of the first byte. Bits are counted on from the beginning beyond the end.
+    /// The bit of this index is flipped. Bit 0 is the lowest bit of the first byte. The index is taken modulo the number of bits.
     Corrupt(u64),
-    /// It arrives a nanosecond behind the last of this number of packets of its path that arrive after it; if fewer come, it does not arrive.
+    /// The packet arrives a nanosecond after the last of this number of later arrivals on its path. If fewer packets arrive, the packet does not arrive.
     Behind(u32),
 }
 
-/// A law that says what becomes of packets, one by one, in the order in which they are offered to their link.
+/// Law that decides the fate of packets, one by one, in the order in which the packets are offered to their link.
 ///
-/// Every run begins with a clone of the law, so that one that counts begins anew. It must not ask the test bed anything, which is busy meanwhile; the packet has the time.
+/// Every run begins with a clone of the law, so that a law with a counter starts anew. A law must not call the test bed, which is busy at that moment; the
+/// packet contains the time.
 ///
 /// ```
 /// use cohaptic_testkit::Testbed;
@@ -123,9 +127,9 @@ pub enum Verdict {
 /// let bed = Testbed::new(["a", "b"]).law("a", "b", LongOnes(0.25));
 /// ```
 pub trait PacketLaw {
-    /// The fate of this packet.
+    /// Returns the fate of a packet.
     ///
-    /// `draws` are random numbers of this packet and this law: they depend on the seed, the path, the number of the packet, and the place of the law among those of the
-    /// path, and on nothing else, so that what other packets draw changes none of them.
+    /// `draws` are random numbers of this packet and this law. They depend on the seed, the path, the number of the packet, and the index of the law among the
+    /// laws of the path only, so draws for other packets do not change them.
     fn judge(&mut self, packet: &SentPacket<'_>, draws: &mut Draws) -> Verdict;
 }

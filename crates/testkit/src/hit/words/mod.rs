@@ -1,4 +1,4 @@
-//! The words that say which packets are hit, and how.
+//! Words of hits: parsing and printing.
 
 use std::fmt;
 use std::ops::{Range, RangeInclusive};
@@ -10,7 +10,7 @@ use cohaptic_units::{parse, print};
 
 use crate::fault::Fault;
 
-/// Which packets of a path are hit, and how.
+/// Hit: the packets of a path that are hit, and the action.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Hit {
     pub(crate) action: Action,
@@ -29,11 +29,11 @@ pub(crate) enum Action {
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) enum Which {
     Numbers(Vec<RangeInclusive<u64>>),
-    /// All of the kind, unless it is the n-th, from 1.
+    /// Packets of a kind: all of them, or only the n-th, counted from 1.
     Nth {
         nth: Option<u64>,
         kind: Kind,
-        /// Bytes that stand in the packet.
+        /// Bytes that the packet must contain. Empty: no restriction.
         with: Vec<u8>,
     },
 }
@@ -61,7 +61,7 @@ const KINDS: &[(&str, Kind)] = &[
     ("RST", Kind::Flag(Flags::RST)),
 ];
 
-/// The words of [`KINDS`] in messages.
+/// List of the words of [`KINDS`] for messages.
 const EXPECTED_KINDS: &str = if cfg!(feature = "tcp") {
     "packet, segment, retransmission, SYN, FIN or RST"
 } else {
@@ -69,20 +69,20 @@ const EXPECTED_KINDS: &str = if cfg!(feature = "tcp") {
 };
 
 impl Hit {
-    /// Drops packets of these numbers, which ascend.
+    /// Creates a hit that drops the packets of these numbers, which must ascend.
     pub(crate) fn dropping(numbers: impl IntoIterator<Item = u64>) -> Self {
         let mut ranges = Vec::new();
         numbers.into_iter().for_each(|number| push_number(&mut ranges, number));
         Self { action: Action::Drop, which: Which::Numbers(ranges) }
     }
 
-    /// Returns whether what becomes of a packet that is hit is random.
+    /// Returns whether the fate of a hit packet is random.
     pub(crate) const fn draws(&self) -> bool {
         matches!(self.action, Action::Corrupt)
     }
 }
 
-/// Adds a number that is greater than all others.
+/// Adds a number that is greater than all numbers of `ranges`.
 pub(crate) fn push_number(ranges: &mut Vec<RangeInclusive<u64>>, number: u64) {
     match ranges.last_mut() {
         Some(last) if last.end() + 1 == number => *last = *last.start()..=number,
@@ -90,7 +90,7 @@ pub(crate) fn push_number(ranges: &mut Vec<RangeInclusive<u64>>, number: u64) {
     }
 }
 
-/// Reads a part of a line: at least one hit, parted by semicolons.
+/// Parses the hits in a part of a line: at least one hit, separated by semicolons.
 pub(crate) fn parse(line: &str, part: Range<usize>) -> Result<Vec<Hit>, Fault> {
     let end = part.start + line[part.clone()].trim_end().len();
     let mut reader = Reader { line, words: tokens(line, part)?, next: 0, end };
@@ -105,7 +105,7 @@ pub(crate) fn parse(line: &str, part: Range<usize>) -> Result<Vec<Hit>, Fault> {
     }
 }
 
-/// The words of a part of a line; a text in quotes is one, and a semicolon.
+/// Splits a part of a line into words. A text in quotes is a single word, and so is a semicolon.
 fn tokens(line: &str, part: Range<usize>) -> Result<Vec<Range<usize>>, Fault> {
     let mut tokens: Vec<Range<usize>> = Vec::new();
     let mut rest = part.start;
@@ -213,14 +213,14 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// `12` or `12-15`.
+/// Parses a number or a range, such as `12` or `12-15`.
 fn range(word: &str) -> Option<RangeInclusive<u64>> {
     let (first, last) = word.split_once('-').unwrap_or((word, word));
     let range = first.parse().ok()?..=last.parse().ok()?;
     (!range.is_empty()).then_some(range)
 }
 
-/// `1st`, `2nd`, `3rd`, `11th`.
+/// Parses an ordinal number, such as `1st`, `2nd`, `3rd` or `11th`.
 fn ordinal(word: &str) -> Option<u64> {
     let digits = word.trim_end_matches(|c: char| c.is_ascii_alphabetic());
     let number: u64 = digits.parse().ok().filter(|number| *number > 0)?;
@@ -237,7 +237,7 @@ const fn suffix(number: u64) -> &'static str {
     }
 }
 
-/// What stands in quotes, or behind `0x`.
+/// Parses the bytes in quotes, or after `0x`.
 fn bytes(word: &str) -> Option<Vec<u8>> {
     if let Some(text) = word.strip_prefix('"') {
         return text.strip_suffix('"').map(|text| text.as_bytes().to_vec());
@@ -247,7 +247,7 @@ fn bytes(word: &str) -> Option<Vec<u8>> {
 }
 
 impl fmt::Display for Hit {
-    /// The words.
+    /// Writes the words from which the hit can be parsed.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.action {
             Action::Drop => f.write_str("drop"),
