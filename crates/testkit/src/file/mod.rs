@@ -70,7 +70,7 @@ pub enum LinkFileError {
     Words {
         /// The file.
         path: PathBuf,
-        /// Where, and why.
+        /// Place and message of the error.
         error: WordsError,
     },
     /// The file is a scene file or a relay file, and this crate was built without the feature for it.

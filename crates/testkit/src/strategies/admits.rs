@@ -1,4 +1,4 @@
-//! Whether a link is within bounds; and chains that lose as much in the long run as they should.
+//! Check whether a link is within bounds, and fitting of chains to a long-run loss.
 
 use cohaptic_wan::netem::{ChanceSpec, LossSpec, Netem, SlotGap};
 
@@ -7,11 +7,11 @@ use super::link::ImpairedLink;
 use super::stage::{self, Stage};
 use super::units::{ALL, nanos, units, whole};
 
-/// By how much the long-run loss of a model with bursts may miss its range: a hundredth of a percent.
+/// Tolerance of the long-run loss of a model with bursts: a hundredth of a percent, in ten-thousandths of a percent.
 pub(super) const SLACK: u64 = 100;
 
 impl LinkBounds {
-    /// Whether such a link may be drawn, or be shrunk to.
+    /// Returns whether the link may be drawn or be the result of shrinking.
     #[must_use]
     pub fn admits(&self, link: &ImpairedLink) -> bool {
         let netem = link.netem();
@@ -19,7 +19,7 @@ impl LinkBounds {
         let right = |stage: Stage| match self.presence(stage) {
             Presence::Never => !present(stage),
             Presence::Maybe => true,
-            // Whatever varies or is overtaken is delayed.
+            // Jitter and reordering include a delay.
             Presence::Always => present(stage) || (stage == Stage::Delay && netem.delay.is_some()),
         };
         Stage::ALL.into_iter().all(|stage| right(stage) && (number(netem, stage).is_none_or(|number| self.span(stage).contains(number))))
@@ -29,7 +29,7 @@ impl LinkBounds {
     }
 }
 
-/// The number of a stage that is there.
+/// Returns the number of a stage, or `None` if the stage is absent or has no single number.
 fn number(netem: &Netem, stage: Stage) -> Option<u64> {
     if !stage::has(netem, stage) {
         return None;
@@ -54,7 +54,7 @@ fn number(netem: &Netem, stage: Stage) -> Option<u64> {
     }
 }
 
-/// How much a link loses in the long run, in ten-thousandths of a percent.
+/// Returns the long-run loss of a link, in ten-thousandths of a percent.
 pub(super) fn long_run(link: &ImpairedLink) -> Option<u64> {
     link.config().loss.mean().map(|mean| units(mean * 100.0).min(ALL))
 }
@@ -71,7 +71,7 @@ fn loss(bounds: &LinkBounds, link: &ImpairedLink) -> bool {
     bounds.models.contains(&model) && (model == LossModel::Random || long_run(link).is_some_and(within))
 }
 
-/// Whether the forms are those that may be drawn.
+/// Returns whether correlations, distributions and jitter are of permitted forms.
 fn shapes(bounds: &LinkBounds, netem: &Netem) -> bool {
     let jitter = netem.delay.as_ref().and_then(|delay| delay.jitter.as_ref());
     let random = if let Some(LossSpec::Random(chance)) = &netem.loss { Some(chance) } else { None };
@@ -86,8 +86,8 @@ fn shapes(bounds: &LinkBounds, netem: &Netem) -> bool {
         && jitter.zip(netem.delay.as_ref()).is_none_or(|(jitter, delay)| jitter.time <= delay.time)
 }
 
-/// The chain whose way into bursts, up to `most` ten-thousandths of a percent, makes it lose that share in the long run, which grows with it; `None` if
-/// none does to half of what it may miss by.
+/// Returns the chain whose long-run loss is `share`. `chain` makes a chain from the probability of entering bursts, which is varied up to `most`, in
+/// ten-thousandths of a percent; the loss must grow with it. `None` if no chain comes within half of the tolerance.
 pub(super) fn fitting(share: u64, most: u64, chain: impl Fn(u64) -> LossSpec) -> Option<LossSpec> {
     let lost = |p: u64| {
         let netem = Netem { loss: Some(chain(p)), ..Netem::default() };

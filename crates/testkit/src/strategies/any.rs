@@ -1,4 +1,4 @@
-//! The strategies.
+//! Strategies of links and networks.
 
 use std::sync::Arc;
 
@@ -14,22 +14,22 @@ use super::network::ImpairedNetwork;
 use super::shrink::Search;
 use super::space::{LinkSpace, NetworkSpace};
 
-/// Any link: [`links_like`] with [`LinkBounds::any`].
+/// Draws any link: [`links_like`] with [`LinkBounds::any`].
 pub fn any_link() -> Links {
     links_like(LinkBounds::any())
 }
 
-/// Links within bounds, shrinking to the least impaired one that still fails.
+/// Draws links within bounds. They shrink to the least impaired link on which the test still fails.
 ///
 /// # Panics
 ///
-/// If the bounds make no sense; [`LinkBounds::check`] gives an error instead.
+/// If the bounds make no sense; [`LinkBounds::check`] returns an error instead.
 #[track_caller]
 pub fn links_like(bounds: LinkBounds) -> Links {
     Links { bounds: checked(bounds) }
 }
 
-/// Any network of that number of hosts: [`networks_like`] with [`LinkBounds::any`].
+/// Draws any network of `hosts` hosts: [`networks_like`] with [`LinkBounds::any`].
 ///
 /// # Panics
 ///
@@ -39,12 +39,12 @@ pub fn any_network(hosts: usize) -> Networks {
     networks_like(hosts, LinkBounds::any())
 }
 
-/// Networks of that number of hosts whose links are within bounds, shrinking to the least impaired one that still fails. In a third each of all networks
-/// about a quarter, half and all of the links are impaired.
+/// Draws networks of `hosts` hosts whose links are within bounds. They shrink to the least impaired network on which the test still fails. About a quarter of
+/// the links is impaired in a third of all networks, half of the links in another third, and all links in the last third.
 ///
 /// # Panics
 ///
-/// With no hosts, or more than 1000, or if the bounds make no sense; [`LinkBounds::check`] gives an error instead.
+/// With no hosts, or more than 1000, or if the bounds make no sense; [`LinkBounds::check`] returns an error instead.
 #[track_caller]
 pub fn networks_like(hosts: usize, bounds: LinkBounds) -> Networks {
     Networks { ideal: ImpairedNetwork::ideal(hosts), bounds: checked(bounds) }
@@ -59,14 +59,14 @@ pub(super) fn checked(bounds: LinkBounds) -> Arc<LinkBounds> {
     Arc::new(bounds)
 }
 
-/// Links at random: see [`links_like`].
+/// Strategy of links: see [`links_like`].
 #[derive(Clone, Debug)]
 #[must_use = "strategies do nothing unless used"]
 pub struct Links {
     bounds: Arc<LinkBounds>,
 }
 
-/// Networks at random: see [`networks_like`].
+/// Strategy of networks: see [`networks_like`].
 #[derive(Clone, Debug)]
 #[must_use = "strategies do nothing unless used"]
 pub struct Networks {
@@ -76,13 +76,13 @@ pub struct Networks {
 
 #[cfg(feature = "scenes")]
 impl Networks {
-    /// Networks of that number of hosts within bounds that were checked.
+    /// Creates a strategy of networks of `hosts` hosts. The bounds must have been checked.
     pub(super) fn within(hosts: usize, bounds: &Arc<LinkBounds>) -> Self {
         Self { ideal: ImpairedNetwork::ideal(hosts), bounds: Arc::clone(bounds) }
     }
 }
 
-/// How often a link is drawn anew where models with bursts cannot lose as little or as much as the bounds say.
+/// Maximum number of draws of a link. A draw fails if a model with bursts cannot reach the loss within the bounds.
 const ATTEMPTS: u32 = 100;
 
 fn link(bounds: &LinkBounds, is_ideal: bool, runner: &mut TestRunner) -> Result<ImpairedLink, proptest::test_runner::Reason> {

@@ -1,4 +1,4 @@
-//! How bad links may be.
+//! Bounds on the impairments of links.
 
 use core::ops::RangeInclusive;
 use core::time::Duration;
@@ -8,10 +8,10 @@ use super::grid::Span;
 use super::stage::Stage;
 use super::units::{nanos, percent, units};
 
-/// Bounds of links, stage by stage: whether it may be there, and its numbers.
+/// Bounds of links, stage by stage: whether the stage may be present, and the range of its number.
 ///
-/// [`LinkBounds::any`] lets every stage be there, [`LinkBounds::ideal`] none. Giving a stage a range lets it be there; [`LinkBounds::always`] and
-/// [`LinkBounds::never`] say more. A range that begins at zero begins at the least that is something: 1 µs, 0.01 %, one packet; without the stage it is
+/// [`LinkBounds::any`] permits every stage, [`LinkBounds::ideal`] none. A range for a stage permits the stage; [`LinkBounds::always`] and [`LinkBounds::never`]
+/// change this. A range that begins at zero begins at the least value with an effect instead: 1 µs, 0.01 %, one packet; a link without the stage stands for
 /// zero. Percentages are counted in ten-thousandths, rates in whole bytes per second.
 ///
 /// | stage | its number | where [`LinkBounds::any`] has it |
@@ -26,8 +26,8 @@ use super::units::{nanos, percent, units};
 /// | limit | packets held at most | 2 to 1000 |
 /// | slot | least time from one slot to the next | 1 ms to 50 ms |
 ///
-/// Not drawn, though words may have them: `ecn`, `seed`, the framing of a rate, bytes of a slot, tables from files, and correlated Pareto laws, which take
-/// long to compute.
+/// The following words are never drawn: `ecn`, `seed`, the framing of a rate, bytes of a slot, tables from files, and correlated Pareto laws, which take long
+/// to compute.
 ///
 /// ```
 /// use std::time::Duration;
@@ -47,7 +47,7 @@ pub struct LinkBounds {
     fault: Option<BoundsError>,
 }
 
-/// Whether a stage is there.
+/// Presence of a stage.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Presence {
     Never,
@@ -55,7 +55,7 @@ pub(super) enum Presence {
     Always,
 }
 
-/// A model of loss.
+/// Model of loss.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 #[non_exhaustive]
 pub enum LossModel {
@@ -67,7 +67,7 @@ pub enum LossModel {
     State,
 }
 
-/// Ten-thousandths of a percent.
+/// One percent, in ten-thousandths of a percent.
 const PERCENT: u64 = 10_000;
 const MS: u64 = 1_000_000;
 
@@ -75,7 +75,7 @@ const fn span(low: u64, high: u64, step: u64) -> Span {
     Span { low, high, step }
 }
 
-/// In the order of [`Stage::ALL`].
+/// Default range of each stage, in the order of [`Stage::ALL`].
 const DEFAULTS: [Span; Stage::ALL.len()] = [
     span(2, 1000, 1),
     span(MS, 500 * MS, 1),
@@ -89,19 +89,19 @@ const DEFAULTS: [Span; Stage::ALL.len()] = [
 ];
 
 impl LinkBounds {
-    /// Any stage may be there, with the ranges above, every distribution, correlation and model of loss.
+    /// Creates bounds that permit every stage, with the ranges above, every distribution, correlation and model of loss.
     #[must_use]
     pub fn any() -> Self {
         Self { presence: [Presence::Maybe; Stage::ALL.len()], ..Self::ideal() }
     }
 
-    /// A phone: a delay of up to 100 ms, a rate from 64 kbit/s to 20 Mbit/s, and nothing else.
+    /// Creates the bounds of a phone: a delay of up to 100 ms, and a rate from 64 kbit/s to 20 Mbit/s.
     #[must_use]
     pub fn phone() -> Self {
         Self::ideal().delay(Duration::ZERO..=Duration::from_millis(100)).rate(64_000..=20_000_000)
     }
 
-    /// No stage is there.
+    /// Creates bounds that permit no stage.
     #[must_use]
     pub fn ideal() -> Self {
         Self {
@@ -114,43 +114,43 @@ impl LinkBounds {
         }
     }
 
-    /// The mean delay, that of jitter and reordering too.
+    /// Sets the range of the mean delay, including the delay of jitter and reordering.
     #[must_use]
     pub fn delay(self, range: RangeInclusive<Duration>) -> Self {
         self.time(Stage::Delay, &range)
     }
 
-    /// The jitter: half the width if the law is uniform, else the standard deviation.
+    /// Sets the range of the jitter: half the width of a uniform law, otherwise the standard deviation.
     #[must_use]
     pub fn jitter(self, range: RangeInclusive<Duration>) -> Self {
         self.time(Stage::Jitter, &range)
     }
 
-    /// How much is lost in the long run \[%\], to a hundredth of a percent for models with bursts.
+    /// Sets the range of the long-run loss \[%\]. Models with bursts keep it to a hundredth of a percent.
     #[must_use]
     pub fn loss(self, range: RangeInclusive<f64>) -> Self {
         self.percent(Stage::Loss, &range)
     }
 
-    /// How much is corrupted \[%\].
+    /// Sets the range of the share of corrupted packets \[%\].
     #[must_use]
     pub fn corrupt(self, range: RangeInclusive<f64>) -> Self {
         self.percent(Stage::Corrupt, &range)
     }
 
-    /// How much comes twice \[%\].
+    /// Sets the range of the share of duplicated packets \[%\].
     #[must_use]
     pub fn duplicate(self, range: RangeInclusive<f64>) -> Self {
         self.percent(Stage::Duplicate, &range)
     }
 
-    /// How much goes at once, before what waits \[%\].
+    /// Sets the range of the share of packets that overtake the delayed packets \[%\].
     #[must_use]
     pub fn reorder(self, range: RangeInclusive<f64>) -> Self {
         self.percent(Stage::Reorder, &range)
     }
 
-    /// The rate \[bit/s\].
+    /// Sets the range of the rate \[bit/s\].
     #[must_use]
     pub fn rate(mut self, range: RangeInclusive<u64>) -> Self {
         const MOST: u64 = 1_000_000_000_000;
@@ -159,7 +159,7 @@ impl LinkBounds {
                 return self.refuse(BoundsError::Rate { found });
             }
         }
-        // A size rounded to whole bytes must stay inside.
+        // A rate is rounded to whole bytes, and the result must stay within the range.
         let (low, high) = (range.start().next_multiple_of(8), range.end() - range.end() % 8);
         if low > high {
             let (low, high) = (format!("{}bit", range.start()), format!("{}bit", range.end()));
@@ -169,7 +169,7 @@ impl LinkBounds {
         self
     }
 
-    /// How many packets are held at most, those under way included.
+    /// Sets the range of the limit: the maximum number of packets held, packets under way included.
     #[must_use]
     pub fn limit(mut self, range: RangeInclusive<u32>) -> Self {
         let (low, high) = (*range.start(), *range.end());
@@ -180,59 +180,59 @@ impl LinkBounds {
         self
     }
 
-    /// The least time from one slot to the next; the longest is drawn up to twice that.
+    /// Sets the range of the least time between two slots. The longest time is drawn up to twice the least time.
     #[must_use]
     pub fn slot(self, range: RangeInclusive<Duration>) -> Self {
         self.time(Stage::Slot, &range)
     }
 
-    /// Whether jitter may have laws other than the uniform one.
+    /// Sets whether jitter may have laws other than the uniform law.
     #[must_use]
     pub const fn distributions(mut self, may: bool) -> Self {
         self.distributions = may;
         self
     }
 
-    /// Whether neighbouring packets may be alike: the correlation of uniform and normal jitter, and of whatever happens with a probability.
+    /// Sets whether neighbouring packets may be correlated: in uniform and normal jitter, and in every stage with a probability.
     #[must_use]
     pub const fn correlation(mut self, may: bool) -> Self {
         self.correlation = may;
         self
     }
 
-    /// Which models of loss there may be.
+    /// Sets the permitted models of loss.
     #[must_use]
     pub fn loss_models(mut self, models: &[LossModel]) -> Self {
         self.models = models.to_vec();
         self
     }
 
-    /// Lets the stage be there in every link; shrinking leaves it there.
+    /// Makes the stage present in every link. Shrinking does not remove it.
     #[must_use]
     pub const fn always(mut self, stage: Stage) -> Self {
         self.presence[stage.place()] = Presence::Always;
         self
     }
 
-    /// Lets the stage be there or not, with the range that it has.
+    /// Permits the stage, with its present range.
     #[must_use]
     pub const fn maybe(mut self, stage: Stage) -> Self {
         self.presence[stage.place()] = Presence::Maybe;
         self
     }
 
-    /// Keeps the stage out. Jitter and reordering bring a delay with them even where there is none otherwise.
+    /// Forbids the stage. Jitter and reordering bring a delay even where a delay by itself is forbidden.
     #[must_use]
     pub const fn never(mut self, stage: Stage) -> Self {
         self.presence[stage.place()] = Presence::Never;
         self
     }
 
-    /// Whether the bounds make sense. The strategies made from them ask it too.
+    /// Checks whether the bounds make sense. The strategies made from the bounds check as well.
     ///
     /// # Errors
     ///
-    /// The first thing that makes none.
+    /// The first fault of the bounds.
     pub fn check(&self) -> Result<(), BoundsError> {
         if let Some(fault) = &self.fault {
             return Err(fault.clone());

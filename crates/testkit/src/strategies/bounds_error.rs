@@ -1,55 +1,55 @@
-//! Why bounds are refused.
+//! Errors of bounds.
 
 use std::fmt;
 use std::time::Duration;
 
 use super::stage::Stage;
 
-/// Why bounds make no sense.
+/// Reason why bounds make no sense.
 #[derive(Clone, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum BoundsError {
-    /// The range has nothing in it.
+    /// The range is empty.
     Empty {
         /// The stage.
         stage: Stage,
-        /// Where it begins.
+        /// Beginning of the range.
         low: String,
-        /// Where it ends.
+        /// End of the range.
         high: String,
     },
-    /// The range has only zero in it.
+    /// The range contains only zero.
     OnlyZero {
         /// The stage.
         stage: Stage,
     },
-    /// No percentage.
+    /// A number is no percentage.
     Percentage {
         /// The stage.
         stage: Stage,
-        /// What was found.
+        /// The number.
         found: f64,
     },
-    /// A time that netem cannot count.
+    /// A time is too long for netem.
     TooLong {
         /// The stage.
         stage: Stage,
-        /// What was found.
+        /// The time.
         found: Duration,
     },
-    /// A rate that netem cannot count.
+    /// A rate is out of the range of netem.
     Rate {
-        /// What was found.
+        /// The rate \[bit/s\].
         found: u64,
     },
-    /// Jitter above any delay.
+    /// The least jitter is longer than the longest delay.
     JitterAboveDelay {
-        /// The least jitter.
+        /// Least jitter.
         jitter: Duration,
-        /// The longest delay.
+        /// Longest delay.
         delay: Duration,
     },
-    /// Loss without a model.
+    /// Loss is permitted, but no model of loss is.
     NoModel,
 }
 

@@ -1,4 +1,4 @@
-//! A link at random.
+//! Random drawing of a link.
 
 use core::num::NonZeroU32;
 use core::time::Duration;
@@ -14,7 +14,8 @@ use super::link::ImpairedLink;
 use super::stage::Stage;
 use super::units::{ALL, percent};
 
-/// A link within bounds: each stage that may be there is, in one of three cases; none, if it `is_ideal`. `None` if the bounds leave nothing.
+/// Draws a link within bounds. Each permitted stage is present in a third of all cases, and absent if `is_ideal`. `None` if the drawn link is not within the
+/// bounds.
 pub(super) fn link(bounds: &LinkBounds, is_ideal: bool, dice: &mut Dice<'_>) -> Option<ImpairedLink> {
     let netem = words(bounds, is_ideal, dice);
     ImpairedLink::new(netem).ok().filter(|link| bounds.admits(link))
@@ -23,7 +24,7 @@ pub(super) fn link(bounds: &LinkBounds, is_ideal: bool, dice: &mut Dice<'_>) -> 
 fn words(bounds: &LinkBounds, is_ideal: bool, dice: &mut Dice<'_>) -> Netem {
     let mut is_there = [false; Stage::ALL.len()];
     for stage in Stage::ALL {
-        // Drawn whether it is asked or not, so that bounds change no other stage.
+        // Drawn for every stage, whatever the bounds say, so that bounds of a stage change no other stage.
         let drawn = dice.one_in(3);
         is_there[stage.place()] = match bounds.presence(stage) {
             Presence::Never => false,
@@ -66,7 +67,7 @@ fn nanos(count: u64) -> Duration {
 }
 
 fn correlation(bounds: &LinkBounds, dice: &mut Dice<'_>) -> Option<cohaptic_wan::netem::Percent> {
-    // 5 % to 90 %.
+    // From 5 % to 90 %.
     (dice.one_in(4) && bounds.correlation).then(|| percent(50_000 * (1 + dice.below(18))))
 }
 
@@ -74,7 +75,7 @@ fn chance(bounds: &LinkBounds, stage: Stage, dice: &mut Dice<'_>) -> ChanceSpec 
     ChanceSpec { percent: percent(dice.number(bounds.span(stage))), correlation: correlation(bounds, dice) }
 }
 
-/// A uniform law may reach from zero to twice the mean; others with a deviation of at most half the mean stay above zero without being bent.
+/// Draws a delay. A uniform law may reach from zero to twice the mean. The other laws stay above zero if their deviation is at most half the mean.
 fn delay(bounds: &LinkBounds, jitters: bool, dice: &mut Dice<'_>) -> DelaySpec {
     let longest = bounds.span(Stage::Delay).high;
     let mut mean = dice.number(bounds.span(Stage::Delay));
@@ -89,7 +90,7 @@ fn delay(bounds: &LinkBounds, jitters: bool, dice: &mut Dice<'_>) -> DelaySpec {
     } else {
         None
     };
-    // For the heavy-tailed laws it takes ten milliseconds to find the chain that has a correlation: a test would spend its time with that.
+    // A heavy-tailed law with correlation needs a search for its chain, which would take most of the time of a test.
     let is_quick = matches!(law, None | Some(Distribution::Normal));
     let correlation = correlation(bounds, dice).filter(|_| is_quick);
     DelaySpec { time: nanos(mean), jitter: Some(JitterSpec { time: nanos(sd), correlation, distribution: law }) }
@@ -120,7 +121,7 @@ fn loss(bounds: &LinkBounds, dice: &mut Dice<'_>) -> LossSpec {
         LossModel::Gemodel => gemodel(share, dice),
         LossModel::State => state(share, dice),
     };
-    // A chain that leaves its bad state as often as it does not enter it can lose any share.
+    // Any share can be lost by a chain that leaves its bad state with the probability of not entering it.
     in_bursts.unwrap_or_else(|| two_states(model, share, ALL - share))
 }
 

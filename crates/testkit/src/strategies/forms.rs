@@ -1,4 +1,4 @@
-//! Stages in plainer forms.
+//! Plainer forms of stages.
 
 use cohaptic_wan::netem::{ChanceSpec, GemodelSpec, JitterSpec, LossSpec, Netem, SlotGap, StateSpec};
 
@@ -9,22 +9,22 @@ use super::numbers::{jitter_mut, random_mut, reorder_mut};
 use super::stage::{self, Stage};
 use super::units::{ALL, percent, whole};
 
-/// A form that can be made plainer, in the order in which they are.
+/// Change of a link to a plainer form. The variants are in the order in which they are tried.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Form {
-    /// Reordering to the delay that it brought.
+    /// Reordering becomes its delay.
     Reordering,
-    /// Jitter to the delay around which it is.
+    /// Jitter becomes its mean delay.
     Jitter,
     JitterCorrelation,
-    /// Any law to the uniform one.
+    /// Any law of jitter becomes the uniform law.
     JitterDistribution,
-    /// Bursts to random loss that loses as much.
+    /// Bursts become random loss with the same long-run loss.
     LossInBursts,
     LossCorrelation,
-    /// The last probability of a chain to its default; the way into bursts is made such that it loses as much as before.
+    /// The last probability of a chain becomes its default. The probability of entering bursts is changed to keep the long-run loss.
     LastProbability,
-    /// Four states to two.
+    /// Four states become two.
     FourStates,
     CorruptCorrelation,
     DuplicateCorrelation,
@@ -37,7 +37,7 @@ pub(super) enum Form {
 }
 
 impl Form {
-    /// A chain has up to four probabilities that can go, so that is tried as often.
+    /// All changes. A chain has up to four probabilities that can be removed, so that change is listed four times.
     pub(super) const ALL: [Self; 19] = [
         Self::Reordering,
         Self::Jitter,
@@ -116,7 +116,7 @@ fn uncorrelate(chance: Option<&mut ChanceSpec>) {
     change(chance, |chance| chance.correlation = None);
 }
 
-/// p and r stay: without r a chain has bursts of another length.
+/// Removes the last probability of a chain other than p and r. The latter stay, because r determines the length of bursts.
 fn without_last_probability(loss: LossSpec, share: u64) -> LossSpec {
     match loss {
         LossSpec::Random(_) => None,

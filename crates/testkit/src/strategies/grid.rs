@@ -1,9 +1,9 @@
-//! Numbers as people write them, and searches among them.
+//! Round numbers, and random choices among them.
 
 use proptest::prelude::Rng;
 use proptest::test_runner::TestRng;
 
-/// Whole numbers from `low` to `high`, those between them multiples of `step` where they are round.
+/// Range of whole numbers from `low` to `high`. Round numbers within the range are multiples of `step`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Span {
     pub(super) low: u64,
@@ -17,26 +17,26 @@ impl Span {
     }
 }
 
-/// The least number of at most `digits` significant digits, counted in steps, that is above `value`; `None` if it cannot be counted.
+/// Returns the least number above `value` with at most `digits` significant digits, counted in steps. `None` if it does not fit.
 fn next_above(value: u64, digits: u32, step: u64) -> Option<u64> {
     let count = value / step;
     let unit = unit(count, digits);
     (count / unit).checked_add(1)?.checked_mul(unit)?.checked_mul(step)
 }
 
-/// The value of the last of that number of digits of a count.
+/// Returns the value of the last of the first `digits` digits of a count.
 fn unit(count: u64, digits: u32) -> u64 {
     let places = count.checked_ilog10().map_or(1, |log| log + 1);
     10_u64.pow(places.saturating_sub(digits))
 }
 
-/// The greatest number of at most `digits` significant digits, counted in steps, that is below `value`; `None` below nothing.
+/// Returns the greatest number below `value` with at most `digits` significant digits, counted in steps. `None` if `value` is 0.
 fn next_below(value: u64, digits: u32, step: u64) -> Option<u64> {
     let count = value.checked_sub(1)? / step;
     Some(count / unit(count, digits) * unit(count, digits) * step)
 }
 
-/// The round number next to `value` on the way to `goal`; that at the latest.
+/// Returns the next round number after `value` on the way to `goal`, or `goal` if there is none before it.
 pub(super) fn next_towards(goal: u64, value: u64, digits: u32, step: u64) -> u64 {
     if goal < value {
         next_below(value, digits, step).map_or(goal, |next| next.max(goal))
@@ -45,22 +45,22 @@ pub(super) fn next_towards(goal: u64, value: u64, digits: u32, step: u64) -> u64
     }
 }
 
-/// All numbers of at most `digits` significant digits strictly between the two, ascending: at most nine tenths of 10^`digits` a decade.
+/// Returns all numbers strictly between `low` and `high` with at most `digits` significant digits, ascending. A decade has at most 0.9 · 10^`digits` of them.
 pub(super) fn round_between(low: u64, high: u64, digits: u32, step: u64) -> Vec<u64> {
     std::iter::successors(next_above(low, digits, step), |value| next_above(*value, digits, step)).take_while(|value| *value < high).collect()
 }
 
-/// Whether the number has at most this number of significant digits, counted in steps.
+/// Returns whether a number has at most `digits` significant digits, counted in steps.
 pub(super) fn is_round(value: u64, digits: u32, step: u64) -> bool {
     let count = value / step;
     value.is_multiple_of(step) && count.is_multiple_of(unit(count, digits))
 }
 
-/// Random choices.
+/// Source of random choices.
 pub(super) struct Dice<'a>(pub(super) &'a mut TestRng);
 
 impl Dice<'_> {
-    /// 0 to `count` − 1; 0 if the count is 0. The bias is below 2⁻³² for any count that is used here.
+    /// Returns a number from 0 to `count` − 1, or 0 if `count` is 0. The bias is below 2⁻³² for the counts used here.
     pub(super) fn below(&mut self, count: u64) -> u64 {
         let wide = u128::from(self.0.next_u64()) * u128::from(count);
         u64::try_from(wide >> 64).unwrap_or(0)
@@ -70,14 +70,14 @@ impl Dice<'_> {
         self.below(count) == 0
     }
 
-    /// One of several.
+    /// Returns one of several values, each with equal probability.
     pub(super) fn pick<T: Copy>(&mut self, first: T, others: &[T]) -> T {
         let place = usize::try_from(self.below(others.len() as u64 + 1)).unwrap_or(0);
         place.checked_sub(1).and_then(|place| others.get(place)).copied().unwrap_or(first)
     }
 
-    /// A number of the span: either end in a tenth of all cases each, else mostly of two digits (every decade as likely as the next in half of the
-    /// cases), and in a tenth of all cases any at all.
+    /// Draws a number of a range. In a tenth of all cases each the result is the lower end, the upper end, or any number. Otherwise it has two significant
+    /// digits; in half of all cases every decade is equally likely.
     pub(super) fn number(&mut self, span: Span) -> u64 {
         let Span { low, high, step } = span;
         let anywhere = |dice: &mut Self| low + dice.below((high - low).saturating_add(1));

@@ -1,4 +1,4 @@
-//! Packets that are hit, at random.
+//! Random hits on packets.
 
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
@@ -12,11 +12,12 @@ use super::shrink::{Number, Search, Space};
 use crate::hit::{Action, Hit, Hits, PathHit, Which, push_number};
 use crate::words::hits_on;
 
-/// Sets of packets that are hit, among the first `packets` of every path between these hosts. Each is hit by one of the actions, which are the words that stand before
-/// the packets: `drop`, `delay 200ms`, `behind 2`. In a third each of all sets about a sixteenth, a quarter and half of the packets are hit.
+/// Draws sets of packets that are hit, among the first `packets` packets of every path between these hosts. Each hit applies one of the actions, given by the
+/// words before the packets: `drop`, `delay 200ms`, `behind 2`. About a sixteenth of the packets is hit in a third of all sets, a quarter in another third, and
+/// half in the last third.
 ///
-/// They shrink to a set from which no packet can be left out, with the first action in place of another one wherever it fails too: all packets are tried at once, then halves,
-/// and so on to single packets. To leave one out [changes nothing else](crate::hit) on the links.
+/// A set shrinks until no packet can be left out. An action becomes the first action wherever the test then fails as well. Shrinking tries all packets at once,
+/// then halves, and so on down to single packets. Leaving a hit out [changes nothing else](crate::hit) on the links.
 ///
 /// ```
 /// use cohaptic_testkit::proptest::test_runner::{TestCaseError, TestError, TestRunner};
@@ -41,7 +42,7 @@ use crate::words::hits_on;
 ///
 /// # Panics
 ///
-/// If there are no actions, one of them makes no sense, or two hosts have one name.
+/// If there are no actions, an action makes no sense, or two hosts have the same name.
 #[track_caller]
 pub fn any_hits<N: Into<String>, A: AsRef<str>>(
     hosts: impl IntoIterator<Item = N>,
@@ -55,7 +56,7 @@ pub fn any_hits<N: Into<String>, A: AsRef<str>>(
     PacketSets(Sets { space, packets })
 }
 
-/// Sets of packets that are hit: see [`any_hits`].
+/// Strategy of sets of packets that are hit: see [`any_hits`].
 #[derive(Clone, Debug)]
 #[must_use = "strategies do nothing unless used"]
 pub struct PacketSets(Sets);
@@ -71,7 +72,7 @@ impl Strategy for PacketSets {
     }
 }
 
-/// What stands before the packets.
+/// Parses an action: the words before the packets of a hit.
 #[track_caller]
 #[expect(clippy::panic, reason = "documented: actions stand in a test")]
 fn action(words: &str) -> Action {
@@ -82,7 +83,7 @@ fn action(words: &str) -> Action {
     }
 }
 
-/// The packets that are hit, by sender, receiver and number, and the place of the action.
+/// Packets that are hit, by sender, receiver and number, with the index of the action.
 type Set = BTreeMap<(usize, usize, u64), usize>;
 
 #[derive(Clone, Debug)]
@@ -112,7 +113,7 @@ impl Strategy for Sets {
     }
 }
 
-/// What can be made of a set.
+/// Space of sets, in which shrinking searches.
 #[derive(Clone, Debug)]
 struct SetSpace {
     hosts: Arc<[String]>,
@@ -120,7 +121,7 @@ struct SetSpace {
 }
 
 impl SetSpace {
-    /// The set in words: the paths in their order, then the actions in theirs.
+    /// Converts a set to hits, sorted by path, then action.
     fn hits(&self, set: &Set) -> Hits {
         let mut numbers: BTreeMap<(usize, usize, usize), Vec<RangeInclusive<u64>>> = BTreeMap::new();
         for (&(from, to, number), &action) in set {

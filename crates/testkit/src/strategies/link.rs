@@ -1,4 +1,4 @@
-//! A link in the words of `tc-netem`.
+//! Links in the words of `tc-netem`.
 
 use core::fmt;
 use core::str::FromStr;
@@ -9,10 +9,10 @@ use cohaptic_wan::{LinkConfig, LinkModel};
 
 use super::stage::{self, Stage};
 
-/// A link that does what words of `tc-netem` say, exactly ([`Netem::to_link_config`]).
+/// Link that emulates words of `tc-netem` exactly ([`Netem::to_link_config`]).
 ///
-/// It is shown as its words: `Display` as they are, `Debug` as Rust that makes the same value, so that what a failing test prints can be pasted into a test. The ideal
-/// link is shown as `delay 0s`, which netem and scenes read as an ideal link too; all that says nothing reads as the ideal link: `""`, `delay 0s`.
+/// `Display` prints the words, `Debug` prints Rust code that makes the same value, so that the output of a failing test can be pasted into a test. The ideal
+/// link is printed as `delay 0s`, which netem and scenes read as an ideal link as well. `""` and `delay 0s` are read as the ideal link.
 ///
 /// ```
 /// use cohaptic_testkit::strategies::{ImpairedLink, Stage};
@@ -32,18 +32,18 @@ pub struct ImpairedLink {
     config: Arc<LinkConfig>,
 }
 
-/// Why words are no link.
+/// Error of words that describe no link.
 #[derive(Clone, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum LinkError {
-    /// They are no words of netem. The message has the line, and a mark under the word to blame.
+    /// The words are no words of netem. The message contains the line, and a mark under the wrong word.
     Words {
-        /// The words and the mark.
+        /// Line of the words, and the mark.
         excerpt: String,
-        /// The fault.
+        /// Fault of the words.
         reason: NetemError,
     },
-    /// They ask for what cannot be. Tables of distributions are not read from files here.
+    /// The words ask for a link that cannot be emulated. Tables of distributions are not read from files here.
     Exact(ExactError),
 }
 
@@ -65,17 +65,17 @@ impl From<ExactError> for LinkError {
 }
 
 impl ImpairedLink {
-    /// The link without any impairment.
+    /// Returns the link without any impairment.
     #[must_use]
     pub fn ideal() -> Self {
         Self::default()
     }
 
-    /// The link that the words say: what `Debug` prints.
+    /// Parses the words that `Debug` prints.
     ///
     /// # Panics
     ///
-    /// If they are refused; `words.parse::<ImpairedLink>()` gives an error instead.
+    /// If the words are refused; `words.parse::<ImpairedLink>()` returns an error instead.
     #[must_use]
     #[track_caller]
     #[expect(clippy::panic, reason = "documented: for words that stand in a test")]
@@ -83,11 +83,11 @@ impl ImpairedLink {
         words.parse().unwrap_or_else(|error| panic!("not the words of a link:\n{error}"))
     }
 
-    /// Checks the words.
+    /// Creates a link from parsed words.
     ///
     /// # Errors
     ///
-    /// [`ExactError`] if they ask for what cannot be, a table of a file among it.
+    /// [`ExactError`] if the link cannot be emulated, such as a link with a table from a file.
     pub fn new(mut netem: Netem) -> Result<Self, ExactError> {
         if netem.delay.as_ref().is_some_and(|delay| delay.time.is_zero() && delay.jitter.is_none()) {
             netem.check()?;
@@ -97,37 +97,38 @@ impl ImpairedLink {
         Ok(Self { netem, config })
     }
 
-    /// What the words say.
+    /// Returns the parsed words.
     #[must_use]
     pub const fn netem(&self) -> &Netem {
         &self.netem
     }
 
-    /// The configuration that does it.
+    /// Returns the configuration of the link.
     #[must_use]
     pub fn config(&self) -> LinkConfig {
         LinkConfig::clone(&self.config)
     }
 
-    /// The model of it, for [`cohaptic_wan::Link`] and [`cohaptic_wan::Network`].
+    /// Returns the model of the link, for [`cohaptic_wan::Link`] and [`cohaptic_wan::Network`].
     #[must_use]
     pub fn model(&self) -> LinkModel {
         LinkModel::from(self.config())
     }
 
-    /// Its impairments, in the order of the words. A delay counts as one only without jitter and reordering, which it serves; a zero, and `seed`, are none.
+    /// Returns the impairments of the link, in the order of the words. A delay counts only without jitter and reordering, to which it belongs otherwise.
+    /// Options with the value zero, and `seed`, do not count.
     #[must_use]
     pub fn stages(&self) -> Vec<Stage> {
         Stage::ALL.into_iter().filter(|stage| stage::has(&self.netem, *stage)).collect()
     }
 
-    /// Whether that is one of its impairments.
+    /// Returns whether the link has the impairment `stage`.
     #[must_use]
     pub fn has(&self, stage: Stage) -> bool {
         stage::has(&self.netem, stage)
     }
 
-    /// Whether it has no impairments.
+    /// Returns whether the link has no impairments.
     #[must_use]
     pub fn is_ideal(&self) -> bool {
         !Stage::ALL.into_iter().any(|stage| self.has(stage))

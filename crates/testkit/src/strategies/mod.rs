@@ -1,7 +1,8 @@
-//! Strategies of proptest: links and networks that shrink to the least impaired one on which a test still fails.
+//! Strategies of proptest: links and networks that shrink to the least impaired links and networks on which a test still fails.
 //!
-//! [`any_hits`] draws packets that are [hit](crate::hit). [`any_link`] and [`any_network`] draw any, [`links_like`] and [`networks_like`] those within [`LinkBounds`]. What a failing test prints can be pasted back:
-//! an [`ImpairedLink`] is shown as the words of `tc-netem`, an [`ImpairedNetwork`] as such words for each link that is not ideal.
+//! [`any_hits`] draws packets that are [hit](crate::hit). [`any_link`] and [`any_network`] draw any links and networks; [`links_like`] and [`networks_like`]
+//! stay within [`LinkBounds`]. The output of a failing test can be pasted into a test: an [`ImpairedLink`] is printed as the words of `tc-netem`, an
+//! [`ImpairedNetwork`] as such words for each link that is not ideal.
 //!
 //! ```
 //! use cohaptic_testkit::proptest::prelude::*;
@@ -16,26 +17,28 @@
 //! # whatever_the_link_my_program_copes();
 //! ```
 //!
-//! proptest stands in [`crate::proptest`]: a package needs no dependency but this one.
+//! proptest is re-exported as [`crate::proptest`], so that a package needs no further dependency.
 //!
 //! # Shrinking
 //!
-//! One impairment is one [`Stage`]. `delay 10ms` is one, `delay 10ms 2ms` is one, jitter, and so is `delay 10ms reorder 25%`, reordering: both are nothing
-//! without the delay, so it is theirs. `delay 10ms 2ms reorder 25%` is two. Shrinking asks in this order, and keeps to what still fails:
+//! An impairment is a [`Stage`]. `delay 10ms` is one stage. `delay 10ms 2ms` is one stage, jitter, and `delay 10ms reorder 25%` is one stage, reordering: both
+//! need the delay, so the delay belongs to them. `delay 10ms 2ms reorder 25%` is two stages. Shrinking tries in this order, and keeps every change after which
+//! the test still fails:
 //!
-//! 1. *Fewer links*: all links of the network to ideal ones at once, then the first half of them and the second, the halves of what could not go, and so on to
-//!    single links. By a link's number that is: the links of `a` first.
-//! 2. *Fewer stages*: the stages of all links that are left, in the same way, those of a link in the order of the words.
-//! 3. *Plainer stages*, link by link. Reordering becomes its delay alone; jitter becomes its delay, jitter without correlation, or without a
-//!    distribution. Bursts become random loss that loses as much, else loss without correlation, chains with fewer probabilities that lose as much, or two
-//!    states in place of four. Corruption, duplication and reordering lose their correlation, reordering its gap. Slots lose their distribution, get a fixed
-//!    length, and lose their limits.
-//! 4. *Smaller numbers*, link by link: jitter, delay, loss, corruption, duplication, reordering, rate, limit, slots, each towards the end of its range
-//!    that impairs least: the upper end for rate and limit, the lower one for all others. That end comes first, then those of one significant digit by bisection,
-//!    then those of two; more digits only if the number drawn has more and none rounder fails. So it ends at `loss 3%`, `delay 11ms`, `rate 1500kbit`.
+//! 1. *Fewer links*: all links of the network become ideal at once, then the first half of them and the second half, then halves of those halves that had to
+//! stay, and so on down to single links. Links are sorted by sender, then receiver: the links of `a` come first.
+//! 2. *Fewer stages*: the stages of all remaining links, in the same way. The stages of a link are in the order of the words.
+//! 3. *Plainer stages*, link by link. Reordering becomes its delay alone; jitter becomes its delay, jitter without correlation, or jitter without a
+//! distribution. Bursts become random loss with the same long-run loss, otherwise loss without correlation, chains with fewer probabilities and the same
+//! long-run loss, or two states in place of four. Corruption, duplication and reordering lose their correlation, and reordering its gap. Slots lose their
+//! distribution, get a fixed length, and lose their limits.
+//! 4. *Smaller numbers*, link by link: jitter, delay, loss, corruption, duplication, reordering, rate, limit, slots. Each number goes towards the end of its
+//! range that impairs least: the upper end for rate and limit, the lower end for all others. That end is tried first, then numbers of one significant digit by
+//! bisection, then numbers of two digits. More digits are tried only if the number drawn has more, and no rounder number fails. Results are numbers such as
+//! `loss 3%`, `delay 11ms`, `rate 1500kbit`.
 //!
-//! If anything went, it begins again at 1, where each number is now tried a step at a time, and what has been tried is not tried again, until nothing goes. A stage
-//! that [`LinkBounds::always`] asks for stays, and whatever is tried is within the bounds. A few dozen runs of the test are usual:
+//! If anything was accepted, the search begins again at 1, where each number is now tried a step at a time, until nothing changes. A value that was tried is
+//! not tried again. A stage required by [`LinkBounds::always`] stays, and every value tried is within the bounds. A few dozen runs of the test are usual:
 //!
 //! ```
 //! use std::time::Duration;
@@ -52,7 +55,7 @@
 //! assert_eq!(network.stages(), 1);
 //! ```
 //!
-//! In a strategy of your own, combined by `prop_map`, tuples and the like, links shrink in the same way.
+//! In strategies combined from these by `prop_map`, tuples and the like, links shrink in the same way.
 
 mod admits;
 mod any;

@@ -1,4 +1,4 @@
-//! A network of such links.
+//! Networks of links in the words of `tc-netem`.
 
 use core::fmt;
 use core::str::FromStr;
@@ -8,14 +8,14 @@ use cohaptic_wan::{LinkModel, NetworkConfig, NodeId};
 
 use super::link::{ImpairedLink, LinkError};
 
-/// The most hosts that a network may have.
+/// Maximum number of hosts of a network.
 const MOST: usize = 1_000;
 
-/// Hosts, and a link from each to each other, most of them perhaps ideal.
+/// Hosts, with a link from each host to each other host. Most links may be ideal.
 ///
-/// It is shown as one line for each impaired link, after one that counts the hosts, which are called `a` to `z`, then `aa`, `ab`, and so on, in the order of
-/// their [`NodeId`]. `Debug` is Rust that makes the same value. It reads back from the same lines; empty lines and the space around lines say nothing, and `;`
-/// ends a line too.
+/// The text form is a line with the number of hosts, followed by a line per impaired link. The names of the hosts are `a` to `z`, then `aa`, `ab`, and so on,
+/// in the order of their [`NodeId`]. `Debug` prints Rust code that makes the same value. The value can be parsed from the same lines; empty lines and blanks
+/// around lines are ignored, and `;` also ends a line.
 ///
 /// ```
 /// use cohaptic_testkit::strategies::{ImpairedLink, ImpairedNetwork};
@@ -31,35 +31,35 @@ const MOST: usize = 1_000;
 #[derive(Clone, PartialEq)]
 pub struct ImpairedNetwork {
     hosts: usize,
-    /// By sender, then receiver; a link that is not there is ideal.
+    /// Links by sender and receiver. A missing entry is an ideal link.
     links: BTreeMap<(NodeId, NodeId), ImpairedLink>,
     ideal: ImpairedLink,
 }
 
-/// Why a text is no network.
+/// Error of a text that describes no network.
 #[derive(Clone, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum NetworkTextError {
-    /// The first line does not count hosts.
+    /// The first line is not a number of hosts.
     Hosts {
         /// The line.
         found: String,
     },
-    /// A line is no link.
+    /// A line is not a link.
     Line {
         /// The line.
         found: String,
     },
-    /// There is no such host, or it would send to itself.
+    /// A line names a host that does not exist, or a link from a host to itself.
     NoLink {
         /// The line.
         found: String,
-        /// The name of the first host.
+        /// Name of the first host.
         first: String,
-        /// The name of the last one.
+        /// Name of the last host.
         last: String,
     },
-    /// A link is said twice.
+    /// Two lines describe the same link.
     Repeated {
         /// The sender.
         from: String,
@@ -72,7 +72,7 @@ pub enum NetworkTextError {
         from: String,
         /// The receiver.
         to: String,
-        /// Why.
+        /// Error of the words.
         reason: LinkError,
     },
 }
@@ -92,7 +92,7 @@ impl fmt::Display for NetworkTextError {
 impl std::error::Error for NetworkTextError {}
 
 impl ImpairedNetwork {
-    /// Hosts whose links are all ideal.
+    /// Creates a network whose links are all ideal.
     ///
     /// # Panics
     ///
@@ -104,11 +104,11 @@ impl ImpairedNetwork {
         Self { hosts, links: BTreeMap::new(), ideal: ImpairedLink::ideal() }
     }
 
-    /// The network that the text says: what `Debug` prints.
+    /// Parses the text that `Debug` prints.
     ///
     /// # Panics
     ///
-    /// If it is refused; `text.parse::<ImpairedNetwork>()` gives an error instead.
+    /// If the text is refused; `text.parse::<ImpairedNetwork>()` returns an error instead.
     #[must_use]
     #[track_caller]
     #[expect(clippy::panic, reason = "documented: for text that stands in a test")]
@@ -116,11 +116,11 @@ impl ImpairedNetwork {
         text.parse().unwrap_or_else(|error| panic!("not the words of a network: {error}"))
     }
 
-    /// The network with that link.
+    /// Returns the network with the given link replaced.
     ///
     /// # Panics
     ///
-    /// If there is no such link.
+    /// If there is no link between these hosts.
     #[must_use]
     #[track_caller]
     pub fn with_link(mut self, from: NodeId, to: NodeId, link: ImpairedLink) -> Self {
@@ -129,13 +129,13 @@ impl ImpairedNetwork {
         self
     }
 
-    /// How many hosts there are.
+    /// Returns the number of hosts.
     #[must_use]
     pub const fn hosts(&self) -> usize {
         self.hosts
     }
 
-    /// The name of a host in the text.
+    /// Returns the name of a host in the text form.
     #[must_use]
     pub fn name(node: NodeId) -> String {
         let mut rest = u64::from(node.0) + 1;
@@ -147,41 +147,41 @@ impl ImpairedNetwork {
         letters.into_iter().rev().collect()
     }
 
-    /// What [`cohaptic_wan::Network::new`] needs beside the links: the names, and a seed.
+    /// Returns the names of the hosts and the seed, as [`cohaptic_wan::Network::new`] needs beside the links.
     #[must_use]
     pub fn config(&self, seed: u64) -> NetworkConfig {
         NetworkConfig { seed, nodes: self.nodes().map(Self::name).collect(), ..NetworkConfig::default() }
     }
 
-    /// The link from one host to another; `None` if there is none.
+    /// Returns the link from one host to another, or `None` if there is none.
     #[must_use]
     pub fn link(&self, from: NodeId, to: NodeId) -> Option<&ImpairedLink> {
         self.is_link(from, to).then(|| self.links.get(&(from, to)).unwrap_or(&self.ideal))
     }
 
-    /// The model of that link; ideal where there is none.
+    /// Returns the model of a link. The model is ideal if there is no such link.
     #[must_use]
     pub fn model(&self, from: NodeId, to: NodeId) -> LinkModel {
         self.link(from, to).map(ImpairedLink::model).unwrap_or_default()
     }
 
-    /// All links, by sender, then receiver.
+    /// Returns all links, sorted by sender, then receiver.
     pub fn links(&self) -> impl Iterator<Item = (NodeId, NodeId, &ImpairedLink)> {
         self.nodes().flat_map(move |from| self.nodes().filter_map(move |to| Some((from, to, self.link(from, to)?))))
     }
 
-    /// The links that are not ideal.
+    /// Returns the links that are not ideal.
     pub fn impaired(&self) -> impl Iterator<Item = (NodeId, NodeId, &ImpairedLink)> {
         self.links.iter().filter(|(_, link)| !link.is_ideal()).map(|((from, to), link)| (*from, *to, link))
     }
 
-    /// How many impairments all links have together.
+    /// Returns the number of impairments of all links together.
     #[must_use]
     pub fn stages(&self) -> usize {
         self.links.values().map(|link| link.stages().len()).sum()
     }
 
-    /// The network without a host: those after it move up. None is left out of one host.
+    /// Returns the network without a host. The hosts after it get smaller indices. The only host of a network stays.
     #[cfg(feature = "scenes")]
     pub(super) fn without_host(&self, gone: usize) -> Self {
         let moved = |node: NodeId| {
@@ -203,7 +203,7 @@ impl ImpairedNetwork {
         is_host(from) && is_host(to) && from != to
     }
 
-    /// Keeps a link that is there.
+    /// Stores a link. An ideal link is not stored.
     fn put(&mut self, from: NodeId, to: NodeId, link: ImpairedLink) {
         if link == self.ideal {
             self.links.remove(&(from, to));
@@ -212,7 +212,7 @@ impl ImpairedNetwork {
         }
     }
 
-    /// The host of that name.
+    /// Returns the host named `name`.
     fn named(&self, name: &str) -> Option<NodeId> {
         self.nodes().find(|node| Self::name(*node) == name)
     }
@@ -221,7 +221,7 @@ impl ImpairedNetwork {
 impl fmt::Display for ImpairedNetwork {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} hosts", self.hosts)?;
-        // A link may say what impairs nothing, such as a seed.
+        // Stored links include links without impairments, such as a link with a seed only.
         for ((from, to), link) in &self.links {
             write!(f, "\n{} -> {}: {link}", Self::name(*from), Self::name(*to))?;
         }

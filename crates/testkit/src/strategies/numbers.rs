@@ -1,4 +1,4 @@
-//! The numbers of netem's words as whole numbers: nanoseconds, ten-thousandths of a percent, bits per second, counts.
+//! Numbers in netem's words as whole numbers: nanoseconds, ten-thousandths of a percent, bits per second, counts.
 
 use core::num::{NonZeroU32, NonZeroU64};
 use core::time::Duration;
@@ -10,22 +10,22 @@ use super::shrink::Number;
 use super::stage::Stage;
 use super::units::{ALL, nanos, percent, whole};
 
-/// Where the least impairing value of a number is.
+/// Least impairing value of a number.
 #[derive(Clone, Copy, Debug)]
 enum Goal {
-    /// Where the range of the stage begins.
+    /// Lower end of the range of the stage.
     Low(Stage),
-    /// Where it ends.
+    /// Upper end of the range of the stage.
     High(Stage),
     At(u64),
 }
 
-/// One number of netem's words.
+/// A number in netem's words, with functions to read and write it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Knob {
     goal: Goal,
     read: fn(&Netem) -> Option<u64>,
-    /// Says nothing where there is no such number.
+    /// Sets the number. Does nothing if the words do not contain the number.
     write: fn(&mut Netem, u64),
 }
 
@@ -48,9 +48,9 @@ impl Knob {
     }
 }
 
-/// All of them, in the order in which they shrink. A correlation that stays goes to one percent, a gap to two packets.
+/// All numbers, in the order in which they shrink. A correlation shrinks to one percent, a gap to two packets.
 pub(super) const KNOBS: [Knob; 27] = [
-    // Jitter goes first, since no delay may be below it.
+    // Jitter comes before the delay, because the delay must not be less than the jitter.
     Knob { goal: Goal::Low(Stage::Jitter), read: |n| Some(nanos(jitter(n)?.time)), write: |n, v| put(jitter_mut(n).map(|j| &mut j.time), time(v)) },
     Knob {
         goal: Goal::At(ONE),
@@ -94,14 +94,14 @@ pub(super) const KNOBS: [Knob; 27] = [
     Knob { goal: Goal::Low(Stage::Slot), read: |n| drawn(n).map(|(delay, _)| nanos(*delay)), write: |n, v| put(drawn_mut(n).map(|d| d.0), time(v)) },
     Knob { goal: Goal::At(1), read: |n| drawn(n).map(|(_, jitter)| nanos(*jitter)), write: |n, v| put(drawn_mut(n).map(|d| d.1), time(v)) },
     Knob {
-        // The more packets leave in a slot, the fewer wait.
+        // The more packets may leave in a slot, the fewer packets wait.
         goal: Goal::At(100),
         read: |n| Some(n.slot.as_ref()?.packets?.get().into()),
         write: |n, v| put(n.slot.as_mut().map(|s| &mut s.packets), count(v)),
     },
 ];
 
-/// One percent: the least correlation that is drawn.
+/// One percent in ten-thousandths: the goal of correlations.
 const ONE: u64 = 10_000;
 
 const fn time(nanos: u64) -> Duration {

@@ -70,15 +70,15 @@ impl Space for LinkSpace {
 #[derive(Clone, Debug)]
 pub(super) struct NetworkSpace(pub(super) LinkSpace);
 
-/// Sender and receiver.
+/// Sender and receiver of a link.
 pub(super) type Pair = (NodeId, NodeId);
 
-/// A part of a network.
+/// Part of a network.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum NetworkPart {
-    /// All stages of a link that can go.
+    /// All removable stages of a link.
     Link(Pair),
-    /// One of them.
+    /// A single stage of a link.
     Stage(Pair, Stage),
 }
 
@@ -88,7 +88,7 @@ impl NetworkSpace {
         Some(network.clone().with_link(pair.0, pair.1, link))
     }
 
-    /// Everything that `of` gives for each link that is not ideal.
+    /// Returns the values of `of` for each link that is not ideal, with the link.
     fn each<T>(network: &ImpairedNetwork, of: impl Fn(&ImpairedLink) -> Vec<T>) -> Vec<(Pair, T)> {
         network.impaired().flat_map(|(from, to, link)| of(link).into_iter().map(move |thing| ((from, to), thing))).collect()
     }

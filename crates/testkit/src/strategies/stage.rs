@@ -1,26 +1,26 @@
-//! What one impairment is, and how it is taken away.
+//! Impairments of a link, and their removal.
 
 use core::fmt;
 
 use cohaptic_wan::netem::{ChanceSpec, DelaySpec, LossSpec, Netem, Percent};
 
-/// One impairment of a link, in the order of netem's words.
+/// Impairment of a link. The order is that of netem's words.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 #[non_exhaustive]
 pub enum Stage {
     /// `limit PACKETS`.
     Limit,
-    /// `delay TIME`, the same for every packet. Where there is jitter or reordering, the delay is theirs and does not count.
+    /// `delay TIME`, equal for every packet. If there is jitter or reordering, the delay belongs to that stage and does not count by itself.
     Delay,
-    /// `delay TIME JITTER`: the delay around which it varies is its own.
+    /// `delay TIME JITTER`, including the mean delay.
     Jitter,
-    /// `loss`, of any model.
+    /// `loss`, with any model.
     Loss,
     /// `corrupt`.
     Corrupt,
     /// `duplicate`.
     Duplicate,
-    /// `delay TIME reorder PERCENT`: the delay of those that are overtaken is its own.
+    /// `delay TIME reorder PERCENT`, including the delay of the packets that are overtaken.
     Reorder,
     /// `rate`.
     Rate,
@@ -29,11 +29,11 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// Each of them.
+    /// All stages, in their order.
     pub const ALL: [Self; 9] =
         [Self::Limit, Self::Delay, Self::Jitter, Self::Loss, Self::Corrupt, Self::Duplicate, Self::Reorder, Self::Rate, Self::Slot];
 
-    /// Its word; `jitter` has none in netem.
+    /// Returns the name of the stage: its word in netem, or `jitter`.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -49,7 +49,7 @@ impl Stage {
         }
     }
 
-    /// Its place in [`Stage::ALL`].
+    /// Returns the index of the stage in [`Stage::ALL`].
     pub(super) const fn place(self) -> usize {
         self as usize
     }
@@ -73,7 +73,7 @@ fn jitters(netem: &Netem) -> bool {
     netem.delay.as_ref().and_then(|delay| delay.jitter.as_ref()).is_some_and(|jitter| !jitter.time.is_zero())
 }
 
-/// Whether that is one of the impairments of these words. An option of zero is none.
+/// Returns whether the words contain the stage. An option with the value zero does not count.
 pub(super) fn has(netem: &Netem, stage: Stage) -> bool {
     match stage {
         Stage::Limit => netem.limit.is_some(),
@@ -92,7 +92,7 @@ pub(super) fn has(netem: &Netem, stage: Stage) -> bool {
     }
 }
 
-/// The words without these impairments. The delay of jitter or of reordering goes with the last of them that goes, unless `keeps_delay`.
+/// Returns the words without the given stages. The delay of jitter or reordering is removed together with the last stage that needs it, unless `keeps_delay`.
 pub(super) fn without(netem: &Netem, stages: &[Stage], keeps_delay: bool) -> Netem {
     let mut less = netem.clone();
     for stage in stages {

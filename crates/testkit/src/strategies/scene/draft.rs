@@ -1,4 +1,4 @@
-//! A scene as a test thinks of it, and the TOML text of it.
+//! Drafts of scenes, and their TOML text.
 
 use core::fmt;
 
@@ -6,41 +6,41 @@ use cohaptic_peer::coordination::{LawSettings, LawValue};
 use cohaptic_peer::{ArmConfig, Contact, Coordination, DeviceConfig, Direction, Enclosure, Gains, SendWhen};
 use cohaptic_scene::{Scene, SceneError};
 
-/// A component for each of up to three axes; those beyond the scene's are not written.
+/// Components for up to three axes. Components beyond the axes of the scene are not written.
 pub type Place = [f64; 3];
 
-/// A scene to order. It is shown as its TOML text.
+/// Draft of a scene. `Debug` prints its TOML text.
 #[derive(Clone, PartialEq)]
 pub struct Draft {
-    /// How long it lasts \[ms\].
+    /// Duration of the scene \[ms\].
     pub duration: u64,
-    /// The seed of all random numbers.
+    /// Seed of all random numbers.
     pub seed: u32,
-    /// 1 to 3.
+    /// Number of axes, from 1 to 3.
     pub axes: usize,
     /// Mass of the whole object \[kg\].
     pub mass: f64,
     /// Damping of each copy [N·s/m].
     pub damping: f64,
-    /// Whether the mass is shared out.
+    /// Whether the mass is divided among the copies.
     pub split_mass: bool,
-    /// Where bodies begin \[m\].
+    /// Initial position of all bodies \[m\].
     pub position: Place,
-    /// How fast they begin \[m/s\].
+    /// Initial velocity of all bodies \[m/s\].
     pub velocity: Place,
-    /// Walls.
+    /// Walls around the object.
     pub enclosure: Option<Enclosure>,
-    /// The strategy.
+    /// Strategy of coordination.
     pub strategy: Coordination,
-    /// KT and BT.
+    /// Stiffness KT and damping BT of the coordination.
     pub gains: Gains,
-    /// The parameters that strategies have of their own.
+    /// Parameters of the strategies.
     pub settings: LawSettings,
-    /// Which samples are sent; `None`: all.
+    /// Condition for sending a sample; `None`: every sample is sent.
     pub send_when: Option<SendWhen>,
-    /// The period of sending \[µs\].
+    /// Period of sending \[µs\].
     pub update: u64,
-    /// Which integrator with how many steps; `None` is the exact one.
+    /// Integrator and number of steps per tick; `None` is the exact integrator.
     pub integrator: Option<(&'static str, u32)>,
     /// The peers.
     pub peers: Vec<DraftPeer>,
@@ -52,47 +52,47 @@ pub struct Draft {
     pub timeline: Vec<String>,
 }
 
-/// A peer of a draft.
+/// Peer of a draft.
 #[derive(Clone, PartialEq, Debug)]
 pub struct DraftPeer {
-    /// Its name.
+    /// Name of the peer.
     pub name: String,
-    /// Its tick \[µs\].
+    /// Length of a tick \[µs\].
     pub tick: u64,
     /// Whether forces act a tick late.
     pub compute_delay: bool,
-    /// At which tick it first sends.
+    /// Index of the first tick at which the peer sends.
     pub phase: u64,
-    /// How it touches the object.
+    /// Contact of the device with the object.
     pub contact: Contact,
-    /// mH and bH.
+    /// Mass mH and damping bH of the device.
     pub device: DeviceConfig,
-    /// KC and BC.
+    /// Stiffness KC and damping BC of the contact.
     pub coupling: Gains,
-    /// What the hand does.
+    /// Activity of the hand.
     pub hand: DraftHand,
-    /// By how much its clock is late \[ns\].
+    /// Offset by which the clock is late \[ns\].
     pub offset: u64,
-    /// How fast its clock runs \[parts per billion\].
+    /// Drift of the clock \[parts per billion\].
     pub drift: i32,
-    /// Where it begins, if not with the object \[m\].
+    /// Initial position of the device, if it differs from that of the object \[m\].
     pub position: Option<Place>,
-    /// How fast it begins, if not with the object \[m/s\].
+    /// Initial velocity of the device, if it differs from that of the object \[m/s\].
     pub velocity: Option<Place>,
-    /// Keys of its uplink, as TOML.
+    /// Keys of the uplink, as TOML.
     pub uplink: Option<String>,
-    /// Keys of its downlink, as TOML.
+    /// Keys of the downlink, as TOML.
     pub downlink: Option<String>,
 }
 
-/// A hand of a draft.
+/// Hand of a draft.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum DraftHand {
-    /// Nothing.
+    /// No force.
     None,
     /// A constant force \[N\].
     Force(Place),
-    /// amplitude·sin(2π·frequency·t + phase) \[N\].
+    /// Force amplitude·sin(2π·frequency·t + phase) \[N\].
     Sine {
         /// Amplitude \[N\].
         amplitude: Place,
@@ -101,23 +101,23 @@ pub enum DraftHand {
         /// Phase \[rad\].
         phase: f64,
     },
-    /// An arm around a place.
+    /// Arm that pulls towards a position.
     Arm {
-        /// Its impedance.
+        /// Impedance of the arm.
         arm: ArmConfig,
-        /// Where it wants to be \[m\].
+        /// Position to which the arm pulls \[m\].
         wanted: Place,
     },
 }
 
-/// One directed link of a draft.
+/// Directed link of a draft.
 #[derive(Clone, PartialEq, Debug)]
 pub struct DraftLink {
-    /// The sender's name.
+    /// Name of the sender.
     pub from: String,
-    /// The receiver's name.
+    /// Name of the receiver.
     pub to: String,
-    /// Its keys, as TOML.
+    /// Keys of the link, as TOML.
     pub keys: String,
 }
 
@@ -128,7 +128,7 @@ impl fmt::Debug for Draft {
 }
 
 impl Draft {
-    /// A calm scene: average-position coordination over an ideal network with a sample a tick of 1 ms, an object of 0.45 kg that nobody touches.
+    /// Creates a calm scene: average-position coordination over an ideal network, with a sample per tick of 1 ms, and an object of 0.45 kg that nobody touches.
     #[must_use]
     pub fn calm(peers: usize) -> Self {
         Self {
@@ -154,11 +154,11 @@ impl Draft {
         }
     }
 
-    /// Reads the draft as a scene file is read.
+    /// Reads the draft like a scene file.
     ///
     /// # Panics
     ///
-    /// If it is refused; [`Draft::read`] gives the error instead.
+    /// If the draft is refused; [`Draft::read`] returns the error instead.
     #[must_use]
     #[track_caller]
     #[expect(clippy::panic, reason = "documented: a draft stands in a test")]
@@ -166,16 +166,16 @@ impl Draft {
         self.read().unwrap_or_else(|error| panic!("{error}\n{}", self.to_toml()))
     }
 
-    /// Reads the draft as a scene file is read.
+    /// Reads the draft like a scene file.
     ///
     /// # Errors
     ///
-    /// What the reader says of a scene that makes no sense.
+    /// The error of the reader for a scene that makes no sense.
     pub fn read(&self) -> Result<Scene, SceneError> {
         Scene::parse(&self.to_toml(), "draft.toml".as_ref(), &[])
     }
 
-    /// The scene file.
+    /// Returns the text of the scene file.
     #[must_use]
     pub fn to_toml(&self) -> String {
         let mut text = String::new();

@@ -1,12 +1,12 @@
-//! The numbers of a draft, in millionths, and the calm ones.
+//! Numbers of a draft, in millionths, with their calm values.
 
 use super::draft::{Draft, DraftHand, DraftPeer, Place};
 use crate::strategies::shrink::Number;
 
-/// Where a number is, if it is there.
+/// Access to a number, or `None` if the draft does not have the number.
 type In<T> = fn(&mut T) -> Option<&mut f64>;
 
-/// A number of the scene, or of one of its peers.
+/// A number of the scene, or of a peer.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Knob {
     Duration,
@@ -15,10 +15,10 @@ pub(super) enum Knob {
     Peer(usize, In<DraftPeer>, u64),
 }
 
-/// Millionths in one.
+/// One, in millionths.
 const ONE: u64 = 1_000_000;
 
-/// Numbers of a scene and where they are calm.
+/// Numbers of a scene, with their calm values in millionths.
 const SCENE: [(In<Draft>, u64); 12] = [
     (|draft| Some(&mut draft.mass), 450_000),
     (|draft| Some(&mut draft.damping), 0),
@@ -34,7 +34,7 @@ const SCENE: [(In<Draft>, u64); 12] = [
     (|draft| draft.enclosure.as_mut().map(|walls| &mut walls.damping), 0),
 ];
 
-/// Numbers of a peer and where they are calm.
+/// Numbers of a peer, with their calm values in millionths.
 const PEER: [(In<DraftPeer>, u64); 18] = [
     (|peer| Some(&mut peer.device.mass), 100_000),
     (|peer| Some(&mut peer.device.damping), 5 * ONE),
@@ -56,7 +56,7 @@ const PEER: [(In<DraftPeer>, u64); 18] = [
     (|peer| peer.velocity.as_mut()?.get_mut(2), 0),
 ];
 
-/// How strong the hand is, or where it wants to be.
+/// Returns the strength of the hand's force, or the position to which the arm pulls.
 const fn strength(peer: &mut DraftPeer) -> Option<&mut Place> {
     match &mut peer.hand {
         DraftHand::None => None,
@@ -82,7 +82,7 @@ impl Knob {
         Some(Number { value, goal, step })
     }
 
-    /// The sign stays.
+    /// Sets the absolute value of the number. The sign stays.
     pub(super) fn set(self, draft: &Draft, value: u64) -> Option<Draft> {
         let mut draft = draft.clone();
         match self {

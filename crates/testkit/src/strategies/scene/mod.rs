@@ -1,7 +1,7 @@
-//! Scenes of coordination at random, which shrink to the calmest one on which a test still fails.
+//! Random scenes of coordination, which shrink to the calmest scene on which a test still fails.
 //!
-//! [`any_scene`] draws scenes of 2 to 6 peers, [`scenes_like`] those whose links are within [`LinkBounds`]. An [`AnyScene`] is shown as TOML text
-//! that can be saved as a scene file. The scenes may be unstable.
+//! [`any_scene`] draws scenes of 2 to 6 peers, [`scenes_like`] scenes whose links are within [`LinkBounds`]. An [`AnyScene`] is printed as TOML text that can
+//! be saved as a scene file. The scenes may be unstable.
 //!
 //! ```
 //! use cohaptic_testkit::proptest::test_runner::{TestCaseError, TestError, TestRunner};
@@ -20,15 +20,15 @@
 //!
 //! # Shrinking
 //!
-//! As for [networks](super#shrinking), in this order:
+//! Scenes shrink like [networks](super#shrinking), in this order:
 //!
-//! 1. *Fewer peers*, down to as few as may be drawn; the links of those that stay, stay.
-//! 2. *Fewer sections*: walls, the object's start, the integrator, the object's damping; of each peer what its hand does, its contact, start, clock, compute
-//!    delay and phase.
+//! 1. *Fewer peers*, down to the least number that may be drawn. The links of the remaining peers stay.
+//! 2. *Fewer sections*: walls, start of the object, integrator, damping of the object; of each peer the activity of its hand, its contact, start, clock,
+//! compute delay and phase.
 //! 3. *Fewer links*, then *fewer stages* of links.
-//! 4. *Plainer forms*: one axis; an arm to a constant force, a sine to a constant force; then stages of links.
-//! 5. *Plainer numbers*: towards those of [`Draft::calm`] (an object of 0.45 kg, 1000 N/m, and so on), a duration of 100 ms and a sample a tick, then those of
-//!    links. In between, those of few digits.
+//! 4. *Plainer forms*: one axis; an arm or a sine becomes a constant force; then stages of links.
+//! 5. *Plainer numbers*: towards those of [`Draft::calm`] (an object of 0.45 kg, 1000 N/m, and so on), a duration of 100 ms and a sample per tick; then the
+//! numbers of links. Numbers of few digits are tried in between.
 
 mod draft;
 mod draw;
@@ -52,22 +52,22 @@ use super::space::{LinkSpace, NetworkSpace};
 pub use draft::{Draft, DraftHand, DraftLink, DraftPeer, Place, contact_to_toml};
 use space::SceneSpace;
 
-/// A scene at random. `Display` and `Debug` are its TOML text.
+/// Random scene. `Display` and `Debug` print its TOML text.
 #[derive(Clone, PartialEq)]
 pub struct AnyScene {
-    /// Without links.
+    /// The scene without its links.
     draft: Draft,
     network: ImpairedNetwork,
 }
 
 impl AnyScene {
-    /// The scene file.
+    /// Returns the text of the scene file.
     #[must_use]
     pub fn to_toml(&self) -> String {
         self.draft().to_toml()
     }
 
-    /// The scene as a draft, its links in the words of netem.
+    /// Returns the scene as a draft, with its links in the words of netem.
     #[must_use]
     pub fn draft(&self) -> Draft {
         let mut draft = self.draft.clone();
@@ -79,17 +79,17 @@ impl AnyScene {
         draft
     }
 
-    /// The links between the peers, in their order.
+    /// Returns the links between the peers, which are numbered in their order.
     #[must_use]
     pub const fn network(&self) -> &ImpairedNetwork {
         &self.network
     }
 
-    /// Reads the text as a scene file is read.
+    /// Reads the text like a scene file.
     ///
     /// # Errors
     ///
-    /// None for what was drawn; the type is that of the reader.
+    /// None for a drawn scene; the type is that of the reader.
     pub fn read(&self) -> Result<Scene, SceneError> {
         self.draft().read()
     }
@@ -107,16 +107,16 @@ impl fmt::Debug for AnyScene {
     }
 }
 
-/// Any scene: [`scenes_like`] with 2 to 6 peers and [`LinkBounds::any`].
+/// Draws any scene: [`scenes_like`] with 2 to 6 peers and [`LinkBounds::any`].
 pub fn any_scene() -> Scenes {
     scenes_like(2..=6, LinkBounds::any())
 }
 
-/// Scenes of that number of peers with such links.
+/// Draws scenes with a number of peers from `peers`, and links within `bounds`.
 ///
 /// # Panics
 ///
-/// With less than 2 or more than 100 peers, or if the bounds make no sense; [`LinkBounds::check`] gives an error instead.
+/// With less than 2 or more than 100 peers, or if the bounds make no sense; [`LinkBounds::check`] returns an error instead.
 #[track_caller]
 pub fn scenes_like(peers: RangeInclusive<usize>, bounds: LinkBounds) -> Scenes {
     let (least, most) = (*peers.start(), *peers.end());
@@ -124,7 +124,7 @@ pub fn scenes_like(peers: RangeInclusive<usize>, bounds: LinkBounds) -> Scenes {
     Scenes { least, most, bounds: checked(bounds) }
 }
 
-/// Scenes at random: see [`scenes_like`].
+/// Strategy of scenes: see [`scenes_like`].
 #[derive(Clone, Debug)]
 #[must_use = "strategies do nothing unless used"]
 pub struct Scenes {

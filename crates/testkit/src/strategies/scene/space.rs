@@ -1,4 +1,4 @@
-//! What can be made of scenes when they shrink.
+//! Space of scenes, in which shrinking searches.
 
 use cohaptic_peer::Contact;
 
@@ -8,24 +8,24 @@ use super::knobs::{self, Knob};
 use crate::strategies::shrink::{Number, Space};
 use crate::strategies::space::{NetworkPart, NetworkSpace};
 
-/// Scenes of at least that number of peers with such links.
+/// Scenes with at least `least` peers, and links of the space `network`.
 #[derive(Clone, Debug)]
 pub(super) struct SceneSpace {
     pub(super) least: usize,
     pub(super) network: NetworkSpace,
 }
 
-/// A part of a scene.
+/// Part of a scene.
 #[derive(Clone, Debug)]
 pub(super) enum Part {
-    /// By its name, since places change.
+    /// Peer, by its name, because indices change when peers are removed.
     Peer(String),
     Section(Section),
     OfPeer(usize, Section),
     Network(NetworkPart),
 }
 
-/// What a scene or a peer has beyond a calm one.
+/// Section in which a scene or a peer differs from a calm one.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Section {
     Walls,
@@ -42,7 +42,7 @@ pub(super) enum Section {
 const OF_SCENE: [Section; 4] = [Section::Walls, Section::Start, Section::Integrator, Section::Damping];
 const OF_PEER: [Section; 6] = [Section::Hand, Section::Contact, Section::Start, Section::Clock, Section::ComputeDelay, Section::Phase];
 
-/// A form that can be plainer.
+/// Change of a scene to a plainer form.
 #[derive(Clone, Debug)]
 pub(super) enum Form {
     Axes,
@@ -50,7 +50,7 @@ pub(super) enum Form {
     Network(<NetworkSpace as Space>::Form),
 }
 
-/// Where a number is.
+/// Place of a number.
 #[derive(Clone, Debug)]
 pub(super) enum Spot {
     Draft(Knob),
@@ -64,7 +64,7 @@ impl AnyScene {
         changed
     }
 
-    /// The scene, if it is another one that can be read.
+    /// Returns the scene if it differs from `before` and can be read.
     fn readable(self, before: &Self) -> Option<Self> {
         (self != *before && self.read().is_ok()).then_some(self)
     }
@@ -93,7 +93,7 @@ fn calm_peer(peer: &mut DraftPeer, section: Section) {
 }
 
 impl SceneSpace {
-    /// The sections that are not calm.
+    /// Returns the sections that are not calm.
     fn sections(scene: &AnyScene) -> Vec<Part> {
         let draft = &scene.draft;
         let of_scene = OF_SCENE.into_iter().filter(|section| scene.with_draft(|draft| calm_scene(draft, *section)) != *scene).map(Part::Section);
