@@ -28,8 +28,8 @@
 //!
 //! The chapter "Testing your own program over a bad network", `docs/testing.md` in the repository, is an introduction by examples.
 //!
-//! A failing property prints a whole `#[test]` that fails again, also after hosts and links were added to it. Its chance is repeated by the seed, or replaced by
-//! [hits](hit) that name the lost packets.
+//! A failing property prints a whole `#[test]` that fails again, also after hosts and links were added to it. Its chance is repeated by the seed, or
+//! replaced by [hits](hit) that name the lost packets.
 //!
 //! # Contents
 //!

@@ -65,7 +65,7 @@ impl Record {
     /// - `summary.txt`: the seed, how to repeat the run, the counts of every link, and the packets that every [law](crate::hit) has hit;
     /// - `trace.txt`: the events of the run, in words;
     /// - `fates-a-to-b.csv`: the fate of every packet from `a` to `b` on its link, for every two hosts between which a packet was sent. The file can be
-    /// [read back](cohaptic_wan::FateLog::parse) and [replayed](cohaptic_wan::LinkModel::Replay);
+    ///   [read back](cohaptic_wan::FateLog::parse) and [replayed](cohaptic_wan::LinkModel::Replay);
     /// - `packets-a-to-b.pcapng`: the same with the contents of the packets, for packet analysers (feature `pcapng`, on by default);
     /// - `links.txt`: a [file of links](crate::Testbed::from_file) that replays all links.
     ///

@@ -55,7 +55,7 @@
 //!
 //! - Every datagram is sent alone (no segmentation offload) and never fragmented, so that quinn searches for the MTU of the path.
 //! - A datagram that the host cannot send is lost without an error, as with `quinn-udp`. This happens if no host has the receiver's address, or if the host has
-//! given up the sender's address.
+//!   given up the sender's address.
 //! - A packet sent as ECT(1) arrives as ECT(0), because links distinguish only "capable" and "marked". Quinn sends ECT(0).
 //! - An endpoint at `[::]` receives over IPv6 only.
 //! - A run begins on the first of January 2027, as far as certificates and tokens are concerned.

@@ -23,17 +23,17 @@ const KIND: &str = "a UDP socket";
 /// Differences to tokio's socket, and further properties:
 ///
 /// - The socket is bound on the host of the task that calls `bind`; [`Host::bind`](crate::Host::bind) names another host. Binding, connecting and dropping take
-/// no time.
+///   no time.
 /// - Sending never waits: the link drops a packet that it cannot take, as a network does. [`UdpSocket::try_send`] never returns `WouldBlock`.
 /// - The size of a datagram on its link is its number of bytes. Headers count only if the `overhead` of the link (the second word of `rate`) says so.
 /// - A datagram is lost if the buffer of the receiving socket is full: see [`Testbed::receive_buffer`](crate::Testbed::receive_buffer). As with Linux, a
-/// datagram is cut off if it is longer than the buffer passed to receive it.
+///   datagram is cut off if it is longer than the buffer passed to receive it.
 /// - If no socket is bound to the port of the peer, a connected socket gets [`io::ErrorKind::ConnectionRefused`] after the answer has come back over the link:
-/// from the next call, or from the call that waits to receive.
+///   from the next call, or from the call that waits to receive.
 /// - A socket at `[::]` receives over IPv6 only.
 /// - After its host has crashed, every method returns [`io::ErrorKind::ConnectionAborted`], with the way out. The same error comes from every method after the
-/// run of the test bed has ended, also within the run of another test bed: a task or a destructor may outlive the run. Binding a socket where there is no host
-/// is a fault of the test, and panics.
+///   run of the test bed has ended, also within the run of another test bed: a task or a destructor may outlive the run. Binding a socket where there is no
+///   host is a fault of the test, and panics.
 /// - The socket belongs to the thread that runs the test bed. On another thread every method returns [`io::ErrorKind::Unsupported`], and the run fails.
 pub struct UdpSocket {
     shared: Arc<Shared>,

@@ -60,7 +60,7 @@ impl Form {
         Self::SlotBytes,
     ];
 
-    /// The words with that made plainer; unchanged if it is plain.
+    /// Returns the words after the change; unchanged if the change does not apply.
     pub(super) fn plainer(self, link: &ImpairedLink, bounds: &LinkBounds) -> Netem {
         let old = link.netem();
         let mut netem = old.clone();

@@ -137,7 +137,7 @@ impl ImpairedLink {
 
 impl PartialEq for ImpairedLink {
     fn eq(&self, other: &Self) -> bool {
-        // The configuration follows from the words.
+        // The configuration is determined by the words.
         self.netem == other.netem
     }
 }

@@ -26,16 +26,16 @@
 //! the test still fails:
 //!
 //! 1. *Fewer links*: all links of the network become ideal at once, then the first half of them and the second half, then halves of those halves that had to
-//! stay, and so on down to single links. Links are sorted by sender, then receiver: the links of `a` come first.
+//!    stay, and so on down to single links. Links are sorted by sender, then receiver: the links of `a` come first.
 //! 2. *Fewer stages*: the stages of all remaining links, in the same way. The stages of a link are in the order of the words.
 //! 3. *Plainer stages*, link by link. Reordering becomes its delay alone; jitter becomes its delay, jitter without correlation, or jitter without a
-//! distribution. Bursts become random loss with the same long-run loss, otherwise loss without correlation, chains with fewer probabilities and the same
-//! long-run loss, or two states in place of four. Corruption, duplication and reordering lose their correlation, and reordering its gap. Slots lose their
-//! distribution, get a fixed length, and lose their limits.
+//!    distribution. Bursts become random loss with the same long-run loss, otherwise loss without correlation, chains with fewer probabilities and the same
+//!    long-run loss, or two states in place of four. Corruption, duplication and reordering lose their correlation, and reordering its gap. Slots lose their
+//!    distribution, get a fixed length, and lose their limits.
 //! 4. *Smaller numbers*, link by link: jitter, delay, loss, corruption, duplication, reordering, rate, limit, slots. Each number goes towards the end of its
-//! range that impairs least: the upper end for rate and limit, the lower end for all others. That end is tried first, then numbers of one significant digit by
-//! bisection, then numbers of two digits. More digits are tried only if the number drawn has more, and no rounder number fails. Results are numbers such as
-//! `loss 3%`, `delay 11ms`, `rate 1500kbit`.
+//!    range that impairs least: the upper end for rate and limit, the lower end for all others. That end is tried first, then numbers of one significant digit
+//!    by bisection, then numbers of two digits. More digits are tried only if the number drawn has more, and no rounder number fails. Results are numbers such
+//!    as `loss 3%`, `delay 11ms`, `rate 1500kbit`.
 //!
 //! If anything was accepted, the search begins again at 1, where each number is now tried a step at a time, until nothing changes. A value that was tried is
 //! not tried again. A stage required by [`LinkBounds::always`] stays, and every value tried is within the bounds. A few dozen runs of the test are usual:

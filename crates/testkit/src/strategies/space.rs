@@ -1,4 +1,4 @@
-//! What can be made of links and networks when they shrink.
+//! Spaces of links and networks, in which shrinking searches.
 
 use std::sync::Arc;
 
@@ -13,12 +13,12 @@ use super::numbers::{KNOBS, Knob};
 use super::shrink::{Number, Space};
 use super::stage::{self, Stage};
 
-/// Links within bounds.
+/// Space of the links within bounds.
 #[derive(Clone, Debug)]
 pub(super) struct LinkSpace(pub(super) Arc<LinkBounds>);
 
 impl LinkSpace {
-    /// The link that the words say, if it is one within bounds and another than before.
+    /// Returns the link described by the words, if it differs from `link` and is within the bounds.
     fn changed(&self, link: &ImpairedLink, netem: Netem) -> Option<ImpairedLink> {
         if netem == *link.netem() {
             return None;
@@ -66,7 +66,7 @@ impl Space for LinkSpace {
     }
 }
 
-/// Networks whose links are within bounds.
+/// Space of the networks whose links are within bounds.
 #[derive(Clone, Debug)]
 pub(super) struct NetworkSpace(pub(super) LinkSpace);
 

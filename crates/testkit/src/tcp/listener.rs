@@ -23,11 +23,11 @@ const BACKLOG: usize = 128;
 ///
 /// - The listener is bound on the host of the task that calls `bind`; [`Host::listen`](crate::Host::listen) names another host.
 /// - At most 129 connections wait to be accepted; [`TcpSocket::listen`](super::TcpSocket::listen) takes another number. As with Linux, a SYN beyond that number
-/// is dropped without an answer, so that its sender tries again after 1, 3, 7 … s.
+///   is dropped without an answer, so that its sender tries again after 1, 3, 7 … s.
 /// - A connection that is reset while it waits is accepted all the same, and reading from it fails.
 /// - A listener at `[::]` accepts connections over IPv6 only.
 /// - After its host has crashed, every method returns [`io::ErrorKind::ConnectionAborted`], with the way out. The same error comes from every method after the
-/// run of the test bed has ended, also within the run of another test bed.
+///   run of the test bed has ended, also within the run of another test bed.
 /// - The listener belongs to the thread that runs the test bed. On another thread every method returns [`io::ErrorKind::Unsupported`], and the run fails.
 pub struct TcpListener {
     shared: Arc<Shared>,

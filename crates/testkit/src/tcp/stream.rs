@@ -21,18 +21,18 @@ use crate::resolve::ToSocketAddrs;
 /// Differences to tokio's stream, and further properties:
 ///
 /// - A connection is opened from the host of the task that calls `connect`; [`Host::connect`](crate::Host::connect) names another host. Its port is given in
-/// turn from 49152 on, independently of the ports of UDP.
+///   turn from 49152 on, independently of the ports of UDP.
 /// - A stream that is dropped sends the bytes written so far, then FIN. If received bytes were not read, or after [`TcpStream::set_zero_linger`], the stream
-/// sends RST instead.
+///   sends RST instead.
 /// - As with Linux, an error of the connection is reported once, after all received bytes were read. Afterwards reads return 0 and writes
-/// [`io::ErrorKind::BrokenPipe`].
+///   [`io::ErrorKind::BrokenPipe`].
 /// - A host that crashes tells nobody. Its peers notice when they write: after [`TcpConfig::retries`] (15 minutes) if the host stays down, or by a RST if it is
-/// up again.
+///   up again.
 /// - A host with new addresses loses its connections: both ends are silent, and time out when they write.
 /// - [`TcpStream::set_linger`] has an effect with zero only, because dropping a stream takes no time.
 /// - `from_std`, `into_std` and `AsFd` are missing, because there is no socket of the operating system.
 /// - After its host has crashed, every method returns [`io::ErrorKind::ConnectionAborted`], with the way out. The same error comes from every method after the
-/// run of the test bed has ended, also within the run of another test bed.
+///   run of the test bed has ended, also within the run of another test bed.
 /// - The stream belongs to the thread that runs the test bed. On another thread every method returns [`io::ErrorKind::Unsupported`], and the run fails.
 pub struct TcpStream {
     pub(super) shared: Arc<Shared>,

@@ -271,7 +271,7 @@ impl Draft {
     }
 }
 
-/// `a = 1, b = { c = 2, d = 3 }` with each key on a line of its own.
+/// Writes each key of `a = 1, b = { c = 2, d = 3 }` on a line of its own.
 fn on_lines(keys: &str) -> String {
     let mut depth = 0;
     let split = keys.chars().map(|c| {
@@ -286,7 +286,7 @@ fn on_lines(keys: &str) -> String {
 }
 
 impl DraftPeer {
-    /// A peer that does nothing.
+    /// Creates a peer that does nothing.
     #[must_use]
     pub fn calm(name: &str) -> Self {
         Self {
@@ -308,7 +308,7 @@ impl DraftPeer {
     }
 }
 
-/// A contact as it stands in a scene file.
+/// Writes a contact as in a scene file.
 #[must_use]
 pub fn contact_to_toml(contact: Contact) -> String {
     match contact {

@@ -1,21 +1,21 @@
-//! A scene without links at random, in round numbers mostly.
+//! Random drawing of a scene without links. Most numbers are round.
 
 use cohaptic_peer::{ArmConfig, Contact, Coordination, DeviceConfig, Direction, Enclosure, Gains};
 
 use super::draft::{Draft, DraftHand, DraftPeer, Place};
 use crate::strategies::grid::{Dice, Span};
 
-/// A number of thousandths as a number.
+/// Converts a number of thousandths.
 fn thousandths(count: u64) -> f64 {
     f64::from(u32::try_from(count).unwrap_or(u32::MAX)) / 1e3
 }
 
-/// A number between, given in thousandths.
+/// Draws a number from a range that is given in thousandths.
 fn number(low: u64, high: u64, dice: &mut Dice<'_>) -> f64 {
     thousandths(dice.number(Span { low, high, step: 1 }))
 }
 
-/// Components up to that number of thousandths, either way; zero now and then.
+/// Draws components with absolute values up to `most` thousandths. A component is zero in a quarter of all cases.
 fn place(most: u64, dice: &mut Dice<'_>) -> Place {
     [(); 3].map(|()| {
         let size = if dice.one_in(4) { 0.0 } else { number(0, most, dice) };

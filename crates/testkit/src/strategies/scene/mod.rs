@@ -24,11 +24,11 @@
 //!
 //! 1. *Fewer peers*, down to the least number that may be drawn. The links of the remaining peers stay.
 //! 2. *Fewer sections*: walls, start of the object, integrator, damping of the object; of each peer the activity of its hand, its contact, start, clock,
-//! compute delay and phase.
+//!    compute delay and phase.
 //! 3. *Fewer links*, then *fewer stages* of links.
 //! 4. *Plainer forms*: one axis; an arm or a sine becomes a constant force; then stages of links.
 //! 5. *Plainer numbers*: towards those of [`Draft::calm`] (an object of 0.45 kg, 1000 N/m, and so on), a duration of 100 ms and a sample per tick; then the
-//! numbers of links. Numbers of few digits are tried in between.
+//!    numbers of links. Numbers of few digits are tried in between.
 
 mod draft;
 mod draw;

@@ -1,14 +1,17 @@
-//! The search for the least impaired value that still fails.
+//! Search for the least impaired value on which a test still fails.
 //!
-//! One search for links, networks and scenes: a [`Space`] says what can be taken away, what can be made plainer and what the numbers are, and [`Search`]
-//! asks in a fixed order:
+//! The search is the same for links, networks and scenes. A [`Space`] lists the parts that can be removed, the forms that can become plainer, and the numbers
+//! of a value. [`Search`] tries changes in a fixed order:
 //!
-//! 1. *Parts*, level by level (the peers of a scene, the links of a network, the stages of a link): all at once, then halves, halves of halves, and each by itself.
-//! 2. *Forms*: each made plainer by itself, in the order in which the space lists them.
-//! 3. *Numbers*, one after the other, towards the least impairing value: that value itself first, then by bisection among those of one significant digit,
-//!    then of two between the last that passed and the first that failed. Where the number drawn is not round and nothing round fails, digit by digit on.
+//! 1. *Parts*, level by level (the peers of a scene, the links of a network, the stages of a link): all at once, then halves, halves of halves, and single
+//!    parts.
+//! 2. *Forms*: each form becomes plainer by itself, in the order in which the space lists the forms.
+//! 3. *Numbers*, one after the other, towards the least impairing value. That value is tried first. Bisection follows among numbers of one significant digit,
+//!    then among numbers of two digits between the last number that passed and the first number that failed. If the number drawn is not round and no round
+//!    number fails, the digits increase further.
 //!
-//! If anything was accepted, it begins again, with numbers now tried one step further only, until nothing changes. What has been tried is not tried again.
+//! If anything was accepted, the search begins again, and each number is then tried only a step further, until nothing changes. A value that was tried is not
+//! tried again.
 
 mod numbers;
 mod space;
@@ -21,23 +24,24 @@ pub(super) use space::{Number, Space};
 
 use crate::failure::Searching;
 
-/// A value and the way to a lesser one.
+/// Value of a strategy, with the search for a lesser value.
 ///
-/// After [`ValueTree::simplify`] or [`ValueTree::complicate`] gave true, the current value is one to be tried: simplify says that it failed, complicate that it
-/// passed. Once nothing is left to try, complicate gives back the last value that failed, to be tried once more, as the trees of proptest do: in a tuple
-/// the shrinking of the next component begins from there.
+/// After [`ValueTree::simplify`] or [`ValueTree::complicate`] has returned true, the test must be run with the current value. `simplify` reports that the test
+/// has failed, `complicate` that it has passed. If nothing is left to try, `complicate` restores the last value that failed, and the test is run with it once
+/// more, as with the trees of proptest: in a tuple the shrinking of the next component begins there.
 #[derive(Clone, Debug)]
 pub(super) struct Search<S: Space> {
     space: S,
-    /// The least value that failed.
+    /// Least value so far with which the test has failed.
     best: S::Value,
-    /// The candidate that is tried now.
+    /// Candidate with which the test is run now.
     trial: Option<S::Value>,
     phase: Phase<S>,
-    /// What passed.
+    /// Candidates with which the test has passed.
     passed: Vec<S::Value>,
-    /// Whether anything was accepted since the phases began anew.
+    /// Whether anything was accepted since the first phase last began.
     progress: bool,
+    /// Number of times that the phases have begun anew.
     round: u32,
     _searching: Searching,
 }
@@ -65,7 +69,7 @@ impl<S: Space> Search<S> {
         }
     }
 
-    /// Takes the next value to try, skipping those that are known to pass.
+    /// Proceeds to the next candidate, and skips candidates that have been tried. Returns whether there is one.
     fn advance(&mut self) -> bool {
         while let Some(candidate) = self.propose() {
             if candidate == self.best || self.passed.contains(&candidate) {
@@ -78,7 +82,7 @@ impl<S: Space> Search<S> {
         false
     }
 
-    /// The next value in the order of the phases.
+    /// Returns the next candidate, in the order of the phases.
     fn propose(&mut self) -> Option<S::Value> {
         loop {
             let (space, best) = (&self.space, &self.best);
@@ -141,13 +145,13 @@ impl<S: Space> ValueTree for Search<S> {
         let Some(passed) = self.trial.take() else { return false };
         self.passed.push(passed);
         self.answer(false);
-        // With nothing left to try the current value is the best again.
+        // If nothing is left to try, there is no candidate, and the current value is the best one again.
         self.advance();
         true
     }
 }
 
-/// Heaps of parts that may go together, the next to try at the end.
+/// Heaps of parts that may be removed together. The heap to try next is the last.
 #[derive(Clone, Debug)]
 struct Parts<P> {
     heaps: Vec<Vec<P>>,
@@ -159,7 +163,7 @@ impl<P> Parts<P> {
         Self { heaps: vec![all], tried: None }
     }
 
-    /// The value without the next heap.
+    /// Returns the value without the parts of the next heap.
     fn propose<V>(&mut self, without: impl Fn(&[P]) -> Option<V>) -> Option<V> {
         while let Some(heap) = self.heaps.pop() {
             if heap.is_empty() {
@@ -175,7 +179,7 @@ impl<P> Parts<P> {
         None
     }
 
-    /// Halves the heap that cannot go as a whole.
+    /// Takes the answer to the last candidate. A heap that could not be removed as a whole is halved.
     fn answer(&mut self, went: bool) {
         let Some(mut first) = self.tried.take() else { return };
         if !went && first.len() > 1 {

@@ -1,14 +1,15 @@
-//! Numbers towards the least impairing value, by bisection among round ones.
+//! Shrinking of numbers to the least impairing value, by bisection among round numbers.
 
 use super::space::{Number, Space};
 use crate::strategies::grid::{is_round, next_towards, round_between};
 
-/// The numbers of a value, one after the other.
+/// Numbers of a value, which shrink one after the other.
 #[derive(Clone, Debug)]
 pub(super) struct Numbers<P> {
     places: std::vec::IntoIter<P>,
-    /// Whether a number is given up if the next round one passes.
+    /// Whether a number is left as it is if the test passes with the next round number.
     only_nearest: bool,
+    /// Number that shrinks now.
     now: Option<(P, Bisection)>,
 }
 
@@ -39,16 +40,17 @@ impl<P: Clone> Numbers<P> {
     }
 }
 
-/// The search for one number.
+/// Search for the least impairing value of a number.
 #[derive(Clone, Debug)]
 struct Bisection {
     step: u64,
-    /// The number nearest to the goal that failed.
+    /// Number nearest to the goal with which the test failed.
     fails: u64,
-    /// The number nearest to it, on the side of the goal, that passed; the goal until then.
+    /// Number nearest to `fails`, on the side of the goal, with which the test passed. The goal before the first such number.
     passes: u64,
+    /// Number of significant digits of the numbers in `between`.
     digits: u32,
-    /// The round numbers between the two, from the goal's side on.
+    /// Round numbers between `passes` and `fails`, beginning on the side of the goal.
     between: Vec<u64>,
     next: Next,
     asked: u64,
@@ -97,7 +99,7 @@ impl Bisection {
                 if !self.between.is_empty() {
                     break self.between[(self.between.len() - 1) / 2];
                 }
-                // Two digits are enough, unless the number drawn has more and stays.
+                // Two digits are enough, unless the number drawn has more digits and no rounder number fails.
                 if self.digits >= 20 || (self.digits >= 2 && is_round(self.fails, self.digits, self.step)) {
                     self.next = Next::Nothing;
                     return None;
@@ -116,6 +118,7 @@ impl Bisection {
                 self.next = Next::Middle;
                 self.fill();
             }
+            // A neighbour fails as well, so the search begins anew with the goal.
             (Next::Nearest, true) => {
                 self.fails = self.asked;
                 self.next = if self.asked == self.passes { Next::Nothing } else { Next::Goal };

@@ -1,45 +1,45 @@
-//! What can be made of a value that shrinks.
+//! Interface between the search and a kind of values that shrink.
 
 use core::fmt;
 
-/// A number that can be changed.
+/// Number of a value that can be changed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(in crate::strategies) struct Number {
     pub(in crate::strategies) value: u64,
-    /// What would impair least.
+    /// Value of the number that impairs least.
     pub(in crate::strategies) goal: u64,
-    /// What digits are counted in.
+    /// Unit in which significant digits are counted.
     pub(in crate::strategies) step: u64,
 }
 
-/// What can be made of a value.
+/// Changes that shrinking can make to a value.
 pub(in crate::strategies) trait Space: fmt::Debug {
     type Value: Clone + PartialEq + fmt::Debug;
     type Part: Clone + fmt::Debug;
     type Form: Clone + fmt::Debug;
     type Place: Clone + fmt::Debug;
 
-    /// How many levels of parts there are.
+    /// Number of levels of parts.
     const LEVELS: usize;
 
-    /// What can be taken away at that level.
+    /// Returns the parts of a level that can be removed.
     fn parts(&self, value: &Self::Value, level: usize) -> Vec<Self::Part>;
 
-    /// The value without these parts; `None` if that is no value.
+    /// Returns the value without the given parts, or `None` if the result is not valid.
     fn without(&self, value: &Self::Value, parts: &[Self::Part]) -> Option<Self::Value>;
 
-    /// What might be made plainer.
+    /// Returns the forms that may become plainer.
     fn forms(&self, value: &Self::Value) -> Vec<Self::Form>;
 
-    /// The value with that made plainer; `None` if it is plain, or that is no value.
+    /// Returns the value with a form made plainer. `None` if the form is plain already, or the result is not valid.
     fn plainer(&self, value: &Self::Value, form: &Self::Form) -> Option<Self::Value>;
 
-    /// Where numbers are.
+    /// Returns the places of numbers.
     fn places(&self, value: &Self::Value) -> Vec<Self::Place>;
 
-    /// The number there, if there is one.
+    /// Returns the number at a place, or `None` if there is none.
     fn number(&self, value: &Self::Value, place: &Self::Place) -> Option<Number>;
 
-    /// The value with another number there; `None` if that is no value.
+    /// Returns the value with another number at a place, or `None` if the result is not valid.
     fn with_number(&self, value: &Self::Value, place: &Self::Place, number: u64) -> Option<Self::Value>;
 }
