@@ -172,8 +172,8 @@ impl Bed {
         self.shared.with(|core| core.wire.note(Happening::Note(text)));
     }
 
-    /// Returns the trace so far. It is recorded in [`Testbed::run_twice`](crate::Testbed::run_twice) and with [`Testbed::traced`](crate::Testbed::traced), and
-    /// empty otherwise.
+    /// Returns the trace so far. Empty unless the run is recorded, as in [`Testbed::run_twice`](crate::Testbed::run_twice) and with
+    /// [`Testbed::traced`](crate::Testbed::traced).
     #[must_use]
     pub fn trace(&self) -> Trace {
         self.shared.with(|core| core.wire.recording().trace().clone())

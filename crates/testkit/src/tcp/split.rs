@@ -12,56 +12,56 @@ use super::TcpStream;
 /// Methods of both kinds of reading halves.
 macro_rules! reading {
     () => {
-        /// As [`TcpStream::peek`].
+        /// Like [`TcpStream::peek`].
         ///
         /// # Errors
         ///
-        /// As there.
+        /// The errors of [`TcpStream::peek`].
         pub async fn peek(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
             self.stream().peek(buffer).await
         }
 
-        /// As [`TcpStream::poll_peek`].
+        /// Like [`TcpStream::poll_peek`].
         ///
         /// # Errors
         ///
-        /// As there.
+        /// The errors of [`TcpStream::poll_peek`].
         pub fn poll_peek(&mut self, cx: &mut Context<'_>, buffer: &mut ReadBuf<'_>) -> Poll<io::Result<usize>> {
             self.stream().poll_peek(cx, buffer)
         }
 
-        /// As [`TcpStream::readable`].
+        /// Like [`TcpStream::readable`].
         ///
         /// # Errors
         ///
-        /// As there.
+        /// The errors of [`TcpStream::readable`].
         pub async fn readable(&self) -> io::Result<()> {
             self.stream().readable().await
         }
 
-        /// As [`TcpStream::try_read`].
+        /// Like [`TcpStream::try_read`].
         ///
         /// # Errors
         ///
-        /// As there.
+        /// The errors of [`TcpStream::try_read`].
         pub fn try_read(&self, buffer: &mut [u8]) -> io::Result<usize> {
             self.stream().try_read(buffer)
         }
 
-        /// As [`TcpStream::try_read_vectored`].
+        /// Like [`TcpStream::try_read_vectored`].
         ///
         /// # Errors
         ///
-        /// As there.
+        /// The errors of [`TcpStream::try_read_vectored`].
         pub fn try_read_vectored(&self, buffers: &mut [IoSliceMut<'_>]) -> io::Result<usize> {
             self.stream().try_read_vectored(buffers)
         }
 
-        /// As [`TcpStream::try_read_buf`].
+        /// Like [`TcpStream::try_read_buf`].
         ///
         /// # Errors
         ///
-        /// As there.
+        /// The errors of [`TcpStream::try_read_buf`].
         pub fn try_read_buf<B: BufMut>(&self, buffer: &mut B) -> io::Result<usize> {
             self.stream().try_read_buf(buffer)
         }
@@ -71,29 +71,29 @@ macro_rules! reading {
 /// Methods of both kinds of writing halves.
 macro_rules! writing {
     () => {
-        /// As [`TcpStream::writable`].
+        /// Like [`TcpStream::writable`].
         ///
         /// # Errors
         ///
-        /// As there.
+        /// The errors of [`TcpStream::writable`].
         pub async fn writable(&self) -> io::Result<()> {
             self.stream().writable().await
         }
 
-        /// As [`TcpStream::try_write`].
+        /// Like [`TcpStream::try_write`].
         ///
         /// # Errors
         ///
-        /// As there.
+        /// The errors of [`TcpStream::try_write`].
         pub fn try_write(&self, buffer: &[u8]) -> io::Result<usize> {
             self.stream().try_write(buffer)
         }
 
-        /// As [`TcpStream::try_write_vectored`].
+        /// Like [`TcpStream::try_write_vectored`].
         ///
         /// # Errors
         ///
-        /// As there.
+        /// The errors of [`TcpStream::try_write_vectored`].
         pub fn try_write_vectored(&self, buffers: &[IoSlice<'_>]) -> io::Result<usize> {
             self.stream().try_write_vectored(buffers)
         }
@@ -103,11 +103,11 @@ macro_rules! writing {
 /// Methods of all halves.
 macro_rules! both {
     () => {
-        /// As [`TcpStream::ready`].
+        /// Like [`TcpStream::ready`].
         ///
         /// # Errors
         ///
-        /// As there.
+        /// The errors of [`TcpStream::ready`].
         #[cfg(feature = "tokio-net")]
         pub async fn ready(&self, interest: tokio::io::Interest) -> io::Result<tokio::io::Ready> {
             self.stream().ready(interest).await
@@ -117,7 +117,7 @@ macro_rules! both {
         ///
         /// # Errors
         ///
-        /// As there.
+        /// The errors of [`TcpStream::peer_addr`].
         pub fn peer_addr(&self) -> io::Result<SocketAddr> {
             self.stream().peer_addr()
         }
@@ -126,7 +126,7 @@ macro_rules! both {
         ///
         /// # Errors
         ///
-        /// As there.
+        /// The errors of [`TcpStream::local_addr`].
         pub fn local_addr(&self) -> io::Result<SocketAddr> {
             self.stream().local_addr()
         }

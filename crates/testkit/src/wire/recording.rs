@@ -34,7 +34,7 @@ pub(crate) struct Recorded {
     pub(crate) packets: Vec<Seen>,
     /// Instant of the end of the run.
     pub(crate) ended: Instant,
-    /// What each law did.
+    /// Reports of the laws.
     pub(crate) hits: Vec<HitCount>,
     pub(crate) drawn: Drawn,
 }

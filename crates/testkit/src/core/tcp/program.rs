@@ -167,7 +167,7 @@ impl Core {
         end.is_held = false;
         end.readers.clear();
         end.writers.clear();
-        // The crash has ended the connection already. After a kill the connection still has to say goodbye to its peer.
+        // The crash has ended the connection already. After a kill the connection may still have to exchange its last segments with the peer.
         if end.gone.is_some_and(|gone| !gone.is_killed) {
             self.remove_connection(id);
             return;
