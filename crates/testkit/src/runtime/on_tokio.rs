@@ -97,7 +97,8 @@ impl Idle {
         if now <= self.until {
             return false;
         }
-        // A jump of this length has no other cause than the timer for "no event". The run is then reported as waiting for ever, not as beyond its limit.
+        // A jump this long without a next event is taken for a jump to the timer for "no event". The run is then reported as waiting for ever, not as beyond
+        // its limit.
         if now.saturating_duration_since(Instant::from_nanos(parked)) > NEVER / 2 && core.next_event().is_none() {
             self.is_idle.store(true, Ordering::Relaxed);
         }

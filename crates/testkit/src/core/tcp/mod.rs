@@ -221,7 +221,6 @@ impl Core {
     fn recount(&mut self, id: ConnId) {
         let end = self.tcp.connections.get_mut(id.0);
         let held = end.machine.held() as u64;
-        // The new number is added first: the count never falls below the sum of the other parts.
         self.wire.held.add(Where::Streams, held);
         self.wire.held.remove(Where::Streams, std::mem::replace(&mut end.counted, held));
     }
