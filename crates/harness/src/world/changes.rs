@@ -1,4 +1,4 @@
-//! The changes of a timeline.
+//! Applies the changes of the scene's timeline to a running world: links, contacts, hands, gains and parameters.
 
 use cohaptic_peer::Strategy;
 use cohaptic_peer::coordination::{BuiltIn, LawValues};
@@ -10,16 +10,16 @@ use cohaptic_wan::{LinkModel, NodeId};
 use super::member::DeviceModel;
 use super::{Remote, World};
 
-/// New values of the parameters that the strategy has of its own.
+/// New values of the strategy's own parameters, computed from the scene before the run.
 pub(super) struct ParameterChange {
     own: LawValues,
-    /// For each peer β, and the damping of its copy with it [N·s/m].
+    /// Own damping β of the strategy and total damping of the copy with β \[N·s/m\], indexed by peer.
     damping: Vec<(f64, f64)>,
-    /// For each peer, if the object turns, the law of its turns, β about each axis, and the damping of the turn of its copy with it [N·m·s/rad].
+    /// Law of the turns, β about each axis and total damping of the copy's turns with β \[N·m·s/rad\], indexed by peer. Empty if the object does not turn.
     turns: Vec<(BuiltIn, Triple, Triple)>,
 }
 
-/// The changes of parameters in the timeline, the first one last.
+/// Returns the new values of each `ChangeKind::Parameters` of the timeline, in reverse order of time.
 pub(super) fn parameter_changes(scene: &Scene) -> Vec<ParameterChange> {
     let change = |change: &Change| {
         let ChangeKind::Parameters(settings) = &change.what else { return None };
@@ -33,7 +33,7 @@ pub(super) fn parameter_changes(scene: &Scene) -> Vec<ParameterChange> {
 }
 
 impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
-    /// Changes of the timeline up to and including `now`, each at its own instant.
+    /// Applies the changes of the timeline up to and including `now`, each at its own instant.
     #[inline(never)]
     pub(super) fn change(&mut self, now: Instant) {
         while let Some(change) = self.changes.pop_if(|change| change.at <= now) {
@@ -45,6 +45,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                         None => {
                             let places = 0..self.members.len();
                             places.clone().flat_map(|from| places.clone().map(move |to| (from, to))).filter(|(from, to)| from != to).collect()
+                            // A strategy counts the other peers without its own peer, so that peers after `place` move down by one.
                         }
                     };
                     for (from, to) in pairs {
@@ -56,6 +57,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                     for (place, member) in self.members.iter_mut().enumerate().filter(|(place, _)| *place != peer) {
                         member.peer.strategy_mut().set_contact(if peer < place { peer } else { peer - 1 }, contact);
                     }
+                    // A peer whose device is not simulated has no hand that could change.
                 }
                 ChangeKind::Hand { peer, hand } => match self.members[peer].peer.device_mut() {
                     DeviceModel::Simulated(device) => device.set_hand(hand.as_ref()),
@@ -65,6 +67,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                     if let Some(rotation) = self.members[peer].peer.rotation_mut() {
                         rotation.set_hand(torque);
                     }
+                    // `parameter_changes` made one entry for each of these changes, in the same order.
                 }
                 ChangeKind::SendWhen(when) => self.send_when = Some(when),
                 ChangeKind::Parameters(_) => {

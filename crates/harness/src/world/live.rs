@@ -1,4 +1,4 @@
-//! A running scene some of whose peers are remote.
+//! Parts of a running scene that only a session needs: datagrams from other processes, devices in hands, changes of links by the operator.
 
 use cohaptic_peer::wire::{Extra, MAX_LEN, Sample, SampleKind};
 use cohaptic_peer::{Clock, Device, Peer, ReceiveError, Reception, SimulatedDevice, State, Strategy};
@@ -17,8 +17,9 @@ use crate::plan::ticking;
 use crate::schedule::Schedule;
 
 impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
-    /// The scene at its beginning, with all remote peers absent.
+    /// Returns the scene before its first instant with all remote peers absent. `devices` gives the device in the hand at the given index of a peer.
     pub(crate) fn seated(mut self, scene: &Scene, mut devices: impl FnMut(usize) -> Option<Box<dyn LiveDevice>>) -> Self {
+        // A peer in another process ticks there. The schedule holds the peers of this process only.
         self.ticking.retain(|place| !self.remote.is_process(*place));
         let here = |place: &usize| &scene.peers[*place];
         let clocks: Vec<(usize, &Clock)> = self.ticking.iter().map(|place| (*place, &here(place).clock)).collect();
@@ -30,6 +31,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
         for (place, (peer, member)) in scene.peers.iter().zip(&mut self.members).enumerate() {
             match peer.kind {
                 PeerKind::Udp(_) => {
+                    // The world never sends for this peer, and its unknown position is left out of the discrepancy.
                     member.next_send = u64::MAX;
                     self.latest[place] = [f64::NAN; A];
                 }
@@ -49,10 +51,11 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
         self
     }
 
-    /// The next instant at which anything happens; the end of the scene is the last.
+    /// Returns the next instant at which anything happens, at latest the end of the scene.
     ///
-    /// Where all live here it is a tick, as in virtual time: what arrives in between waits for it anyway. With a process it is any arrival: its record has one
-    /// order for all receivers.
+    /// Without peers in other processes this is a tick, as in virtual time: a packet that arrives between two ticks is read at the later tick anyway. With such
+    /// a
+    /// peer, every arrival is an instant of its own, because the record of the session has one order for all receivers.
     pub(crate) fn next_instant(&self) -> Instant {
         let tick = self.next_tick();
         if !self.remote.has_processes {
@@ -66,11 +69,11 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
         self.schedule.next_instant().map_or(self.end, |tick| tick.min(self.end))
     }
 
-    /// The next instant that somebody waits for: a tick, or something that is on the way to a process. What happens for local peers before it can happen
-    /// when it comes.
+    /// Returns the next instant that the driver must not miss: a tick, a change of the timeline or the arrival of a packet for another process. Arrivals at
+    /// local peers before this instant can be computed when it comes.
     pub(crate) fn next_wake(&self) -> Instant {
         if self.schedule.next_instant().is_none() {
-            // Nobody else looks at what comes in.
+            // Without local ticks, every arrival is for another process.
             return self.next_instant();
         }
         let awaited = self.network.poll_awaited().unwrap_or(self.end);
@@ -78,7 +81,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
         self.next_tick().min(awaited).min(change)
     }
 
-    /// Everything that happens at [`World::next_instant`], which is `at`.
+    /// Computes everything that happens at `at`, which must be the instant of [`World::next_instant`].
     pub(crate) fn happen(&mut self, at: Instant, observer: &mut (impl Observer<Error = Ended> + ?Sized), watch: Watch) -> Result<Step, Ended> {
         self.remote.undrained = None;
         self.notice_silence(at);
@@ -94,7 +97,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
         Ok(Step::Ticked)
     }
 
-    /// A sample has come from the process of a peer. Everything before `at` has happened, nothing at it.
+    /// Takes in a sample from the process of the peer at index `place`. Everything before `at` must have been computed, nothing at `at`.
     pub(crate) fn take_sample(&mut self, at: Instant, place: usize, datagram: &[u8], session: u64) -> Result<(), SampleError> {
         self.notice_silence(at);
         let Some(seat) = self.remote.seat_mut(place).filter(|seat| seat.is_process) else {
@@ -106,7 +109,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
         let (mut sample, extra) = read?;
         seat.admit(sample.sequence)?;
         let joins = seat.hear(at);
-        // A peer that comes back counts from 0 again; for the others its numbers go on.
+        // A peer that joins again counts its samples from 0. The receivers see numbers that go on, or they would take the samples for stale.
         sample.sequence = seat.next_sequence;
         seat.next_sequence += 1;
         if joins {
@@ -123,6 +126,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
             rotation.set_copy(extra.attitude);
             turning.latest[place] = extra.attitude;
         }
+        // Changes that are due apply to the links before the sample enters the network.
         self.change(at);
         let copies = if kind.is_personal() { 1 } else { peers - 1 };
         let handle = if kind == SampleKind::State {
@@ -142,14 +146,14 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
         Ok(())
     }
 
-    /// A link changes from outside. Everything before `at` has happened, nothing at it.
+    /// Changes the configuration of a link from outside of the scene. Everything before `at` must have been computed, nothing at `at`.
     pub(crate) fn take_link(&mut self, at: Instant, from: usize, to: usize, link: &LinkModel) {
         self.change(at);
         self.set_link(at, from, to, link);
         self.remote.undrained = Some(at);
     }
 
-    /// Nobody feels a force of the session any more.
+    /// Ends all forces on devices in hands: no hand feels a force of the session after `now`.
     pub(crate) fn let_go(&mut self, now: Instant) {
         for member in &mut self.members {
             if let Some(device) = member.peer.device_mut().hand_mut() {
@@ -186,14 +190,14 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
         (is_there(from) && is_there(to)).then(|| self.network.link_stats(NodeId::new(from), NodeId::new(to))).flatten()
     }
 
-    /// The device, if it is here, and the copy of a peer.
+    /// Returns the states of a peer's device and copy. The device is `None` if it is in another process; the result is `None` if there is no peer `place`.
     pub(crate) fn states(&self, place: usize) -> Option<(Option<State<A>>, State<A>)> {
         let member = self.members.get(place)?;
         let is_process = self.remote.is_process(place);
         Some(((!is_process).then(|| member.peer.device().state()), *member.peer.object().state()))
     }
 
-    /// The attitudes of a peer; `None` if the object does not turn.
+    /// Returns the attitudes of a peer. `None` if the object does not turn or if there is no peer `place`.
     pub(crate) fn turn(&self, place: usize) -> Option<TurnState> {
         let rotation = self.members.get(place)?.peer.rotation()?;
         let device = rotation.device().filter(|_| !self.remote.is_process(place));
@@ -202,7 +206,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
 
     fn notice_silence(&mut self, now: Instant) {
         let (latest, members) = (&mut self.latest, &self.members);
-        // A copy that nobody hears of is no measure of how far copies are apart.
+        // The position of a silent peer is unknown, so that the discrepancy leaves it out. A device in a hand keeps its copy in this process.
         self.remote.notice_silence(now, |place| {
             if !matches!(members[place].peer.device(), DeviceModel::Unsimulated(UnsimulatedDevice::InHand(_))) {
                 latest[place] = [f64::NAN; A];
@@ -239,6 +243,7 @@ impl<const A: usize> Remote<A> for RemotePeers<A> {
     ) -> Option<Result<Reception, ReceiveError>> {
         let ends = (event.path.from.index(), event.path.to.index());
         let mut buffer = [0; MAX_LEN];
+        // A datagram to another process is damaged as on the link and sent on; the other process decodes or refuses it.
         if self.is_process(ends.1) {
             let len = sample.datagram(event.damage.as_ref(), &mut buffer).len();
             self.send_out(ends.1, event.at, Datagram::new(buffer, len));
@@ -247,6 +252,7 @@ impl<const A: usize> Remote<A> for RemotePeers<A> {
         Some(match &event.damage {
             None => self.take_in(now, ends, sample.sample(), &sample.extra(), receiver),
             Some(damage) => match Sample::decode_as(sample.datagram(Some(damage), &mut buffer), sample.kind(), sample.axes) {
+                // Damage can change the index of the receiver, which only a personal sample carries.
                 Ok((_, extra)) if sample.kind().is_personal() && extra.receiver as usize != ends.1 => {
                     Err(ReceiveError::Receiver { receiver: extra.receiver })
                 }
@@ -269,6 +275,7 @@ impl<const A: usize> Remote<A> for RemotePeers<A> {
             observer.on_input(&InputRow { at: now, what: Input::Device { peer: place, state: read.as_ref().map(|state| row(state, axes)) } })?;
             if let Some(state) = read {
                 let joins = seat.hear(now);
+                // A device that comes back fades in, and so do the forces of the peers that it follows.
                 if joins {
                     device.keep();
                     seat.fades[place].moved(now);
@@ -284,7 +291,7 @@ impl<const A: usize> Remote<A> for RemotePeers<A> {
     }
 }
 
-/// The sample of the peer in that place among all peers.
+/// Decodes a datagram as a sample of the peer at index `place` of `peers` peers, and refuses samples of other sessions, senders and impossible receivers.
 fn read_sample<const A: usize>(
     datagram: &[u8],
     kind: SampleKind,

@@ -1,4 +1,4 @@
-//! A peer of a run with its clock and what stands for its device.
+//! A peer of a run with its clock, its device and its counters.
 
 use std::time::Duration;
 
@@ -13,23 +13,27 @@ use crate::disturbance::Disturbance;
 use crate::observer::{Ended, Observer, StepRow, TurnStepRow};
 use crate::plan::{DeviceChoice, Plan};
 
-/// A peer with its clock.
+/// A peer with its clock and the counters of its ticks and samples.
 pub(super) struct Member<const A: usize, S, D> {
     pub(super) peer: Peer<A, DeviceModel<A, D>, S>,
     pub(super) clock: Clock,
+    /// Number of ticks that the peer has computed.
     pub(super) tick: u64,
-    /// The tick at which it sends next, and how many ticks later again.
+    /// Tick at which the next sample is due.
     pub(super) next_send: u64,
+    /// Ticks between two samples, at least 1.
     pub(super) send_every: u64,
-    /// With dead bands alone.
+    /// State that was sent last. Kept only if the scene has a send condition (dead bands).
     pub(super) last_sent: Option<LastSent<A>>,
+    /// Samples that arrived after a newer sample of the same sender.
     pub(super) stale_samples: u64,
+    /// Samples that were refused because damage made them undecodable.
     pub(super) refused_samples: u64,
-    /// The held part of the coordination force that was computed at the latest tick, if steps are watched.
+    /// Held part of the coordination force that was computed at the latest tick \[N\]. Updated only if steps are watched.
     pub(super) commanded: [f64; A],
 }
 
-/// What stands for a peer's device; D is the type of those that nobody simulates.
+/// Model of a peer's device. D is the type of the devices that are not simulated.
 #[derive(Debug)]
 #[expect(clippy::large_enum_variant, reason = "most peers of most scenes are the large variant, and a box would cost a cache miss a tick")]
 pub(crate) enum DeviceModel<const A: usize, D> {
@@ -56,7 +60,8 @@ impl<const A: usize, D: Device<A>> Device<A> for DeviceModel<A, D> {
 }
 
 impl<const A: usize, S: Strategy<A>, D: Device<A>> Member<A, S, D> {
-    /// Moves to the next tick, with `commanded` the held part of the coordination force that was computed at this one.
+    /// Moves to the next tick and shows the step. `commanded` is the held part of the coordination force that was computed at the present tick \[N\]; `row` is
+    /// the index of the peer and the number of axes.
     #[inline]
     pub(super) fn advance_watched(
         &mut self,
@@ -67,13 +72,13 @@ impl<const A: usize, S: Strategy<A>, D: Device<A>> Member<A, S, D> {
         observer: &mut (impl Observer<Error = Ended> + ?Sized),
     ) -> Result<(), Ended> {
         match self.peer.role() {
-            // The role is known where this is compiled, which took 2 % of the instructions of all measures.
+            // The most frequent case passes a constant role and no turn, so that the compiler specialises the inlined function.
             Role::Copy if self.peer.rotation().is_none() => self.advance_as(now, span, commanded, (row, Role::Copy), observer, None),
             role @ (Role::Copy | Role::Client { .. }) => self.advance_otherwise(now, span, commanded, (row, role), observer),
         }
     }
 
-    /// [`Member::advance_watched`] of a client, or of a peer that turns: where no peer does, its copies were 3 % of the instructions of all measures.
+    /// Like [`Member::advance_watched`], for a client or for a peer that turns. Not inlined, so that the frequent case stays small.
     #[inline(never)]
     fn advance_otherwise(
         &mut self,
@@ -95,7 +100,7 @@ impl<const A: usize, S: Strategy<A>, D: Device<A>> Member<A, S, D> {
         self.advance_as(now, span, commanded, row, observer, turn)
     }
 
-    /// Moves to the next tick and shows the step, whose turn has no end yet.
+    /// Moves to the next tick and shows the step. The field `after` of `turn` is filled in here, after the move.
     #[inline(always)]
     fn advance_as(
         &mut self,
@@ -107,8 +112,10 @@ impl<const A: usize, S: Strategy<A>, D: Device<A>> Member<A, S, D> {
         turn: Option<TurnStepRow>,
     ) -> Result<(), Ended> {
         let late = std::mem::replace(&mut self.commanded, commanded);
+        // With a compute delay, the force of the previous tick acts during this step.
         let coordination = if self.peer.compute_delay() { late } else { commanded };
         let before = self.moved_by_coordination(role);
+        // `advance` may replace the applied forces, so that they are copied first.
         let acting = *self.peer.applied();
         self.peer.advance(now, span);
         let turn = turn.map(|turn| TurnStepRow { after: self.peer.attitude().rate, ..turn });
@@ -126,7 +133,7 @@ impl<const A: usize, S: Strategy<A>, D: Device<A>> Member<A, S, D> {
         })
     }
 
-    /// The body on which the others act: the copy, or the device of a client.
+    /// Returns the state of the body on which the other peers act: the copy, or the device of a client.
     #[inline(always)]
     fn moved_by_coordination(&self, role: Role) -> State<A> {
         if role == Role::Copy { *self.peer.object().state() } else { self.peer.device().state() }
@@ -178,7 +185,7 @@ impl<const A: usize, S: Strategy<A>, D: Device<A> + From<RestingDevice<A>>> Memb
 
     #[inline]
     pub(super) fn is_finite(&self) -> bool {
-        // Each kind by itself: asked as one, both become a selection of addresses, which costs two peers a fiftieth of a tick.
+        // One match arm for each kind, not a reference chosen by the match: each arm then reads a known address.
         let device = match self.peer.device() {
             DeviceModel::Unsimulated(device) => device.state().is_finite(),
             DeviceModel::Simulated(device) => device.state().is_finite(),

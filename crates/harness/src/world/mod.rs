@@ -1,4 +1,7 @@
-//! The running scene: its peers, its network, its clock, with A simulated axes.
+//! A running scene in virtual time or in a session: its peers, its network and its schedule, with A simulated axes.
+//!
+//! A [`World`] is made from a checked scene and a [`Plan`]. Each step computes one instant and shows rows to the observer; the summary is read at the end. No
+//! file, socket or clock of the machine is known here.
 
 mod changes;
 mod live;
@@ -31,56 +34,56 @@ pub(crate) use remote::{Arriving, NoRemote, Remote};
 use turning::Turning;
 pub(crate) use watch::Watch;
 
-/// A scene in the middle of a run; E holds its remote peers.
+/// A scene during a run. The type parameter E holds the remote peers.
 pub(crate) struct World<const A: usize, S, E: Remote<A> = NoRemote> {
-    /// The axes that the scene has, of the A that are simulated.
+    /// Number of axes of the scene, at most A. The arrays have A axes; the rows of observers have this number of axes.
     axes: usize,
     names: Vec<String>,
     members: Vec<Member<A, S, E::Device>>,
     network: Network<Handle>,
     samples: SamplesInFlight<A>,
-    /// What each sample is for the network.
+    /// Size and ECN capability of every sample's packet.
     packet: PacketInfo,
-    /// Which samples are sent, if not all.
+    /// Condition under which a due sample is sent; `None` if every due sample is sent.
     send_when: Option<SendWhen>,
-    /// Up to which age receivers extrapolate samples \[s\], if they do.
+    /// Age up to which receivers extrapolate samples \[s\]; `None` if receivers hold samples.
     horizon: Option<f64>,
     schedule: Schedule,
-    /// The changes to come, the next one last.
+    /// Changes of the timeline that are still to come, in reverse order of time: the next change is popped from the end.
     changes: Vec<Change>,
-    /// What these changes of parameters are, the next one last.
+    /// New parameter values of the `ChangeKind::Parameters` changes in `changes`, in the same reverse order.
     parameters: Vec<ParameterChange>,
-    /// By peer, or of all if it is the same.
+    /// Factors of the coordination gains, indexed by peer, or a single factor if all peers have the same gains.
     coordination_factors: Vec<f64>,
-    /// The neighbours of each peer, if they are not all others.
+    /// Neighbours of each peer; `None` if every peer sends to all other peers.
     topology: Option<Arc<Topology>>,
     end: Instant,
     now: Instant,
-    /// Where each copy was at its latest tick.
+    /// Position of each copy at its latest tick \[m\], indexed by peer. NaN for a peer in another process that is silent.
     latest: Vec<[f64; A]>,
-    /// The attitudes of the copies, if the object turns.
+    /// Attitudes of the copies; `None` if the object does not turn.
     turning: Option<Box<Turning>>,
     max_discrepancy: f64,
     finite: bool,
-    /// The peers that tick at the present instant, if not all local ones.
+    /// Peers that tick at the present instant, by index. In lockstep all local peers.
     ticking: Vec<usize>,
-    /// In lockstep, the next tick at which anybody sends.
+    /// Next tick at which any local peer sends. Read in lockstep only, where all peers count the same ticks.
     earliest_send: u64,
     remote: E,
 }
 
-/// The two bodies of a peer.
+/// Positions of a peer's device and of its copy of the object \[m\].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bodies<const A: usize> {
     pub(crate) device: [f64; A],
     pub(crate) object: [f64; A],
     pub(crate) contact: Contact,
-    /// The point of the copy that the device grasps: its centre if the object does not turn.
+    /// Point of the copy that the device grasps \[m\]: the centre of the copy if the object does not turn.
     pub(crate) grasp: [f64; A],
     pub(crate) turns: Option<Turns>,
 }
 
-/// The attitudes of the two bodies of a peer; angles times `length` are lengths \[m\].
+/// Attitudes of a peer's device and of its copy. An angle \[rad\] times `length` \[m\] is comparable with a distance.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Turns {
     pub(crate) object: Attitude,
@@ -88,7 +91,7 @@ pub(crate) struct Turns {
     pub(crate) length: f64,
 }
 
-/// What one step of a run came to.
+/// Outcome of one step of a run.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Step {
     Ticked,
@@ -96,7 +99,7 @@ pub(crate) enum Step {
 }
 
 impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
-    /// The scene at its beginning, with the strategies that `strategy` makes for the places of the peers.
+    /// Returns the scene before its first instant. `strategy` makes the strategy of the peer at the given index.
     pub(crate) fn new(scene: &Scene, plan: &Plan, disturbance: Option<Disturbance>, remote: E, strategy: impl Fn(usize) -> S) -> Self {
         let initial: Vec<State<A>> = (0..scene.peers.len()).map(|place| scene.initial_state(place)).collect();
         let member = |place| Member::new(scene, plan, &initial, disturbance, place, strategy(place));
@@ -129,17 +132,17 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         }
     }
 
-    /// The instant of the latest step.
+    /// Returns the instant of the latest step.
     pub(crate) fn now(&self) -> Instant {
         self.now
     }
 
-    /// The end of the scene.
+    /// Returns the instant at which the scene ends.
     pub(crate) fn end(&self) -> Instant {
         self.end
     }
 
-    /// Everything that happens at the next instant at which a peer ticks, or the end of the scene.
+    /// Computes the next instant at which a peer ticks. Ends the run if that instant is not before the end of the scene, or if a number is not finite.
     pub(crate) fn step(&mut self, observer: &mut (impl Observer<Error = Ended> + ?Sized), watch: Watch) -> Result<Step, Ended> {
         let Some(now) = self.schedule.next_instant().filter(|now| *now < self.end) else {
             return self.finish(observer, watch).map(Step::Ended);
@@ -153,7 +156,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         }
         self.schedule.take(now, &mut self.ticking);
         self.send(now, observer, watch)?;
-        // Where all peers are local, nobody asks the network what comes next.
+        // Without remote peers nothing else polls the network, so that an instant without events need not be delivered.
         if !E::IS_EMPTY || self.network.may_have_events(now) {
             self.deliver(now, observer, watch)?;
         }
@@ -165,7 +168,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         Ok(Step::Ticked)
     }
 
-    /// What came out, up to `ending`.
+    /// Returns the results of the run up to `ending`.
     pub(crate) fn summary(&self, ending: Ending) -> Summary {
         let stop = match ending {
             Ending::Complete => self.end,
@@ -194,7 +197,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         }
     }
 
-    /// Where each peer's device and copy are, and whether they touch.
+    /// Returns the positions and attitudes of each peer's device and copy, and their contact, in the order of the peers.
     pub(crate) fn bodies(&self) -> impl Iterator<Item = Bodies<A>> {
         let length = self.turning.as_ref().map_or(1.0, |turning| turning.length());
         self.members.iter().map(move |member| {
@@ -209,8 +212,9 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         })
     }
 
-    /// Step 1: those whose time it is send their sample to everybody else, or to their neighbours.
+    /// Step 1 of an instant: each ticking peer whose sample is due sends this sample to all other peers, to its neighbours, or as a client to its server.
     fn send(&mut self, now: Instant, observer: &mut (impl Observer<Error = Ended> + ?Sized), watch: Watch) -> Result<(), Ended> {
+        // In lockstep all local peers have the tick of the leading peer, so that one comparison skips the loop at ticks without samples.
         if matches!(self.schedule, Schedule::Lockstep { .. }) && self.members[self.remote.lead()].tick < self.earliest_send {
             return Ok(());
         }
@@ -220,6 +224,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             if member.tick != member.next_send {
                 continue;
             }
+            // The next due tick moves on even if `send_when` keeps back this sample: the condition is evaluated at due ticks only.
             member.next_send += member.send_every;
             let local_time = member.clock.local_time(member.tick);
             if let Some(when) = &self.send_when {
@@ -242,7 +247,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             {
                 handle
             } else {
-                // The states are finite, or the run had ended, but a number made of them is not.
+                // The states are finite, because the run ends at a state that is not. A number that is computed from the states has overflowed.
                 self.finite = false;
                 continue;
             };
@@ -250,6 +255,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             let sent = match role {
                 Role::Copy => self.network.handle_broadcast(now, sender, self.packet, handle),
                 Role::Client { server } => {
+                    // The role counts servers without the client itself; nodes of the network count all peers.
                     let server = if server < from { server } else { server + 1 };
                     self.network.handle_packet(now, sender, NodeId::new(server), self.packet, handle)
                 }
@@ -263,13 +269,13 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         Ok(())
     }
 
-    /// Step 2: whatever has arrived is handed to its receiver.
+    /// Step 2 of an instant: each packet that has arrived is handed to its receiver.
     fn deliver(&mut self, now: Instant, observer: &mut (impl Observer<Error = Ended> + ?Sized), watch: Watch) -> Result<(), Ended> {
         let Self { network, members, samples, remote, axes, .. } = self;
         network.handle_timeout(now).expect("instants come in order");
         let mut receivers = Receivers { members, samples, remote, axes: *axes };
         loop {
-            // Nearly all events are mere arrivals. Handed on by themselves, most parts of an event are never made.
+            // Nearly all events are simple arrivals, for which the network need not build a complete event.
             while let Some(taken) = network.take_mere_arrival(|event| receivers.take(now, &event, observer, watch)) {
                 taken?;
             }
@@ -278,7 +284,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         }
     }
 
-    /// Steps 3 and 4: each peer that ticks computes forces and moves to the next tick.
+    /// Steps 3 and 4 of an instant: each ticking peer computes its forces and moves to its next tick.
     fn compute_and_move(&mut self, now: Instant, observer: &mut (impl Observer<Error = Ended> + ?Sized), watch: Watch) -> Result<(), Ended> {
         let lockstep = match &mut self.schedule {
             Schedule::Lockstep { tick, next } => {
@@ -301,6 +307,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             });
             let forces = member.peer.compute_over(now, span);
             let object = member.peer.object().state();
+            // Noted between `compute_over` and `advance`: the positions of the present instant, not of the next tick.
             self.latest[place] = object.position;
             if let (Some(turning), Some(rotation)) = (&mut self.turning, member.peer.rotation()) {
                 turning.latest[place] = *rotation.copy();
@@ -334,7 +341,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         Ok(())
     }
 
-    /// The work of each peer that ticks, where all tick and nobody watches: it took 10 % off a tick.
+    /// Computes and moves all peers in one loop, for runs in lockstep in which nobody watches ticks or steps. The results equal those of the general loop.
     #[inline]
     fn move_together(&mut self, now: Instant, span: Duration) {
         if let Some(turning) = &mut self.turning {
@@ -353,7 +360,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         self.finite &= finite;
     }
 
-    /// The largest distance along an axis between two copies at their latest ticks \[m\].
+    /// Returns the largest distance along an axis between two copies at their latest ticks \[m\]. Copies of absent peers are left out.
     #[inline(always)]
     fn measure_discrepancy(&mut self) -> f64 {
         let (mut low, mut high) = ([f64::INFINITY; A], [f64::NEG_INFINITY; A]);
@@ -377,7 +384,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         discrepancy
     }
 
-    /// The end of the scene: what has arrived by then is delivered.
+    /// Ends the scene: applies the changes and delivers the packets that are due at the end.
     fn finish(&mut self, observer: &mut (impl Observer<Error = Ended> + ?Sized), watch: Watch) -> Result<Ending, Ended> {
         self.change(self.end);
         self.deliver(self.end, observer, watch)?;
@@ -405,7 +412,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
     }
 }
 
-/// The links and access lines of a scene.
+/// Builds the network of the scene's links and access lines.
 fn network<T: Clone>(scene: &Scene, plan: &Plan) -> Network<T> {
     let config = NetworkConfig { seed: scene.seed, nodes: scene.peers.iter().map(|peer| peer.name.clone()).collect(), general: plan.general_links };
     let link = |from: NodeId, to: NodeId| scene.links.between(from.index(), to.index()).clone();
@@ -427,13 +434,15 @@ fn network<T: Clone>(scene: &Scene, plan: &Plan) -> Network<T> {
     if scene.relay { network.with_relay() } else { network }
 }
 
-/// What each sample of a scene is for the network.
+/// Returns the properties that the network needs of each sample's packet.
 fn packet(kind: SampleKind, scene: &Scene) -> PacketInfo {
-    // Capable of ECN, so that a queue that marks has something to mark: nobody sends less for it, but a marked packet arrives.
+    // Packets are ECN-capable, so that a queue that marks has packets to mark. No sender reacts to a mark; a marked packet arrives.
     PacketInfo { size: Bytes::new(kind.datagram_len(scene.axes.count()) as u64), ecn_capable: true }
 }
 
-/// Stores a sample with its attitude and extra numbers, which the peer in the place `from` has for each of the others, or for all; `None` if one is not finite.
+/// Stores a sample with the attitude and the extra numbers of the peer at index `from`: numbers for each receiver if the kind is personal, else one set for
+/// all.
+/// Returns `None` if a number is not finite.
 fn store_extended<const A: usize, D: Device<A>, S: Strategy<A>>(
     samples: &mut SamplesInFlight<A>,
     packets: (usize, usize),
@@ -443,6 +452,7 @@ fn store_extended<const A: usize, D: Device<A>, S: Strategy<A>>(
     let kind = samples.kind();
     samples.store_extended(packets, sample, peer.attitude(), |numbers| {
         if kind.is_personal() {
+            // Numbers are indexed by node, but the peer counts the other peers without itself. The zeros in its own place are never sent.
             numbers.extend((0..from).map(|other| peer.extra(other)));
             numbers.push([0.0; A]);
             numbers.extend((from..others).map(|other| peer.extra(other)));
@@ -453,7 +463,7 @@ fn store_extended<const A: usize, D: Device<A>, S: Strategy<A>>(
     })
 }
 
-/// The peers to which the network hands packets.
+/// Receiving side of the world: the parts that a delivered packet changes, borrowed apart from the network that delivers it.
 struct Receivers<'a, const A: usize, S, E: Remote<A>> {
     members: &'a mut [Member<A, S, E::Device>],
     samples: &'a mut SamplesInFlight<A>,
@@ -462,7 +472,7 @@ struct Receivers<'a, const A: usize, S, E: Remote<A>> {
 }
 
 impl<const A: usize, S: Strategy<A>, E: Remote<A>> Receivers<'_, A, S, E> {
-    /// Takes what has become of a packet.
+    /// Handles an event of a packet: hands over a delivered sample, releases the stored sample, shows the packet's record.
     #[inline(always)]
     fn take(
         &mut self,
@@ -485,12 +495,13 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> Receivers<'_, A, S, E> {
                 Some(Err(error)) => unreachable!("peers of one scene understand each other: {error}"),
             }
         }
+        // A stored sample counts its packets: a copy adds a packet, every other event takes one away.
         if event.fate == Fate::Duplicated {
             self.samples.retain(event.payload);
         } else {
             self.samples.release(event.payload);
         }
-        // Making a copy is no end: the packet and its copy each have one.
+        // `Fate::Duplicated` is not an end: the packet and its copy each get a later record.
         if watch.packets && event.fate.is_end() {
             observer.on_packet(&event.record)?;
         }

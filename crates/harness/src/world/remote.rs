@@ -1,4 +1,4 @@
-//! The questions of a running scene about its remote peers.
+//! Interface between a running world and its remote peers, and its implementation for virtual time, which has none.
 
 use cohaptic_peer::wire::{Extra, MAX_LEN, Sample, SampleKind};
 use cohaptic_peer::{Device, Peer, ReceiveError, Reception, RestingDevice, Strategy};
@@ -9,24 +9,23 @@ use super::DeviceModel;
 use crate::in_flight::{Handle, SamplesInFlight};
 use crate::observer::{Ended, Observer};
 
-/// The peers of a running scene that are remote: in other processes, or with their device in somebody's hand.
+/// Remote peers of a running scene: peers in other processes, and peers whose device is in a person's hand.
 ///
-/// A type parameter of the world and not a field that may be empty: virtual time, where all peers are local, is not to carry what live scenes need. As a
-/// field, with ages in every peer, it cost two peers a seventh of a tick and ten of them a tenth, though nothing ever came of its questions.
+/// A type parameter of the world, not an optional field: virtual time has no remote peers, and its peers then carry no ages and its loop asks no questions.
 pub(crate) trait Remote<const A: usize> {
-    /// What stands for a device that nobody simulates.
+    /// Type of the devices that are not simulated.
     type Device: Device<A> + From<RestingDevice<A>>;
 
-    /// Whether all peers are local whatever the scene, so that they may tick in one loop that asks nothing.
+    /// Whether every peer of every scene is local, so that all peers can tick in one loop without calls of `attend`.
     const IS_EMPTY: bool;
 
-    /// The first local peer, by whose ticks all of them tick in lockstep.
+    /// Returns the index of the first local peer. In lockstep its tick count stands for all local peers.
     fn lead(&self) -> usize;
 
-    /// Whether a peer is there, so that it is of interest how far its copy is from the others.
+    /// Returns whether the peer is present, so that its copy counts in the discrepancy.
     fn is_there(&self, place: usize) -> bool;
 
-    /// Hands a packet that the network has delivered to its receiver, and says what became of it; `None` if that lives in another process.
+    /// Hands a delivered packet to its receiver and returns the outcome; `None` if the receiver is in another process.
     fn receive<S: Strategy<A>>(
         &mut self,
         now: Instant,
@@ -35,7 +34,7 @@ pub(crate) trait Remote<const A: usize> {
         receiver: &mut Peer<A, DeviceModel<A, Self::Device>, S>,
     ) -> Option<Result<Reception, ReceiveError>>;
 
-    /// Tells a peer that is about to tick the ages of the remote peers; its own device may be one of them.
+    /// Prepares a peer for its tick: reads its device if that is in a hand, and tells the peer the ages of the remote peers.
     fn attend<S: Strategy<A>>(
         &mut self,
         now: Instant,
@@ -46,7 +45,7 @@ pub(crate) trait Remote<const A: usize> {
     ) -> Result<(), Ended>;
 }
 
-/// All peers are local: virtual time.
+/// Remote peers of a run in virtual time: none, all peers are local.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct NoRemote;
 
@@ -93,14 +92,14 @@ impl<const A: usize> Remote<A> for NoRemote {
     }
 }
 
-/// A sample that arrives.
+/// Stored sample of a packet that arrives.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Arriving<'a, const A: usize> {
     pub(super) samples: &'a SamplesInFlight<A>,
     pub(super) handle: Handle,
-    /// The place of the receiver.
+    /// Index of the receiver.
     pub(super) to: usize,
-    /// How many axes the scene has.
+    /// Number of axes of the scene.
     pub(super) axes: usize,
 }
 
@@ -110,19 +109,19 @@ impl<const A: usize> Arriving<'_, A> {
         self.samples.kind()
     }
 
-    /// Position and velocity.
+    /// Returns the position and velocity of the sample.
     #[inline(always)]
     pub(super) fn sample(&self) -> &Sample<A> {
         self.samples.sample(self.handle)
     }
 
-    /// What else the sample says to its receiver.
+    /// Returns the attitude and the extra numbers for this receiver.
     #[inline(always)]
     pub(super) fn extra(&self) -> Extra<A> {
         self.samples.extra(self.handle, self.to)
     }
 
-    /// Its bytes, which nobody has made before.
+    /// Encodes the sample into `buffer` and applies `damage`. Samples travel as numbers, so that bytes are made only here.
     pub(super) fn datagram<'b>(&self, damage: Option<&Damage>, buffer: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
         let len = self.sample().encode_as(self.kind(), &self.extra(), self.axes, buffer);
         if let Some(damage) = damage {

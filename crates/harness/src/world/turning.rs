@@ -1,4 +1,4 @@
-//! What a running scene keeps of an object that turns.
+//! State that a running scene keeps for an object that turns.
 
 use cohaptic_peer::Gains;
 use cohaptic_peer::rotation::{Attitude, Rotation, Triple};
@@ -7,20 +7,20 @@ use cohaptic_scene::Scene;
 use crate::observer::{Ended, Observer, TickRow, TurnRow};
 use crate::spread::Spread;
 
-/// The attitudes of all copies, and changes of the gains on them.
+/// Attitudes of all copies, their spread, and the coming changes of the rotational gains.
 #[derive(Clone, Debug)]
 pub(super) struct Turning {
-    /// The attitude of each copy at its latest tick.
+    /// Attitude of each copy at its latest tick, indexed by peer.
     pub(super) latest: Vec<Attitude>,
     pub(super) spread: Spread,
-    /// KR and BR after each change of the coordination gains, the next one last.
+    /// Rotational gains KR and BR after each change of gains, in reverse order of time: the next gains are popped from the end.
     gains: Vec<Gains<Triple>>,
-    /// √(tr J/3m): angles times this are lengths \[m\].
+    /// Radius √(tr J/3m) \[m\]. An angle \[rad\] times this radius is comparable with a distance.
     length: f64,
 }
 
 impl Turning {
-    /// That of a scene at its beginning; `None` if its object does not turn.
+    /// Returns the state before the first instant; `None` if the object does not turn.
     pub(super) fn new(scene: &Scene) -> Option<Box<Self>> {
         let rotation = scene.rotation.as_ref()?;
         let mut gains: Vec<_> = scene.rotation_gains_in_time().skip(1).collect();
@@ -30,24 +30,24 @@ impl Turning {
         Some(Box::new(Self { gains, latest, spread: Spread::default(), length }))
     }
 
-    /// Angles times this are lengths \[m\].
+    /// Returns the radius that converts angles \[rad\] to lengths \[m\].
     pub(super) fn length(&self) -> f64 {
         self.length
     }
 
-    /// KR and BR from the change on that is due now.
+    /// Removes and returns the gains KR and BR that hold from the change that is due now.
     pub(super) fn next_gains(&mut self) -> Option<Gains<Triple>> {
         self.gains.pop()
     }
 
-    /// Takes in how far the copies that are there are turned apart, at their latest ticks.
+    /// Updates the spread with the orientations of the copies that are present.
     pub(super) fn measure(&mut self, is_there: impl Fn(usize) -> bool) {
         let there = self.latest.iter().enumerate().filter(|(place, _)| is_there(*place));
         self.spread.take(there.map(|(_, attitude)| attitude.orientation));
     }
 }
 
-/// Shows a tick of a peer that turns. Apart from the loop over peers, where the larger row would be written for those that do not turn as well.
+/// Shows a tick of a peer that turns. A function of its own, so that the loop over peers does not build the larger row for peers that do not turn.
 #[inline(never)]
 pub(super) fn on_tick(observer: &mut (impl Observer<Error = Ended> + ?Sized), tick: TickRow<'_>, rotation: &Rotation) -> Result<(), Ended> {
     observer.on_tick(&TickRow {

@@ -1,8 +1,8 @@
-//! The rows that an observer asks for.
+//! Selection of the rows that an observer wants, read once before a run.
 
 use crate::observer::Observer;
 
-/// What an observer wants to see.
+/// Kinds of rows that an observer wants, one flag for each `Observer::wants_…`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Watch {
     pub(crate) ticks: bool,
@@ -16,7 +16,7 @@ pub(crate) struct Watch {
 impl Watch {
     pub(crate) const NOTHING: Self = Self { ticks: false, packets: false, steps: false, instants: false, sends: false, holds: false };
 
-    /// Whether no more is looked at than ticks and instants.
+    /// Returns whether the observer wants at most ticks and instants.
     pub(crate) fn is_of_ticks(self) -> bool {
         Self { ticks: false, instants: false, ..self } == Self::NOTHING
     }
