@@ -1,7 +1,7 @@
-//! The bodies of all peers and how they move, eight lanes at a time.
+//! Bodies of all peers and their motion, eight lanes at a time.
 //!
-//! What a lane computes is [`cohaptic_peer::tick`] and the scene's law, as [`cohaptic_peer::Peer`] does, so every bit is the same. Each tick is a loop over
-//! lanes without branches, which the compiler turns into vector instructions.
+//! A lane computes [`cohaptic_peer::tick`] and the scene's law, as [`cohaptic_peer::Peer`] does, so that every bit is the same. Each tick is a loop over lanes
+//! without branches, which the compiler turns into vector instructions.
 
 mod block;
 mod law;
@@ -25,53 +25,55 @@ pub(super) use law::{LawOfLanes, law_of_lanes};
 pub(super) struct Blocks {
     places: Places,
     axes: usize,
+    /// Blocks in the order of [`Places`]: all blocks of the first axis, then those of the next.
     blocks: Vec<Block>,
-    /// By how much the samples held have moved on since they were sent, a block after another; empty for a law that does not ask.
+    /// Displacements of the means since the held samples were sent \[m\], indexed by block. Empty for a law that does not extrapolate.
     leads: Vec<Lanes>,
-    /// What the law remembers: the numbers of one lane after those of another, a block after another.
+    /// Numbers that the law remembers, ordered by block, then lane.
     memory: Vec<f64>,
-    /// The copies at the latest ticks, as many as the law looks back: the blocks of one tick, then those of the next.
+    /// Motions of the copies at the latest ticks, as many as the law looks back: a ring of ticks, each with all blocks.
     past: Vec<Motions>,
-    /// The oldest of those ticks.
+    /// Index in the ring of the oldest tick in `past`.
     oldest: usize,
-    /// How copies move in a tick. One map for all: a map for each block cost ten peers 3 %.
+    /// Step map of the copies. One map for all peers, which differs only between runs.
     object_map: StepMap<Lanes>,
-    /// The forces computed at the latest tick, where anybody applies them a tick late.
+    /// Forces computed at the latest tick, indexed by block. `None` if no peer applies its forces a tick late.
     late: Option<Vec<Late>>,
-    /// The walls of each run, where any has some.
+    /// Walls of the object, indexed by run. `None` if no run has walls.
     walls: Option<Vec<Option<Enclosure>>>,
-    /// The runs that have not ended.
+    /// Lanes of runs that have not ended. Other lanes are not checked for finite numbers.
     pub(super) goes_on: Mask,
-    /// The least and the greatest positions along the axis that is worked at. Here, and not beside the loop over blocks: as variables of it they were compared lane
-    /// by lane, in turned order, which took 2 to 8 % of a run over constant delays.
+    /// Least and greatest positions along the axis that is computed at present \[m\]. A field, not local variables of the loop over blocks, because the
+    /// compiler
+    /// vectorises this form only.
     extremes: [Lanes; 2],
 }
 
-/// Position and velocity of eight bodies along one axis.
+/// Position \[m\] and velocity \[m/s\] of eight bodies along one axis.
 pub(super) type Motions = Motion<Lanes>;
 
-/// What rows say of eight peers along one axis.
+/// States and forces of eight peers along one axis, as rows show them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seen {
     pub(super) device: Motions,
     pub(super) object: Motions,
     pub(super) target: Motions,
-    /// FC.
+    /// Coupling force FC \[N\].
     pub(super) coupling: Lanes,
-    /// FT without what the law damps.
+    /// Coordination force FT \[N\], without the part of the law's own damping.
     pub(super) coordination: Lanes,
 }
 
-/// Positions along each axis, the least and the greatest of each run.
+/// Results of a tick for each of L runs.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Moved<const L: usize> {
-    /// The largest distance along an axis between two copies, before they moved \[m\].
+    /// Largest distance along an axis between two copies before they moved \[m\], indexed by run.
     pub(super) discrepancy: [f64; L],
-    /// Whether everything is a finite number, after it moved.
+    /// Whether all numbers are finite after the move, indexed by run.
     pub(super) finite: [bool; L],
 }
 
-/// The motion of one lane.
+/// Returns the motion of one lane.
 #[inline(always)]
 pub(super) fn lane_of(motions: &Motions, lane: usize) -> Motion {
     Motion { position: motions.position.0[lane], velocity: motions.velocity.0[lane] }
@@ -84,8 +86,9 @@ fn set_lane(motions: &mut Motions, lane: usize, motion: Motion) {
 }
 
 impl Blocks {
-    /// The bodies of runs of these scenes, all of which have that law, with numbers of their own. `devices` says what stands for the device of each peer, if anybody
-    /// looks; otherwise only those move that ever touch their copies.
+    /// Returns the bodies of runs of these scenes, which share the kind of `law` and may differ in its coefficients. `devices` is the choice for each peer's
+    /// device if
+    /// an observer sees devices. With `None` only those devices move that ever touch their copies.
     pub(super) fn new<const A: usize>(places: Places, scenes: &[&Scene], law: &BuiltIn, devices: Option<&[DeviceChoice]>) -> Self {
         let mut blocks = Vec::with_capacity(A * places.blocks());
         let mut late = Vec::with_capacity(A * places.blocks());
@@ -102,7 +105,7 @@ impl Blocks {
                 late[spot.block].is_late.set(spot.lane, config.compute_delay);
                 block.touch(spot.lane, config.contact);
                 if !moves(scenes[run], member, devices) {
-                    // Nothing depends on its device.
+                    // The device stays at rest: no force on the copy depends on it, and no observer sees it.
                     set_map(&mut block.device_map, spot.lane, &RESTING);
                     continue;
                 }
@@ -116,6 +119,7 @@ impl Blocks {
                 block.hand.0[spot.lane] = force.map_or(0.0, |force| force[axis]);
             }
         }
+        // Lists for delays and walls are kept only if a peer or a run has one, so that the usual tick skips both.
         let any_late = scenes.iter().any(|scene| scene.peers.iter().any(|peer| peer.compute_delay));
         let walls: Vec<Option<Enclosure>> = scenes.iter().map(|scene| scene.object.enclosure).collect();
         Self {
@@ -134,7 +138,7 @@ impl Blocks {
         }
     }
 
-    /// Position and velocity of a copy of the object.
+    /// Returns position \[m\] and velocity \[m/s\] of a copy of the object along an axis.
     #[inline(always)]
     pub(super) fn object(&self, axis: usize, peer: usize, run: usize) -> (f64, f64) {
         let Spot { block, lane } = self.places.spot(axis, peer, run);
@@ -142,7 +146,7 @@ impl Blocks {
         (position, velocity)
     }
 
-    /// Along each axis the least and the greatest position of the copies, if there is one run: what lies beyond the last peer repeats it.
+    /// Returns the least and the greatest position of the copies \[m\] for each axis, in a single run. Lanes beyond the last peer repeat it and change neither.
     #[inline]
     pub(super) fn extremes(&self) -> impl Iterator<Item = (f64, f64)> {
         self.blocks.chunks(self.places.blocks()).map(|blocks| {
@@ -157,17 +161,17 @@ impl Blocks {
         })
     }
 
-    /// How many runs there are.
+    /// Returns the number of runs.
     pub(super) const fn runs(&self) -> usize {
         self.places.runs
     }
 
-    /// The bodies of all peers, by axis.
+    /// Returns the bodies of all peers, by axis.
     pub(super) fn of_all(&self) -> &[Block] {
         &self.blocks
     }
 
-    /// What rows say of the peers in a place, before they move.
+    /// Returns states and forces of the block at index `place`, before the bodies move.
     pub(super) fn seen(&self, place: usize, law: &BuiltIn<Lanes>) -> Seen {
         law.visit(Look { blocks: self, place })
     }
@@ -176,6 +180,7 @@ impl Blocks {
         let (block, remembered, lag) = (&self.blocks[place], law.remembered() * WIDTH, law.looks_back());
         let past = if lag > 0 { self.past[self.oldest * self.blocks.len() + place] } else { block.object };
         let lead = self.leads.get(place).unwrap_or(&Lanes::ZERO);
+        // A copy of the memory: looking must not change what the law remembers.
         let mut memory = self.memory[place * remembered..(place + 1) * remembered].to_vec();
         let coupling = block.coupling();
         let (mut coordination, mut target) = (Lanes::ZERO, block.mean);
@@ -188,13 +193,14 @@ impl Blocks {
         Seen { device: block.device, object: block.object, target, coupling, coordination }
     }
 
-    /// Replaces the mean of the samples that a peer holds, in all runs.
+    /// Replaces the mean of the samples that a peer holds along an axis, in all runs.
     #[inline(always)]
     pub(super) fn set_target<const L: usize>(&mut self, axis: usize, peer: usize, x: [f64; L], v: [f64; L]) {
         for run in 0..L {
             let Spot { block, lane } = self.places.spot(axis, peer, run);
             set_lane(&mut self.blocks[block].mean, lane, Motion { position: x[run], velocity: v[run] });
         }
+        // The last run of the last peer fills the unused lanes, which move like it.
         if L < WIDTH && peer + 1 == self.places.peers {
             let Spot { block, lane } = self.places.spot(axis, peer, L - 1);
             let mean = &mut self.blocks[block].mean;
@@ -203,7 +209,7 @@ impl Blocks {
         }
     }
 
-    /// Replaces by how much the samples that a peer holds have moved on, in all runs.
+    /// Replaces the displacement of the mean since the held samples were sent \[m\], in all runs.
     pub(super) fn set_lead<const L: usize>(&mut self, axis: usize, peer: usize, lead: [f64; L]) {
         for (run, lead) in lead.into_iter().enumerate() {
             let Spot { block, lane } = self.places.spot(axis, peer, run);
@@ -214,39 +220,39 @@ impl Blocks {
         }
     }
 
-    /// A run has ended: it is not looked at any more whether its numbers are finite.
+    /// Ends a run: its numbers are no longer checked for being finite.
     pub(super) fn end(&mut self, run: usize) {
         for lane in (run..WIDTH).step_by(self.places.runs) {
             self.goes_on.set(lane, false);
         }
     }
 
-    /// The damping of copies from now on is that of these scenes, in each run.
+    /// Replaces the damping of the copies by that of these scenes, indexed by run.
     pub(super) fn set_damping(&mut self, scenes: &[&Scene]) {
         self.object_map = object_map(scenes);
     }
 
-    /// A device touches its copy in that way from now on, in all runs.
+    /// Replaces the contact between a peer's device and copy, in all runs.
     pub(super) fn set_contact(&mut self, peer: usize, contact: Contact) {
         for (spot, ..) in (0..self.axes).flat_map(|axis| self.places.all(axis)).filter(|(_, other, _)| *other == peer) {
             self.blocks[spot.block].touch(spot.lane, contact);
         }
     }
 
-    /// A hand pushes with that force from now on, in a run.
+    /// Replaces the force of a hand \[N\], in one run.
     pub(super) fn set_hand<const A: usize>(&mut self, peer: usize, run: usize, force: [f64; A]) {
         for (axis, force) in force.into_iter().enumerate() {
             let Spot { block, lane } = self.places.spot(axis, peer, run);
             let hands = &mut self.blocks[block].hand.0;
             hands[lane] = force;
-            // The last of all fills the lanes that are left.
+            // The last run of the last peer fills the unused lanes, which move like it.
             if peer + 1 == self.places.peers && run + 1 == self.places.runs {
                 hands[lane..].fill(force);
             }
         }
     }
 
-    /// The law looks back this number of ticks from now on. The latest copies stay; before the oldest one they were as then.
+    /// Replaces the number of ticks that the law looks back. The latest known ticks stay; earlier ticks get the oldest known motion.
     pub(super) fn set_lag(&mut self, lag: usize) {
         let known = self.past.len() / self.blocks.len();
         if lag == known {
@@ -260,9 +266,9 @@ impl Blocks {
         self.oldest = 0;
     }
 
-    /// Everybody computes forces by the law and moves to the next tick.
+    /// Computes the forces of all peers by the law and moves all bodies to the next tick.
     ///
-    /// The law is chosen at each tick: all loops over ticks, one for each kind of bodies and of observers, then call one piece of code for each law.
+    /// The law is chosen here at each tick, so that all loops over ticks share one compiled function for each law.
     #[inline(always)]
     pub(super) fn advance<const L: usize>(&mut self, processor: pulp::Arch, law: &BuiltIn<Lanes>) -> Moved<L> {
         law.visit(Advance::<L> { blocks: self, processor })
@@ -278,13 +284,14 @@ impl Blocks {
             self.extremes = [Lanes::splat(f64::INFINITY), Lanes::splat(f64::NEG_INFINITY)];
             for place in axis * per_axis..(axis + 1) * per_axis {
                 let block = &mut self.blocks[place];
-                // Most laws ask for none of these, and the compiler then leaves them out.
+                // Most laws use none of the three, and the compiler then leaves them out.
                 let past = if lag > 0 { std::mem::replace(&mut self.past[oldest + place], block.object) } else { block.object };
                 let lead = self.leads.get(place).unwrap_or(&Lanes::ZERO);
                 let memory = if remembered > 0 { &mut self.memory[place * remembered..(place + 1) * remembered] } else { &mut [] };
                 let [low, high] = &mut self.extremes;
                 *low = low.smaller(block.object.position);
                 *high = high.larger(block.object.position);
+                // The usual case in one pass over the lanes; walls, delays and one-sided contacts need the forces as values.
                 if self.walls.is_none() && self.late.is_none() && block.contacts.is_none() {
                     block.tick(law, &past, lead, memory, &self.object_map);
                 } else {
@@ -311,10 +318,10 @@ impl Blocks {
         Moved { discrepancy, finite: self.finite(size) }
     }
 
-    /// Whether everything in each run is finite, where `size` is the sum of the sizes of all that moves.
+    /// Returns whether all numbers of each run are finite. `size` is the sum of the magnitudes of all positions and velocities, by lane.
     #[inline(always)]
     fn finite<const L: usize>(&self, size: Lanes) -> [bool; L] {
-        // A sum of sizes is finite only if they all are. Were it not for overflow it would also be so the other way round.
+        // A finite sum means that every magnitude is finite. An infinite sum can also come from overflow, so that each number is then checked.
         let [a, b, c, d, e, f, g, h] = (size & self.goes_on).0;
         if ((a + e) + (b + f)) + ((c + g) + (d + h)) < f64::INFINITY { [true; L] } else { self.look_at_each() }
     }
@@ -333,12 +340,12 @@ impl Blocks {
     }
 }
 
-/// Whether a device moves: it may touch its copy, or is looked at.
+/// Returns whether a device must be moved: it may touch its copy, or an observer sees it.
 pub(super) fn moves(scene: &Scene, peer: usize, devices: Option<&[DeviceChoice]>) -> bool {
     touches(scene, peer) || devices.is_some_and(|devices| devices[peer] == DeviceChoice::Simulated)
 }
 
-/// [`Blocks::advance`] by a law of its own type.
+/// Visitor of [`Blocks::advance`], which gets the law by its own type.
 struct Advance<'a, const L: usize> {
     blocks: &'a mut Blocks,
     processor: pulp::Arch,
@@ -351,12 +358,12 @@ impl<const L: usize> LawVisitor<Lanes> for Advance<'_, L> {
     fn visit<W: Coefficients<Coefficient = Lanes, Of<f64>: Law<f64>>>(self, law: &W) -> Moved<L> {
         let Self { blocks, processor } = self;
         let tick = Tick { blocks, law };
-        // With wide registers a run of three or ten peers over constant delays takes six tenths of the time.
+        // The widest registers: most of a tick is arithmetic on lanes.
         on_widest(processor, tick)
     }
 }
 
-/// The motion of a tick.
+/// Motion of a tick as a task that is compiled for each kind of processor.
 struct Tick<'a, W, const L: usize> {
     blocks: &'a mut Blocks,
     law: &'a W,
@@ -371,7 +378,7 @@ impl<W: LawOfLanes, const L: usize> NullaryFnOnce for Tick<'_, W, L> {
     }
 }
 
-/// [`Blocks::seen`] by a law of its own type.
+/// Visitor of [`Blocks::seen`], which gets the law by its own type.
 struct Look<'a> {
     blocks: &'a Blocks,
     place: usize,
@@ -385,7 +392,7 @@ impl LawVisitor<Lanes> for Look<'_> {
     }
 }
 
-/// How copies of runs of these scenes move in a tick.
+/// Returns the step map of the copies of these scenes. Lane l has the map of run l modulo the number of runs.
 fn object_map(scenes: &[&Scene]) -> StepMap<Lanes> {
     let mut map = ZERO_MAP;
     for lane in 0..WIDTH {
@@ -395,9 +402,10 @@ fn object_map(scenes: &[&Scene]) -> StepMap<Lanes> {
     map
 }
 
-/// The distance from the least to the greatest of each run.
+/// Returns the distance from the least to the greatest position of each run \[m\].
 #[inline(always)]
 fn distances<const L: usize>(mut low: Lanes, mut high: Lanes) -> [f64; L] {
+    // Lanes of a run are L apart, and L divides the width: halving leaves one lane for each run.
     let mut width = WIDTH;
     while width > L {
         width /= 2;

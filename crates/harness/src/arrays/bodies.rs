@@ -1,4 +1,4 @@
-//! The bodies of all peers, copies with devices, and the hands that push the devices.
+//! Bodies of all peers, which are copies and devices, and the hands that push the devices.
 
 use cohaptic_peer::coordination::BuiltIn;
 use cohaptic_peer::{Hand, HandForce};
@@ -15,12 +15,12 @@ use crate::plan::DeviceChoice;
 #[derive(Clone, Debug)]
 pub(super) struct Bodies<const A: usize> {
     blocks: Blocks,
-    /// Hands whose force varies: peer, run and force.
+    /// Hands whose force varies in time: index of the peer, index of the run, force.
     hands: Vec<(usize, usize, HandForce<A>)>,
 }
 
 impl<const A: usize> Bodies<A> {
-    /// The bodies of runs of these scenes, all of which have that law, with numbers of their own; `devices` as for [`Blocks::new`].
+    /// Returns the bodies of runs of these scenes, which share the kind of `law`. `devices` as for [`Blocks::new`].
     pub(super) fn new(places: Places, scenes: &[&Scene], law: &BuiltIn, devices: Option<&[DeviceChoice]>) -> Self {
         let varying = |(peer, run): (usize, usize)| {
             let (scene, member) = (scenes[run], places.first + peer);
@@ -33,19 +33,19 @@ impl<const A: usize> Bodies<A> {
         }
     }
 
-    /// The bodies without the hands.
+    /// Returns the bodies without the hands.
     #[inline(always)]
     pub(super) fn blocks(&self) -> &Blocks {
         &self.blocks
     }
 
-    /// [`Bodies::blocks`], to change what moves them.
+    /// Returns the bodies without the hands, to change contacts, hands and means.
     #[inline(always)]
     pub(super) fn blocks_mut(&mut self) -> &mut Blocks {
         &mut self.blocks
     }
 
-    /// What a peer sends now.
+    /// Returns the sample that a peer sends at the present tick.
     #[inline(always)]
     pub(super) fn sample<const L: usize>(&self, peer: usize) -> Sample<A, L> {
         let mut sample = Sample::ZERO;
@@ -57,7 +57,7 @@ impl<const A: usize> Bodies<A> {
         sample
     }
 
-    /// A hand does that from now on, in all runs.
+    /// Replaces the hand of a peer in all runs. `None`: no hand.
     pub(super) fn set_hand(&mut self, peer: usize, hand: Option<&Hand>) {
         let (hand, runs) = (HandForce::<A>::of(hand), self.blocks.runs());
         self.hands.retain(|(other, ..)| *other != peer);
@@ -67,7 +67,7 @@ impl<const A: usize> Bodies<A> {
         }
     }
 
-    /// Hands take the force of now.
+    /// Sets the forces of varying hands to those of the instant `now`.
     #[inline(always)]
     pub(super) fn move_hands(&mut self, now: Instant) {
         for (peer, run, hand) in &self.hands {
@@ -75,13 +75,13 @@ impl<const A: usize> Bodies<A> {
         }
     }
 
-    /// Everybody computes forces by the law and moves to the next tick.
+    /// Computes the forces of all peers and moves all bodies to the next tick.
     #[inline(always)]
     pub(super) fn advance<const L: usize>(&mut self, processor: pulp::Arch, law: &BuiltIn<Lanes>) -> Moved<L> {
         self.blocks.advance(processor, law)
     }
 
-    /// What rows say of the peers in a place along each axis, before they move.
+    /// Returns states and forces of the peers in the block at index `place`, along each axis, before they move.
     pub(super) fn seen(&self, place: usize, law: &BuiltIn<Lanes>) -> [Seen; A] {
         let blocks = self.blocks.of_all().len() / A;
         std::array::from_fn(|axis| self.blocks.seen(axis * blocks + place, law))

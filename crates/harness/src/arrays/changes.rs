@@ -1,4 +1,6 @@
-//! The changes of a timeline. A run in arrays goes in stretches from one to the next: in a stretch nothing changes, and the law is a constant of the loop.
+//! Changes of the timeline in runs in arrays.
+//!
+//! A run goes in stretches from one change to the next. Nothing changes within a stretch, so that the law is a constant of the loop over ticks.
 
 use std::slice;
 
@@ -10,16 +12,16 @@ use cohaptic_wan::LinkModel;
 use super::blocks::law_of_lanes;
 use super::{Arrays, Samples};
 
-/// The changes to come, which are the same in all runs, and what follows from them in each.
+/// Changes that are still to come, which are the same in all runs, and the laws that follow from them in each run.
 #[derive(Debug)]
 pub(super) struct Changes<'a, const L: usize> {
     to_come: slice::Iter<'a, Change>,
-    /// The laws of the scenes after each of them, the next ones last; empty if their strategies are no laws.
+    /// Laws of the runs after each change, in reverse order of time. Empty if the strategies of the scenes are no laws of the registry.
     laws: Vec<[BuiltIn; L]>,
 }
 
 impl<'a, const L: usize> Changes<'a, L> {
-    /// All of them, of runs of these scenes.
+    /// Returns all changes of runs of these scenes.
     pub(super) fn new(scenes: &[&'a Scene; L]) -> Self {
         let to_come = scenes[0].timeline.iter();
         if to_come.as_slice().is_empty() {
@@ -30,13 +32,13 @@ impl<'a, const L: usize> Changes<'a, L> {
         Self { to_come, laws }
     }
 
-    /// When something changes next; never, if nothing does.
+    /// Returns the instant of the next change; [`Instant::MAX`] if there is none.
     pub(super) fn next_at(&self) -> Instant {
         self.to_come.as_slice().first().map_or(Instant::MAX, |change| change.at)
     }
 }
 
-/// What iterators give together, until one of them ends.
+/// Collects the items that the iterators return together, until one of them ends.
 fn side_by_side<T, I: Iterator<Item = T>, const L: usize>(mut iterators: [I; L]) -> Vec<[T; L]> {
     let mut together = Vec::new();
     while let Ok(items) = <[T; L]>::try_from(iterators.iter_mut().map_while(Iterator::next).collect::<Vec<T>>()) {
@@ -46,18 +48,20 @@ fn side_by_side<T, I: Iterator<Item = T>, const L: usize>(mut iterators: [I; L])
 }
 
 impl<const A: usize, const L: usize> Arrays<'_, A, L> {
-    /// The tick at which something changes next.
+    /// Returns the tick at or after the next change.
     pub(super) fn next_change(&self) -> u64 {
         self.shape.tick_at(self.changes.next_at())
     }
 
-    /// Makes the changes up to an instant, those of links each at an instant of its own, at that tick or at the end of the scene before that tick. Tells `damped` of the
-    /// scene whose damping the copies have from then on.
+    /// Applies the changes up to the instant `until`, which is at the tick `tick` or, at the end of the scene, before it. Each change of a link takes effect at
+    /// its
+    /// own instant. Calls `damped` with the scene whose damping the copies have from then on.
     #[cold]
     pub(super) fn change(&mut self, tick: u64, until: Instant, damped: &mut dyn FnMut(&Scene)) {
         while self.changes.next_at() <= until
             && let Some(change) = self.changes.to_come.next()
         {
+            // One entry for each change of the timeline, so that an entry is popped even if this change keeps the law.
             let laws = self.changes.laws.pop();
             match &change.what {
                 ChangeKind::Link(link) => self.set_links(tick, change.at, &[(link.from, link.to)], |_, _| &link.config),
@@ -88,17 +92,18 @@ impl<const A: usize, const L: usize> Arrays<'_, A, L> {
                 }
             }
         }
+        // Queues wait for this call, because a packet's fate can depend on a change that was not applied yet.
         if self.shape.has_queues() {
             self.pass(tick);
         }
     }
 
-    /// The place here of a peer of the scene.
+    /// Returns the index of a peer of the scene among the members; `None` if other arrays hold this peer.
     fn member(&self, peer: usize) -> Option<usize> {
         self.members.contains(&peer).then(|| peer - self.members.start)
     }
 
-    /// The links to the peers that are here.
+    /// Returns the sender and the receiver of each link to a member.
     fn pairs(&self) -> Vec<(usize, usize)> {
         let Samples::PerPacket(samples) = &self.samples else { return Vec::new() };
         self.members.clone().flat_map(|to| samples.senders(to - self.members.start).map(move |from| (from, to))).collect()
@@ -111,11 +116,12 @@ impl<const A: usize, const L: usize> Arrays<'_, A, L> {
         }
     }
 
-    /// As [`cohaptic_peer::Peer::set_parameters`] does.
+    /// Changes the strategy's own parameters, as [`cohaptic_peer::Peer::set_parameters`] does.
     fn change_parameters(&mut self, settings: &LawSettings, laws: &[BuiltIn; L], damped: &mut dyn FnMut(&Scene)) {
         self.law = law_of_lanes(laws);
         if let Some((horizons, leads)) = &mut self.leads {
             for (run, law) in laws.iter().enumerate() {
+                // A lead stays valid if the horizon stays the same to the bit.
                 if let Some(horizon) = Law::<f64>::horizon(law).filter(|horizon| horizon.to_bits() != horizons[run].to_bits()) {
                     horizons[run] = horizon;
                     leads.iter_mut().for_each(|leads| leads[run] = super::Lead::STALE);

@@ -1,16 +1,16 @@
-//! Lanes numbers at once.
+//! Vectors of eight numbers.
 
 use std::ops::{Add, BitAnd, Div, Mul, Sub};
 
-/// How many numbers are computed at once: a cache line, and one register of the widest processors.
+/// Numbers computed at once: a cache line, and a register of the widest processors.
 pub(crate) const WIDTH: usize = 8;
 
-/// Lanes numbers that have the same done to them. Each is rounded as it would be alone, so what they are computed with changes no bit.
+/// Eight numbers that undergo the same operations. Each number is rounded as it would be alone, so that the other lanes change no bit.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 pub(super) struct Lanes(pub(super) [f64; WIDTH]);
 
-/// For each of eight numbers all bits or none.
+/// Mask of eight lanes: all bits of a lane are set, or none.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(align(64))]
 pub(super) struct Mask([u64; WIDTH]);
@@ -28,26 +28,26 @@ impl Lanes {
         Self(self.0.map(f64::abs))
     }
 
-    /// The smaller of each pair.
+    /// Returns the smaller number in each lane.
     #[inline(always)]
     pub(super) fn smaller(self, other: Self) -> Self {
         Self(std::array::from_fn(|i| smaller(self.0[i], other.0[i])))
     }
 
-    /// The larger of each pair.
+    /// Returns the larger number in each lane.
     #[inline(always)]
     pub(super) fn larger(self, other: Self) -> Self {
         Self(std::array::from_fn(|i| larger(self.0[i], other.0[i])))
     }
 }
 
-/// The smaller of two; if they are equal, or one is not a number, the second. One instruction, which [`f64::min`] is not.
+/// Returns the smaller of two numbers; the second if both are equal or one is NaN. Compiles to one instruction, unlike [`f64::min`].
 #[inline(always)]
 pub(crate) fn smaller(one: f64, other: f64) -> f64 {
     if one < other { one } else { other }
 }
 
-/// The larger of two; if they are equal, or one is not a number, the second.
+/// Returns the larger of two numbers; the second if both are equal or one is NaN.
 #[inline(always)]
 pub(crate) fn larger(one: f64, other: f64) -> f64 {
     if one > other { one } else { other }
@@ -65,20 +65,20 @@ impl Mask {
         self.0[place] != 0
     }
 
-    /// The number where the mask holds in that lane, +0 elsewhere.
+    /// Returns `number` if the mask holds in this lane, else +0.
     #[inline(always)]
     pub(super) fn keep(&self, lane: usize, number: f64) -> f64 {
         f64::from_bits(number.to_bits() & self.0[lane])
     }
 
-    /// `yes` where it holds, `no` elsewhere.
+    /// Returns the lanes of `yes` where the mask holds and those of `no` elsewhere.
     #[inline(always)]
     pub(super) fn choose(self, yes: Lanes, no: Lanes) -> Lanes {
         Lanes(std::array::from_fn(|i| f64::from_bits(yes.0[i].to_bits() & self.0[i] | no.0[i].to_bits() & !self.0[i])))
     }
 }
 
-/// The numbers where the mask holds, +0 elsewhere.
+/// Keeps the lanes in which the mask holds, and sets the other lanes to +0.
 impl BitAnd<Mask> for Lanes {
     type Output = Self;
 

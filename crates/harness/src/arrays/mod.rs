@@ -1,10 +1,10 @@
-//! Scenes that need no events: all numbers of all peers in arrays, one scene or several of one shape side by side.
+//! Runs of scenes that need no events: all numbers of all peers in arrays, for one scene or for several scenes of one shape side by side.
 //!
-//! Where everybody ticks together and nobody watches more than ticks, a run is a loop over ticks: sending, arrivals, forces, motion. Here that loop works on
-//! arrays, eight numbers at a time: eight peers of one run, or one peer of eight runs. It is what [`crate::world::World`] does, with the same operations in the same order on each number, the same random numbers at the same addresses and the same
-//! counters, and comes to the same [`Summary`] to the bit.
-//!
-//! With events, a second of ten peers takes 5.1 times as long over constant delays, and 2.0 times over jitter and loss.
+//! If all peers tick together and the observer wants no more than ticks, a run is a loop over ticks: samples are sent, samples arrive, forces are computed,
+//! bodies
+//! move. This loop works on arrays, eight numbers at a time: eight peers of one run, or one peer of eight runs. [`crate::world::World`] computes the same with
+//! events. Both do the same operations in the same order on each number, draw the same random numbers at the same addresses and keep the same counters, so
+//! that both return the same [`Summary`] to the bit.
 
 mod blocks;
 mod bodies;
@@ -46,13 +46,13 @@ pub(crate) use shape::Shape;
 pub use side_by_side::{run_side_by_side, same_shape};
 pub use ticks::Ticks;
 
-/// A run of a scene of that shape with that law, to its end. `keep_going` is asked as [`crate::Observer::keep_going`] is.
+/// Runs a scene of the given shape and law to its end. `keep_going` is called as [`crate::Observer::keep_going`] is.
 pub(crate) fn run(scene: &Scene, shape: Shape, law: BuiltIn, keep_going: &mut dyn FnMut(Instant) -> bool) -> Summary {
     let [summary] = run_lanes([scene], shape, [law], keep_going);
     summary
 }
 
-/// L runs of scenes of that shape with these laws, to their ends.
+/// Runs L scenes of the given shape to their ends, each with its law.
 fn run_lanes<const L: usize>(scenes: [&Scene; L], shape: Shape, laws: [BuiltIn; L], keep_going: &mut dyn FnMut(Instant) -> bool) -> [Summary; L] {
     let watch = Unwatched(keep_going);
     match scenes[0].axes {
@@ -61,7 +61,7 @@ fn run_lanes<const L: usize>(scenes: [&Scene; L], shape: Shape, laws: [BuiltIn; 
     }
 }
 
-/// A run of a scene to its end, or until the onlooker fails: then the summary means nothing.
+/// Runs a scene to its end, or until `onlooker` fails. The summary has no meaning after a failure.
 pub(crate) fn run_watched(scene: &Scene, (shape, law): (Shape, BuiltIn), plan: &Plan, onlooker: &mut dyn Onlooker) -> Summary {
     let (watch, scenes, laws, devices) = (WatchedTicks::new(scene, onlooker), [scene], [law], Some(plan.devices.as_slice()));
     let [summary] = match scene.axes {
@@ -71,7 +71,7 @@ pub(crate) fn run_watched(scene: &Scene, (shape, law): (Shape, BuiltIn), plan: &
     summary
 }
 
-/// A run of a scene on that number of threads, to its end; `None` if it diverged: another without threads says when.
+/// Runs a scene on the given number of threads to its end. Returns `None` if the run diverged: only a run without threads knows the instant.
 pub(crate) fn run_on_threads(
     scene: &Scene,
     shape: &Shape,
@@ -85,32 +85,37 @@ pub(crate) fn run_on_threads(
     }
 }
 
-/// Some or all peers of L runs of scenes of one shape with A axes.
+/// Some or all peers of L runs of scenes that have one shape, with A axes.
 #[derive(Debug)]
 struct Arrays<'a, const A: usize, const L: usize> {
     scenes: [&'a Scene; L],
     shape: Shape,
     law: BuiltIn<Lanes>,
-    /// The peers that are here; they are counted from 0 in what follows, unless it is said otherwise.
+    /// Peers of the scene that these arrays hold. Unless a comment says otherwise, a peer is counted from the first of these members.
     members: Range<usize>,
     bodies: Bodies<A>,
     samples: Samples<A, L>,
     changes: Changes<'a, L>,
-    /// Up to which age samples are extrapolated in each run \[s\], and how far they have come by peer and run, if the law does that.
+    /// Horizons of the extrapolation \[s\], indexed by run, and leads of the held samples, indexed by peer, then run. `None` if the law does not extrapolate.
     leads: Option<([f64; L], Vec<[Lead<A>; L]>)>,
-    /// The tick at which each peer of the scene sends next.
+    /// Tick at which each peer sends next, indexed by peer of the scene.
     next_send: Vec<u64>,
+    /// Least entry of `next_send`: at earlier ticks nothing is sent.
     earliest_send: u64,
-    /// The peers of the scene that send now, and what each sent last, where each link is one by itself.
+    /// Peers of the scene that send at the present tick. Used only with [`Samples::PerPacket`].
     senders: Vec<usize>,
+    /// Latest sample of each peer of the scene. Empty with [`Samples::Broadcast`].
     sent: Vec<Sample<A, L>>,
+    /// Largest distance between two copies along an axis so far \[m\], indexed by run.
     max_discrepancy: [f64; L],
+    /// Whether all numbers were finite after the latest tick, indexed by run.
     finite: [bool; L],
+    /// Results of the runs that have ended, indexed by run.
     summaries: [Option<Summary>; L],
     processor: pulp::Arch,
 }
 
-/// How samples travel.
+/// Samples in flight and samples held, in the form that the links allow.
 #[derive(Debug)]
 #[expect(clippy::large_enum_variant, reason = "there is one a run, and a box would be another look-up a packet")]
 enum Samples<const A: usize, const L: usize> {
@@ -119,7 +124,7 @@ enum Samples<const A: usize, const L: usize> {
 }
 
 impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
-    /// The scenes at their beginning, all of that shape; `devices` as for [`Bodies::new`].
+    /// Returns all peers of the scenes before the first tick. `devices` as for [`Bodies::new`].
     fn new(scenes: [&'a Scene; L], shape: Shape, laws: [BuiltIn; L], devices: Option<&[DeviceChoice]>) -> Self {
         let members = 0..shape.peers;
         let bodies = bodies_of::<A, L>(&scenes, &members, &laws, devices);
@@ -127,7 +132,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         Self::of_members(scenes, shape, laws, members, bodies, &initial)
     }
 
-    /// Those peers with their bodies; `initial` has the samples with which all peers of the scene begin.
+    /// Returns the given peers with their bodies before the first tick. `initial` holds the initial states of all peers of the scene.
     fn of_members(
         scenes: [&'a Scene; L],
         shape: Shape,
@@ -162,10 +167,11 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         }
     }
 
-    /// Runs all of them to their end.
+    /// Runs all L runs to their ends.
     fn run(mut self, mut watch: impl RunWatch<A>) -> [Summary; L] {
         let (mut tick, last) = (0, self.shape.tick_at(self.shape.end));
         loop {
+            // Stretches between changes: within a stretch the law and the links stay as they are.
             let until = self.next_change().min(last);
             if self.run_over(tick..until, &mut watch).is_break() {
                 break;
@@ -184,7 +190,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         self.summaries.map(|summary| summary.expect("every run has ended"))
     }
 
-    /// Runs all of them over those ticks, or until they have all ended.
+    /// Computes the given ticks of all runs. Breaks early if all runs have ended.
     fn run_over(&mut self, ticks: Range<u64>, watch: &mut impl RunWatch<A>) -> ControlFlow<()> {
         let tick_nanos = nanos(self.shape.tick);
         for tick in ticks {
@@ -202,7 +208,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         ControlFlow::Continue(())
     }
 
-    /// The scenes end after that number of ticks.
+    /// Ends all runs at the end of the scene, after the given number of ticks.
     fn finish(&mut self, ticks: u64, watch: &mut impl RunWatch<A>) {
         let end = self.shape.end;
         self.change(ticks, end, &mut |scene| watch.change_damping(scene));
@@ -212,7 +218,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         self.end_all(ticks, |finite| if finite { Ending::Complete } else { Ending::Diverged(end) });
     }
 
-    /// Everything that happens at a tick. Gives how far copies are apart \[m\].
+    /// Computes a tick. Returns the distance between copies \[m\], indexed by run.
     #[inline(always)]
     fn step(&mut self, tick: u64, now: Instant, watch: &mut impl RunWatch<A>) -> [f64; L] {
         if self.begin(tick) {
@@ -221,8 +227,9 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         self.go_on(now, tick, watch)
     }
 
-    /// What happens at a tick before anything is sent. Says whether something is sent now: then `senders` has the peers of the scene that send, and `sent` has
-    /// in the places of those that are here what each of them sends.
+    /// Begins a tick: takes the samples of the peers that send now. Returns whether any peer sends; then `senders` lists the sending peers of the scene, and
+    /// `sent`
+    /// holds the samples of those among them that are members.
     #[inline(always)]
     fn begin(&mut self, tick: u64) -> bool {
         let sends = tick == self.earliest_send;
@@ -232,7 +239,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         sends
     }
 
-    /// What happens at a tick after all have sent. Gives how far copies are apart \[m\].
+    /// Finishes a tick after all samples were sent. Returns the distance between copies \[m\], indexed by run.
     #[inline(always)]
     fn go_on(&mut self, now: Instant, tick: u64, watch: &mut impl RunWatch<A>) -> [f64; L] {
         match &mut self.samples {
@@ -251,9 +258,10 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         discrepancy
     }
 
-    /// Means and motion of a tick.
+    /// Computes the means of the held samples and moves all bodies.
     #[inline(always)]
     fn motion(&mut self, now: Instant, watch: &mut impl RunWatch<A>) -> Moved<L> {
+        // In a broadcast, means stay as they are until a sample arrives.
         if !matches!(&self.samples, Samples::Broadcast(samples) if samples.is_settled()) {
             on_widest(self.processor, Means::<A, L> { samples: &mut self.samples, bodies: &mut self.bodies });
         }
@@ -261,10 +269,11 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         self.bodies.advance::<L>(self.processor, &self.law)
     }
 
-    /// Leads of a tick: what [`cohaptic_peer::Held::move_on`] gives, to the bit.
+    /// Computes the leads of all held samples, to the bit as [`cohaptic_peer::Held::move_on`] does.
     #[inline(never)]
     fn extrapolate(&mut self, now: Instant) {
         let Shape { tick, send_every, phases, .. } = &self.shape;
+        // A link is offered every sample of its sender, so that the sequence number of a sample gives its instant.
         let sent = |sender: usize, sequence: u64| Instant::from_nanos((phases[sender] + sequence * send_every) * nanos(*tick));
         let Some((horizons, leads)) = &mut self.leads else { return };
         for (peer, leads) in leads.iter_mut().enumerate() {
@@ -287,7 +296,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         }
     }
 
-    /// Takes the samples of the peers that send at this tick.
+    /// Takes the samples of the peers that send at this tick, and sets the tick at which each of them sends next.
     fn gather(&mut self, tick: u64) {
         self.senders.clear();
         for (peer, next) in self.next_send.iter_mut().enumerate() {
@@ -308,16 +317,17 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         self.earliest_send = self.next_send.iter().copied().min().unwrap_or(u64::MAX);
     }
 
-    /// Samples of all that send at this tick leave for the peers that are here.
+    /// Sends the gathered samples over the links to the members. A broadcast was sent by [`Arrays::gather`].
     fn send(&mut self, tick: u64, now: Instant) {
         if let Samples::PerPacket(samples) = &mut self.samples {
+            // Links may look ahead only to the next sample or the next change of the timeline, whichever is earlier.
             let change = self.changes.next_at();
             let next = |sender: usize| next_offer(&self.shape, self.next_send[sender]).min(change);
             samples.send(self.processor, (tick, now), &self.senders, &self.sent, next);
         }
     }
 
-    /// Queues did nothing yet that happens at this tick or later.
+    /// Advances the queues of all links up to `tick`; nothing that happens at `tick` or later is done.
     #[cold]
     fn pass(&mut self, tick: u64) {
         if let Samples::PerPacket(samples) = &mut self.samples {
@@ -326,7 +336,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         }
     }
 
-    /// Ends the runs that have diverged before that tick, and says whether none is left.
+    /// Ends the runs that diverged before `tick`. Returns whether all runs have ended.
     #[cold]
     fn end_diverged(&mut self, tick: u64, now: Instant) -> bool {
         for run in 0..L {
@@ -345,14 +355,14 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         }
     }
 
-    /// Writes down the results of a run after that number of ticks.
+    /// Ends a run after the given number of ticks and stores its summary.
     fn end(&mut self, run: usize, ticks: u64, ending: Ending) {
         let until = self.stop(run, ticks, ending);
         self.summaries[run] = Some(summary(std::slice::from_ref(self), run, ticks, ending, until, self.max_discrepancy[run]));
         self.bodies.blocks_mut().end(run);
     }
 
-    /// A run ends after that number of ticks: nothing is on the way any more. Gives until when packets were delivered.
+    /// Stops a run after the given number of ticks and discards its packets in flight. Returns the instant up to which packets were delivered.
     fn stop(&mut self, run: usize, ticks: u64, ending: Ending) -> Instant {
         // Packets are delivered up to the latest tick, and to the end of the scene if that was reached.
         let delivered_until = match ending {
@@ -369,7 +379,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         delivered_until
     }
 
-    /// What came out for a peer.
+    /// Returns the results of a peer.
     fn peer_summary(&self, peer: usize, run: usize) -> PeerSummary {
         let (position, velocity) = (0..self.scenes[run].axes.count()).map(|axis| self.bodies.blocks().object(axis, peer, run)).unzip();
         let stale_samples = match &self.samples {
@@ -380,10 +390,12 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         PeerSummary { name, position, velocity, attitude: None, stale_samples, refused_samples: 0 }
     }
 
-    /// The counters of each link from a peer after that number of ticks, if what arrives by an instant is delivered and all links have that constant delay.
+    /// Returns the counters of each link from `from` after the given number of ticks, if all links have the constant delay `delay` and packets that arrive up
+    /// to
+    /// `until` are delivered.
     fn broadcast_stats(&self, from: usize, delay: Duration, ticks: u64, until: Instant) -> LinkStats {
         let delay = nanos(delay);
-        // Such a link need not count: sent at phase, phase + M, phase + 2M …
+        // Such a link keeps no counters: its packets are sent at ticks phase, phase + M, phase + 2M, … with M = `send_every`.
         let sent_before = |ticks: u64| ticks.saturating_sub(self.shape.phases[from]).div_ceil(self.shape.send_every);
         let last = until.as_nanos().checked_sub(delay).map(|nanos| nanos / crate::arrays::nanos(self.shape.tick));
         let offered = sent_before(ticks);
@@ -392,13 +404,13 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
     }
 }
 
-/// What the links did of a run that ended after that number of ticks; the peers are here and there.
+/// Returns the counters of the links of a run that ended after the given number of ticks. `parts` together hold all peers.
 fn links<const A: usize, const L: usize>(parts: &[Arrays<'_, A, L>], run: usize, ticks: u64, until: Instant) -> LinkSummaries {
     let peers = parts[0].shape.peers;
     if let Some(delay) = parts[0].shape.delay {
         return LinkSummaries::by_sender((0..peers).map(|from| parts[0].broadcast_stats(from, delay, ticks, until)).collect());
     }
-    // Room for all at once: to grow took as long as to count.
+    // Capacity for all links, so that the vector of a large mesh does not grow several times.
     let mut stats = Vec::with_capacity(parts[0].shape.topology.as_ref().map_or(peers * (peers - 1), |topology| topology.links()));
     for (from, part) in (0..peers).flat_map(|from| parts.iter().map(move |part| (from, part))) {
         let Samples::PerPacket(samples) = &part.samples else { continue };
@@ -416,7 +428,7 @@ fn links<const A: usize, const L: usize>(parts: &[Arrays<'_, A, L>], run: usize,
     }
 }
 
-/// What a run came to after that number of ticks, with the packets that arrived by an instant; the peers are here and there.
+/// Returns the summary of a run after the given number of ticks, with the packets that arrived up to `until`. `parts` together hold all peers.
 fn summary<const A: usize, const L: usize>(
     parts: &[Arrays<'_, A, L>],
     run: usize,
@@ -436,15 +448,15 @@ fn summary<const A: usize, const L: usize>(
         ticks,
         peers: members().map(|(part, peer)| part.peer_summary(peer, run)).collect(),
         links: links(parts, run, ticks, until),
-        // The shape of a scene says that it has none.
+        // `Shape::of` refuses scenes with access lines.
         access_lines: Vec::new(),
         max_discrepancy,
-        // The shape of a scene says that its object does not turn.
+        // `Shape::of` refuses scenes whose object turns.
         max_rotation_discrepancy: None,
     }
 }
 
-/// The bodies of some peers.
+/// Returns the bodies of some peers.
 fn bodies_of<const A: usize, const L: usize>(
     scenes: &[&Scene; L],
     members: &Range<usize>,
@@ -454,7 +466,7 @@ fn bodies_of<const A: usize, const L: usize>(
     Bodies::new(Places { first: members.start, peers: members.len(), runs: L }, scenes, &laws[0], devices)
 }
 
-/// The means of the samples held.
+/// Task that computes the means of the held samples, compiled for the widest registers.
 struct Means<'a, const A: usize, const L: usize> {
     samples: &'a mut Samples<A, L>,
     bodies: &'a mut Bodies<A>,
@@ -472,12 +484,12 @@ impl<const A: usize, const L: usize> NullaryFnOnce for Means<'_, A, L> {
     }
 }
 
-/// When a peer sends next, at that tick: until then its links may look ahead.
+/// Returns the instant of the tick `next_send`. Until then the sender offers its links no further packet.
 fn next_offer(shape: &Shape, next_send: u64) -> Instant {
     Instant::from_nanos(next_send.saturating_mul(nanos(shape.tick)))
 }
 
-/// A span of at most a year.
+/// Returns a span in nanoseconds. Spans here are at most a year, so that the conversion never saturates.
 fn nanos(span: Duration) -> u64 {
     u64::try_from(span.as_nanos()).unwrap_or(u64::MAX)
 }

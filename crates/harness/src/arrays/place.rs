@@ -1,25 +1,27 @@
-//! Where the numbers of a body lie.
+//! Indices of the numbers of a body in blocks of eight lanes.
 
 use super::lanes::WIDTH;
 
-/// Which of the eight numbers of which block.
+/// Index of a block and of a lane in this block.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Spot {
     pub(super) block: usize,
     pub(super) lane: usize,
 }
 
-/// Some or all peers of a scene, counted from 0: bodies by axis, then peer, then run; each axis begins a block of its own, so that work along an axis is work on whole blocks.
+/// Layout of the bodies of some or all peers of a scene, counted from 0: by axis, then peer, then run. Each axis begins a new block, so that work along an axis
+/// is
+/// work on whole blocks.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Places {
-    /// The peer of the scene that is the first here: others may be elsewhere.
+    /// Index in the scene of the first of these peers.
     pub(super) first: usize,
     pub(super) peers: usize,
     pub(super) runs: usize,
 }
 
 impl Places {
-    /// Blocks an axis.
+    /// Number of blocks of an axis.
     pub(super) const fn blocks(self) -> usize {
         (self.peers * self.runs).div_ceil(WIDTH)
     }
@@ -30,8 +32,8 @@ impl Places {
         Spot { block: axis * self.blocks() + number / WIDTH, lane: number % WIDTH }
     }
 
-    /// Every spot of an axis with the peer that lies there. Those beyond the last peer of the last run repeat it: they move as it does, so that whole blocks can be
-    /// looked at.
+    /// Returns every spot of an axis with its peer and run. Spots beyond the last run of the last peer repeat that peer and run, and move alike, so that whole
+    /// blocks can be computed and compared.
     pub(super) fn all(self, axis: usize) -> impl Iterator<Item = (Spot, usize, usize)> {
         let last = self.peers * self.runs - 1;
         (0..self.blocks() * WIDTH).map(move |number| {

@@ -1,8 +1,8 @@
-//! Which instructions there are.
+//! Choice of the processor's instructions.
 
 use pulp::{Arch, NullaryFnOnce};
 
-/// Does something that is compiled once for any processor and once for one that has AVX2: with wider registers, and not one rounding less.
+/// Calls a function that is compiled twice, for any processor and for processors with AVX2. Both versions round every operation in the same way.
 #[inline(always)]
 pub(super) fn on_widest<O: NullaryFnOnce>(processor: Arch, what: O) -> O::Output {
     match processor {
@@ -12,7 +12,7 @@ pub(super) fn on_widest<O: NullaryFnOnce>(processor: Arch, what: O) -> O::Output
     }
 }
 
-/// Not where it is called from: there are many such places.
+/// Calls a function compiled for any processor. Not inlined, because `on_widest` is inlined into many callers.
 #[cold]
 #[inline(never)]
 fn on_any<O: NullaryFnOnce>(processor: Arch, what: O) -> O::Output {

@@ -1,4 +1,4 @@
-//! Observers of runs in arrays.
+//! Observers of runs in arrays, as seen by the loop over ticks.
 
 use cohaptic_peer::coordination::BuiltIn;
 use cohaptic_scene::Scene;
@@ -10,26 +10,26 @@ use super::lanes::{Lanes, WIDTH};
 use super::ticks::{Source, Ticks};
 use crate::observer::{InstantRow, StateRow, TickRow};
 
-/// An observer of a run in arrays: the loop over ticks is compiled for each kind, so that an unwatched run pays nothing.
+/// Observer of a run in arrays. The loop over ticks is compiled for each implementation, so that an unwatched run makes no rows.
 pub(super) trait RunWatch<const A: usize> {
-    /// Asked as [`crate::Observer::keep_going`] is.
+    /// Called as [`crate::Observer::keep_going`] is.
     fn keep_going(&mut self, now: Instant) -> bool;
 
-    /// At that tick everything that arrives has arrived, and nobody has moved.
+    /// Called at each tick after samples were delivered and before any body moves.
     #[inline(always)]
     fn before_motion(&mut self, _now: Instant, _bodies: &Bodies<A>, _law: &BuiltIn<Lanes>) {}
 
-    /// The damping of the law from now on is that of this scene.
+    /// Called when the law's own damping becomes that of `scene`.
     fn change_damping(&mut self, _scene: &Scene) {}
 
-    /// At that tick copies were that far apart \[m\]; gives whether the run goes on.
+    /// Called after each tick with the distance between copies before they moved \[m\]. Returns whether the run goes on.
     #[inline(always)]
     fn after_motion(&mut self, _now: Instant, _discrepancy: f64) -> bool {
         true
     }
 }
 
-/// An observer that is only asked whether to go on.
+/// Observer that is asked only whether the run goes on.
 pub(super) struct Unwatched<'k>(pub(super) &'k mut dyn FnMut(Instant) -> bool);
 
 impl<const A: usize> RunWatch<A> for Unwatched<'_> {
@@ -38,24 +38,24 @@ impl<const A: usize> RunWatch<A> for Unwatched<'_> {
     }
 }
 
-/// An observer of ticks and instants, of any type.
+/// Observer of ticks and instants behind a trait object, so that the loops are not compiled for every type of observer.
 pub(crate) trait Onlooker {
     /// See [`crate::Observer::on_ticks`].
     fn on_ticks(&mut self, ticks: &Ticks<'_>);
 
-    /// See [`crate::Observer::on_instant`]. Gives whether the run goes on: nothing has failed.
+    /// See [`crate::Observer::on_instant`]. Returns whether the run goes on, that is, whether no call has failed.
     fn on_instant(&mut self, row: &InstantRow) -> bool;
 
     /// See [`crate::Observer::keep_going`].
     fn keep_going(&mut self, now: Instant) -> bool;
 }
 
-/// An observer of all peers of one run.
+/// Passes ticks and instants of one run to an onlooker.
 pub(super) struct WatchedTicks<'a> {
     onlooker: &'a mut dyn Onlooker,
-    /// By how much the law damps each peer [N·s/m].
+    /// Own damping of the law \[N·s/m\], indexed by peer.
     damping: Vec<f64>,
-    /// Number of axes of the scene, which rows have. The run may simulate more.
+    /// Number of axes in rows, which is that of the scene. The run may simulate more axes.
     shown: usize,
 }
 
@@ -65,7 +65,7 @@ impl<'a> WatchedTicks<'a> {
     }
 }
 
-/// By how much the law damps each peer [N·s/m].
+/// Returns the own damping of the law \[N·s/m\], indexed by peer.
 fn damping(scene: &Scene) -> Vec<f64> {
     (0..scene.peers.len()).map(|peer| scene.own_damping(peer)).collect()
 }
@@ -91,21 +91,22 @@ impl<const A: usize> RunWatch<A> for WatchedTicks<'_> {
     }
 }
 
-/// A peer at one of its ticks.
+/// Peer at one of its ticks.
 struct Place {
     at: Instant,
     peer: usize,
-    /// By how much the law damps it [N·s/m].
+    /// Own damping of the law for this peer \[N·s/m\].
     damping: f64,
-    /// Number of axes that rows have.
+    /// Number of axes in rows.
     shown: usize,
 }
 
 impl Place {
-    /// Hands on its row, from the states and forces of its eight peers along each axis.
+    /// Calls `on` with the row of this peer. `axes` holds states and forces of the peer's block along each axis. Returns the result of `on`.
     fn hand_on<const A: usize>(&self, axes: &[Seen; A], on: &mut dyn FnMut(&TickRow<'_>) -> bool) -> bool {
         let lane = self.peer % WIDTH;
         let object = StateOfLane::of(axes.each_ref().map(|seen| &seen.object), lane);
+        // The law's own damping is part of the copy's step map, not of the force that the law computes, so that it is added for the row.
         let recorded = |axis: usize| {
             let held = axes[axis].coordination.0[lane];
             if self.damping > 0.0 { held + self.damping * object.velocity[axis] } else { held }
@@ -123,17 +124,17 @@ impl Place {
     }
 }
 
-/// All peers before they move.
+/// All peers at a tick, before they move.
 struct Peers<'a, const A: usize> {
     at: Instant,
     bodies: &'a Bodies<A>,
     law: &'a BuiltIn<Lanes>,
     damping: &'a [f64],
-    /// Number of axes that rows have.
+    /// Number of axes in rows.
     shown: usize,
 }
 
-/// Position and velocity of a lane along each axis.
+/// Position \[m\] and velocity \[m/s\] of a lane along each axis.
 struct StateOfLane<const A: usize> {
     position: [f64; A],
     velocity: [f64; A],

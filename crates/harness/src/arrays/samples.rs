@@ -1,4 +1,4 @@
-//! Samples between peers: those in flight, and those that each peer holds of the others. A sample is position and velocity along each axis.
+//! Samples between peers: samples in flight, and samples that each peer holds of other peers. A sample is a position and a velocity along each axis.
 
 pub(super) use broadcast::Broadcast;
 pub(super) use per_packet::PerPacket;
@@ -11,7 +11,7 @@ mod per_packet;
 mod quads;
 mod rows;
 
-/// A sample of every run.
+/// One sample for each of L runs: positions \[m\] and velocities \[m/s\], indexed by axis, then run.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sample<const A: usize, const L: usize> {
     pub(super) position: [[f64; L]; A],
@@ -21,13 +21,13 @@ pub(super) struct Sample<const A: usize, const L: usize> {
 impl<const A: usize, const L: usize> Sample<A, L> {
     pub(super) const ZERO: Self = Self { position: [[0.0; L]; A], velocity: [[0.0; L]; A] };
 
-    /// That of a run.
+    /// Returns the sample of the run at index `run`.
     fn state(&self, run: usize) -> State<A> {
         State { position: self.position.map(|runs| runs[run]), velocity: self.velocity.map(|runs| runs[run]) }
     }
 }
 
-/// A number of peers to divide by.
+/// Converts a number of peers to a divisor of means.
 #[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
 fn count(peers: usize) -> f64 {
     peers as f64

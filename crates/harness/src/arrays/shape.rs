@@ -1,4 +1,4 @@
-//! Which scenes can be run in arrays, and which of them side by side.
+//! Decides which scenes can run in arrays, and which of these scenes can run side by side.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -15,74 +15,75 @@ use super::{nanos, threads};
 use crate::observer::instants_between_questions;
 use crate::plan::{Plan, Ticking};
 
-/// What two scenes must have in common to be run side by side.
+/// Properties that scenes must have in common to run side by side. Made only for a scene that can run in arrays.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Shape {
     pub(super) law: Coordination,
-    /// How many numbers it remembers along each axis.
+    /// Numbers that the law remembers along each axis.
     pub(super) memory: usize,
-    /// How many ticks it looks back.
+    /// Ticks that the law looks back.
     pub(super) lag: usize,
     pub(super) peers: usize,
     pub(super) axes: usize,
     pub(super) tick: Duration,
     pub(super) end: Instant,
-    /// Ticks from one sample to the next.
+    /// Ticks between two samples of a peer.
     pub(super) send_every: u64,
-    /// The tick at which each peer sends first.
+    /// First tick at which each peer sends, indexed by peer.
     pub(super) phases: Vec<u64>,
-    /// The samples that a link is offered.
+    /// Size of the samples and least time between two samples on a link.
     pub(super) load: Load,
-    /// When the fates of packets become known.
+    /// Time at which the fates of packets become known.
     pub(super) way: Way,
-    /// The delay of all links, if they do nothing but delay, all alike, and lead from all to all.
+    /// Delay of all links, if every peer sends to all other peers and links do nothing but delay, all by this span; else `None`.
     pub(super) delay: Option<Duration>,
-    /// The neighbours of each peer, if they are not all others.
+    /// Neighbours of each peer; `None` if every peer sends to all other peers.
     pub(super) topology: Option<Arc<Topology>>,
-    /// Ticks between two calls of [`Observer::keep_going`](crate::Observer::keep_going): a power of two.
+    /// Ticks between two calls of [`Observer::keep_going`](crate::Observer::keep_going). A power of two.
     pub(super) between_questions: u64,
 }
 
-/// When the fates of packets become known, if links do more than delay all packets by the same span.
+/// Time at which the fates of packets become known, if links do more than delay all packets by the same span.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Way {
-    /// Fate of each packet known as the packet is sent.
+    /// The fate of each packet is known as the packet is sent.
     Direct,
-    /// Fate of each packet known before the sender sends the next one. The fate may depend on later packets, or on a change of the timeline.
+    /// The fate of each packet is known before its sender sends the next packet. It can depend on later packets, or on a change of the timeline.
     Stepped,
 }
 
-/// A year: far from where instants end, so that sums of a few need no care.
+/// Longest duration of a run in arrays: a year. Sums of a few such spans do not overflow an instant.
 const LONGEST: Duration = Duration::from_secs(365 * 86_400);
 
 impl Shape {
-    /// The tick before one, and when it is.
+    /// Returns the tick before `tick` and its instant. At tick 0 this is tick 0 itself.
     pub(super) fn before(&self, tick: u64) -> (u64, Instant) {
         let before = tick.saturating_sub(1);
         (before, self.instant(before))
     }
 
-    /// Whether the observer is asked, before that tick, whether to go on.
+    /// Returns whether the observer is asked before `tick` whether the run goes on.
     pub(super) const fn is_asked_before(&self, tick: u64) -> bool {
+        // A power of two minus one masks the remainder.
         tick > 0 && tick & (self.between_questions - 1) == 0
     }
 
-    /// The first tick after that one before which the observer is asked.
+    /// Returns the first tick after `tick` before which the observer is asked.
     pub(super) const fn asked_after(&self, tick: u64) -> u64 {
         (tick | (self.between_questions - 1)) + 1
     }
 
-    /// When a tick is.
+    /// Returns the instant of a tick.
     pub(super) fn instant(&self, tick: u64) -> Instant {
         Instant::from_nanos(tick * nanos(self.tick))
     }
 
-    /// Whether a sample reaches all others together, so that links take no memory.
+    /// Returns whether a sample reaches all other peers at the same tick, so that links take no memory.
     pub(crate) const fn is_broadcast(&self) -> bool {
         self.delay.is_some()
     }
 
-    /// How the queues of these links are simulated, and why; `None` if no link has one.
+    /// Returns how the queues of these links are simulated and why; `None` if no link has a queue.
     pub(crate) fn queues(&self, links: &[(&LinkModel, u64)]) -> Option<(&'static str, String)> {
         let have_queues = |config: &LinkConfig| config.bottleneck.is_some() || config.token_bucket.is_some();
         let mut configs = links.iter().filter_map(|(link, _)| link.as_fixed()).filter(|config| have_queues(config)).peekable();
@@ -99,29 +100,29 @@ impl Shape {
         })
     }
 
-    /// How many threads pay for a run at most, and why no more.
+    /// Returns the largest number of threads that shortens a run, and the reason why more threads do not.
     pub(crate) fn threads(&self) -> (usize, &'static str) {
         threads::that_pay(self)
     }
 
-    /// Whether a run on one thread takes its peers in groups.
+    /// Returns whether a run on one thread is faster with its peers in groups.
     pub(crate) fn pays_in_groups(&self) -> bool {
         threads::groups_pay(self)
     }
 
-    /// Whether the fate of a packet on some link is decided before it happens.
+    /// Returns whether links have queues that must be advanced as time passes.
     pub(super) fn has_queues(&self) -> bool {
         self.way == Way::Stepped
     }
 
-    /// The first tick at or after an instant.
+    /// Returns the first tick at or after an instant.
     pub(super) fn tick_at(&self, at: Instant) -> u64 {
         at.as_nanos().div_ceil(nanos(self.tick))
     }
 
-    /// The shape of a scene, and its law; why it cannot be run in arrays, if it cannot.
+    /// Returns the shape and the law of a scene, or the reason for which the scene cannot run in arrays.
     pub(crate) fn of<S: Strategies>(scene: &Scene, plan: &Plan, strategies: &S) -> Result<(Self, BuiltIn), &'static str> {
-        // All tick together, so that all have one law.
+        // All peers tick together, so that the law of the first peer is the law of all.
         let law = strategies.law(scene, 0).ok_or("the strategy is not a law of the registry")?;
         let clock = scene.peers[0].clock;
         let load = load(scene);
@@ -130,7 +131,7 @@ impl Shape {
         let are_direct = !links_change && links.iter().all(|(link, _)| DirectLinks::takes(link, load));
         let delay = one_delay(scene, load).filter(|_| !links_change);
         let late = links.iter().find_map(|(link, _)| why_known_late(link)).or_else(|| models_to_come(scene).find_map(why_known_late));
-        // Of strategies that are not the scene's own nobody knows the law after a change.
+        // The law after a change is known only for the scene's own strategies.
         let changes_law = |change: &Change| matches!(change.what, ChangeKind::Coordination(_) | ChangeKind::Parameters(_));
         let fits = [
             (!plan.general_links, "everything is modelled"),
@@ -144,7 +145,7 @@ impl Shape {
             (!sends_by_difference(scene), "there are dead bands"),
             (!scene.has_gains_by_peer(), "the gains follow the weight that a peer hears, so they differ from peer to peer"),
             (S::OF_SCENE || !scene.timeline.iter().any(changes_law), "the timeline changes the law of the strategy"),
-            // What each packet carries counts them in 16 bits.
+            // A packet stores the index of its receiver in 16 bits.
             (scene.peers.len() <= usize::from(u16::MAX) || delay.is_some(), "there are more than 65,535 peers, over links that take memory"),
             (scene.duration <= LONGEST && clock.tick <= LONGEST, "it lasts longer than a year"),
         ];
@@ -152,7 +153,7 @@ impl Shape {
             return Err(why);
         }
         let peers = scene.peers.len();
-        // A sample that reaches all together takes as long as one packet.
+        // One sample to all peers takes as long as one packet.
         let packets = match (&scene.topology, delay) {
             (Some(topology), _) => topology.links(),
             (None, Some(_)) => peers,
@@ -178,12 +179,12 @@ impl Shape {
     }
 }
 
-/// Whether some samples are sent only when something has changed.
+/// Returns whether a send condition (dead bands) keeps back samples at some time of the run.
 fn sends_by_difference(scene: &Scene) -> bool {
     scene.coordination.send_when.is_some() || scene.timeline.iter().any(|change| matches!(change.what, ChangeKind::SendWhen(_)))
 }
 
-/// The links that the timeline makes.
+/// Returns the link models that the timeline sets.
 fn models_to_come(scene: &Scene) -> impl Iterator<Item = &LinkModel> {
     scene.timeline.iter().flat_map(|change| match &change.what {
         ChangeKind::Link(link) => vec![&*link.config],
@@ -200,7 +201,7 @@ fn models_to_come(scene: &Scene) -> impl Iterator<Item = &LinkModel> {
 
 /// Returns why the fate of a packet over a link may be unknown when the sender sends the next packet; `None` if the fate is known by then.
 ///
-/// Without meaning for a link that damages packets: [`Shape::of`] gives another reason before.
+/// Meaningless for a link that damages packets, for which [`Shape::of`] gives another reason first.
 fn why_known_late(link: &LinkModel) -> Option<&'static str> {
     (!SteppedLinks::takes(link)).then_some(match link {
         LinkModel::Replay(_) => "a link replays a log",
@@ -210,14 +211,14 @@ fn why_known_late(link: &LinkModel) -> Option<&'static str> {
     })
 }
 
-/// The samples that each link of a scene is offered.
+/// Returns the samples that each link of a scene is offered: their size, and the least time between two of them.
 fn load(scene: &Scene) -> Load {
     let ticks = |peer: usize| u32::try_from(scene.samples_every(peer)).unwrap_or(u32::MAX);
     let gaps = scene.peers.iter().enumerate().map(|(peer, spec)| spec.clock.tick.saturating_mul(ticks(peer)));
     Load { size: Bytes::new(SampleKind::State.datagram_len(scene.axes.count()) as u64), gap: gaps.min().unwrap_or(Duration::ZERO) }
 }
 
-/// The delay of all links for the samples of a scene, if they do nothing else, and lead from all to all.
+/// Returns the delay of all links for the samples of a scene. Returns `None` if links do anything else, differ, or do not lead from every peer to all others.
 fn one_delay(scene: &Scene, load: Load) -> Option<Duration> {
     if scene.topology.is_some() {
         return None;
@@ -238,7 +239,7 @@ mod tests {
 
     const SHIPPED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios");
 
-    /// Why two peers with these keys besides cannot be run in arrays.
+    /// Returns why two peers with the given additional keys cannot run in arrays; `None` if they can.
     fn refusal(keys: &str) -> Option<&'static str> {
         let text = r#"
 scene = { duration = "1s", count = 2 }

@@ -1,4 +1,4 @@
-//! Many runs, those of one shape at the same time.
+//! Runs many scenes, those of one shape at the same time.
 
 use cohaptic_peer::EXACT_FROM;
 use cohaptic_scene::{Change, FromScene, Scene};
@@ -9,10 +9,11 @@ use super::shape::Way;
 use crate::plan::{Model, Plan};
 use crate::{NoObserver, Simulation, Summary};
 
-/// Runs scenes that nobody watches, and gives what came out of each, in their order: the same to the bit as [`Simulation::run`] of each alone.
+/// Runs scenes without observers and returns their summaries in the order of the scenes, each the same to the bit as [`Simulation::run`] of that scene alone.
 ///
-/// Neighbours of one shape ([`same_shape`]) are run eight at a time where that pays, a number of each in one register: scenes with the same peers, ticks,
-/// duration, timeline and delays that differ in their seed, in gains, masses, hands, jitter or loss. Others are run alone.
+/// Consecutive scenes of one shape ([`same_shape`]) run up to eight at a time if this is faster: scenes with the same peers, ticks, duration, timeline and
+/// delays
+/// that differ in seed, gains, masses, hands, jitter or loss. All other scenes run alone.
 ///
 /// # Panics
 ///
@@ -37,28 +38,28 @@ pub fn run_side_by_side(scenes: &[Scene]) -> Vec<Summary> {
     summaries
 }
 
-/// Whether that number of scenes of a shape is run faster in eight lanes than one after the other.
+/// Returns whether `alike` scenes of a shape run faster in eight lanes than one after the other.
 ///
-/// Lanes that nobody needs cost what the others do. Where samples travel together, eight runs of three peers take a third of the time of eight alone, of ten
-/// peers half of it. Where each packet has an arrival of its own, that is most of the work and done for each run by itself: eight runs of three peers take
-/// half, of ten peers five sixths, and from sixteen peers on more than alone, since eight times the samples in flight do not fit into the nearest cache.
-/// Exact means are those of one run.
+/// Unused lanes cost as much as used lanes, so that a minimum of scenes is needed. If all samples travel together, lanes share all work up to the number of
+/// peers
+/// from which means are exact; exact means are computed for a single run. If each packet has an arrival of its own, packets are most of the work and are
+/// computed for each run by itself. With many peers, the samples in flight of eight runs then no longer fit into the nearest cache.
 fn pays(shape: &Shape, alike: usize) -> bool {
     if shape.delay.is_some() { alike >= 5 && shape.peers <= EXACT_FROM } else { alike >= 7 && shape.peers <= 12 && shape.way == Way::Direct }
 }
 
-/// Whether two scenes can be run side by side.
+/// Returns whether two scenes can run side by side.
 #[must_use]
 pub fn same_shape(one: &Scene, other: &Scene) -> bool {
     shape(one).is_some_and(|shape_of_one| Some(shape_of_one) == shape(other))
 }
 
-/// The shape of a scene that can be run in arrays, and what changes on its way.
+/// Returns the shape and the timeline of a scene; `None` if the scene cannot run in arrays.
 fn shape(scene: &Scene) -> Option<(Shape, &[Change])> {
     Shape::of(scene, &Plan::new(scene, Model::Least, false), &FromScene).ok().map(|(shape, _)| (shape, &scene.timeline[..]))
 }
 
-/// Runs up to eight scenes of one shape; the last one fills the lanes that are left.
+/// Runs up to eight scenes of one shape. The last scene fills the unused lanes, whose results are discarded.
 fn run_eight(scenes: &[Scene], shape: Shape) -> Vec<Summary> {
     let lanes: [&Scene; WIDTH] = std::array::from_fn(|lane| &scenes[lane.min(scenes.len() - 1)]);
     let laws = lanes.map(|scene| scene.law(0).expect("scenes of a shape have a law"));

@@ -1,11 +1,11 @@
-//! One run on several threads, or of groups of peers on one, to the same bits as of all peers together.
+//! One run on several threads, or with groups of peers on one thread. Results equal those of all peers together, to the bit.
 //!
-//! Each thread has some of the peers: it moves them, and has the links to them with the samples in flight. Peers act on each other by their
-//! samples alone, so threads meet only at ticks at which some peer sends, and exchange the samples. Fates of packets have addresses, so any thread may
-//! draw them.
+//! Each thread has some of the peers: it moves these peers, and has the links to them with the samples in flight. Peers act on each other by their samples
+//! alone, so that threads need to meet only at ticks at which some peer sends, to exchange the samples. The fate of a packet is drawn at an address of its own,
+//! so that any thread can draw the fate.
 //!
-//! For the same reason a thread need not move all its peers at once. It has them in groups, and takes each group from one meeting to the next before it turns to
-//! another: what a group holds stays in the cache meanwhile. That takes 8 % off a run of a thousand peers.
+//! For the same reason a thread need not move all its peers tick by tick. A thread computes one group of peers from one meeting to the next, then the next
+//! group, so that the samples that a group holds stay in the cache.
 
 mod barrier;
 mod exchange;
@@ -25,13 +25,13 @@ use super::shape::Shape;
 use super::{Arrays, Samples, bodies_of, summary};
 use crate::summary::{Ending, Summary};
 
-/// Peers a thread at least: for fewer the threads wait for each other longer than they work.
+/// Least number of peers for each thread. With fewer peers, threads wait for each other longer than they work.
 const PEERS_A_THREAD: usize = 8;
 
-/// The memory of the samples that a group holds \[bytes\]: half of a cache of the second level, through which links and packets pass besides.
+/// Memory of the samples that a group holds \[bytes\]: half of a typical second-level cache, which links and packets share.
 const HELD_BY_A_GROUP: usize = 1 << 20;
 
-/// How many threads pay for a scene of that shape at most, and why no more.
+/// Returns the largest number of threads that shortens a run of the given shape, and the reason why more threads do not.
 pub(super) fn that_pay(shape: &Shape) -> (usize, &'static str) {
     match why_together(shape) {
         Some(why) => (1, why),
@@ -42,18 +42,20 @@ pub(super) fn that_pay(shape: &Shape) -> (usize, &'static str) {
     }
 }
 
-/// Why all peers move together, if they do.
+/// Returns the reason for which all peers must move together; `None` if they need not.
 fn why_together(shape: &Shape) -> Option<&'static str> {
     let whys = [(shape.delay.is_some(), "all samples travel together: a tick takes less time than threads take to meet")];
     whys.into_iter().find_map(|(is_so, why)| is_so.then_some(why))
 }
 
-/// Whether groups of peers pay on one thread.
+/// Returns whether a run on one thread is faster with its peers in groups.
 pub(super) fn groups_pay(shape: &Shape) -> bool {
     why_together(shape).is_none() && groups(shape, &(0..shape.peers), HELD_BY_A_GROUP).len() > 1
 }
 
-/// The peers of a thread in groups of whole registers, whose samples held take that memory at most unless one register has more.
+/// Divides the peers of a thread into groups of whole registers. The held samples of a group take at most `held_by_a_group` bytes, unless one register of peers
+/// takes
+/// more.
 fn groups(shape: &Shape, members: &Range<usize>, held_by_a_group: usize) -> Vec<Range<usize>> {
     let heard = shape.topology.as_ref().map_or(shape.peers - 1, |topology| topology.links().div_ceil(shape.peers));
     let held_by_a_peer = heard.max(1) * (size_of::<u64>() + shape.axes * size_of::<[f64; 2]>());
@@ -62,7 +64,7 @@ fn groups(shape: &Shape, members: &Range<usize>, held_by_a_group: usize) -> Vec<
     members.clone().step_by(size).map(|first| first..(first + size).min(members.end)).collect()
 }
 
-/// A run of a scene on that number of threads, to its end; `None` if it diverged, which is known later than it happens.
+/// Runs a scene on the given number of threads to its end. Returns `None` if the run diverged, because threads notice that only at their next meeting.
 pub(super) fn run<const A: usize>(
     scene: &Scene,
     shape: &Shape,
@@ -84,6 +86,7 @@ fn run_in_groups<const A: usize>(
     let groups: Vec<Vec<Range<usize>>> = shares.map(|share| groups(shape, &share, held_by_a_group)).collect();
     let bodies: Vec<Vec<Bodies<A>>> =
         groups.iter().map(|groups| groups.iter().map(|members| bodies_of::<A, 1>(&[scene], members, &[law], None)).collect()).collect();
+    // Every part begins with the initial states of all peers, so that all bodies are made before any thread starts.
     let all = bodies.iter().flatten().zip(groups.iter().flatten());
     let initial: Vec<Sample<A, 1>> = all.flat_map(|(bodies, members)| (0..members.len()).map(|peer| bodies.sample(peer))).collect();
     let exchange = Exchange::new(threads);
@@ -99,6 +102,7 @@ fn run_in_groups<const A: usize>(
     let ended: Vec<Option<Ended<'_, A>>> = std::thread::scope(|scope| {
         let mut bodies = bodies.into_iter();
         let first = bodies.next()?;
+        // The first part runs on the present thread: `keep_going` belongs to the caller and is not sent to another thread.
         let part = &part;
         let others: Vec<_> = bodies.enumerate().map(|(place, bodies)| scope.spawn(move || part(place + 1, bodies, None))).collect();
         let first = part(0, first, Some(keep_going));
@@ -111,27 +115,27 @@ fn run_in_groups<const A: usize>(
     Some(summary(&groups, 0, ticks, ending, until, max_discrepancy))
 }
 
-/// The peers of a thread at the end of the run.
+/// Peers of a thread at the end of the run.
 struct Ended<'a, const A: usize> {
     groups: Vec<Arrays<'a, A, 1>>,
     ending: Ending,
     ticks: u64,
-    /// Until when packets were delivered.
+    /// Instant up to which packets were delivered.
     until: Instant,
     max_discrepancy: f64,
 }
 
-/// The run of a thread, which has one group at least.
+/// Share of a thread in a run. Has at least one group.
 struct Part<'a, 'e, 'k, const A: usize> {
     groups: Vec<Arrays<'a, A, 1>>,
     thread: Thread<'e, A>,
     keep_going: Option<&'k mut dyn FnMut(Instant) -> bool>,
 }
 
-/// Why the run of a thread ends early.
+/// Reason for which the run of a thread ends early.
 enum Early {
     Diverged,
-    /// After that number of ticks.
+    /// The observer ended the run after the given number of ticks.
     Interrupted(u64),
 }
 
@@ -160,6 +164,7 @@ impl<'a, const A: usize> Part<'a, '_, '_, A> {
                 samples.finish(shape.before(ticks));
             }
         }
+        // A last exchange without samples: extremes and finiteness of the ticks since the last meeting.
         thread.exchange(&[], &mut []);
         if !thread.all_are_finite() {
             return None;
@@ -182,6 +187,7 @@ impl<'a, const A: usize> Part<'a, '_, '_, A> {
                 self.meet();
             }
             let end = self.groups[0].earliest_send.min(self.groups[0].shape.asked_after(tick)).min(ticks.end);
+            // Up to the next tick at which a peer sends or the observer is asked, groups do not depend on each other.
             self.go_on(tick..end, sends);
             let shape = &self.groups[0].shape;
             let (latest, is_asked) = (shape.instant(end - 1), shape.is_asked_before(end));
@@ -193,7 +199,7 @@ impl<'a, const A: usize> Part<'a, '_, '_, A> {
         ControlFlow::Continue(())
     }
 
-    /// Every group gets the samples of the others.
+    /// Gives every group the samples of all other groups and threads.
     fn meet(&mut self) {
         let Self { groups, thread, .. } = self;
         let Some((first, others)) = groups.split_first_mut() else { return };
@@ -204,7 +210,7 @@ impl<'a, const A: usize> Part<'a, '_, '_, A> {
         others.iter_mut().for_each(|group| group.sent.copy_from_slice(&first.sent));
     }
 
-    /// Group by group goes through these ticks, which all have begun; in the first of them some peers may send.
+    /// Computes the given ticks, one group after another. All groups have begun the ticks; samples are sent in the first tick only, if `sends`.
     fn go_on(&mut self, ticks: Range<u64>, sends: bool) {
         let Self { groups, thread, .. } = self;
         let noted = thread.ticks_noted();
@@ -221,7 +227,7 @@ impl<'a, const A: usize> Part<'a, '_, '_, A> {
         }
     }
 
-    /// Whether the run goes on after that instant: the first thread asks the observer.
+    /// Returns whether the run goes on after the instant `before`. The first thread asks the observer, and the other threads take its answer.
     fn goes_on(&mut self, before: Instant) -> bool {
         let known = self.keep_going.as_mut().map(|keep_going| keep_going(before));
         self.thread.goes_on(known)
@@ -237,7 +243,7 @@ mod tests {
     use super::*;
     use crate::plan::{Model, Plan};
 
-    /// 43 peers over these links, with these settings besides.
+    /// Returns a scene of 43 peers over the given links, with further settings.
     fn scene(link: &str, settings: &[&str]) -> Scene {
         let text = format!(
             r#"
@@ -253,7 +259,7 @@ mod tests {
         Scene::parse(&text, Path::new("x.toml"), &settings).unwrap_or_else(|error| panic!("{link}, {settings:?}: {error}"))
     }
 
-    /// What comes of a scene whose peers move in groups of eight or more on that number of threads, or together, until the observer is asked that often.
+    /// Runs a scene with peers in groups of eight on the given number of threads, and all peers together, until the observer was asked `questions` times.
     fn runs(scene: &Scene, threads: usize, questions: u32) -> (Option<Summary>, Summary) {
         let (shape, law) = Shape::of(scene, &Plan::new(scene, Model::Least, false), &FromScene).unwrap();
         let mut asked = [questions; 2];
@@ -267,7 +273,7 @@ mod tests {
         (in_groups, crate::arrays::run(scene, shape, law, &mut other))
     }
 
-    /// Links of all kinds, phases, neighbours, a timeline that falls between two meetings, and an observer who ends the run between two meetings.
+    /// Covers links of all kinds, phases, neighbours, a timeline with a change between two meetings, and an observer that ends the run between two meetings.
     #[test]
     #[ignore = ".ci/nightly runs it: it takes long"]
     fn groups_come_to_what_all_come_to_together() {
@@ -287,7 +293,7 @@ mod tests {
         }
     }
 
-    /// The copies that are farthest apart at first come nearer, while others leave their places: between two meetings, and a change in between.
+    /// Copies that are farthest apart at first approach, while other copies move away, all between two meetings with a change in between.
     #[test]
     fn copies_are_apart_at_one_tick() {
         let apart = "peers=[{ name = \"peer1\", position = 0.012, hand = { force = -200 } }, { name = \"peer2\", hand = { force = -1 } }]";
@@ -306,7 +312,7 @@ mod tests {
     fn groups_are_whole_registers_that_share_all_peers() {
         let scene = scene("delay = \"9ms\", jitter = \"3ms\"", &["scene.count=1000"]);
         let (shape, _) = Shape::of(&scene, &Plan::new(&scene, Model::Least, false), &FromScene).unwrap();
-        // A peer holds 999 numbers of samples with position and velocity.
+        // A peer holds 999 entries: a sequence number, a position and a velocity, of 8 bytes each.
         for (held, size) in [(1, 8), (999 * 24 * 16, 16), (999 * 24 * 17, 24), (999 * 24 * 900, 504), (usize::MAX, 1000)] {
             let groups = groups(&shape, &(0..1000), held);
             assert_eq!(groups[0], 0..size, "{held}");

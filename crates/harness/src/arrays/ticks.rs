@@ -1,4 +1,4 @@
-//! All peers at one instant.
+//! View of all peers at one instant of a run in arrays.
 
 use cohaptic_units::Instant;
 
@@ -6,9 +6,9 @@ use super::blocks::Block;
 use super::lanes::WIDTH;
 use crate::observer::TickRow;
 
-/// All peers of a scene whose object does not turn, at an instant at which all of them tick, with the forces of that instant, before any of them moves.
+/// All peers of a scene whose object does not turn, at an instant at which all of them tick, with the forces of that instant and before any peer moves.
 ///
-/// Positions cost little; what [`Ticks::each`] has beyond them is computed when it is called.
+/// Positions are read from the arrays. The other parts of a row are computed when [`Ticks::each`] is called.
 #[derive(Clone, Copy)]
 pub struct Ticks<'a> {
     at: Instant,
@@ -17,9 +17,9 @@ pub struct Ticks<'a> {
     source: &'a dyn Source,
 }
 
-/// Where rows come from.
+/// Source of the rows of [`Ticks::each`].
 pub(super) trait Source {
-    /// Hands the rows on, in the order of the peers, until that gives `false`.
+    /// Calls `on` with each row in the order of the peers, until `on` returns `false`.
     fn each(&self, on: &mut dyn FnMut(&TickRow<'_>) -> bool);
 }
 
@@ -29,14 +29,14 @@ impl<'a> Ticks<'a> {
         Self { at, peers, blocks, source }
     }
 
-    /// The instant.
+    /// Returns the instant.
     #[must_use]
     #[inline]
     pub const fn at(&self) -> Instant {
         self.at
     }
 
-    /// Where each copy of the object is along an axis \[m\], in the order of the peers.
+    /// Returns the position of each copy of the object along an axis \[m\], in the order of the peers.
     ///
     /// # Panics
     ///
@@ -46,18 +46,18 @@ impl<'a> Ticks<'a> {
         self.blocks_of_positions(axis).zip(0..).flat_map(move |(positions, place)| positions[..WIDTH.min(self.peers - place * WIDTH)].iter().copied())
     }
 
-    /// [`Ticks::positions`], eight at a time; beyond the last peer there is any number.
+    /// Like [`Ticks::positions`], eight positions at a time. Numbers beyond the last peer are arbitrary.
     #[inline]
     pub(crate) fn blocks_of_positions(&self, axis: usize) -> impl Iterator<Item = &[f64; WIDTH]> {
         let blocks = self.peers.div_ceil(WIDTH);
         self.blocks[axis * blocks..(axis + 1) * blocks].iter().map(Block::positions)
     }
 
-    /// Where the copy of a peer is along an axis \[m\].
+    /// Returns the position of a peer's copy along an axis \[m\].
     ///
     /// # Panics
     ///
-    /// If there is no such peer, or no such axis.
+    /// If there is no such peer or axis.
     #[must_use]
     #[inline]
     pub fn position(&self, peer: usize, axis: usize) -> f64 {
@@ -65,11 +65,11 @@ impl<'a> Ticks<'a> {
         self.blocks[axis * self.peers.div_ceil(WIDTH) + peer / WIDTH].positions()[peer % WIDTH]
     }
 
-    /// Hands each peer's row to `on`, in the order of the peers.
+    /// Calls `on` with each peer's row, in the order of the peers.
     ///
     /// # Errors
     ///
-    /// The first of `on`, which sees no row after it.
+    /// The first error of `on`, which is not called again after it.
     pub fn each<E>(&self, mut on: impl FnMut(&TickRow<'_>) -> Result<(), E>) -> Result<(), E> {
         let mut result = Ok(());
         self.source.each(&mut |row| {

@@ -1,4 +1,4 @@
-//! Eight devices with their copies along one axis, and their tick.
+//! Eight devices with their copies along one axis, and their motion in a tick.
 
 use cohaptic_peer::coordination::{Law, Observation};
 use cohaptic_peer::tick::{forces, grasp, on_device, on_object};
@@ -7,44 +7,48 @@ use cohaptic_peer::{Contact, Enclosure, Gains, Motion, StepMap};
 use super::law::{LawOfLanes, memory_of_lane};
 use super::{Lanes, Mask, Motions, WIDTH, lane_of, set_lane};
 
-/// Lanes devices with their copies of the object, along one axis.
+/// Eight devices with their copies of the object, along one axis.
 #[derive(Clone, Debug)]
 pub(in crate::arrays) struct Block {
     pub(super) device: Motions,
     pub(super) object: Motions,
-    /// The mean of the samples held.
+    /// Mean of the samples held.
     pub(super) mean: Motions,
+    /// Force of a hand on each device \[N\].
     pub(super) hand: Lanes,
-    /// KC and BC.
+    /// Coupling gains KC \[N/m\] and BC \[N·s/m\].
     pub(super) coupling: Gains<Lanes>,
+    /// Lanes whose device grasps its copy.
     pub(super) grasps: Mask,
     pub(super) device_map: StepMap<Lanes>,
-    /// The contacts of all eight, if any of them is one-sided.
+    /// Contacts of all eight lanes. `None` if no lane has ever had a one-sided contact along this axis.
     pub(super) contacts: Option<Box<[Contact; WIDTH]>>,
     pub(super) axis: usize,
-    /// Whether anything ties one of the devices to ground.
+    /// Whether any of the devices is tied to ground, so that its step map has no free motion.
     pub(super) is_tied: bool,
 }
 
-/// The forces of a tick on eight peers.
+/// Forces of a tick on eight peers \[N\].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Forces {
-    /// FC.
+    /// Coupling force FC.
     pub(super) coupling: Lanes,
-    /// FC − FT, and the walls.
+    /// Force on the copy: FC − FT, plus the force of the walls.
     pub(super) on_object: Lanes,
 }
 
-/// Forces that are applied a tick late.
+/// Forces of lanes that apply them a tick late.
 #[derive(Clone, Debug)]
 pub(super) struct Late {
+    /// Forces that were computed at the latest tick.
     pub(super) computed: Forces,
+    /// Lanes that apply their forces a tick late.
     pub(super) is_late: Mask,
 }
 
 pub(super) const ZERO_MAP: StepMap<Lanes> = StepMap::new([[Lanes::ZERO; 2]; 2], [Lanes::ZERO; 2]);
 
-/// A map that moves nothing, and where no force acts keeps even the sign of a zero.
+/// Step map that moves nothing. Without force it keeps even the sign of a zero, which is the reason for the entries of −0.
 pub(super) const RESTING: StepMap = StepMap::new([[0.0, -0.0], [0.0, 0.0]], [-0.0, 0.0]);
 
 impl Forces {
@@ -62,7 +66,7 @@ pub(super) fn set_map(maps: &mut StepMap<Lanes>, lane: usize, map: &StepMap) {
     });
 }
 
-/// [`Block::tick`]. By references of their own the compiler knows that nothing that is written is read in another lane.
+/// Computes [`Block::tick`]. Each array is a reference of its own, so that the compiler knows that no lane reads what another lane writes.
 #[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "each by a reference of its own")]
 fn tick_of_lanes<const TIED: bool, L: LawOfLanes>(
@@ -113,9 +117,10 @@ impl Block {
         }
     }
 
-    /// A device touches its copy in that way from now on.
+    /// Replaces the contact of a lane.
     pub(super) fn touch(&mut self, lane: usize, contact: Contact) {
         self.grasps.set(lane, contact == Contact::Grasp);
+        // The list is made at the first one-sided contact along this axis, from the contacts of all lanes so far.
         if matches!(contact, Contact::Push(direction) if direction.axis == self.axis) {
             let grasps = self.grasps;
             let so_far = |lane| if grasps.get(lane) { Contact::Grasp } else { Contact::None };
@@ -126,7 +131,7 @@ impl Block {
         }
     }
 
-    /// Forces and motion of a tick in one pass, where nothing but grasps and the law acts.
+    /// Computes forces and motion of a tick in one pass, if no forces but grasps, hands and the law act.
     #[inline(always)]
     pub(super) fn tick<L: LawOfLanes>(&mut self, law: &L, past: &Motions, lead: &Lanes, memory: &mut [f64], object_map: &StepMap<Lanes>) {
         let common = (law, object_map);
@@ -139,7 +144,7 @@ impl Block {
         }
     }
 
-    /// FC.
+    /// Returns the coupling force FC of each lane \[N\].
     #[inline(always)]
     pub(super) fn coupling(&self) -> Lanes {
         let apart = |lane| lane_of(&self.device, lane).relative_to(lane_of(&self.object, lane));
@@ -162,13 +167,13 @@ impl Block {
         Observation { own: lane_of(&self.object, lane), past: lane_of(past, lane), mean: lane_of(&self.mean, lane), lead: lead.0[lane] }
     }
 
-    /// The positions of copies.
+    /// Returns the positions of the copies \[m\].
     #[inline(always)]
     pub(in crate::arrays) const fn positions(&self) -> &[f64; WIDTH] {
         &self.object.position.0
     }
 
-    /// The forces of a tick without walls.
+    /// Returns the forces of a tick, without walls.
     #[inline(always)]
     pub(super) fn forces<L: LawOfLanes>(&self, coupling: Lanes, law: &L, past: &Motions, lead: &Lanes, memory: &mut [f64]) -> Forces {
         let mut on_copy = Lanes::ZERO;
@@ -217,7 +222,7 @@ impl Block {
 }
 
 impl Late {
-    /// Remembers the forces computed now, and gives those that are applied.
+    /// Stores the forces computed now, and returns the forces that act: those of the previous tick in late lanes.
     #[inline(always)]
     pub(super) fn exchange(&mut self, forces: Forces) -> Forces {
         let applied = Forces {

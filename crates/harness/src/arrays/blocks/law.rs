@@ -1,4 +1,4 @@
-//! Laws of eight lanes.
+//! Laws with coefficients for eight lanes.
 
 use std::mem::discriminant;
 
@@ -6,21 +6,21 @@ use cohaptic_peer::coordination::{BuiltIn, Coefficients, Law};
 
 use super::Lanes;
 
-/// A law of eight lanes, by its own type.
+/// Law with coefficients for eight lanes, by its own type.
 pub(in crate::arrays) trait LawOfLanes: Coefficients<Coefficient = Lanes, Of<f64>: Law<f64>> {
-    /// The law of one lane.
+    /// Returns the law of one lane.
     #[inline(always)]
     fn of_lane(&self, lane: usize) -> Self::Of<f64> {
         self.map(|coefficient| coefficient.0[lane])
     }
 
-    /// How many numbers it remembers along each axis: for most laws a constant that the compiler knows, so that they pay nothing for those that remember.
+    /// Returns how many numbers the law remembers along each axis. A constant for most laws, so that the compiler removes the code for memory.
     #[inline(always)]
     fn remembered(&self) -> usize {
         self.of_lane(0).memory()
     }
 
-    /// How many ticks it looks back.
+    /// Returns how many ticks the law looks back.
     #[inline(always)]
     fn looks_back(&self) -> usize {
         self.of_lane(0).lag()
@@ -29,7 +29,7 @@ pub(in crate::arrays) trait LawOfLanes: Coefficients<Coefficient = Lanes, Of<f64
 
 impl<L: Coefficients<Coefficient = Lanes, Of<f64>: Law<f64>>> LawOfLanes for L {}
 
-/// The laws of runs that are made of one law, as one of eight lanes; lane l is of run l modulo their number.
+/// Combines the laws of runs into one law of eight lanes. All laws must be of one kind; lane l gets the coefficients of run l modulo the number of runs.
 pub(in crate::arrays) fn law_of_lanes(laws: &[BuiltIn]) -> BuiltIn<Lanes> {
     let coefficients = |law: &BuiltIn| {
         let mut all = Vec::new();
@@ -45,7 +45,7 @@ pub(in crate::arrays) fn law_of_lanes(laws: &[BuiltIn]) -> BuiltIn<Lanes> {
     })
 }
 
-/// What a law remembers of one lane.
+/// Returns the numbers that a law remembers of one lane.
 #[inline(always)]
 pub(super) fn memory_of_lane(memory: &mut [f64], remembered: usize, lane: usize) -> &mut [f64] {
     if remembered > 0 { &mut memory[lane * remembered..(lane + 1) * remembered] } else { &mut [] }

@@ -1,6 +1,6 @@
-//! Samples that reach everybody else at one tick: all links have the same constant delay and lose nothing.
+//! Samples that reach all other peers at the same tick: all links have the same constant delay and lose nothing.
 //!
-//! Then all hold the same of a sender, and a sample is one thing for all its receivers, on the way and when it is held.
+//! All receivers then hold the same sample of a sender, so that a sample is stored once for all receivers, both in flight and when held.
 
 use std::collections::VecDeque;
 
@@ -12,41 +12,44 @@ use super::{Sample, count};
 use crate::arrays::blocks::Blocks;
 use crate::arrays::bodies::Bodies;
 
-/// The samples in flight, and those held from each sender. Time counts ticks.
+/// Samples in flight, and samples held from each sender. Time is counted in ticks.
 #[derive(Clone, Debug)]
 pub(in crate::arrays) struct Broadcast<const A: usize, const L: usize> {
+    /// Ticks from sending to arrival.
     delay: u64,
+    /// Samples in flight, in the order of their arrival: with one delay, the order in which the samples were sent.
     on_the_way: VecDeque<Sent<A, L>>,
     peers: usize,
-    /// The samples held from each sender but the first, by axis, as the first peer holds it; and from the first.
+    /// Samples held from each sender but the first, indexed by axis, then by sender − 1: the order in which the first peer holds them.
     held: [Vec<Quad<L>>; A],
+    /// Sample held from the first sender.
     first: Sample<A, L>,
-    /// The sums of the samples held from all, if their means are exact.
+    /// Sums of the samples held from all senders. `None` if means are not computed exactly.
     sums: Option<ExactMeans<A>>,
-    /// How many samples of each sender have arrived.
+    /// Number of samples that have arrived, indexed by sender.
     arrived: Vec<u64>,
     changed: Changed,
 }
 
-/// The senders whose samples have arrived since the means were computed.
+/// Senders whose samples have arrived since the means were computed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Changed {
     Nothing,
     From(usize),
-    /// Several, or nothing was computed yet.
+    /// Several senders, or the means were never computed.
     More,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Sent<const A: usize, const L: usize> {
-    /// When it is in force.
+    /// Tick at which the sample arrives.
     due: u64,
     sender: usize,
     sample: Sample<A, L>,
 }
 
 impl<const A: usize, const L: usize> Broadcast<A, L> {
-    /// Everybody holds the initial states of the others, and nothing is on the way.
+    /// Returns the state before the first tick: all peers hold the initial states of the other peers, and nothing is in flight.
     pub(in crate::arrays) fn new(initial: &[Sample<A, L>], delay: u64) -> Self {
         let peers = initial.len();
         let mut broadcast = Self {
@@ -67,14 +70,14 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
         broadcast
     }
 
-    /// A peer sends to all others.
+    /// Sends the sample of a peer to all other peers.
     #[inline(always)]
     pub(in crate::arrays) fn send(&mut self, tick: u64, sender: usize, bodies: &Bodies<A>) {
         let due = tick.saturating_add(self.delay);
         self.on_the_way.push_back(Sent { due, sender, sample: bodies.sample(sender) });
     }
 
-    /// What has arrived is held from now on.
+    /// Holds the samples that have arrived by `tick`.
     pub(in crate::arrays) fn deliver(&mut self, tick: u64) {
         while let Some(Sent { sender, sample, .. }) = self.next_due(tick) {
             self.hold(sender, &sample);
@@ -83,7 +86,7 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
         }
     }
 
-    /// The next sample that has arrived, which is on the way no more.
+    /// Removes and returns the next sample in flight that has arrived by `tick`.
     #[inline(always)]
     fn next_due(&mut self, tick: u64) -> Option<Sent<A, L>> {
         let sent = *self.on_the_way.front().filter(|sent| sent.due <= tick)?;
@@ -91,7 +94,7 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
         Some(sent)
     }
 
-    /// The sample held from a sender in the first run: with this number of peers there are no others.
+    /// Returns the sample held from a sender in the first run. Exact means are used in single runs only.
     fn held_from(&self, sender: usize) -> State<A> {
         match sender.checked_sub(1) {
             None => self.first.state(0),
@@ -116,7 +119,8 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
         }
     }
 
-    /// How what a peer holds in a run moves on, in the order in which the peer holds it. `sent` says when a sample of a sender was sent.
+    /// Returns the instant and the velocity of each sample that a peer holds in a run, in the order in which the peer holds them. `sent` returns the instant at
+    /// which the sample with a sequence number was sent by a sender.
     pub(in crate::arrays) fn moving(&self, (peer, run): (usize, usize), sent: impl Fn(usize, u64) -> Instant) -> impl Iterator<Item = Moving<A>> {
         (0..self.peers).filter(move |sender| *sender != peer).map(move |sender| Moving {
             sent: self.arrived[sender].checked_sub(1).map_or(Instant::ZERO, |newest| sent(sender, newest)),
@@ -127,13 +131,13 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
         })
     }
 
-    /// Whether nothing that anybody holds has changed since the means were computed.
+    /// Returns whether no held sample has changed since the means were computed.
     #[inline(always)]
     pub(in crate::arrays) fn is_settled(&self) -> bool {
         self.changed == Changed::Nothing
     }
 
-    /// Whether anything that a peer holds has changed since the means were computed.
+    /// Returns whether any sample that `peer` holds has changed since the means were computed.
     pub(in crate::arrays) fn has_changed(&self, peer: usize) -> bool {
         match self.changed {
             Changed::Nothing => false,
@@ -142,7 +146,7 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
         }
     }
 
-    /// The means are those of the samples held.
+    /// Computes the mean of the samples that each peer holds.
     #[inline(always)]
     pub(in crate::arrays) fn refresh(&mut self, blocks: &mut Blocks) {
         self.changed = Changed::Nothing;
@@ -153,7 +157,8 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
         let count = count(self.peers - 1);
         for axis in 0..A {
             let held = &mut self.held[axis];
-            // From one receiver to the next, its own sample is replaced by that of the receiver before.
+            // Each receiver holds the samples of all senders but itself. From one receiver to the next only one place changes: the receiver's own sample gives
+            // way to that of the receiver before.
             let mut own = (self.first.position[axis], self.first.velocity[axis]);
             for peer in 0..self.peers {
                 if peer > 0 {
@@ -162,14 +167,14 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
                 let (x, v) = quads::mean(held, count);
                 blocks.set_target(axis, peer, x, v);
             }
-            // And back.
+            // Swap back, so that the places are again those of the first peer.
             for peer in (1..self.peers).rev() {
                 quads::swap(held, peer - 1, &mut own);
             }
         }
     }
 
-    /// [`Broadcast::refresh`] of many: what all hold together without the receiver's own.
+    /// Like [`Broadcast::refresh`], for many peers: subtracts the receiver's own sample from the exact sums of all samples.
     #[cold]
     fn refresh_exactly(&self, blocks: &mut Blocks) {
         let Some(sums) = &self.sums else { return };

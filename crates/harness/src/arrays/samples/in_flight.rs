@@ -1,36 +1,38 @@
-//! Samples in flight, in a wheel by the tick at which they are in force.
+//! Samples in flight, in a timing wheel indexed by the tick at which a sample arrives.
 
 use std::collections::BTreeMap;
 
 use cohaptic_units::Instant;
 
-/// Ticks ahead that lie in the wheel: a second, for a satellite and a queue. What arrives later than that is kept aside, which takes more than twice as long.
+/// Ticks of the wheel, so that a second at 1 kHz fits: delays of satellites with queues. Packets that arrive later are kept in a map, which is slower.
 const HORIZON: u64 = 1024;
-/// Two for each of them.
+/// Slots of the wheel: two for each tick.
 const SLOTS: usize = 2048;
 
-/// Where the samples of a tick lie in the wheel: those in order, and next to them those that overtake.
+/// Returns the first slot of a tick: samples in order. The next slot holds samples that overtake.
 #[inline(always)]
 fn slot(tick: u64) -> usize {
     2 * (tick % HORIZON) as usize
 }
 
-/// The samples in flight, by the tick at which they are in force.
+/// Samples in flight, by the tick at which they arrive.
 #[derive(Clone, Debug)]
 pub(super) struct InFlight<const A: usize> {
     ticks: Ticks,
+    /// Packets that arrive within [`HORIZON`] ticks. See [`slot`].
     wheel: Box<[Vec<Packet<A>>; SLOTS]>,
+    /// Packets that arrive later, by tick.
     beyond: BTreeMap<u64, Bucket<A>>,
-    /// Memory of buckets that were emptied, the latest last: it is what the cache holds. It took 5 % off a tick of ten peers whose packets arrive together.
+    /// Allocations of emptied slots. The latest is used first, because its memory is most likely in the cache.
     emptied: Vec<Vec<Packet<A>>>,
 }
 
-/// The samples in force at a tick.
+/// Samples that arrive at the same tick.
 #[derive(Clone, Debug)]
 pub(super) struct Bucket<const A: usize> {
-    /// Those of each link in the order in which they arrive.
+    /// Samples that arrive, link by link, in the order in which they were put here.
     pub(super) in_order: Vec<Packet<A>>,
-    /// Those that may arrive before others that were put here earlier.
+    /// Samples that may arrive before samples of the same link that were put here earlier.
     pub(super) overtaking: Vec<Packet<A>>,
 }
 
@@ -44,18 +46,19 @@ impl<const A: usize> Default for Bucket<A> {
 pub(super) struct Packet<const A: usize> {
     pub(super) arrival: Instant,
     pub(super) sequence: u64,
-    /// Where its receiver holds what it says, by place, then run.
+    /// Place at which the receiver holds the sample, times the number of runs, plus the run.
     pub(super) place: u32,
     pub(super) receiver: u16,
     pub(super) position: [f64; A],
     pub(super) velocity: [f64; A],
 }
 
-/// How many ticks a span takes, rounded up.
+/// Converts spans to ticks, rounded up.
 #[derive(Clone, Copy, Debug)]
 struct Ticks {
+    /// Length of a tick \[ns\].
     nanos: u64,
-    /// ⌈2^64/nanos⌉, if ticks are shorter than 2^31 ns.
+    /// ⌈2^64/nanos⌉. `None` if a tick has 2^31 ns or more, or 1 ns.
     reciprocal: Option<u64>,
 }
 
@@ -64,8 +67,11 @@ impl Ticks {
         Self { nanos, reciprocal: (2..1 << 31).contains(&nanos).then(|| u64::MAX / nanos + 1) }
     }
 
-    /// A division would add 4 % to a tick of ten peers over links with jitter and loss. With r = ⌈2^64/d⌉ = (2^64 + e)/d, 0 ≤ e < d, the product n·r/2^64 is
-    /// n/d + n·e/(d·2^64), which has the same whole part as n/d while n·e < 2^64: for n and d below 2^32.
+    /// Returns the number of ticks in `span` \[ns\], rounded up, without a division where possible.
+    ///
+    /// With r = ⌈2^64/d⌉ = (2^64 + e)/d, 0 ≤ e < d, the product n·r/2^64 is n/d + n·e/(d·2^64), which has the same whole part as n/d while n·e < 2^64. This
+    /// holds for
+    /// n and d below 2^32.
     #[inline(always)]
     fn count(self, span: u64) -> u64 {
         match self.reciprocal {
@@ -76,30 +82,31 @@ impl Ticks {
 }
 
 impl<const A: usize> InFlight<A> {
-    /// Nothing in flight, with ticks of that length.
+    /// Returns a wheel without samples. A tick has `tick_nanos` nanoseconds.
     pub(super) fn new(tick_nanos: u64) -> Self {
         Self { ticks: Ticks::new(tick_nanos), wheel: Box::new(std::array::from_fn(|_| Vec::new())), beyond: BTreeMap::new(), emptied: Vec::new() }
     }
 
-    /// A packet that is known at this tick and instant; whether it may arrive before another of its link that was put here earlier.
+    /// Stores a packet that becomes known at the given tick and instant. `overtakes`: whether it may arrive before an earlier packet of its link.
     #[inline(always)]
     pub(super) fn push(&mut self, (tick, now): (u64, Instant), packet: Packet<A>, overtakes: bool) {
-        // `now` is on the lattice of ticks, so this is the first tick at or after the arrival.
+        // `now` is a multiple of the tick, so that this sum is the first tick at or after the arrival.
         let ticks = self.ticks.count(packet.arrival.as_nanos() - now.as_nanos());
         let due = tick.saturating_add(ticks);
         self.packets_at((ticks, due), overtakes).push(packet);
     }
 
-    /// Where a packet goes that is due at a tick, which is that number of ticks ahead.
+    /// Returns the packets that are due at the tick `due`, which is `ticks` ahead.
     ///
-    /// The packet itself is handed to no call: it would be put together on the stack for that, and copied from there in words wider than its parts, for which a
-    /// processor waits. It took an eighth of the time of a thousand peers.
+    /// The caller pushes the packet itself. A packet as an argument would be assembled on the stack and copied in words wider than its fields, for which a
+    /// processor
+    /// stalls.
     #[inline(always)]
     fn packets_at(&mut self, (ticks, due): (u64, u64), overtakes: bool) -> &mut Vec<Packet<A>> {
         if ticks >= HORIZON {
             return self.packets_beyond(due, overtakes);
         }
-        // Found by adding, without a branch.
+        // Index by addition, without a branch.
         let packets = &mut self.wheel[slot(due) + usize::from(overtakes)];
         if packets.capacity() == 0 {
             *packets = self.emptied.pop().unwrap_or_default();
@@ -117,12 +124,12 @@ impl<const A: usize> InFlight<A> {
         packets
     }
 
-    /// All of them, in no order.
+    /// Returns all packets in flight, in no particular order.
     pub(super) fn iter(&self) -> impl Iterator<Item = &Packet<A>> {
         self.wheel.iter().flatten().chain(self.beyond.values().flat_map(|bucket| bucket.in_order.iter().chain(&bucket.overtaking)))
     }
 
-    /// Takes back the memory of a bucket whose packets are gone.
+    /// Keeps the allocations of a bucket whose packets were taken in.
     pub(super) fn reuse(&mut self, Bucket { in_order, overtaking }: Bucket<A>) {
         for mut packets in [overtaking, in_order] {
             if packets.capacity() > 0 {
@@ -132,7 +139,7 @@ impl<const A: usize> InFlight<A> {
         }
     }
 
-    /// The samples that are due at that tick, if there are any.
+    /// Removes and returns the samples that are due at `tick`; `None` if there are none.
     #[inline(always)]
     pub(super) fn due(&mut self, tick: u64) -> Option<Bucket<A>> {
         if !self.beyond.is_empty() {
@@ -143,7 +150,7 @@ impl<const A: usize> InFlight<A> {
         (!in_order.is_empty() || !overtaking.is_empty()).then_some(Bucket { in_order, overtaking })
     }
 
-    /// The samples that are due at that tick and were sent long ago.
+    /// Moves the samples of the map that are due at `tick` into the wheel, before the samples that were pushed later.
     #[cold]
     fn come_near(&mut self, tick: u64) {
         if let Some(bucket) = self.beyond.remove(&tick) {

@@ -1,7 +1,8 @@
 //! Samples that each arrive at an instant of their own: links that differ, jitter, loss, bursts, outages.
 //!
-//! Peers look at what has arrived at their ticks alone, and all tick together. So samples in flight lie in a wheel, by the tick at which it is in force, and
-//! nothing is sorted but the samples that are due together on a link on which one overtook another.
+//! Peers read arrived samples only at their ticks, and all peers tick together. Samples in flight therefore lie in a timing wheel indexed by the tick at which
+//! they
+//! arrive. Nothing is sorted but samples that arrive at the same tick over a link on which one sample overtook another.
 
 mod neighbours;
 
@@ -22,47 +23,53 @@ use crate::arrays::processor::on_widest;
 use crate::arrays::shape::Way;
 use crate::arrays::{Shape, nanos};
 
-/// Set in the sequence number of a link on which one of the samples that are due overtakes another.
+/// Flag in an entry of `next`: a sample that arrives at this tick over this link overtook another.
 const IS_OVERTAKEN: u64 = 1 << 63;
-/// Samples whose memory is asked for at once.
+/// Number of samples that [`PerPacket::take_in_together`] takes in at once.
 const TAKEN_TOGETHER: usize = 16;
 
-/// The links to some peers, the samples in flight to them, and those that each of them holds of each other peer.
+/// Links to some peers, samples in flight to these peers, and samples that each of them holds of every other peer.
 ///
-/// Work goes from receiver to receiver: what one holds lies together, and receivers may be shared out among threads.
+/// The arrays are ordered by receiver: the samples that a receiver holds are contiguous, and receivers can be shared out among threads.
 #[derive(Clone, Debug)]
 pub(in crate::arrays) struct PerPacket<const A: usize, const L: usize> {
     rows: Rows,
-    /// The receivers, counted from 0 below.
+    /// Peers of the scene that receive. Elsewhere in this type, receivers are counted from 0.
     receivers: Range<usize>,
+    /// End of the scene.
     end: Instant,
-    /// By receiver, then sender, then run, as [`Rows`] says.
+    /// Links, ordered by receiver, then sender, then run; see [`Rows`].
     links: Links<A>,
-    /// Whether each peer of the scene sends now.
+    /// Whether a peer sends at the present tick, indexed by peer of the scene.
     sends: Vec<bool>,
     in_flight: InFlight<A>,
-    /// Samples held, by axis, then receiver, then sender. Each receiver has whole quads, of which the last may be empty.
+    /// Samples held, indexed by axis, then ordered by receiver and sender. Each receiver has whole quads, the last of which may be padded.
     held: [Vec<Quad<L>>; A],
-    /// By receiver the sums of its samples, if its mean is exact: then there is one run. Empty if no mean is.
+    /// Sums of the samples that a receiver holds, indexed by receiver; `None` if the mean of that receiver is not exact. Empty if no mean is exact. Exact means
+    /// are
+    /// computed in single runs only.
     sums: Vec<Option<ExactMeans<A>>>,
-    /// By place, then run: the lowest sequence number that is newer than the sample held.
+    /// Least sequence number that is newer than the sample held, indexed by place, then run. 0 as long as no sample has arrived.
     next: Vec<u64>,
-    /// By receiver: bit r says whether a sample has arrived in run r since the means were computed.
+    /// Whether a sample has arrived since the means were computed: bit r for run r, indexed by receiver.
     changed: Vec<u8>,
-    /// By receiver, then run: samples that arrived after a newer one.
+    /// Number of samples that arrived after a newer one, indexed by receiver, then run.
     stale: Vec<u64>,
 }
 
-/// The links.
+/// Links in the form that the shape's [`Way`] needs.
 #[derive(Clone, Debug)]
 enum Links<const A: usize> {
+    /// Links that decide the fate of a packet as it is sent.
     Direct(DirectLinks),
-    /// They are told when each sender sends next. Only in single runs: scenes side by side have direct links, and `const { L > 1 }` spares the compiler the rest.
+    /// Links that need the instant of the sender's next packet. Only in single runs: scenes that run side by side have direct links, and `const { L > 1 }`
+    /// keeps the
+    /// compiler from generating this case.
     Stepped(SteppedLinks<State<A>>),
 }
 
 impl<const A: usize, const L: usize> PerPacket<A, L> {
-    /// The receivers hold the initial states of the others, and nothing is on the way.
+    /// Returns the state before the first tick: receivers hold the initial states of the other peers, and nothing is in flight.
     pub(in crate::arrays) fn new(scenes: &[&Scene], initial: &[Sample<A, L>], shape: &Shape, receivers: Range<usize>) -> Self {
         let peers = scenes[0].peers.len();
         let info = PacketInfo { size: shape.load.size, ecn_capable: true };
@@ -77,7 +84,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         for (receiver, to) in receivers.clone().enumerate() {
             for (from, scene) in (0..rows.columns(receiver)).flat_map(|column| scenes.iter().map(move |scene| (column, scene))) {
                 let from = rows.sender(receiver, from);
-                // The diagonal has a link that nothing is ever sent over, so that a place is found by multiplying.
+                // A receiver's link to itself is never used. It exists so that indices are products; any model does.
                 let (from, to) = if from == to { (0, 1) } else { (from, to) };
                 let name = LinkName::between(&scene.peers[from].name, &scene.peers[to].name);
                 let model: &LinkModel = scene.links.between(from, to);
@@ -103,6 +110,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
             rows,
         };
         let Self { rows, held, .. } = &mut samples;
+        // A held sample is stored with its weight, as `Rows::packet` weighs samples that arrive.
         for (receiver, place) in (0..count).flat_map(|receiver| rows.held(receiver).map(move |place| (receiver, place))) {
             let column = rows.column_of(receiver, place);
             let (sample, weight) = (&initial[rows.sender(receiver, column)], rows.weight(receiver, column));
@@ -119,8 +127,11 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         samples
     }
 
-    /// Some peers send to all that hear them what `sent` has in their places, and then nothing until `next` of each, or until [`PerPacket::pass`] if that is earlier.
-    /// A run that has ended goes on sending; nobody looks.
+    /// Sends the samples of `senders` to all receivers that hear them. `sent` holds samples indexed by peer of the scene. Each sender sends nothing further
+    /// until its
+    /// `next` instant; before that, only [`PerPacket::pass`] changes the links.
+    ///
+    /// A run that has ended goes on sending, because lanes cannot stop one by one; its results are no longer read.
     #[inline(never)]
     pub(in crate::arrays) fn send(
         &mut self,
@@ -139,7 +150,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
                 sends.fill(false);
                 senders.iter().for_each(|sender| sends[*sender] = true);
                 let (receivers, sends) = (receivers.clone(), &**sends);
-                // Eight links of which two are used take longer than two.
+                // Links are computed eight at a time, which does not pay if few of eight carry a packet.
                 let (are_few, are_chains) = (L == 1 && senders.len() * 4 < peers, links.are_chains());
                 let sending = DirectSending { peers, receivers, links, senders, sends, sent, in_flight, at: (tick, now) };
                 match are_chains {
@@ -165,7 +176,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
     }
 
-    /// Time passes on the links of all senders until `next` of each; until the latest tick, which is this one, it has.
+    /// Advances the links of all senders until the `next` instant of each. `latest` is the latest tick that was computed, with its instant.
     #[cold]
     pub(in crate::arrays) fn pass(&mut self, latest: (u64, Instant), next: &dyn Fn(usize) -> Instant) {
         if const { L > 1 } {
@@ -184,13 +195,13 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
     }
 
-    /// The other peers that a receiver hears.
+    /// Returns the other peers of the scene that a receiver hears.
     pub(in crate::arrays) fn senders(&self, receiver: usize) -> impl Iterator<Item = usize> + '_ {
         let senders = (0..self.rows.columns(receiver)).map(move |column| self.rows.sender(receiver, column));
         senders.filter(move |sender| *sender != self.receivers.start + receiver)
     }
 
-    /// In runs of these scenes a link to one of the receivers is another one from an instant on, which is not before the latest tick.
+    /// Replaces the model of the link from `from` to the receiver `to`, both peers of the scene, from the instant `at` on, which is not before the latest tick.
     #[cold]
     pub(in crate::arrays) fn set_link(
         &mut self,
@@ -214,7 +225,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
     }
 
-    /// What has arrived is held from now on.
+    /// Takes in the samples that have arrived by `tick`.
     #[inline(always)]
     pub(in crate::arrays) fn deliver(&mut self, tick: u64) {
         if let Some(bucket) = self.in_flight.due(tick) {
@@ -222,7 +233,8 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
     }
 
-    /// How what a peer holds in a run moves on, in the order in which the peer holds it. `sent` says when a sample of a sender was sent.
+    /// Returns the instant and the velocity of each sample that a peer holds in a run, in the order in which the peer holds them. `sent` returns the instant at
+    /// which the sample with a sequence number was sent by a sender.
     pub(in crate::arrays) fn moving(&self, (peer, run): (usize, usize), sent: impl Fn(usize, u64) -> Instant) -> impl Iterator<Item = Moving<A>> {
         self.rows.held(peer).map(move |place| {
             let sender = self.rows.sender(peer, self.rows.column_of(peer, place));
@@ -234,15 +246,15 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         })
     }
 
-    /// Whether anything that a peer holds in a run has changed since the means were computed.
+    /// Returns whether any sample that a peer holds in a run has changed since the means were computed.
     pub(in crate::arrays) fn has_changed(&self, peer: usize, run: usize) -> bool {
         self.changed[peer] & (1 << run) != 0
     }
 
-    /// The means are those of the samples held.
+    /// Computes the means of the receivers for which a sample has arrived.
     #[inline(always)]
     pub(in crate::arrays) fn refresh(&mut self, blocks: &mut Blocks) {
-        // Ten peers hear something new in seven of ten ticks: to ask for each of them how rows lie took 2 % of a run.
+        // The usual case first: rows of equal length at computed offsets, without a question for each receiver.
         let Rows::All { peers, .. } = self.rows else { return self.refresh_unequal(blocks) };
         if !self.sums.is_empty() {
             return self.refresh_unequal(blocks);
@@ -259,7 +271,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
     }
 
-    /// [`PerPacket::refresh`] where peers hear different numbers of others, or means are exact.
+    /// Like [`PerPacket::refresh`], for receivers that hear different numbers of peers or have exact means.
     #[inline(never)]
     fn refresh_unequal(&mut self, blocks: &mut Blocks) {
         let Self { rows, held, sums, changed, .. } = self;
@@ -283,9 +295,10 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
     }
 
-    /// At the end of the scene, which is at or before the tick after the latest: what has arrived by then.
+    /// Takes in the samples that have arrived by the end of the scene, which is at or before the tick after `latest`.
     pub(in crate::arrays) fn finish(&mut self, latest: (u64, Instant)) {
         self.pass(latest, &|_| Instant::MAX);
+        // The bucket is that of the tick at or after the end, so that packets which arrive between the end and this tick are removed.
         if let Some(mut bucket) = self.in_flight.due(latest.0 + 1) {
             for packets in [&mut bucket.in_order, &mut bucket.overtaking] {
                 packets.retain(|packet| packet.arrival <= self.end);
@@ -296,16 +309,19 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
 
     /// Takes in samples that have arrived.
     ///
-    /// The order among links does not matter: of each link the newest sample stays, and sums of samples are exact. So samples are taken in as they lie, from
-    /// receiver to receiver, but for those on links on which one overtakes another: those come last, in order. To sort all of them took two thirds of the time
-    /// of a thousand peers, and left them in an order in which each missed the cache.
+    /// The order among links does not matter: of each link the newest sample stays, and sums of samples are exact. Samples are therefore taken in as they lie,
+    /// from
+    /// receiver to receiver, without sorting. Samples of links on which one sample overtakes another come last, sorted, because their order decides which
+    /// samples
+    /// are stale.
     #[inline(never)]
     fn take_in(&mut self, mut bucket: Bucket<A>) {
+        // Mark the links first: their samples in order must wait for the sorted pass too.
         for packet in &bucket.overtaking {
             self.next[packet.place as usize] |= IS_OVERTAKEN;
         }
         let overtaking = bucket.overtaking.len();
-        // Where no mean is exact there are no sums: to look for one took 1 % of a run of ten peers.
+        // Without exact means there are no sums to update.
         match self.sums.is_empty() {
             true => self.take_in_order(&mut bucket),
             false => self.take_in_together(&mut bucket),
@@ -316,7 +332,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         self.in_flight.reuse(bucket);
     }
 
-    /// Takes in the samples of the links on which none overtakes; puts the others behind those that overtake.
+    /// Takes in the samples of links without overtaking. Appends the other samples to `bucket.overtaking`.
     #[inline(always)]
     fn take_in_order(&mut self, bucket: &mut Bucket<A>) {
         for packet in &bucket.in_order {
@@ -326,13 +342,15 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
     }
 
-    /// [`PerPacket::take_in_order`] where means are exact, and samples held are more than a cache has room for: some samples at once, whose memory is asked for before any
-    /// of them is added to a sum. One by one took 5 % longer for a thousand peers.
+    /// Like [`PerPacket::take_in_order`], for exact means. Takes in several samples at once, so that the reads of held samples overlap before the sums need
+    /// them: these
+    /// samples are more than a cache holds.
     #[inline(always)]
     fn take_in_together(&mut self, bucket: &mut Bucket<A>) {
         for packets in bucket.in_order.chunks(TAKEN_TOGETHER) {
             let (mut newest, mut count) = ([0; TAKEN_TOGETHER], 0);
             for (place, packet) in packets.iter().enumerate() {
+                // Written in any case and counted only if newest: no branch.
                 newest[count] = place;
                 count += usize::from(self.is_newest(packet, &mut bucket.overtaking));
             }
@@ -348,10 +366,11 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
     }
 
-    /// Whether a sample is newer than the one held, which it is from then on; puts one of a link on which some overtake behind those.
+    /// Returns whether a sample is newer than the held one, and notes its sequence number if so. Appends a sample of a marked link to `overtaking`.
     #[inline(always)]
     fn is_newest(&mut self, packet: &Packet<A>, overtaking: &mut Vec<Packet<A>>) -> bool {
         let next = &mut self.next[packet.place as usize];
+        // A marked entry has its top bit set, so that no sequence number reaches it.
         let is_newest = packet.sequence >= *next;
         if is_newest {
             *next = packet.sequence + 1;
@@ -363,7 +382,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         is_newest
     }
 
-    /// Takes in all samples of the links on which some overtake, which are the first ones.
+    /// Takes in all samples of marked links, in the order of arrival. The first `overtaking` packets are those by which links were marked.
     fn take_in_overtaking(&mut self, packets: &mut [Packet<A>], overtaking: usize) {
         for packet in &packets[..overtaking] {
             self.next[packet.place as usize] &= !IS_OVERTAKEN;
@@ -374,7 +393,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
     }
 
-    /// Takes in a sample after all that arrived before it.
+    /// Takes in a sample, after all samples of its link that arrived before.
     #[inline(always)]
     fn take_in_one(&mut self, packet: &Packet<A>) {
         let next = &mut self.next[packet.place as usize];
@@ -388,7 +407,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
     }
 
-    /// A sample takes the place of the one before it in the sums of its receiver, if there are any.
+    /// Replaces the sample `before` by that of `packet` in the sums of its receiver, if the receiver has sums.
     #[inline(always)]
     fn replace(&mut self, before: &State<A>, packet: &Packet<A>) {
         if let Some(Some(sums)) = self.sums.get_mut(usize::from(packet.receiver)) {
@@ -396,7 +415,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
     }
 
-    /// A sample is held.
+    /// Holds a sample: replaces the held one and marks the mean as out of date.
     #[inline(always)]
     fn hold(&mut self, packet: &Packet<A>) {
         let (place, run) = (packet.place as usize / L, packet.place as usize % L);
@@ -411,12 +430,12 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         self.stale[usize::from(packet.receiver) * L + packet.place as usize % L] += 1;
     }
 
-    /// A run ends at an instant before the end of the scene: samples still in flight in it never arrive, and links do nothing more.
+    /// Ends a run at the instant `at` before the end of the scene: samples still in flight never arrive, and links do nothing more.
     ///
-    /// `sent` says when a packet of a sender was sent.
+    /// `sent` returns the instant at which a packet of a sender was sent, by its sequence number.
     pub(in crate::arrays) fn end_early(&mut self, run: usize, at: Instant, sent: impl Fn(usize, u64) -> Instant) {
         if let Links::Stepped(links) = &mut self.links {
-            // There is one run.
+            // Stepped links exist in single runs only, so that stopping all links stops this run only.
             links.stop(at);
         }
         for packet in self.in_flight.iter().filter(|packet| packet.place as usize % L == run) {
@@ -431,12 +450,12 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
     }
 
-    /// How many samples a peer received after a newer one.
+    /// Returns the number of samples that a receiver took in after a newer one.
     pub(in crate::arrays) fn stale_samples(&self, receiver: usize, run: usize) -> u64 {
         self.stale[receiver * L + run]
     }
 
-    /// The counters of the link from a peer to a receiver, if there is one.
+    /// Returns the counters of the link from a peer of the scene to a receiver; `None` if there is no link.
     pub(in crate::arrays) fn stats(&self, from: usize, receiver: usize, run: usize) -> Option<LinkStats> {
         let link = LinkId::new(self.rows.link(receiver, self.rows.column(receiver, from)?) * L + run);
         Some(match &self.links {
@@ -446,23 +465,24 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
     }
 }
 
-/// The packets of a tick over links that know at once when each arrives, between all peers.
+/// Packets of a tick over direct links, if all peers hear all other peers.
 ///
-/// Compiled for any processor and for one that has AVX2, whose instructions take 2 % off a run of ten peers over links with jitter and loss.
+/// Compiled for any processor and for processors with AVX2.
 struct DirectSending<'a, const A: usize, const L: usize> {
-    /// Of the scene.
+    /// Number of peers of the scene.
     peers: usize,
     receivers: Range<usize>,
     links: &'a mut DirectLinks,
     senders: &'a [usize],
-    /// Whether each peer of the scene is one of them.
+    /// Whether a peer of the scene is among `senders`, indexed by peer.
     sends: &'a [bool],
     sent: &'a [Sample<A, L>],
     in_flight: &'a mut InFlight<A>,
+    /// Present tick and its instant.
     at: (u64, Instant),
 }
 
-/// One function for each way: two in one have too few registers, and take ten instructions more for a packet of links with jitter and loss.
+/// One type, and so one compiled function, for each way of sending: several ways in one function need more registers than there are.
 struct BySender<'a, const A: usize, const L: usize>(DirectSending<'a, A, L>);
 struct ByChain<'a, const A: usize, const L: usize>(DirectSending<'a, A, L>);
 struct ByLink<'a, const A: usize, const L: usize>(DirectSending<'a, A, L>);
@@ -495,19 +515,21 @@ impl<const A: usize, const L: usize> NullaryFnOnce for ByLink<'_, A, L> {
 }
 
 impl<const A: usize, const L: usize> DirectSending<'_, A, L> {
-    /// Link by link, those to one receiver after those to another, without a gap: ten links to each of ten receivers are thirteen times eight, and not twenty
-    /// times eight or fewer. It took 3 % off a run of ten peers, and 9 % off one of three.
+    /// Sends link by link, eight at a time and without a gap between the rows of receivers, so that only the last eight can be incomplete. `CHAINS` says
+    /// whether all
+    /// links have chains.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "the bits of eight links")]
     fn by_link<const CHAINS: bool>(self) {
         let Self { peers, receivers, links, senders, sends, sent, in_flight, at } = self;
         let (row, all_send) = (peers * L, senders.len() == peers);
         let count = receivers.len() * row;
-        // The next link from a receiver to itself; the receiver of the link looked at, and where its row ends.
+        // Next link from a receiver to itself; receiver of the present link; end of the row of this receiver.
         let (mut own, mut receiver, mut end) = (receivers.start * L, 0, row);
         let mut arrivals = Arrivals::NONE;
         for first in (0..count).step_by(DirectLinks::AT_ONCE) {
             let mut but = 0_u8;
+            // Links from a receiver to itself are excluded by their bits in `but`, one for each run.
             while own < first + DirectLinks::AT_ONCE {
                 but |= (((1_u16 << L) - 1) << (own - first)) as u8;
                 own += row + L;
@@ -533,7 +555,7 @@ impl<const A: usize, const L: usize> DirectSending<'_, A, L> {
         }
     }
 
-    /// Sender by sender, in one run.
+    /// Sends sender by sender, one link at a time, in a single run.
     #[inline(always)]
     fn by_sender(self) {
         let Self { peers, receivers, links, senders, sent, in_flight, at, .. } = self;
@@ -549,7 +571,9 @@ impl<const A: usize, const L: usize> DirectSending<'_, A, L> {
     }
 }
 
-/// The packet over a link to a receiver, which is that peer of the scene, if all hear all. Links are counted by sender, then run.
+/// Returns the packet over the link at index `link` of a row, to a receiver that is the peer `peer` of the scene, if all peers hear all other peers. A row is
+/// ordered
+/// by sender, then run.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "peers are counted in 16 bits, what they hold in 32")]
 fn packet<const A: usize, const L: usize>(

@@ -1,22 +1,22 @@
-//! The samples that one peer holds, along one axis, so that their mean is a matter of few instructions.
+//! Storage of the samples that one peer holds along one axis, laid out so that their mean takes few instructions.
 
 use cohaptic_peer::State;
 
-/// Samples of L runs, four senders together: four positions, then four velocities.
+/// Samples of four senders in L runs: four positions \[m\], then four velocities \[m/s\].
 ///
-/// A mean adds every fourth sample to one of four sums, as [`cohaptic_peer::Held::refresh`] does; here those are the lanes of a register, with the sums of the
-/// velocities beside them. It took 5 % off a tick of ten peers over links with jitter, where seven of ten have heard something new.
+/// A mean adds every fourth sample to the same one of four sums, as [`cohaptic_peer::Held::refresh`] does. The four sums of positions and the four sums of
+/// velocities are the lanes of a register.
 pub(super) type Quad<const L: usize> = [[f64; L]; 8];
 
-/// What lies where there is no sender. Adding it changes no sum, of whatever sign its zero is.
+/// Number in places without a sender: −0, whose addition changes no sum, not even the sign of a zero.
 const NOBODY: f64 = -0.0;
 
-/// Quads of that number of empty samples.
+/// Returns quads for the given number of samples, all empty.
 pub(super) fn empty<const L: usize>(samples: usize) -> Vec<Quad<L>> {
     vec![[[NOBODY; L]; 8]; samples.div_ceil(4)]
 }
 
-/// Replaces the sample in that place of a run.
+/// Replaces the sample at index `place` in a run.
 #[inline(always)]
 pub(super) fn set<const L: usize>(quads: &mut [Quad<L>], place: usize, run: usize, position: f64, velocity: f64) {
     let quad = &mut quads[place / 4];
@@ -24,18 +24,18 @@ pub(super) fn set<const L: usize>(quads: &mut [Quad<L>], place: usize, run: usiz
     quad[place % 4 + 4][run] = velocity;
 }
 
-/// The sample in that place of a run, from its quads along each axis.
+/// Returns the sample at index `place` in a run. `quads` is indexed by axis.
 pub(super) fn state<const A: usize, const L: usize>(quads: &[Vec<Quad<L>>; A], place: usize, run: usize) -> State<A> {
     let number = |axis: usize, part: usize| quads[axis][place / 4][place % 4 + part][run];
     State { position: std::array::from_fn(|axis| number(axis, 0)), velocity: std::array::from_fn(|axis| number(axis, 4)) }
 }
 
-/// The velocity of the sample in that place of a run.
+/// Returns the velocity of the sample at index `place` in a run.
 pub(super) fn velocity<const L: usize>(quads: &[Quad<L>], place: usize, run: usize) -> f64 {
     quads[place / 4][place % 4 + 4][run]
 }
 
-/// Lets two samples change places, in all runs.
+/// Swaps the sample at index `one` with `other`, in all runs.
 #[inline(always)]
 pub(super) fn swap<const L: usize>(quads: &mut [Quad<L>], one: usize, other: &mut ([f64; L], [f64; L])) {
     let quad = &mut quads[one / 4];
@@ -43,7 +43,7 @@ pub(super) fn swap<const L: usize>(quads: &mut [Quad<L>], one: usize, other: &mu
     std::mem::swap(&mut quad[one % 4 + 4], &mut other.1);
 }
 
-/// The mean position and velocity of each run, of this number of samples.
+/// Returns the mean position and velocity of `count` samples, indexed by run.
 #[inline(always)]
 pub(super) fn mean<const L: usize>(quads: &[Quad<L>], count: f64) -> ([f64; L], [f64; L]) {
     let mut sums: Quad<L> = [[0.0; L]; 8];
@@ -55,6 +55,7 @@ pub(super) fn mean<const L: usize>(quads: &[Quad<L>], count: f64) -> ([f64; L], 
         }
     }
     let mean = |first: usize| -> [f64; L] {
+        // The order of additions is that of `Held::refresh`, or the last bit would differ.
         std::array::from_fn(|run| ((sums[first][run] + sums[first + 1][run]) + (sums[first + 2][run] + sums[first + 3][run])) / count)
     };
     (mean(0), mean(4))

@@ -1,4 +1,6 @@
-//! The senders that each receiver hears, and the places of its links and of the samples that it holds.
+//! Senders that each receiver hears, and the indices of its links and of the samples that it holds.
+//!
+//! A row has a column for each link to its receiver. A place is an index into the arrays of held samples; each receiver has whole quads of places.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -9,38 +11,38 @@ use cohaptic_units::Instant;
 
 use super::in_flight::Packet;
 
-/// The rows of some receivers, which are counted from 0: a link from each sender, in order, and a place for the sample held from each.
+/// Rows of some receivers, which are counted from 0. Each row has a link from each sender, in the order of the senders.
 #[derive(Clone, Debug)]
 pub(super) enum Rows {
-    /// Each hears all others. There is a link from itself too, over which nothing is sent, so that a place is found by multiplying.
+    /// Every peer hears all other peers. There is also a link from each receiver to itself, over which nothing is sent, so that indices are products.
     All {
-        /// Of the scene.
+        /// Number of peers of the scene.
         peers: usize,
-        /// The first receiver among them.
+        /// Index in the scene of the first receiver.
         first: usize,
     },
-    /// Each hears its neighbours.
+    /// Every peer hears its neighbours only.
     Some(SomeRows),
 }
 
-/// The rows of receivers that hear their neighbours.
+/// Rows of receivers that hear their neighbours only.
 #[derive(Clone, Debug)]
 pub(super) struct SomeRows {
     topology: Arc<Topology>,
     receivers: Range<usize>,
-    /// By receiver where its places begin, and at last where they end.
+    /// First place of each receiver, indexed by receiver; the last entry is the end of all places.
     places: Vec<usize>,
-    /// By link what a sample weighs; empty if all weigh as much.
+    /// Relative weight of a sample, indexed by link. Empty if all samples have the same weight.
     weights: Vec<f64>,
 }
 
-/// How many places that number of senders has: whole quads.
+/// Returns the number of places for the given number of senders: whole quads.
 const fn whole(senders: usize) -> usize {
     senders.next_multiple_of(4)
 }
 
 impl Rows {
-    /// Those of these receivers out of that number of peers.
+    /// Returns the rows of the given receivers among `peers` peers. Every peer hears all other peers if `topology` is `None`.
     pub(super) fn new(peers: usize, topology: Option<&Arc<Topology>>, receivers: Range<usize>) -> Self {
         let Some(topology) = topology else { return Self::All { peers, first: receivers.start } };
         let mut places = vec![0];
@@ -57,7 +59,7 @@ impl Rows {
         Self::Some(SomeRows { topology: Arc::clone(topology), receivers, places, weights })
     }
 
-    /// How many places there are.
+    /// Returns the number of places of the given number of receivers.
     pub(super) fn places(&self, receivers: usize) -> usize {
         match self {
             Self::All { peers, .. } => receivers * whole(peers - 1),
@@ -65,7 +67,7 @@ impl Rows {
         }
     }
 
-    /// How many links lead to a receiver.
+    /// Returns the number of links to a receiver.
     #[inline]
     pub(super) fn columns(&self, receiver: usize) -> usize {
         match self {
@@ -74,7 +76,7 @@ impl Rows {
         }
     }
 
-    /// The sender of one of them, which may be the receiver itself.
+    /// Returns the sender of a link, by index in the scene. With [`Rows::All`] this may be the receiver itself.
     #[inline]
     pub(super) fn sender(&self, receiver: usize, column: usize) -> usize {
         match self {
@@ -83,7 +85,7 @@ impl Rows {
         }
     }
 
-    /// The column of a sender; `None` if there is no link.
+    /// Returns the column of a sender; `None` if there is no link.
     pub(super) fn column(&self, receiver: usize, sender: usize) -> Option<usize> {
         match self {
             Self::All { first, .. } => (sender != first + receiver).then_some(sender),
@@ -91,7 +93,7 @@ impl Rows {
         }
     }
 
-    /// The link in a column.
+    /// Returns the index of the link in a column.
     #[inline]
     pub(super) fn link(&self, receiver: usize, column: usize) -> usize {
         match self {
@@ -100,16 +102,17 @@ impl Rows {
         }
     }
 
-    /// The place in which what comes over the link in a column is held.
+    /// Returns the place of the samples that arrive over the link in a column.
     #[inline]
     pub(super) fn place(&self, receiver: usize, column: usize) -> usize {
         match self {
+            // The receiver holds no sample of itself, so that senders after it move down by one.
             Self::All { peers, first } => receiver * whole(peers - 1) + column - usize::from(column > first + receiver),
             Self::Some(rows) => rows.places[receiver] + column,
         }
     }
 
-    /// The column whose samples are held in a place of a receiver.
+    /// Returns the column of the samples that are held in a place of a receiver. Inverse of [`Rows::place`].
     #[inline]
     pub(super) fn column_of(&self, receiver: usize, place: usize) -> usize {
         match self {
@@ -121,7 +124,7 @@ impl Rows {
         }
     }
 
-    /// The places of a receiver that hold something.
+    /// Returns the places of a receiver that hold samples. The padding up to whole quads is left out.
     #[inline(always)]
     pub(super) fn held(&self, receiver: usize) -> Range<usize> {
         match self {
@@ -130,7 +133,7 @@ impl Rows {
         }
     }
 
-    /// The packet to a receiver over the link in a column, in one of L runs.
+    /// Returns the packet to a receiver over the link in a column, in one of L runs. Multiplies the sample by the weight of the link.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "peers are counted in 16 bits, what they hold in 32")]
     pub(super) fn packet<const A: usize, const L: usize>(
@@ -152,7 +155,7 @@ impl Rows {
         }
     }
 
-    /// By what a sample over the link in a column is multiplied, if by anything.
+    /// Returns the factor of samples over the link in a column; `None` if samples are not weighted.
     #[inline]
     pub(super) fn weight(&self, receiver: usize, column: usize) -> Option<f64> {
         match self {
@@ -168,6 +171,7 @@ impl SomeRows {
     }
 
     fn first_link(&self, receiver: usize) -> usize {
+        // The topology counts links from the first peer of the scene, these rows from their first receiver.
         self.topology.places(self.receivers.start + receiver).start - self.topology.places(self.receivers.start).start
     }
 }

@@ -2,15 +2,18 @@
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// How often a thread looks whether the others have come before it lets other programs run.
+/// Number of times that a waiting thread looks before it yields the processor.
 const LOOKS: u32 = 10_000;
 
-/// A place where a number of threads wait for each other, again and again. They spin: a system call takes longer than most of them wait.
+/// Point at which a fixed number of threads wait for each other, again and again. Waiting threads spin, because most waits are shorter than a system call.
 #[derive(Debug)]
 pub(super) struct Barrier {
     threads: usize,
+    /// Number of threads that have come to the present meeting.
     arrived: AtomicUsize,
+    /// Number of meetings so far. Its change releases the waiting threads.
     meetings: AtomicUsize,
+    /// Whether a thread panicked, so that waiting threads must not wait for it.
     is_broken: AtomicBool,
 }
 
@@ -34,14 +37,16 @@ impl Barrier {
         Guard(self)
     }
 
-    /// Waits until all threads have come. What each did before is seen by all after.
+    /// Waits until all threads have called this function. Everything that a thread wrote before is visible to all threads after.
     ///
     /// # Panics
     ///
     /// If another thread panicked.
     pub(super) fn wait(&self) {
+        // Read before the arrival is counted: after that, the last thread may end this meeting at any time.
         let meeting = self.meetings.load(Ordering::Acquire);
         if self.arrived.fetch_add(1, Ordering::AcqRel) + 1 == self.threads {
+            // The count is reset before the release, so that a released thread that comes again is counted for the next meeting.
             self.arrived.store(0, Ordering::Relaxed);
             self.meetings.store(meeting.wrapping_add(1), Ordering::Release);
             return;

@@ -1,4 +1,4 @@
-//! What threads tell each other where they meet.
+//! Exchange of samples, extremes and finiteness between threads at their meetings.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -8,35 +8,41 @@ use super::barrier::{Barrier, Guard};
 use crate::arrays::lanes::{larger, smaller};
 use crate::arrays::samples::Sample;
 
-/// The words that threads exchange.
+/// State that threads share.
 pub(super) struct Exchange<const A: usize> {
-    /// The words of each thread, in turns: an early thread tells the next while others still read the last.
+    /// Report of each thread, for two alternating meetings: a fast thread writes its next report while slow threads still read the last.
     told: [Vec<Mutex<Told<A>>>; 2],
     barrier: Barrier,
     goes_on: AtomicBool,
 }
 
-/// The words of a thread at a tick.
+/// Report of a thread at a meeting.
 struct Told<const A: usize> {
+    /// Samples of the thread's peers that send, with their index in the scene.
     samples: Vec<(usize, Sample<A, 1>)>,
-    /// The least and the greatest position of its copies along each axis, at each tick since it last told.
+    /// Least and greatest position of the thread's copies \[m\], indexed by tick since the last report, then axis.
     extremes: Vec<(f64, f64)>,
+    /// Whether all numbers of the thread's peers have been finite so far.
     is_finite: bool,
 }
 
-/// A thread's side of the exchange.
+/// Side of one thread in the exchange.
 pub(super) struct Thread<'e, const A: usize> {
     exchange: &'e Exchange<A>,
+    /// Index of the thread.
     place: usize,
+    /// Peers of the scene that the thread moves.
     members: Range<usize>,
+    /// Index in `told` of the next meeting: 0 or 1.
     turn: usize,
-    /// Those of its copies since it last told.
+    /// Extremes of the thread's own copies since its last report, in the order of [`Told::extremes`].
     extremes: Vec<(f64, f64)>,
-    /// Those of all threads at a meeting.
+    /// Extremes of all threads at a meeting. A field, so that its memory is used again.
     extremes_of_all: Vec<(f64, f64)>,
     is_finite: bool,
-    /// As far as all have told.
+    /// Whether all numbers of all threads were finite at the last meeting.
     all_are_finite: bool,
+    /// Largest distance between two copies along an axis up to the last meeting \[m\].
     max_discrepancy: f64,
 }
 
@@ -46,14 +52,14 @@ impl<const A: usize> Exchange<A> {
         Self { told: [told(), told()], barrier: Barrier::new(threads), goes_on: AtomicBool::new(true) }
     }
 
-    /// While it lives, a panic of its thread is one of all threads.
+    /// Returns a guard that makes all threads panic if the present thread panics while it holds the guard.
     pub(super) const fn guard(&self) -> Guard<'_> {
         self.barrier.guard()
     }
 }
 
 impl<'e, const A: usize> Thread<'e, A> {
-    /// The thread in that place, which has these peers.
+    /// Returns the side of the thread at index `place`, which moves the peers `members`.
     pub(super) const fn new(exchange: &'e Exchange<A>, place: usize, members: Range<usize>) -> Self {
         Self {
             exchange,
@@ -68,27 +74,27 @@ impl<'e, const A: usize> Thread<'e, A> {
         }
     }
 
-    /// Whether all numbers of all threads were finite when they last met.
+    /// Returns whether all numbers of all threads were finite at the last meeting.
     pub(super) const fn all_are_finite(&self) -> bool {
         self.all_are_finite
     }
 
-    /// The largest discrepancy up to the last meeting \[m\].
+    /// Returns the largest discrepancy up to the last meeting \[m\].
     pub(super) const fn max_discrepancy(&self) -> f64 {
         self.max_discrepancy
     }
 
-    /// Of how many ticks since it last told it knows where copies are.
+    /// Returns the number of ticks whose extremes were noted since the last report.
     pub(super) const fn ticks_noted(&self) -> usize {
         self.extremes.len() / A
     }
 
-    /// Whether all numbers of some of its peers are finite.
+    /// Notes whether all numbers of some of the thread's peers are finite.
     pub(super) const fn note_finite(&mut self, is_finite: bool) {
         self.is_finite &= is_finite;
     }
 
-    /// Where some of its copies are at most, along each axis, in the tick in that place of the ticks since it last told.
+    /// Adds the least and greatest positions of some of the thread's copies \[m\], one pair for each axis, to the tick at index `tick` since the last report.
     pub(super) fn note_extremes(&mut self, tick: usize, extremes: impl Iterator<Item = (f64, f64)>) {
         let extremes = extremes.enumerate().map(|(axis, extremes)| (tick * A + axis, extremes));
         for (place, (low, high)) in extremes {
@@ -99,7 +105,9 @@ impl<'e, const A: usize> Thread<'e, A> {
         }
     }
 
-    /// At this tick these peers of the scene send: puts what those of other threads send into their places in `sent`, where those of this one are already.
+    /// Meets the other threads at a tick at which the peers `senders` of the scene send. Fills `sent` with the samples of the other threads' peers; those of
+    /// the
+    /// thread's own peers must be there already.
     pub(super) fn exchange(&mut self, senders: &[usize], sent: &mut [Sample<A, 1>]) {
         let told = &self.exchange.told[self.turn];
         self.turn = 1 - self.turn;
@@ -107,7 +115,7 @@ impl<'e, const A: usize> Thread<'e, A> {
             let mut own = told[self.place].lock().unwrap_or_else(PoisonError::into_inner);
             own.samples.clear();
             own.samples.extend(senders.iter().filter(|sender| self.members.contains(sender)).map(|sender| (*sender, sent[*sender])));
-            // They change places, so that neither is allocated again.
+            // The vectors are swapped, so that neither is allocated again.
             own.extremes.clear();
             std::mem::swap(&mut own.extremes, &mut self.extremes);
             own.is_finite = self.is_finite;
@@ -125,10 +133,11 @@ impl<'e, const A: usize> Thread<'e, A> {
             }
             self.all_are_finite &= told.is_finite;
         }
+        // Extremes are those of one tick of all copies, so that their difference is the discrepancy of that tick.
         self.max_discrepancy = self.extremes_of_all.iter().fold(self.max_discrepancy, |largest, (low, high)| largest.max(high - low));
     }
 
-    /// Whether the run goes on, which one thread knows and the others ask.
+    /// Returns whether the run goes on. One thread passes the answer, all others `None`.
     pub(super) fn goes_on(&self, known: Option<bool>) -> bool {
         let Exchange { barrier, goes_on, .. } = self.exchange;
         if let Some(known) = known {
@@ -136,7 +145,7 @@ impl<'e, const A: usize> Thread<'e, A> {
         }
         barrier.wait();
         let wanted = goes_on.load(Ordering::Relaxed);
-        // The next answer may be given once all have this one.
+        // A second meeting, so that no thread stores the next answer before all threads have read this one.
         barrier.wait();
         wanted
     }
@@ -146,7 +155,7 @@ impl<'e, const A: usize> Thread<'e, A> {
 mod tests {
     use super::*;
 
-    /// Two groups note two ticks and, after a stretch without a meeting, a third: copies are as far apart as in one tick of all groups.
+    /// Two groups note two ticks, and a third tick after a stretch without a meeting: the discrepancy is that of one tick of all groups.
     #[test]
     fn the_discrepancy_is_that_of_one_tick_of_all_groups() {
         let exchange = Exchange::<1>::new(1);

@@ -1,4 +1,4 @@
-//! Samples to neighbours alone.
+//! Sending samples over the links of a topology, in which peers hear their neighbours only.
 
 use cohaptic_units::Instant;
 use cohaptic_wan::{Arrivals, DirectLinks, LinkId};
@@ -7,7 +7,7 @@ use super::super::Sample;
 use super::{Links, PerPacket};
 
 impl<const A: usize, const L: usize> PerPacket<A, L> {
-    /// [`PerPacket::send`] where each receiver has senders of its own.
+    /// Like [`PerPacket::send`], for rows whose receivers have different senders.
     #[inline(never)]
     pub(super) fn send_to_neighbours(
         &mut self,
@@ -27,6 +27,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
                     let mut arrivals = Arrivals::NONE;
                     for first in (0..row).step_by(DirectLinks::AT_ONCE) {
                         let count = DirectLinks::AT_ONCE.min(row - first);
+                        // One bit for each of up to eight links: a set bit means that the link is offered no packet.
                         let mut idle = u8::MAX;
                         for place in (0..count).filter(|place| sends[rows.sender(receiver, (first + place) / L)]) {
                             idle &= !(1 << place);
@@ -43,6 +44,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
                         }
                     }
                 }
+                // Several runs at once have direct links only.
                 Links::Stepped(_) if const { L > 1 } => {}
                 Links::Stepped(links) => {
                     for number in 0..row {
