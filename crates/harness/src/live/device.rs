@@ -1,4 +1,4 @@
-//! A device in somebody's hand.
+//! Devices in a person's hand.
 
 use std::time::Duration;
 
@@ -7,22 +7,27 @@ use cohaptic_units::Instant;
 
 use super::pulled::PulledDevice;
 
-/// What a live session needs of a device, or of the pointer that pulls a simulated one. Components beyond the axes of the scene are zero, and are not looked at.
+/// Device of a person in a live session, or pointer that pulls a simulated device. Components beyond the axes of the scene are zero and are ignored.
 pub trait LiveDevice: Send {
-    /// Position and velocity in the coordinates of the scene, at the tick at `now`; called once a tick. For a peer of kind `pointer` those of the pointer. `None` if that cannot be told: there is no device, it
-    /// does not answer, it is not homed. A peer whose device is silent for long lets go of the object, and takes it up again, little by little.
+    /// Returns position \[m\] and velocity \[m/s\] at the tick at `now`, in the coordinates of the scene; for a peer of kind `pointer`, those of the pointer.
+    /// Called once
+    /// a tick. Returns `None` if there is no device, or if the device does not answer or is not homed.
+    ///
+    /// A peer whose device is silent for long lets go of the object gradually, and takes the object up again gradually when the device is back.
     fn read(&mut self, now: Instant) -> Option<State<3>>;
 
-    /// Holds a force until the next tick, `span` after `now`: FC \[N\], which the hand feels with the opposite sign. Called once a tick, after
-    /// [`LiveDevice::read`], and with zero forces when the session ends.
+    /// Applies the force FC \[N\] until the next tick, `span` after `now`. The hand feels FC with the opposite sign. Called once a tick, after
+    /// [`LiveDevice::read`],
+    /// and with zero forces when the session ends.
     fn hold(&mut self, now: Instant, span: Duration, coupling_force: [f64; 3]);
 }
 
-/// A device that nobody simulates.
+/// Device without a simulation of its own.
 #[derive(Debug)]
 pub(crate) enum UnsimulatedDevice<const A: usize> {
-    /// It stays where it is.
+    /// The device stays where it is.
     Resting(RestingDevice<A>),
+    /// The device follows a hand.
     InHand(Box<HandDevice<A>>),
 }
 
@@ -48,51 +53,54 @@ impl<const A: usize> Device<A> for UnsimulatedDevice<A> {
     }
 }
 
-/// The device of a peer, where it was when it was last read.
+/// Device of a peer, at the state that was read last.
 pub(crate) struct HandDevice<const A: usize> {
     device: Option<Box<dyn LiveDevice>>,
+    /// State that was read last.
     read: State<A>,
-    /// What was felt when it came back, and how far it has come from there.
+    /// State shown when the device came back. The shown state moves from there to `read`.
     before: State<A>,
+    /// Share of the way from `before` to `read`, from 0 to 1.
     share: f64,
-    /// The device that a pointer pulls, if a pointer is read.
+    /// Simulated device at the pointer's arm. `None` if `device` is a real device.
     pulled: Option<PulledDevice<A>>,
 }
 
 impl<const A: usize> HandDevice<A> {
-    /// `None` is a device that is never there.
+    /// Returns a device at rest at `state`. `None` for a device that is never there.
     pub(crate) const fn new(device: Option<Box<dyn LiveDevice>>, state: State<A>) -> Self {
         Self { device, read: state, before: state, share: 1.0, pulled: None }
     }
 
-    /// A pointer that pulls a simulated device; `None` is one that is never there.
+    /// Returns a simulated device that a pointer pulls. `None` for a pointer that is never there.
     pub(crate) fn pulling(pointer: Option<Box<dyn LiveDevice>>, pulled: PulledDevice<A>) -> Self {
         let state = pulled.state();
         Self { pulled: Some(pulled), ..Self::new(pointer, state) }
     }
 
-    /// Reads the device along the axes of the scene, and says whether that could be done. A scene of two axes is simulated along three, of which the third rests.
+    /// Reads the device along the axes of the scene. Returns `None` if there is no reading, or if a number is not finite.
     pub(crate) fn read(&mut self, now: Instant, axes: usize) -> Option<State<A>> {
         let State { position, velocity } = self.device.as_mut()?.read(now)?;
+        // A scene of two axes is simulated along three, and the third axis rests.
         let first = |values: [f64; 3]| core::array::from_fn(|axis| values.get(axis).copied().filter(|_| axis < axes).unwrap_or(0.0));
         Some(State { position: first(position), velocity: first(velocity) }).filter(State::is_finite)
     }
 
-    /// Takes what was read.
+    /// Stores a reading.
     pub(crate) const fn set(&mut self, state: State<A>) {
         self.read = state;
     }
 
-    /// The share counts from the force felt until now.
+    /// Makes the shown state the start of the way to later readings.
     pub(crate) fn keep(&mut self) {
         self.before = self.shown();
     }
 
-    /// How far the way to what was read is gone, and how much of the hand is felt. Gives what the coupling is to be multiplied by.
+    /// Sets the share of the way to the reading and the weight of the hand. Returns the factor of the coupling.
     pub(crate) const fn set_age(&mut self, age: Age) -> f64 {
         self.share = age.share;
         match &mut self.pulled {
-            // The device lives here and stays coupled: it is the arm that lets go.
+            // The simulated device stays coupled: only the arm lets go.
             Some(pulled) => {
                 pulled.set_weight(age.weight);
                 1.0
@@ -101,7 +109,7 @@ impl<const A: usize> HandDevice<A> {
         }
     }
 
-    /// What was read, after the way there from what was felt before.
+    /// Returns the state between `before` and `read`, at `share` of the way.
     fn shown(&self) -> State<A> {
         if self.share < 1.0 {
             let mix = |from: [f64; A], to: [f64; A]| core::array::from_fn(|axis| from[axis] + self.share * (to[axis] - from[axis]));
@@ -144,7 +152,7 @@ impl<const A: usize> core::fmt::Debug for HandDevice<A> {
 mod tests {
     use super::*;
 
-    /// A device that always shows this state.
+    /// A device with a constant state.
     struct Fixed(State<3>);
 
     impl LiveDevice for Fixed {
@@ -155,7 +163,7 @@ mod tests {
         fn hold(&mut self, _now: Instant, _span: Duration, _coupling_force: [f64; 3]) {}
     }
 
-    /// A scene of two axes is simulated along three: its record has two, so that a third that moved would make another session of it.
+    /// A scene of two axes is simulated along three. A moving third axis would change the run, but has no column in the record.
     #[test]
     fn components_beyond_the_axes_of_the_scene_are_not_looked_at() {
         for beyond in [3.0, f64::NAN] {

@@ -1,4 +1,4 @@
-//! Numbers that go from 0 to 1 and back at a given speed.
+//! Numbers that move between 0 and 1 at a given speed.
 
 use std::time::Duration;
 
@@ -8,19 +8,22 @@ use cohaptic_units::Instant;
 /// A number from 0 to 1 that moves towards one end, by 1 in the time `over`.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Ramp {
+    /// Value at `since`.
     from: f64,
     since: Instant,
+    /// Whether the number moves towards 1.
     rises: bool,
+    /// Time from 0 to 1.
     over: Duration,
 }
 
 impl Ramp {
-    /// At 0, where it stays.
+    /// Returns a ramp that stays at 0.
     pub(crate) const fn down(over: Duration) -> Self {
         Self { from: 0.0, since: Instant::ZERO, rises: false, over }
     }
 
-    /// At 1, where it stays.
+    /// Returns a ramp that stays at 1.
     pub(crate) const fn up(over: Duration) -> Self {
         Self { from: 1.0, since: Instant::ZERO, rises: true, over }
     }
@@ -30,33 +33,35 @@ impl Ramp {
         if self.rises { (self.from + way).min(1.0) } else { (self.from - way).max(0.0) }
     }
 
-    /// From its value at `at` it rises, or falls.
+    /// Makes the number rise or fall from its value at `at`.
     pub(crate) fn turn(&mut self, at: Instant, rises: bool) {
         if self.rises != rises {
             *self = Self { from: self.value(at), since: at, rises, ..*self };
         }
     }
 
-    /// From 0 at `at` it rises.
+    /// Makes the number rise from 0 at `at`.
     pub(crate) fn restart(&mut self, at: Instant) {
         *self = Self { from: 0.0, since: at, rises: true, ..*self };
     }
 }
 
-/// How much of one peer's pull another one feels, over time.
+/// Strength over time with which one peer feels another.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Fade {
+    /// Weight of the peer's pull.
     weight: Ramp,
+    /// Share of the way from the state held before a return to the present state.
     share: Ramp,
 }
 
 impl Fade {
-    /// Of a peer that has never been heard.
+    /// Returns the fade of a peer that was never heard.
     pub(crate) const fn unheard(over: Duration) -> Self {
         Self { weight: Ramp::down(over), share: Ramp::up(over) }
     }
 
-    /// Of a peer that is wholly there.
+    /// Returns the fade of a peer with full weight.
     pub(crate) const fn whole(over: Duration) -> Self {
         Self { weight: Ramp::up(over), share: Ramp::up(over) }
     }
@@ -69,7 +74,7 @@ impl Fade {
         self.weight.turn(at, true);
     }
 
-    /// The held sample has moved to another place: the way there begins now, unless nobody feels it.
+    /// Notes a jump of the held sample. The way to the new state begins at `at`, unless the weight is 0: then nobody feels a jump.
     pub(crate) fn moved(&mut self, at: Instant) {
         if self.weight.value(at) > 0.0 {
             self.share.restart(at);
@@ -91,7 +96,7 @@ mod tests {
         Instant::from_nanos(millis * 1_000_000)
     }
 
-    /// With a fade of 256 ms steps of 64 ms are quarters, exactly.
+    /// With a fade of 256 ms, steps of 64 ms are exact quarters.
     #[test]
     fn the_weight_is_linear_both_ways_and_turns_where_it_is() {
         let mut fade = Fade::unheard(Duration::from_millis(256));

@@ -1,4 +1,4 @@
-//! What came into a session from outside.
+//! Inputs of a session from outside: samples, readings of devices, changes of links, the end.
 
 use std::collections::BTreeMap;
 
@@ -9,55 +9,55 @@ use cohaptic_wan::LinkModel;
 
 use crate::observer::StateRow;
 
-/// The first line of a record of inputs.
+/// First line of a record of inputs.
 pub const HEADER: &str = "at_ns,input,peer,to,value";
 
-/// Something that came into a session, and when it counts.
+/// Input of a session and the instant at which it takes effect.
 #[derive(Clone, Copy, Debug)]
 pub struct InputRow<'a> {
-    /// The instant; never before that of the row before it.
+    /// Instant of the input, at or after the instant of the previous row.
     pub at: Instant,
-    /// What.
+    /// The input.
     pub what: Input<'a>,
 }
 
-/// What came in. Peers are named by their place in [`Scene::peers`](cohaptic_scene::Scene::peers).
+/// Input of a session. Peers are indices of [`Scene::peers`](cohaptic_scene::Scene::peers).
 #[derive(Clone, Copy, Debug)]
 pub enum Input<'a> {
-    /// A sample from the process of a peer, as it came.
+    /// Datagram from the process of a peer.
     Sample {
-        /// The peer.
+        /// Index of the peer.
         peer: usize,
-        /// Its bytes.
+        /// Bytes as received.
         datagram: &'a [u8],
     },
-    /// What the device in somebody's hand showed at a tick.
+    /// Reading of the device in a person's hand at a tick.
     Device {
-        /// The peer.
+        /// Index of the peer.
         peer: usize,
-        /// `None`: it could not be read.
+        /// Position and velocity along each axis of the scene; `None` if there was no reading.
         state: Option<StateRow<'a>>,
     },
-    /// A link was changed.
+    /// Change of a link.
     Link {
-        /// The sender.
+        /// Index of the sender.
         from: usize,
-        /// The receiver.
+        /// Index of the receiver.
         to: usize,
-        /// All keys that the link has from now on.
+        /// Complete keys of the link after the change.
         keys: &'a LinkKeys,
     },
-    /// Somebody ended the session, after everything at this instant. One that ran to the end of its scene has no such row.
+    /// End of the session by a person, after everything at this instant. A session that reaches the end of its scene has no such row.
     End,
 }
 
-/// The recorded inputs of a session.
+/// Recorded inputs of a session, in the order of time.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Inputs {
     pub(crate) rows: Vec<(Instant, Recorded)>,
 }
 
-/// An input that was read from a record.
+/// Input read from a record. Variants correspond to those of [`Input`].
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) enum Recorded {
     Sample { peer: usize, datagram: Vec<u8> },
@@ -66,28 +66,28 @@ pub(crate) enum Recorded {
     End,
 }
 
-/// Why a text is no record of the inputs of a scene. Lines are counted from 1, the header being line 1.
+/// Reason why a text is no valid record of the inputs of a scene. Lines are counted from 1; line 1 is the header.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum InputsError {
     /// The first line is not the header.
     #[error("line 1: found \"{found}\", expected the header \"{HEADER}\"")]
     Header {
-        /// The first line, or the beginning of it.
+        /// First line, shortened if long.
         found: String,
     },
-    /// A row cannot be read.
+    /// A cell of a row cannot be read.
     #[error("line {line}, column {column}: found \"{found}\", expected {expected}")]
     Cell {
-        /// The line.
+        /// Number of the line.
         line: usize,
-        /// The name of the column.
+        /// Name of the column.
         column: &'static str,
-        /// What stands there, or the beginning of it.
+        /// Text of the cell, shortened if long.
         found: String,
-        /// What would have been right.
+        /// Description of valid text.
         expected: String,
     },
-    /// The last whole line is no row that closes the record.
+    /// The last whole line does not close the record.
     #[error(
         "it is cut short: its last whole line, {line}, at {at} of the session, does not close it. Expected {at_ns},closed,,,{rows} behind it, which \
          earlier versions did not write",
@@ -95,54 +95,54 @@ pub enum InputsError {
         rows = .line - 1
     )]
     NotClosed {
-        /// The last line that is whole.
+        /// Number of the last whole line.
         line: usize,
-        /// Its instant.
+        /// Instant of that line.
         at: Instant,
     },
-    /// Lines are missing before the last one, which says how many there were.
+    /// Lines are missing: the last line gives a larger number of rows.
     #[error("it is not whole: the last line says that {said} rows stand before it, and there are {found}")]
     Rows {
-        /// The number of rows that the last line says.
+        /// Number of rows in the last line.
         said: u64,
-        /// The number of rows that there are.
+        /// Number of rows found.
         found: u64,
     },
-    /// A row stands behind one that is later, or behind the end.
+    /// A row follows a row with a later instant, or follows the end.
     #[error(
         "line {line}: a row at {at} behind one at {before}: expected rows in the order of time, and none behind the end but that which closes it"
     )]
     Order {
-        /// The line.
+        /// Number of the line.
         line: usize,
-        /// Its instant.
+        /// Instant of the row.
         at: Instant,
-        /// That of the row before it.
+        /// Instant of the previous row.
         before: Instant,
     },
 }
 
 impl Inputs {
-    /// How many there are.
+    /// Returns the number of inputs.
     #[must_use]
     pub fn len(&self) -> usize {
         self.rows.len()
     }
 
-    /// Without the changes of links, as for a session whose links are others.
+    /// Returns the inputs without changes of links, for a session with different links.
     #[must_use]
     pub fn without_links(&self) -> Self {
         let is_link = |what: &Recorded| matches!(what, Recorded::Link { .. });
         Self { rows: self.rows.iter().filter(|(_, what)| !is_link(what)).cloned().collect() }
     }
 
-    /// When the last one came; `None` if none did.
+    /// Returns the instant of the last input; `None` if there are no inputs.
     #[must_use]
     pub fn last_instant(&self) -> Option<Instant> {
         self.rows.last().map(|(at, _)| *at)
     }
 
-    /// The peer whose device, or pointer, could be read most often; `None` if none could.
+    /// Returns the peer with the most readings of a device or pointer; `None` if there are no readings.
     #[must_use]
     pub fn busiest_device(&self) -> Option<usize> {
         let mut read = BTreeMap::new();
@@ -151,18 +151,18 @@ impl Inputs {
                 *read.entry(*peer).or_insert(0_usize) += 1;
             }
         }
-        // Of equally many the first.
+        // `max_by_key` returns the last of equal counts, which after `rev` is the first peer.
         read.into_iter().rev().max_by_key(|(_, count)| *count).map(|(peer, _)| peer)
     }
 
-    /// Whether nothing came in.
+    /// Returns whether there are no inputs.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }
 }
 
-/// The beginning of a text that is too long for a message.
+/// Shortens a text to 80 characters and an ellipsis, for messages.
 pub(super) fn shorten(text: &str) -> String {
     match text.char_indices().nth(80) {
         Some((end, _)) => format!("{}…", &text[..end]),

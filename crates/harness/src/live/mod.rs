@@ -1,10 +1,10 @@
-//! A scene some of whose peers are remote: in other processes, or with their device in somebody's hand.
+//! Scenes with remote peers: peers in other processes, and peers whose device is in a person's hand.
 //!
-//! [`LiveScene`] is a state machine. Its driver hands in what comes from outside with the instant at which it came, lets time pass, and sends on what
-//! the network has delivered. It reads no clock and touches no socket: driven by the clock of the wall it is a live session, driven by the recorded
-//! [`Inputs`] of one, with [`replay`], it is the same session in virtual time, with the same fates and the same motion.
+//! [`LiveScene`] is a state machine without clock and sockets. Its driver passes each input with its instant, lets time pass, and sends the datagrams of the
+//! network to other processes. Driven by the wall clock, this is a live session. Driven by recorded [`Inputs`], with [`replay`], this is the same session in
+//! virtual time, with the same fates and the same motion.
 //!
-//! What a peer's silence does to the others is written in `docs/live.md`.
+//! `docs/live.md` describes the effect of a silent peer on other peers.
 
 mod device;
 mod fade;

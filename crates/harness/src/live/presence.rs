@@ -1,4 +1,4 @@
-//! The presence of remote peers: which are there, what the others feel of them, and the datagrams to be sent to them.
+//! Presence of remote peers, its effect on local peers, and datagrams for other processes.
 
 use std::collections::VecDeque;
 
@@ -9,7 +9,7 @@ use cohaptic_units::Instant;
 
 use super::seat::Seat;
 
-/// A datagram, in place.
+/// Datagram with its bytes in place, without allocation.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Datagram {
     bytes: [u8; MAX_LEN],
@@ -36,33 +36,35 @@ impl std::fmt::Debug for Datagram {
     }
 }
 
-/// A datagram that the network has delivered to a peer in another process.
+/// Datagram that the network has delivered to a peer in another process.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Transmit {
-    /// The receiver.
+    /// Index of the receiver.
     pub to: usize,
-    /// When it arrived.
+    /// Instant of the arrival.
     pub at: Instant,
-    /// Its bytes, with whatever damage the network did.
+    /// Bytes, with the damage of the network.
     pub datagram: Datagram,
 }
 
-/// The remote peers of a scene.
+/// Remote peers of a scene.
 #[derive(Debug)]
 pub(crate) struct RemotePeers<const A: usize> {
+    /// Seats, indexed by peer; `None` for a peer that cannot fall silent.
     seats: Vec<Option<Seat>>,
-    /// The places of those that are there.
+    /// Indices of peers with a seat.
     places: Vec<usize>,
-    /// The ages of the others, for each local peer.
+    /// Ages of the remote peers, as applied to each local peer. Indexed by local peer.
     ages: Vec<Ages<A>>,
-    /// What each (sender, receiver) was last told.
+    /// Age that was applied last, indexed by sender · number of peers + receiver; `None` before the first.
     told: Vec<Option<Age>>,
+    /// Datagrams for other processes, in the order of arrival.
     outbox: VecDeque<Transmit>,
-    /// Whether any peer lives in another process.
+    /// Whether any peer is in another process.
     pub(crate) has_processes: bool,
-    /// The first local peer.
+    /// Index of the first local peer.
     pub(crate) lead: usize,
-    /// When something came in from outside whose consequences have not been looked at.
+    /// Instant of an input whose packets were not delivered yet. The world must look at this instant again.
     pub(crate) undrained: Option<Instant>,
 }
 
@@ -86,12 +88,12 @@ impl<const A: usize> RemotePeers<A> {
         self.seats.get_mut(place)?.as_mut()
     }
 
-    /// Whether a peer lives in another process.
+    /// Returns whether a peer is in another process.
     pub(crate) fn is_process(&self, place: usize) -> bool {
         self.seat(place).is_some_and(|seat| seat.is_process)
     }
 
-    /// Notices peers that have fallen silent, and calls `silent` for each.
+    /// Notes peers that have fallen silent by `now`, and calls `silent` with the index of each.
     pub(crate) fn notice_silence(&mut self, now: Instant, mut silent: impl FnMut(usize)) {
         for place in &self.places {
             if self.seats[*place].as_mut().is_some_and(|seat| seat.notice_silence(now)) {
@@ -100,12 +102,12 @@ impl<const A: usize> RemotePeers<A> {
         }
     }
 
-    /// From now on the first sample of that number or a later one is a return of that peer to the other.
+    /// Makes the first sample of `from` with the number `sequence` or later a return of `from` for the peer `to`.
     pub(crate) fn await_return<D: Device<A>, S: Strategy<A>>(&mut self, from: usize, to: usize, sequence: u64, peer: &mut Peer<A, D, S>) {
         self.ages[to].await_return(peer, other(from, to), sequence);
     }
 
-    /// A sample has arrived.
+    /// Hands a sample to its receiver. `ends` are the indices of sender and receiver.
     pub(crate) fn take_in<D: Device<A>, S: Strategy<A>>(
         &mut self,
         now: Instant,
@@ -122,24 +124,27 @@ impl<const A: usize> RemotePeers<A> {
         Ok(received)
     }
 
-    /// A sample has arrived that is newer than all before it.
+    /// Handles a sample newer than all samples before. If this is a return of its sender, the fade begins.
     fn arrived(&mut self, now: Instant, from: usize, to: usize) {
         let Some(seat) = self.seats.get_mut(from).and_then(Option::as_mut).filter(|seat| seat.is_process) else { return };
+        // The sender may return to each receiver at a different instant, when its first new sample arrives there.
         if !self.ages[to].take_return(other(from, to)) {
             return;
         }
         seat.fades[to].moved(now);
+        // The sender can be silent again before its sample arrives. The jump then is faded, but the weight keeps falling.
         if !seat.is_silent() {
             seat.fades[to].rise(now);
         }
     }
 
-    /// Tells a peer that is about to tick what it feels of the remote peers.
+    /// Applies the ages of all remote peers to the peer `to` before its tick.
     pub(crate) fn tell<D: Device<A>, S: Strategy<A>>(&mut self, to: usize, now: Instant, peer: &mut Peer<A, D, S>) {
         let peers = self.seats.len();
         for from in self.places.iter().copied().filter(|from| *from != to) {
             let Some(seat) = &self.seats[from] else { continue };
             let (age, told) = (seat.fades[to].age(now), &mut self.told[from * peers + to]);
+            // Most ages are constant between ticks, and only changes are applied.
             if *told != Some(age) {
                 *told = Some(age);
                 self.ages[to].set(peer, other(from, to), age);
@@ -157,7 +162,7 @@ impl<const A: usize> RemotePeers<A> {
     }
 }
 
-/// The place of a sender among the others of a receiver.
+/// Returns the index of `from` among the senders of `to`, which do not include `to`.
 const fn other(from: usize, to: usize) -> usize {
     if from < to { from } else { from - 1 }
 }

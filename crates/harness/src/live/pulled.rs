@@ -1,4 +1,4 @@
-//! A simulated device that a pointer pulls.
+//! A simulated device pulled by a pointer.
 
 use std::time::Duration;
 
@@ -6,12 +6,12 @@ use cohaptic_peer::{Device, Hand, Signal, SimulatedDevice, State};
 use cohaptic_scene::PointerSpec;
 use cohaptic_units::Instant;
 
-/// A simulated device at the end of an arm, whose other end is a pointer. The force of the arm is held over a tick, as that of every hand.
+/// A simulated device at the end of an arm, whose opposite end is a pointer. The force of the arm is constant over a tick, like the force of every hand.
 #[derive(Clone, Debug)]
 pub(crate) struct PulledDevice<const A: usize> {
     body: SimulatedDevice<A>,
     arm: PointerSpec,
-    /// How much of the arm there is, from 0 to 1.
+    /// Weight of the arm's force, from 0 to 1.
     weight: f64,
 }
 
@@ -36,7 +36,7 @@ impl<const A: usize> PulledDevice<A> {
         self.body.advance(now, span, coupling_force);
     }
 
-    /// w·(stiffness·(wanted − device) + damping·(their velocities)), and no longer than w times the limit.
+    /// Returns w·(stiffness·(x_wanted − x_device) + damping·(v_wanted − v_device)) \[N\], at most w times the force limit in length.
     fn pull(&self, wanted: &State<A>) -> [f64; A] {
         let State { position, velocity } = self.body.state();
         let PointerSpec { stiffness, damping, force_limit, .. } = self.arm;
@@ -76,8 +76,8 @@ mod tests {
         assert!((force[0] - 12.0).abs() < 1e-12 && (force[1] - 16.0).abs() < 1e-12, "20 N towards the pointer: {force:?}");
     }
 
-    /// With nothing coupled to it the device comes to rest at the pointer. 0.1·s² + (5 + 20)·s + 400 = 0 has the roots −17.2 and −232.8 per second, so that
-    /// after a second 232.8/(232.8 − 17.2)·e^(−17.2) of 30 mm is left: 1.1 nm.
+    /// Without coupling the device comes to rest at the pointer. 0.1·s² + (5 + 20)·s + 400 = 0 has the roots −17.2 and −232.8 per second. After a second,
+    /// 232.8/(232.8 − 17.2)·e^(−17.2) of 30 mm is left: 1.1 nm.
     #[test]
     fn a_device_comes_to_its_pointer_without_overshoot() {
         let mut device = pulled(PointerSpec::default());

@@ -1,6 +1,6 @@
-//! The scene with which inputs were recorded, so that they are not replayed with another one without a word.
+//! Identity of the scene of a record of inputs, to notice a replay with a different scene.
 //!
-//! It stands before everything else in a record of inputs, as rows of their own:
+//! The identity stands before all inputs in a record, as rows of its own:
 //!
 //! ```text
 //! 0,program,,,0.1.0
@@ -17,44 +17,45 @@ use cohaptic_units::print::csv_quoted;
 
 use super::inputs::{HEADER, InputsError, shorten};
 
-/// The scene with which inputs were recorded.
+/// Identity of the scene of a record of inputs.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct RecordedScene {
-    /// The version of the program that recorded it.
+    /// Version of the recording program.
     program: String,
-    /// That of the scene without its expectations.
+    /// Fingerprint of the scene without its expectations.
     fingerprint: Fingerprint,
+    /// Keys and files of the scene.
     content: SceneContent,
 }
 
-/// Something in which a scene differs from the one that was recorded. Values are TOML; `None`: it is not there.
+/// Difference between a recorded scene and a present one. Values are TOML; `None`: absent.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum SceneDifference {
-    /// A key.
+    /// A key differs.
     Key {
-        /// Its dotted path.
+        /// Dotted path of the key.
         key: String,
-        /// Its value in the record.
+        /// Recorded value.
         recorded: Option<String>,
-        /// Its value in the scene.
+        /// Present value.
         now: Option<String>,
     },
-    /// A file that the scene names.
+    /// A file named by the scene differs.
     File {
-        /// Its path, relative to the folder of the scene.
+        /// Path relative to the folder of the scene.
         name: String,
-        /// What it held when it was recorded.
+        /// Fingerprint of the recorded content.
         recorded: Option<Fingerprint>,
-        /// What it holds.
+        /// Fingerprint of the present content.
         now: Option<Fingerprint>,
     },
-    /// The record does not say which keys and files it was made with.
+    /// The scenes differ, but the record has no keys and files to compare.
     Unsaid,
-    /// Nothing that is written: another version of the program reads the scene in another way.
+    /// No key and no file differs: the present version of the program reads the scene differently.
     Program {
-        /// The version that recorded it.
+        /// Version of the recording program.
         recorded: String,
-        /// This one.
+        /// Version of the present program.
         now: String,
     },
 }
@@ -80,22 +81,24 @@ impl fmt::Display for SceneDifference {
     }
 }
 
-/// This version of the program.
+/// Version of the present program.
 const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 
-/// The rows about the scene.
+/// Kinds of rows about the scene.
 const KINDS: [&str; 4] = ["program", "scene", "file", "key"];
 
 impl RecordedScene {
-    /// A scene as it is recorded. `content`: its keys and files, from [`cohaptic_scene::scene_content`]; without them a replay can tell that its scene is
-    /// another one, and not what differs.
+    /// Returns the identity of a scene. `content`: keys and files from [`cohaptic_scene::scene_content`]. With empty content, a replay can notice a different
+    /// scene but
+    /// cannot name the difference.
     #[must_use]
     pub fn of(scene: &Scene, content: SceneContent) -> Self {
+        // Expectations do not change a run.
         let bare = Scene { expect: None, ..scene.clone() };
         Self { program: PROGRAM.to_owned(), fingerprint: bare.fingerprint(), content }
     }
 
-    /// Reads it from the text of a record of inputs; `None` if that says nothing of its scene, as the first records of sessions did.
+    /// Reads the identity from the text of a record of inputs; `None` if the record has none, as records of early versions.
     ///
     /// # Errors
     ///
@@ -103,6 +106,7 @@ impl RecordedScene {
     pub fn read(text: &str) -> Result<Option<Self>, InputsError> {
         let (mut program, mut fingerprint, mut content) = (None, None, SceneContent::default());
         for (line, row) in (1..).zip(text.lines()).skip(1) {
+            // Rows about the scene come first, and the first different row ends them.
             let Some((kind, value)) = kind_and_value(row) else { break };
             let refused = |expected: &str| InputsError::Cell { line, column: "value", found: shorten(value), expected: expected.to_owned() };
             match kind {
@@ -122,7 +126,7 @@ impl RecordedScene {
         Ok(fingerprint.map(|fingerprint| Self { program: program.unwrap_or_default(), fingerprint, content }))
     }
 
-    /// In what this scene differs from another one, such as that of a replay; nothing if the two are the same.
+    /// Returns the differences to the present scene `other`. Empty if both are the same.
     #[must_use]
     pub fn differences(&self, other: &Self) -> Vec<SceneDifference> {
         if self.fingerprint == other.fingerprint {
@@ -142,7 +146,7 @@ impl RecordedScene {
     }
 }
 
-/// The entries in which two maps differ, in the order of their names.
+/// Returns the names whose entries in two maps differ, with both entries, in the order of the names.
 fn differing<T: Clone + PartialEq>(one: &BTreeMap<String, T>, other: &BTreeMap<String, T>) -> impl Iterator<Item = (String, Option<T>, Option<T>)> {
     let mut names: Vec<&String> = one.keys().chain(other.keys()).collect();
     names.sort();
@@ -151,25 +155,25 @@ fn differing<T: Clone + PartialEq>(one: &BTreeMap<String, T>, other: &BTreeMap<S
     names.into_iter().map(row).filter(|(_, one, other)| one != other).collect::<Vec<_>>().into_iter()
 }
 
-/// Whether a line of a record is about its scene.
+/// Returns whether a line of a record is about its scene.
 pub(super) fn is_about_the_scene(row: &str) -> bool {
     kind_and_value(row).is_some()
 }
 
-/// What a row about the scene is about, and its value.
+/// Returns the kind and the value of a row about the scene; `None` for different rows.
 fn kind_and_value(row: &str) -> Option<(&str, &str)> {
     let (kind, rest) = row.strip_prefix("0,")?.split_once(',')?;
     let value = rest.strip_prefix(",,")?;
     KINDS.contains(&kind).then_some((kind, value))
 }
 
-/// The name and the value in a cell in quotes.
+/// Returns the name and the value in a quoted cell; `None` if the cell has a different form.
 fn line_in(cell: &str) -> Option<(String, String)> {
     let quoted = cell.strip_prefix('"')?.strip_suffix('"')?;
     SceneContent::read_line(&quoted.replace("\"\"", "\""))
 }
 
-/// The lines of a record before its inputs: the header, and the rows about the scene.
+/// Writes the lines of a record before its inputs: the header, and the rows about the scene.
 impl fmt::Display for RecordedScene {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{HEADER}")?;

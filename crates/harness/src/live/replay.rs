@@ -1,4 +1,4 @@
-//! A session again, in virtual time.
+//! Replay of a recorded session in virtual time.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -14,13 +14,13 @@ use crate::observer::Observer;
 use crate::simulation::questions_of;
 use crate::summary::Summary;
 
-/// Runs a scene with the inputs of a recorded session, as fast as the processor goes: with the same fates and the same motion, to the bit.
+/// Runs a scene with the inputs of a recorded session, as fast as possible. Fates and motion are those of the session, to the bit.
 ///
-/// What the network delivers to other processes goes nowhere.
+/// Datagrams for other processes are discarded.
 ///
 /// # Errors
 ///
-/// That of the observer.
+/// The error of the observer.
 ///
 /// # Panics
 ///
@@ -29,7 +29,7 @@ pub fn replay<O: Observer>(scene: &Scene, inputs: &Inputs, observer: &mut O) -> 
     let mut live = LiveScene::new(scene, |place| Some(Box::new(Playback::of(inputs, place))));
     let mut questions = Questions { between: questions_of(scene), left: questions_of(scene) };
     for (at, what) in &inputs.rows {
-        // The instants up to the row, one by one, so that the observer can end a long span without rows too.
+        // Instants up to the row pass one by one: the observer can end a long span without rows too.
         while live.poll_timeout().is_some_and(|due| due < *at) {
             next_instant(&mut live, observer)?;
             if questions.end(&mut live, observer)? {
@@ -38,13 +38,13 @@ pub fn replay<O: Observer>(scene: &Scene, inputs: &Inputs, observer: &mut O) -> 
         }
         match what {
             Recorded::Sample { peer, datagram } => {
-                // Of a record that somebody has changed a sample may be refused, as it would have been in the session.
+                // A sample in an edited record may be refused, as in a session.
                 let _refused_or_not = live.handle_sample(*at, *peer, datagram, observer)?;
             }
             Recorded::Link { from, to, keys, model } => {
                 live.set_link(*at, (*from, *to), keys, model, observer)?;
             }
-            // The device is asked for it.
+            // `Playback` returns the readings when the world reads the device.
             Recorded::Device { .. } => {}
             Recorded::End => live.stop(*at, observer)?,
         }
@@ -59,7 +59,7 @@ pub fn replay<O: Observer>(scene: &Scene, inputs: &Inputs, observer: &mut O) -> 
     Ok(live.summary())
 }
 
-/// Lets the next instant pass.
+/// Computes the next instant and discards datagrams for other processes.
 fn next_instant<O: Observer>(live: &mut LiveScene, observer: &mut O) -> Result<(), O::Error> {
     if let Some(due) = live.poll_timeout() {
         live.handle_timeout(due, observer)?;
@@ -68,14 +68,16 @@ fn next_instant<O: Observer>(live: &mut LiveScene, observer: &mut O) -> Result<(
     Ok(())
 }
 
-/// When the observer is asked next whether to go on \[instants\].
+/// Counts instants between two calls of [`Observer::keep_going`].
 struct Questions {
+    /// Instants between two calls.
     between: u32,
+    /// Instants until the next call, at least 1.
     left: u32,
 }
 
 impl Questions {
-    /// Counts an instant, and ends the scene if the observer is asked and wants that; says whether it has ended.
+    /// Counts an instant. Asks the observer when the count is complete, and stops the scene on refusal. Returns whether the scene has stopped.
     fn end<O: Observer>(&mut self, live: &mut LiveScene, observer: &mut O) -> Result<bool, O::Error> {
         self.left -= 1;
         if self.left > 0 {
@@ -91,8 +93,9 @@ impl Questions {
     }
 }
 
-/// A device that shows again what it showed.
+/// A device with recorded readings.
 struct Playback {
+    /// Instants and states of the readings still to come, in the order of time.
     readings: VecDeque<(Instant, State<3>)>,
 }
 
@@ -108,6 +111,7 @@ impl Playback {
 
 impl LiveDevice for Playback {
     fn read(&mut self, now: Instant) -> Option<State<3>> {
+        // A reading between ticks belongs to a different scene and is skipped.
         while self.readings.front().is_some_and(|(at, _)| *at < now) {
             self.readings.pop_front();
         }

@@ -10,10 +10,11 @@
 //! 12000000,closed,,,5
 //! ```
 //!
-//! The last row closes the record: it says how many rows stand before it, with the instant of the last of them. A file without it was cut short.
+//! The last row closes the record with the number of rows before it and the instant of the last of these rows. A file without this row was cut short.
 //!
-//! A sample is written in hexadecimal. A device, or the pointer that pulls one, shows position and velocity on each axis in turn (`x vx y vy`), with digits that read back as the same numbers,
-//! or `none`. A link has all its keys, as a TOML table. The rows before these say [with which scene](super::RecordedScene) they were recorded.
+//! A sample is written in hexadecimal. A device or pointer has position and velocity along each axis in turn (`x vx y vy`), with digits from which the same
+//! numbers
+//! are read back, or `none`. A link has all its keys, as a TOML table. The first rows name [the recorded scene](super::RecordedScene).
 
 use std::fmt;
 use std::path::Path;
@@ -27,12 +28,12 @@ use super::inputs::{HEADER, Input, InputRow, Inputs, InputsError, Recorded, shor
 use super::recorded::is_about_the_scene;
 use crate::record::parts;
 
-/// A row as a line, without the newline.
+/// An input as a line without the newline.
 #[derive(Clone, Copy, Debug)]
 pub struct InputLine<'a> {
     /// The row.
     pub row: &'a InputRow<'a>,
-    /// The names of the peers.
+    /// Names of the peers, indexed by peer.
     pub names: &'a [String],
 }
 
@@ -64,12 +65,12 @@ impl fmt::Display for InputLine<'_> {
     }
 }
 
-/// The row that closes a record, as a line without the newline.
+/// The closing row of a record, as a line without the newline.
 #[derive(Clone, Copy, Debug)]
 pub struct ClosingLine {
-    /// The instant of the last row before it.
+    /// Instant of the last row before.
     pub at: Instant,
-    /// How many rows stand between the header and this one.
+    /// Number of rows between the header and the closing row.
     pub rows: u64,
 }
 
@@ -79,26 +80,27 @@ impl fmt::Display for ClosingLine {
     }
 }
 
-/// The kind of the row that closes a record.
+/// Kind of the closing row.
 const CLOSED: &str = "closed";
 
 impl Inputs {
-    /// Reads what [`crate::record::InputRecorder`] wrote for the same scene. `keys`: those of any link of the scene, from [`cohaptic_scene::link_keys`].
+    /// Reads a record of [`crate::record::InputRecorder`] for the same scene. `keys`: keys of any link of the scene, from [`cohaptic_scene::link_keys`].
     ///
     /// # Errors
     ///
-    /// [`InputsError`] for anything else, and for a record that is not whole.
+    /// [`InputsError`] for any different text, and for an incomplete record.
     pub fn read(text: &str, scene: &Scene, keys: &LinkKeys) -> Result<Self, InputsError> {
         let (inputs, missing) = Self::read_cut(text, scene, keys)?;
         missing.map_or(Ok(inputs), Err)
     }
 
-    /// Reads a record as [`Inputs::read`] does, and also one that is not whole, such as a killed session leaves: then says what is missing. A record that is
-    /// cut short ends the session at its last whole line.
+    /// Reads a record as [`Inputs::read`] does, or an incomplete one, as a killed session leaves behind. For an incomplete record the second value is the
+    /// reason, and
+    /// the inputs end the session at the last whole line.
     ///
     /// # Errors
     ///
-    /// [`InputsError`] for whole lines that are no rows of a record.
+    /// [`InputsError`] for whole lines without a valid row.
     pub fn read_cut(text: &str, scene: &Scene, keys: &LinkKeys) -> Result<(Self, Option<InputsError>), InputsError> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let mut lines = text.lines();
@@ -113,7 +115,7 @@ impl Inputs {
         let count = text.lines().count();
         for (line, row) in (2..).zip(lines) {
             let closing = closing(line, row);
-            // A number without its last digits is a number too: a line without its newline is no row, unless it closes the record with the right number.
+            // A number without its last digits is still a number. A line without newline is therefore no row, except a closing row with a valid number.
             let is_whole = line < count || text.ends_with('\n');
             if !is_whole && !matches!(closing, Ok(Some(_))) {
                 break;
@@ -139,6 +141,7 @@ impl Inputs {
         }
         let missing = match closed {
             Some(said) => {
+                // The header is line 1 and no row.
                 let found = last_line as u64 - 1;
                 (said != found).then_some(InputsError::Rows { said, found })
             }
@@ -154,7 +157,7 @@ impl Inputs {
     }
 }
 
-/// The instant and the number of rows of a row that closes a record; `None` if the row is another one.
+/// Returns the instant and the number of rows of a closing row; `None` for any different row.
 fn closing(line: usize, row: &str) -> Result<Option<(Instant, u64)>, InputsError> {
     let mut cells = row.splitn(5, ',');
     let mut cell = || cells.next().unwrap_or_default();
@@ -166,8 +169,9 @@ fn closing(line: usize, row: &str) -> Result<Option<(Instant, u64)>, InputsError
     Ok(Some((cells.instant()?, rows)))
 }
 
-/// The four cells before the value, and that.
+/// Cells of a row: four short cells and the value.
 struct Cells<'a> {
+    /// Number of the line, for messages.
     line: usize,
     cells: [&'a str; 5],
 }
@@ -210,7 +214,7 @@ impl Cells<'_> {
     }
 
     fn whole_number(&self, column: usize) -> Option<u64> {
-        // Rust reads "+1" too, which no writer of this format writes.
+        // `parse` accepts "+1" too, but no writer of this format writes a sign.
         let plain = self.cells[column].bytes().all(|byte| byte.is_ascii_digit());
         self.cells[column].parse().ok().filter(|_| plain)
     }
@@ -219,7 +223,7 @@ impl Cells<'_> {
         self.whole_number(0).map(Instant::from_nanos).ok_or_else(|| self.refused(0, "a whole number of nanoseconds from 0 to 2^64 - 1"))
     }
 
-    /// A peer of one of those kinds, or of any if there are none.
+    /// Returns the peer named in a cell. `kinds` lists the allowed kinds of peers; an empty list allows all.
     fn peer(&self, column: usize, scene: &Scene, kinds: &[&str]) -> Result<usize, InputsError> {
         let named = scene.peer_index(self.cells[column]);
         let fits = |kind: &PeerKind| kinds.is_empty() || kinds.contains(&kind.name());

@@ -22,26 +22,32 @@ use crate::world::{Step, Watch, World};
 
 const NANOSECOND: Duration = Duration::from_nanos(1);
 
-/// A scene in the middle of a session, some of whose peers may be remote.
+/// A running session of a scene with or without remote peers.
 ///
-/// The driver hands in samples with [`LiveScene::handle_sample`], each with the logical instant at which it came, asks with [`LiveScene::poll_timeout`] when to
-/// come back, calls [`LiveScene::handle_timeout`] then, and after every call drains [`LiveScene::poll_transmit`]. Being late costs nothing but lateness: what
-/// was due happens instant by instant, in the order that `docs/model.md` lays down, and comes out with the instant at which it was due. In which steps the
-/// driver lets time pass changes nothing but when it learns of things.
+/// The driver passes samples with [`LiveScene::handle_sample`], each with the logical instant of its arrival. [`LiveScene::poll_timeout`] returns the instant
+/// at
+/// which to call [`LiveScene::handle_timeout`]. After every call the driver drains [`LiveScene::poll_transmit`]. A late call changes no result: everything due
+/// is
+/// computed instant by instant, in the order of `docs/model.md`, with the instant at which it was due. Many short steps of time give the same result as one
+/// long
+/// step.
 ///
-/// Time is *open* from some instant on: everything before it has happened. What comes in counts at its own instant, before anything else at that instant, or,
-/// if that has passed, at the first one that is open.
+/// Time is *open* from some instant on: everything before that instant has happened. An input takes effect at its own instant, before anything else at that
+/// instant. If its instant has passed, the input takes effect at the first open instant.
 #[derive(Debug)]
 pub struct LiveScene {
     world: AnyWorld,
+    /// Number of the session in samples.
     session: u64,
-    /// The receivers of a sample.
+    /// Number of receivers of a sample.
     others: u64,
+    /// First instant that has not happened.
     open: Instant,
+    /// Ending; `None` while the session runs.
     ended: Option<Ending>,
 }
 
-/// A world with one axis, or with three, which also simulates scenes of two.
+/// A world with one axis, or with three axes, which also simulates scenes of two.
 enum AnyWorld {
     One(Box<World<1, BuiltInStrategy<1>, RemotePeers<1>>>),
     Three(Box<World<3, BuiltInStrategy<3>, RemotePeers<3>>>),
@@ -56,32 +62,33 @@ macro_rules! each {
     };
 }
 
-/// One peer as it stands, for display. Components beyond the axes of the scene are zero.
+/// State of a peer for display. Components beyond the axes of the scene are zero.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct PeerState {
-    /// Whether it is there.
+    /// Presence of the peer.
     pub presence: Presence,
-    /// When it was last heard; `None` if it is simulated here, or never was.
+    /// Instant at which the peer was last heard; `None` for a simulated peer, and before the first time.
     pub heard: Option<Instant>,
-    /// Its device at its latest tick; `None` for a peer in another process.
+    /// State of the device at its latest tick; `None` for a peer in another process.
     pub device: Option<State<3>>,
-    /// Its copy of the object; for a peer in another process, what its newest sample says of it (where it begins, before the first).
+    /// State of the copy of the object. For a peer in another process this is the state in its newest sample, or the initial state before the first.
     pub object: State<3>,
-    /// How copy and device are turned; `None` if the object does not turn.
+    /// Attitudes of copy and device; `None` if the object does not turn.
     pub turn: Option<TurnState>,
 }
 
-/// How one peer is turned, at the same instants as its [`PeerState`].
+/// Attitudes of a peer, at the same instants as its [`PeerState`].
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct TurnState {
-    /// The attitude of its device; `None` for one that does not turn, or in another process.
+    /// Attitude of the device; `None` for a device without attitude and for a peer in another process.
     pub device: Option<Attitude>,
-    /// The attitude of its copy.
+    /// Attitude of the copy.
     pub object: Attitude,
 }
 
 impl LiveScene {
-    /// The scene at its beginning. `devices` gives the device of each peer of kind `falcon`, by its place; `None` is one that is never there.
+    /// Returns the scene before its first instant. `devices` returns the device or pointer of the peer with the given index; `None` for a device that is never
+    /// there.
     ///
     /// # Panics
     ///
@@ -91,28 +98,31 @@ impl LiveScene {
         Self::with_devices(scene, &mut devices)
     }
 
-    /// [`LiveScene::new`], compiled here once: for a function of any type, each crate that begins a session would compile the engine.
+    /// Like [`LiveScene::new`], compiled once here. With a generic closure, each crate with a session would compile the engine again.
     fn with_devices(scene: &Scene, devices: &mut dyn FnMut(usize) -> Option<Box<dyn LiveDevice>>) -> Self {
-        // The observer is not known yet, and may change.
+        // The plan assumes an observer of everything, because each call may pass a different observer.
         let plan = Plan::new(scene, Model::Least, true);
         let simulation = Simulation::new(scene, Model::Least);
         let world = match plan.axes {
             Axes::One => AnyWorld::One(Box::new(simulation.world(&plan, RemotePeers::new(scene)).seated(scene, devices))),
             Axes::Two | Axes::Three => AnyWorld::Three(Box::new(simulation.world(&plan, RemotePeers::new(scene)).seated(scene, devices))),
         };
-        // The session that peers of the scene have: see `Scene::peer_config`.
+        // The seed is the session number of peers: see `Scene::peer_config`.
         Self { world, session: scene.seed, others: scene.peers.len() as u64 - 1, open: Instant::ZERO, ended: None }
     }
 
-    /// Takes a sample of a peer of kind `udp`, which came at `at`, and sends it on over the links of that peer. Gives the instant at which it counts: `at`, or
-    /// the first that is open.
+    /// Takes a sample of a peer of kind `udp`, which arrived at `at`, and sends the sample over the links of that peer. Returns the instant at which the sample
+    /// takes
+    /// effect: `at`, or the first open instant if `at` has passed.
     ///
-    /// The datagram is one of that peer for certain: the caller has made sure where it came from. It is checked all the same. A refused sample is counted
-    /// and changes nothing. The peer's samples must have rising numbers; after a silence they may begin anew. For the others they are numbered on.
+    /// The caller has verified the origin of the datagram; its content is checked here. A refused sample is counted and changes nothing else. Sequence numbers
+    /// of a
+    /// peer must rise, but may start again after a silence. The receivers see continuous numbers.
     ///
     /// # Errors
     ///
-    /// The outer error is that of the observer, which sees all that is due before `at`, and the sample if it is taken; the inner one says why the sample was refused.
+    /// The outer error is the error of the observer, which sees everything due before `at`, and the sample if taken. The inner error is the reason of a
+    /// refusal.
     pub fn handle_sample<O: Observer>(
         &mut self,
         at: Instant,
@@ -136,7 +146,7 @@ impl LiveScene {
             return Ok(Err(error));
         }
         let late = counts.saturating_duration_since(at);
-        // What comes at the very instant that was just handled is not late, but it counts behind it.
+        // An input at the instant handled last takes effect a nanosecond later, which is not counted as late.
         if late > NANOSECOND {
             each!(&mut self.world, world => world.note_late(peer, late));
         }
@@ -148,12 +158,13 @@ impl LiveScene {
         Ok(Ok(counts))
     }
 
-    /// Changes a link from `at` on, or from the first instant that is open, which it gives; `None` if there is no such link or the session has ended. `model` is
-    /// that of `keys`: see [`LinkKeys::model`]. Packets on the way keep their delay.
+    /// Changes a link from `at` on, or from the first open instant if `at` has passed. Returns the instant of the change; `None` if there is no such link or if
+    /// the
+    /// session has ended. `model` is the model of `keys`: see [`LinkKeys::model`]. Packets in flight keep their delay.
     ///
     /// # Errors
     ///
-    /// That of the observer, which sees all that is due before `at`, and the change.
+    /// The error of the observer, which sees everything due before `at`, and the change.
     pub fn set_link<O: Observer>(
         &mut self,
         at: Instant,
@@ -172,44 +183,44 @@ impl LiveScene {
         Ok(Some(at))
     }
 
-    /// Lets everything happen that is due up to and including `now`.
+    /// Computes everything due up to and including `now`.
     ///
     /// # Errors
     ///
-    /// That of the observer.
+    /// The error of the observer.
     pub fn handle_timeout<O: Observer>(&mut self, now: Instant, observer: &mut O) -> Result<(), O::Error> {
         Erased::run(observer, |observer| self.let_happen(now, observer))?;
         self.open = self.open.max(now.saturating_add(NANOSECOND));
         Ok(())
     }
 
-    /// When [`LiveScene::handle_timeout`] must be called next, for a tick or for a peer in another process; `None` once the session has ended. What reaches
-    /// peers that are simulated here in between waits for it: they look at ticks.
+    /// Returns the instant of the next call of [`LiveScene::handle_timeout`], for a tick or for a peer in another process; `None` once the session has ended.
+    /// Packets
+    /// for simulated peers wait for the next tick, at which these peers read them.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         if self.ended.is_some() { None } else { Some(each!(&self.world, world => world.next_wake())) }
     }
 
-    /// When anything happens next.
+    /// Returns the next instant at which anything happens; `None` once the session has ended.
     fn next_instant(&self) -> Option<Instant> {
         if self.ended.is_some() { None } else { Some(each!(&self.world, world => world.next_instant())) }
     }
 
-    /// The next datagram that the network has delivered to a peer of kind `udp`, whether or not that is there; in the order of arrival. Until it is fetched it
-    /// takes memory.
+    /// Removes and returns the next datagram for a peer of kind `udp`, present or not, in the order of arrival. A datagram takes memory until this call.
     pub fn poll_transmit(&mut self) -> Option<Transmit> {
         each!(&mut self.world, world => world.next_transmit())
     }
 
-    /// Ends the session after everything that is due up to and including `now`.
+    /// Ends the session after everything due up to and including `now`.
     ///
     /// # Errors
     ///
-    /// That of the observer.
+    /// The error of the observer.
     pub fn stop<O: Observer>(&mut self, now: Instant, observer: &mut O) -> Result<(), O::Error> {
         self.handle_timeout(now, observer)?;
         if self.ended.is_none() {
-            // With a `now` that has passed, the last instant that has not.
+            // If `now` has passed, this is the last instant that has happened, not `now`.
             let at = Instant::from_nanos(self.open.as_nanos() - 1);
             observer.on_input(&InputRow { at, what: Input::End })?;
             self.end(Ending::Interrupted(at));
@@ -217,37 +228,37 @@ impl LiveScene {
         Ok(())
     }
 
-    /// How the session has ended; `None` if it has not.
+    /// Returns the ending of the session; `None` while the session runs.
     #[must_use]
     pub const fn ended(&self) -> Option<Ending> {
         self.ended
     }
 
-    /// The first instant that is open: everything before it has happened.
+    /// Returns the first open instant. Everything before has happened.
     #[must_use]
     pub const fn open(&self) -> Instant {
         self.open
     }
 
-    /// Whether a peer is there; `None` beyond the last peer.
+    /// Returns the presence of a peer; `None` beyond the last peer.
     #[must_use]
     pub fn presence(&self, peer: usize) -> Option<Presence> {
         each!(&self.world, world => world.presence(peer, self.open))
     }
 
-    /// What came in at a peer that is remote; `None` for one that is simulated here.
+    /// Returns the counters of inputs of a remote peer; `None` for a simulated peer.
     #[must_use]
     pub fn seat_stats(&self, peer: usize) -> Option<SeatStats> {
         each!(&self.world, world => world.seat_stats(peer))
     }
 
-    /// The counters of a link; `None` if there is none.
+    /// Returns the counters of a link; `None` if there is no such link.
     #[must_use]
     pub fn link_stats(&self, from: usize, to: usize) -> Option<LinkStats> {
         each!(&self.world, world => world.link_stats(from, to))
     }
 
-    /// One peer as it stands; `None` beyond the last.
+    /// Returns the state of a peer for display; `None` beyond the last peer.
     #[must_use]
     pub fn peer(&self, peer: usize) -> Option<PeerState> {
         let presence = self.presence(peer)?;
@@ -258,13 +269,13 @@ impl LiveScene {
         })
     }
 
-    /// What has come out so far; as if it were interrupted now, unless it has ended.
+    /// Returns the results so far. While the session runs, the ending is an interruption at the present instant.
     #[must_use]
     pub fn summary(&self) -> Summary {
         each!(&self.world, world => world.summary(self.ended.unwrap_or_else(|| Ending::Interrupted(world.now()))))
     }
 
-    /// Lets everything before `at` happen, and gives the instant at which what comes in at `at` counts; `None` if the session has ended by then.
+    /// Computes everything before `at`, and returns the instant at which an input of `at` takes effect; `None` if the session has ended by then.
     fn come_in(&mut self, at: Instant, observer: &mut AnyObserver<'_>) -> Result<Option<Instant>, Ended> {
         let at = at.max(self.open);
         if let Some(before) = at.as_nanos().checked_sub(1) {

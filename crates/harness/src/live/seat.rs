@@ -1,4 +1,4 @@
-//! The place of a peer that is remote, taken or not.
+//! Seats: state of each remote peer, whether present or not.
 
 use std::ops::Range;
 use std::time::Duration;
@@ -10,37 +10,37 @@ use cohaptic_units::Instant;
 
 use super::fade::Fade;
 
-/// Whether a peer is there.
+/// Presence of a peer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Presence {
-    /// It is simulated here.
+    /// The peer is simulated in this process.
     Here,
-    /// Nothing has ever been heard of it.
+    /// The peer was never heard.
     Absent,
-    /// It is heard.
+    /// The peer is heard.
     Present,
-    /// Nothing has been heard of it for so long that its pull fades or has faded, which began at this instant.
+    /// The peer has been silent for so long that its pull fades or has faded. The fade began at this instant.
     Stale(Instant),
 }
 
-/// Why a sample from outside was refused. Nothing changed but a counter.
+/// Reason why a sample from outside was refused. Only counters have changed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum SampleError {
-    /// The peer does not live in another process.
+    /// The peer is not in another process.
     #[error("peer {peer} is no peer of kind \"udp\" of this scene")]
     NoSeat {
-        /// The peer.
+        /// Index of the peer.
         peer: usize,
     },
-    /// It is no sample of this session and that peer.
+    /// The datagram is no sample of this session and this peer.
     #[error(transparent)]
     Sample(#[from] ReceiveError),
-    /// A later sample of the peer came before it, or the same one.
+    /// The sequence number is not higher than that of an earlier sample of the peer.
     #[error("sample {found} after sample {newest}: expected a higher number, or any number once the peer has been silent")]
     OutOfOrder {
-        /// Its number.
+        /// Sequence number of the sample.
         found: u64,
-        /// The highest number that came before it.
+        /// Highest sequence number so far.
         newest: u64,
     },
     /// The session has ended.
@@ -54,46 +54,49 @@ impl From<DecodeError> for SampleError {
     }
 }
 
-/// What came in at a seat.
+/// Counters of the inputs at a seat.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct SeatStats {
-    /// Samples taken in, or ticks at which the device could be read.
+    /// Samples taken, or ticks with a reading of the device.
     pub taken: u64,
-    /// How often the peer came, the first time included.
+    /// Number of times that the peer joined, including the first.
     pub joined: u64,
-    /// Samples that were no samples of this session and this peer.
+    /// Datagrams that were no samples of this session and this peer.
     pub refused: u64,
-    /// Samples that came after a later one, or twice.
+    /// Samples after a later one, and repeated samples.
     pub out_of_order: u64,
-    /// Samples handed in later than what they should have come before, and moved to the first instant that was still open.
+    /// Samples passed in after their instant, and moved to the first open instant.
     pub late: u64,
-    /// By how much the latest of them.
+    /// Largest time by which a sample was moved.
     pub most_late: Duration,
 }
 
-/// The place of a peer that is remote.
+/// Seat of a remote peer.
 #[derive(Clone, Debug)]
 pub(crate) struct Seat {
+    /// Whether the peer is in another process.
     pub(crate) is_process: bool,
-    /// Whose fades follow whether it is heard: all of them, or with a device that is simulated here that of its hand alone.
+    /// Indices of the fades that fall and rise with the silence of the peer: all fades, or for a pointer only the fade of its own hand.
     followed: Range<usize>,
+    /// Time until silence and time of fading.
     silence: Silence,
+    /// Instant at which the peer was last heard.
     pub(crate) heard: Option<Instant>,
-    /// Whether the present silence has been noticed. So is one before anything was heard.
+    /// Whether the peer is silent. True before the peer is heard for the first time, unless a pointer is held from the start.
     is_silent: bool,
-    /// The number that the peer gave its newest sample.
+    /// Sequence number that the peer gave its newest sample.
     newest: u64,
-    /// The number that its next sample has for the others.
+    /// Sequence number of the next sample for the receivers.
     pub(crate) next_sequence: u64,
     pub(crate) stats: SeatStats,
-    /// What each of the others feels of it; what it has of its own device in its own place.
+    /// Strength with which each peer feels this peer, indexed by peer. The peer's own entry is the strength of its own device.
     pub(crate) fades: Vec<Fade>,
-    /// KC and BC when it is wholly there.
+    /// Coupling gains KC and BC at full presence.
     pub(crate) coupling: Gains,
 }
 
 impl Seat {
-    /// `None` for a peer that is never silent.
+    /// Returns the seat of a peer; `None` for a peer that is never silent.
     pub(crate) fn of(kind: &PeerKind, place: usize, peers: usize, coupling: Gains) -> Option<Self> {
         let silence = kind.silence()?;
         let pointer = if let PeerKind::Pointer(_, pointer) = kind { Some(pointer) } else { None };
@@ -114,25 +117,26 @@ impl Seat {
         })
     }
 
-    /// What follows whether it is heard.
+    /// Returns the fades that fall and rise with the silence of the peer.
     pub(crate) fn followed_mut(&mut self) -> &mut [Fade] {
         &mut self.fades[self.followed.clone()]
     }
 
-    /// Whether its copy is of interest: one with a device that is simulated here is, held or not.
+    /// Returns whether the copy of the peer counts in the discrepancy. The copy of a pointer's peer always counts, because its device is simulated here.
     pub(crate) fn is_there(&self) -> bool {
         !self.is_silent || self.followed.len() < self.fades.len()
     }
 
-    /// Notices that nothing has been heard for too long, and answers whether that is new.
+    /// Notes a silence that has lasted too long by `now`. Returns whether the silence is new.
     pub(crate) fn notice_silence(&mut self, now: Instant) -> bool {
         let Some(since) = self.falls_silent().filter(|since| !self.is_silent && now >= *since) else { return false };
+        // The fade begins when the peer fell silent, which may be before `now`.
         self.is_silent = true;
         self.followed_mut().iter_mut().for_each(|fade| fade.fall(since));
         true
     }
 
-    /// Something is heard, and answers whether the peer was silent until now.
+    /// Notes that the peer is heard. Returns whether the peer was silent before.
     pub(crate) fn hear(&mut self, now: Instant) -> bool {
         self.heard = Some(now);
         let joins = core::mem::take(&mut self.is_silent);
@@ -141,7 +145,7 @@ impl Seat {
         joins
     }
 
-    /// Whether a sample of that number can be the next, and if so notes it.
+    /// Checks the sequence number of a sample and notes it. Any number is admitted after a silence.
     pub(crate) fn admit(&mut self, sequence: u64) -> Result<(), SampleError> {
         if !self.is_silent && sequence <= self.newest {
             self.stats.out_of_order += 1;
@@ -163,7 +167,7 @@ impl Seat {
         }
     }
 
-    /// When it counts as silent if nothing more is heard.
+    /// Returns the instant from which the peer is silent if nothing more is heard; `None` if nothing was ever heard.
     fn falls_silent(&self) -> Option<Instant> {
         Some(self.heard?.saturating_add(self.silence.after))
     }
