@@ -1,5 +1,6 @@
-//! How old the samples are that peers hold: at each tick of a peer, for each other peer of which anything has arrived, tick less sampling. Both are instants of the
-//! scene, so clocks that drift do not count.
+//! Ages of the samples that peers hold: at each tick of a peer and for each sender with an arrived sample, the instant of the tick less the instant of
+//! sampling. Both
+//! are instants of the scene, so drifting clocks do not change an age.
 
 use std::time::Duration;
 
@@ -13,28 +14,33 @@ use crate::{HoldRow, TickRow};
 /// Ages so far.
 #[derive(Clone, Debug)]
 pub(super) struct Ages {
+    /// Samples held, indexed by receiver.
     receivers: Vec<Receiver>,
-    /// Σ of all ages \[ns\], which is exact.
+    /// Σ of all ages \[ns\]. An integer, so the sum is exact.
     nanos: u128,
+    /// Number of ages in `nanos`.
     count: u64,
-    /// `None` if no quantile is asked for.
+    /// Sketch of the ages \[s\]; `None` if no quantile is wanted.
     sketch: Option<QuantileSketch>,
 }
 
-/// The samples that a peer holds.
+/// Instants of the samples that a peer holds.
 #[derive(Clone, Debug)]
 struct Receiver {
-    /// The senders of which it holds one, in ascending order, and when each was sampled: on a topology these are few of all peers.
+    /// Senders with an arrived sample, in ascending order, and the instant of their newest sample. A sorted list, because a topology has few senders for each
+    /// receiver.
     sampled: Vec<(usize, Instant)>,
-    /// Σ of these instants \[ns\].
+    /// Σ of the instants in `sampled` \[ns\].
     nanos: u128,
-    /// These instants in ascending order, and how many samples are of each, if a quantile is asked for. Where peers sample together these are a few.
+    /// Distinct instants in `sampled` in ascending order, with the number of samples of each. Kept only if a quantile is wanted. Short if peers sample
+    /// together.
     instants: Vec<(Instant, u64)>,
 }
 
 impl Receiver {
-    /// The place of a sender, or where it is to be put. Where all others send, each soon has the place that it has among them. Searches for senders and instants took a
-    /// fifth of the time of all measures of ten peers.
+    /// Returns the index of a sender in `sampled`, or the index for its insertion. First tries the index that the sender has if all other peers send, and
+    /// searches only
+    /// if a different sender is found there.
     #[inline]
     fn place_of(&self, from: usize, to: usize) -> Result<usize, usize> {
         let likely = from - usize::from(from > to);
@@ -44,9 +50,9 @@ impl Receiver {
         }
     }
 
-    /// A sample of one instant takes the place of one of another, if there was one.
+    /// Replaces one sample of the instant `before`, if any, by one of the instant `now`.
     fn replace(&mut self, before: Option<Instant>, now: Instant) {
-        // Mostly the oldest instant gives way to the newest.
+        // The replaced sample is most often one of the oldest, and the new sample one of the newest, so both ends are tried first.
         if let Some(before) = before {
             let place = match self.instants.first() {
                 Some((first, _)) if *first == before => Some(0),
@@ -100,6 +106,7 @@ impl Accumulator for Ages {
                 None
             }
         };
+        // Add before subtracting: the sum is unsigned.
         receiver.nanos = receiver.nanos + u128::from(row.sampled.as_nanos()) - before.map_or(0, |before| u128::from(before.as_nanos()));
         if self.sketch.is_some() {
             receiver.replace(before, row.sampled);
@@ -110,6 +117,7 @@ impl Accumulator for Ages {
     fn on_tick(&mut self, row: &TickRow<'_>) {
         let Receiver { sampled, nanos, instants } = &self.receivers[row.peer];
         let held = sampled.len() as u64;
+        // Σ (tick − sampled) over all held samples, in one multiplication.
         self.nanos += u128::from(held) * u128::from(row.at.as_nanos()) - nanos;
         self.count += held;
         if let Some(sketch) = &mut self.sketch {
@@ -127,7 +135,7 @@ impl Accumulator for Ages {
     }
 }
 
-/// A division would take longer than all the rest of a held sample.
+/// Converts nanoseconds to seconds by a product with 10⁻⁹, which is faster than a division.
 #[inline]
 #[expect(clippy::cast_precision_loss, reason = "an age above 104 days is rounded to its nearest double")]
 fn seconds(nanos: u64) -> f64 {

@@ -1,4 +1,4 @@
-//! How far copies are apart, instant by instant: root mean square and quantiles.
+//! Distance between copies over the instants of a run: root mean square and quantiles.
 
 use std::time::Duration;
 
@@ -8,19 +8,20 @@ use super::quantiles::QuantileSketch;
 use super::{Accumulator, Asked, Rows, mean_square_root};
 use crate::InstantRow;
 
-/// Counts each instant at which any peer ticks once.
+/// Discrepancies so far. Each instant at which any peer ticks counts once.
 #[derive(Clone, Debug)]
 pub(super) struct Discrepancy {
+    /// Σ of the squared discrepancies \[m²\].
     squares: f64,
     count: u64,
-    /// `None` if no quantile is asked for.
+    /// Sketch of the discrepancies \[m\]; `None` if no quantile is wanted.
     sketch: Option<QuantileSketch>,
 }
 
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Figure {
     Rms,
-    /// Of a number of per cent.
+    /// Quantile of a number of per cent.
     Quantile(u64),
 }
 

@@ -1,22 +1,27 @@
-//! The energy that the coordination injects into the copies.
+//! Energy that the coordination injects into the copies.
 //!
-//! Over a step a copy moves by d under forces that are held, so their work is exact: −F·d is what the held part F of the coordination force does. A law that damps the
-//! copy by β takes energy between ticks too. All damping, bO + β, takes f·d − ½·m·(v₁² − v₀²) in a step, with f the sum of the held forces, and β takes its
-//! share β/(bO + β) of it:
+//! Over a step a copy moves by d under held forces, so the work of each force is exact: the held part F of the coordination force does the work −F·d. A law
+//! with own
+//! damping β takes energy between ticks too. All damping, bO + β, takes f·d − ½·m·(v₁² − v₀²) in a step, with f the sum of the held forces, and β takes its
+//! share
+//! β/(bO + β):
 //!
 //! ```text
 //! W = Σᵢ Σₖ (−F·d − β/(bO + β)·(f·d − ½·m·Δv²))
 //! ```
 //!
-//! Where the object turns, there is the same of its turns, with the held part T of the coordination torque, the sum τ of the held torques and the integral Θ of ω, all
-//! in body axes. The loss about one axis has what the gyroscopic term brings to it, (Jⱼ − Jₖ)·∫ωxωyωz dt, by Simpson's rule; over all three axes that is nothing.
+//! A rotating object adds the same for its turns, with the held part T of the coordination torque, the sum τ of the held torques and the integral Θ of ω, all
+//! in body
+//! axes. The loss about one axis includes the work of the gyroscopic term, (Jⱼ − Jₖ)·∫ωxωyωz dt, by Simpson's rule. The sum of this term over all three axes is
+//! zero.
 //!
 //! ```text
 //! W += −T·Θ − Σᵢ β/(bR + β)·(τ·Θ − ½·J·Δω² + (Jⱼ − Jₖ)·∫ωxωyωz dt)ᵢ
 //! ```
 //!
-//! Where a server alone has the object, F of the server is −Σ FC of its clients, and each client adds −FC·dH, with dH the motion of its device: the rows of its steps
-//! are those of that device.
+//! If only a server has the object, F of the server is −Σ FC of its clients. Each client adds −FC·dH, with dH the motion of its device, because the step rows
+//! of a
+//! client describe its device.
 
 use std::time::Duration;
 
@@ -26,24 +31,26 @@ use cohaptic_scene::{Measure, Scene};
 use super::{Accumulator, Asked, Rows};
 use crate::{InstantRow, StepRow, TurnStepRow};
 
-/// W so far.
+/// Injected energy W \[J\] so far.
 #[derive(Clone, Debug)]
 pub(super) struct Energy {
     peers: Vec<PeerEnergy>,
-    /// Σ over peers, in the order of steps.
+    /// Σ over all peers \[J\], added in the order of the steps.
     injected: f64,
+    /// Largest `injected` after an instant so far \[J\], at least 0.
     peak: f64,
 }
 
-/// W of one copy.
+/// Injected energy W of one copy.
 #[derive(Clone, Debug)]
 struct PeerEnergy {
+    /// Mass of the copy \[kg\].
     mass: f64,
-    /// bO [N·s/m].
+    /// Damping bO of the object [N·s/m].
     damping: f64,
-    /// J and bR, if the object turns.
+    /// Inertia J and damping bR of the copy's turns; `None` if the object does not turn.
     spin: Option<Spin>,
-    /// `None` before its first step: a peer in another process never makes one.
+    /// Energy so far \[J\]; `None` before the first step. A peer in another process never makes a step.
     injected: Option<f64>,
 }
 
@@ -52,7 +59,7 @@ impl PeerEnergy {
         Self { mass: scene.copy_config(place).mass, damping: scene.object.damping, spin: scene.copy_spin(), injected: None }
     }
 
-    /// What the coordination injects into the copy in a step \[J\].
+    /// Returns the energy that the coordination injects into the copy in a step \[J\].
     #[inline(always)]
     fn of_step(&self, row: &StepRow<'_>) -> f64 {
         let mut energy = 0.0;
@@ -63,6 +70,7 @@ impl PeerEnergy {
         for (((from, to), (before, after)), (coordination_force, held_force)) in positions.zip(velocities).zip(forces) {
             let moved = to - from;
             energy -= coordination_force * moved;
+            // Without own damping the second term is zero, and β/(bO + β) could be 0/0.
             if share > 0.0 {
                 energy -= share * (held_force * moved - 0.5 * self.mass * (after * after - before * before));
             }
@@ -74,7 +82,7 @@ impl PeerEnergy {
     }
 }
 
-/// What the coordination injects into the turn of a copy in a step \[J\].
+/// Returns the energy that the coordination injects into the turn of a copy in a step \[J\].
 #[inline(never)]
 fn of_turn(turn: &TurnStepRow, spin: &Spin) -> f64 {
     let TurnStepRow { before, after, travel, held_torque, coordination_torque, own_damping, .. } = turn;
@@ -85,7 +93,7 @@ fn of_turn(turn: &TurnStepRow, spin: &Spin) -> f64 {
     if own_damping.iter().any(|own| *own > 0.0) {
         let seconds = turn.span.as_secs_f64();
         let product = |rate: &[f64; 3]| rate[0] * rate[1] * rate[2];
-        // Simpson's rule over a step whose mean angular velocity is known.
+        // Simpson's rule needs the rate in the middle, which follows from both ends and the mean rate.
         let middle: [f64; 3] = std::array::from_fn(|axis| (6.0 * travel[axis] / seconds - before[axis] - after[axis]) / 4.0);
         let gyroscopic = seconds / 6.0 * (product(before) + 4.0 * product(&middle) + product(after));
         for axis in (0..3).filter(|axis| own_damping[*axis] > 0.0) {
@@ -124,7 +132,7 @@ impl Accumulator for Energy {
         self.injected += energy;
     }
 
-    /// Steps of one instant are simultaneous: W between two of them is nothing that ever was.
+    /// Updates the peak after all steps of an instant, because these are simultaneous: a sum over some of them has no meaning.
     fn on_instant(&mut self, _row: &InstantRow) {
         self.peak = self.peak.max(self.injected);
     }

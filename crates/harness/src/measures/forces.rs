@@ -1,4 +1,4 @@
-//! How large the forces of coordination and coupling are, and how rough. Each component along an axis counts by itself.
+//! Size and roughness of the coordination force and of the coupling force. Each component along an axis counts separately.
 
 use std::time::Duration;
 
@@ -8,22 +8,26 @@ use super::{Accumulator, Asked, Rows, mean_square_root};
 use crate::TickRow;
 use crate::arrays::larger;
 
-/// F_T on the copies.
+/// Coordination force F_T on the copies.
 #[derive(Clone, Debug)]
 pub(super) struct CoordinationForce(Force);
 
-/// F_C, which hands feel.
+/// Coupling force F_C, felt by hands.
 #[derive(Clone, Debug)]
 pub(super) struct FeltForce(Force);
 
-/// One force of every peer, over all ticks.
+/// Figures of one kind of force over all peers and ticks.
 #[derive(Clone, Debug)]
 struct Force {
+    /// Largest magnitude of a component \[N\].
     peak: f64,
+    /// Σ of the squared components \[N²\].
     squares: f64,
+    /// Number of components.
     count: u64,
+    /// Largest change of a component from one tick of a peer to the next \[N\].
     jump: f64,
-    /// At the latest tick of each peer; no number before its first, from which nothing jumps.
+    /// Components at the latest tick of each peer \[N\], indexed by peer. NaN before the first tick, so the first force is no jump.
     latest: Vec<[f64; 3]>,
 }
 
@@ -36,6 +40,7 @@ impl Force {
     fn add(&mut self, peer: usize, force: &[f64]) {
         self.count += force.len() as u64;
         for (component, latest) in force.iter().zip(&mut self.latest[peer]) {
+            // `larger` returns its second argument if the first is NaN.
             self.peak = larger(component.abs(), self.peak);
             self.squares += component * component;
             self.jump = larger((component - *latest).abs(), self.jump);

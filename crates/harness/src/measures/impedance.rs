@@ -1,7 +1,8 @@
-//! What the hand of a probe meets: the impedance at the frequency with which it pushes.
+//! Impedance felt by the hand of a probe, at the frequency of its push.
 //!
-//! Force and velocity of the device, both at its ticks in the second half of the scene, are fitted by c₀ + c·cos ωt + s·sin ωt with the least sum of squares. Their
-//! phasors c − j·s give Z = F/v, with the viscosity Re Z and the effective mass Im Z/ω.
+//! Force and velocity of the device, at its ticks in the second half of the scene, are fitted by c₀ + c·cos ωt + s·sin ωt with least squares. The phasors c −
+//! j·s give
+//! Z = F/v, with the viscosity Re Z and the effective mass Im Z/ω.
 
 use std::cmp::Ordering;
 use std::time::Duration;
@@ -13,18 +14,21 @@ use cohaptic_units::{Instant, RadPerSec};
 use super::{Accumulator, Asked, Rows};
 use crate::TickRow;
 
-/// Sums of the normal equations; empty without a probe.
+/// Impedance of the probe; `None` without a probe.
 #[derive(Clone, Debug)]
 pub(super) struct Impedance(Option<Probe>);
 
 #[derive(Clone, Debug)]
 struct Probe {
+    /// Index of the probe's peer.
     peer: usize,
-    /// The second half begins here.
+    /// Instant at which the second half of the scene begins.
     from: Instant,
+    /// Angular frequency of the push \[rad/s\].
     omega: f64,
+    /// Phase of the push \[rad\].
     phase: f64,
-    /// The amplitude over its square, component by component: the velocity along the force, for a force of 1.
+    /// Amplitude over its square \[1/N\], by component. The scalar product with a velocity is the velocity along the force, for a force of amplitude 1.
     direction: [f64; 3],
     fit: Fit,
 }
@@ -67,7 +71,7 @@ impl Accumulator for Impedance {
     fn value(&self, figure: Figure, _peer: Option<usize>, _elapsed: Duration) -> Option<f64> {
         let probe = self.0.as_ref()?;
         let [[_, fc, fs], [_, vc, vs]] = probe.fit.solve()?;
-        // (fc − j·fs)/(vc − j·vs)
+        // Z = (fc − j·fs)/(vc − j·vs), expanded by the conjugate of the denominator.
         let square = vc * vc + vs * vs;
         Some(match figure {
             Figure::Viscosity => (fc * vc + fs * vs) / square,
@@ -76,15 +80,17 @@ impl Accumulator for Impedance {
     }
 }
 
-/// Least squares of two signals on three regressors.
+/// Least-squares fit of two signals by three regressors.
 #[derive(Clone, Default, Debug)]
 struct Fit {
+    /// Products of the regressors, summed: the matrix of the normal equations.
     normal: [[f64; 3]; 3],
+    /// Products of each signal with the regressors, summed: the right-hand sides.
     right: [[f64; 3]; 2],
 }
 
-/// Regressors are dependent where a pivot is this much smaller than the sum of squares of its column: a half of the scene that is a small part of a period, or
-/// ticks at multiples of half a period.
+/// Ratio of a pivot to the sum of squares of its column below which regressors count as dependent: half of the scene is a small part of a period, or ticks are
+/// multiples of half a period.
 const DEPENDENT: f64 = 1e-9;
 
 impl Fit {
@@ -102,12 +108,12 @@ impl Fit {
         }
     }
 
-    /// The coefficients of both signals, by Gauss's elimination; `None` where they are not determined.
+    /// Returns the coefficients of both signals, by Gaussian elimination; `None` if they are not determined.
     fn solve(&self) -> Option<[[f64; 3]; 2]> {
         let (mut matrix, mut right) = (self.normal, self.right);
         for pivot in 0..3 {
             let row = matrix[pivot];
-            // Not above: no tick at all gives zero for both.
+            // Anything but greater: without ticks both sides are zero, and a NaN must be refused too.
             if row[pivot].partial_cmp(&(DEPENDENT * self.normal[pivot][pivot])) != Some(Ordering::Greater) {
                 return None;
             }
@@ -133,7 +139,7 @@ impl Fit {
 mod tests {
     use super::*;
 
-    /// Signals that are combinations of the regressors are found again, over half a period as well as over many.
+    /// Fits signals made of the regressors, over half a period and over many periods.
     #[test]
     fn a_combination_of_the_regressors_is_found_again() {
         for (omega, ticks) in [(3.0, 1000_u32), (7.0, 500), (40.0, 3000)] {
@@ -153,7 +159,7 @@ mod tests {
     #[test]
     fn what_is_not_determined_has_no_value() {
         assert!(Fit::default().solve().is_none());
-        // All samples at multiples of half a period: the sine is not seen.
+        // Ticks at multiples of half a period, at which the sine is zero.
         let mut fit = Fit::default();
         (0..100).for_each(|tick| fit.add([1.0, if tick % 2 == 0 { 1.0 } else { -1.0 }, 1e-13], [1.0, 1.0]));
         assert!(fit.solve().is_none());

@@ -1,8 +1,11 @@
-//! Measures: numbers that sum a run up, computed while it runs, in one pass and constant memory. Sums are taken in the order of ticks, so a measure has the same bits
-//! whatever the [`Model`].
+//! Measures: numbers that summarise a run, computed during the run, in one pass and constant memory. Sums are added in the order of ticks, so a measure has the
+//! same
+//! bits with every [`Model`].
 //!
-//! [`Measures`] is an [`Observer`]; a scene without measures has none, and its runs are not watched. Names, units and words stand in [`cohaptic_scene::Measure`]. Each file here is one idea that gives some
-//! of them; a new one is such a file, its line in the list below, and its lines in that registry.
+//! [`Measures`] is an [`Observer`]. A scene without measures has none, and its runs are unwatched. [`cohaptic_scene::Measure`] has names, units and
+//! descriptions. Each
+//! file of this module accumulates one quantity and gives the measures of this quantity. A new quantity is a new file, a line in the list below, and lines in
+//! [`cohaptic_scene::Measure`].
 //!
 //! ```
 //! use cohaptic_harness::measures::Measures;
@@ -43,17 +46,17 @@ use crate::{HoldRow, InstantRow, Model, NoObserver, Observer, SendRow, Simulatio
 
 pub use quantiles::QuantileSketch;
 
-/// Something that is accumulated over a run, and the measures that come of it.
+/// Accumulated quantity of a run, and the measures computed from this quantity.
 trait Accumulator: Sized {
-    /// What it can be asked for.
+    /// Type that selects one of the measures.
     type Figure: Copy + 'static;
 
-    /// The measures that it gives.
+    /// Measures of this accumulator, each with its figure.
     const GIVES: &'static [(Measure, Self::Figure)];
-    /// The rows that it takes in.
+    /// Kinds of rows that the accumulator takes.
     const ROWS: Rows;
 
-    /// Before the run.
+    /// Returns the accumulator before the run.
     fn new(asked: &Asked<'_>) -> Self;
 
     fn on_tick(&mut self, _row: &TickRow<'_>) {}
@@ -66,14 +69,15 @@ trait Accumulator: Sized {
 
     fn on_hold(&mut self, _row: &HoldRow) {}
 
-    /// A figure, of one peer if it is one of each peer, after that much of the scene; `None` where it has no value.
+    /// Returns a figure after `elapsed` of the scene, of the peer `peer` if the figure is per peer; `None` if the figure has no value.
     fn value(&self, figure: Self::Figure, peer: Option<usize>, elapsed: Duration) -> Option<f64>;
 }
 
-/// The measures of a scene that are asked for.
+/// Wanted measures of a scene.
 #[derive(Clone, Copy, Debug)]
 struct Asked<'a> {
     scene: &'a Scene,
+    /// Names of the measures.
     names: &'a [MeasureName],
     settings: &'a MeasureSettings,
 }
@@ -84,7 +88,7 @@ impl Asked<'_> {
     }
 }
 
-/// Rows of an observer.
+/// Kinds of rows of an observer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Rows {
     ticks: bool,
@@ -111,15 +115,15 @@ impl Rows {
 /// A measure and its value.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct MeasuredValue {
-    /// Which measure.
+    /// Name of the measure.
     pub name: MeasureName,
-    /// In the unit of the measure; `None` where it has no value, among them that of a run that diverged beyond all numbers.
+    /// Value in the unit of the measure. `None` if there is no value, or if the value is not finite because the run diverged.
     pub value: Option<f64>,
 }
 
 macro_rules! accumulators {
     ($($field:ident: $kind:ty;)+) => {
-        /// The measures of one run.
+        /// Measures of one run.
         #[derive(Clone, Debug)]
         pub struct Measures {
             names: Vec<MeasureName>,
@@ -128,7 +132,7 @@ macro_rules! accumulators {
         }
 
         impl Measures {
-            /// Those measures of a run of the scene, before it begins.
+            /// Returns measures of a run of the scene, before the run.
             #[must_use]
             pub fn new(scene: &Scene, names: &[MeasureName], settings: &MeasureSettings) -> Self {
                 let asked = Asked { scene, names, settings };
@@ -184,7 +188,7 @@ macro_rules! accumulators {
             accumulators! { forwarded $($field: $kind;)+ => on_hold HoldRow, holds }
         }
 
-        /// The measures that accumulators give.
+        /// Returns the measures of all accumulators.
         #[cfg(test)]
         fn given() -> Vec<Measure> {
             let mut given = Vec::new();
@@ -218,13 +222,13 @@ accumulators! {
 }
 
 impl Measures {
-    /// The measures that `[measure]` of the scene asks for; `None` if it asks for none.
+    /// Returns the measures in `[measure]` of the scene; `None` if the scene has no such section.
     #[must_use]
     pub fn of(scene: &Scene) -> Option<Self> {
         scene.measure.as_ref().map(|measure| Self::new(scene, &measure.names, &measure.settings))
     }
 
-    /// Runs a scene with the measures that it asks for, and gives their values; none if it asks for none.
+    /// Runs a scene and returns the values of its measures; no values if the scene has no `[measure]`.
     ///
     /// # Panics
     ///
@@ -241,7 +245,7 @@ impl Measures {
         (summary, values)
     }
 
-    /// The value of each measure after that much of the scene, in order; at the end of a run that is [`Summary::duration`].
+    /// Returns the value of each measure after `elapsed` of the scene, in the order of the names. At the end of a run `elapsed` is [`Summary::duration`].
     #[must_use]
     pub fn values(&self, elapsed: Duration) -> Vec<MeasuredValue> {
         let value = |name: MeasureName| self.value(name, elapsed).filter(|value| value.is_finite());
@@ -249,13 +253,13 @@ impl Measures {
     }
 }
 
-/// `None` for a mean of nothing.
+/// Returns the mean `sum / count`; `None` if `count` is 0.
 #[expect(clippy::cast_precision_loss, reason = "sums of nanoseconds and counts, rounded once each")]
 fn ratio(sum: u128, count: u64) -> Option<f64> {
     (count > 0).then(|| sum as f64 / count as f64)
 }
 
-/// `None` for a mean of nothing.
+/// Returns the root of the mean square; `None` if `count` is 0.
 #[expect(clippy::cast_precision_loss, reason = "fewer rows than 2^53")]
 fn mean_square_root(squares: f64, count: u64) -> Option<f64> {
     (count > 0).then(|| libm::sqrt(squares / count as f64))

@@ -1,24 +1,26 @@
 //! Quantiles of any number of values in constant memory.
 //!
-//! Values are counted in bins, 128 in each octave from 2⁻⁴⁰ to 2²⁴. The bin of a value is its exponent with the first seven bits of its mantissa: no
-//! logarithm, so the same bin on every machine. The middle of a bin is at most 2⁻⁸ of a value in it away from that value. Two sketches
-//! [add up](QuantileSketch::merge), and the sum is that of one sketch of all values.
+//! Values are counted in bins, 128 in each octave from 2⁻⁴⁰ to 2²⁴. The bin of a value is its exponent with the first seven bits of its mantissa. No logarithm
+//! is
+//! needed, so a value has the same bin on every machine. The middle of a bin differs from each value in the bin by at most 2⁻⁸ of the value. Two sketches
+//! [add up](QuantileSketch::merge): their sum is the sketch of all values.
 
-/// Values below this count as zero.
+/// Least value of the bins. Smaller values count as zero.
 const LEAST: f64 = f64::from_bits((1023 - 40) << 52);
-/// Bits of a double behind those that name its bin: all of its mantissa but seven.
+/// Number of low bits of a double without influence on its bin: the mantissa without its first seven bits.
 const BEHIND: u32 = 52 - 7;
-/// What those bits leave of the first bin.
+/// High bits of the values in the first bin.
 const FIRST: u64 = LEAST.to_bits() >> BEHIND;
 const BINS: usize = 64 << 7;
 
-/// The counts of all values so far.
+/// Counts of all values so far, by bin.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct QuantileSketch {
-    /// 64 kB.
+    /// Number of values, indexed by bin. 64 kB.
     bins: Box<[u64]>,
-    /// Values below the first bin.
+    /// Number of values below the first bin.
     below: u64,
+    /// Number of all values, including values above the last bin.
     count: u64,
 }
 
@@ -29,13 +31,13 @@ impl Default for QuantileSketch {
 }
 
 impl QuantileSketch {
-    /// Counts a value. One below 2⁻⁴⁰, or below zero, counts as zero; one of 2²⁴ or more, and a NaN, as infinite.
+    /// Counts a value. Values below 2⁻⁴⁰ count as zero; values from 2²⁴ on, and NaN, count as infinite.
     #[inline]
     pub fn insert(&mut self, value: f64) {
         self.insert_many(value, 1);
     }
 
-    /// Counts a value this number of times.
+    /// Counts a value `times` times.
     #[inline]
     pub fn insert_many(&mut self, value: f64, times: u64) {
         self.count += times;
@@ -43,6 +45,7 @@ impl QuantileSketch {
             self.below += times;
             return;
         }
+        // The positive doubles are ordered as their bits. Values above the last bin and NaN have no bin and are counted only in `count`.
         let bin = usize::try_from((value.to_bits() >> BEHIND).wrapping_sub(FIRST)).unwrap_or(usize::MAX);
         if let Some(bin) = self.bins.get_mut(bin) {
             *bin += times;
@@ -58,13 +61,14 @@ impl QuantileSketch {
         self.count += other.count;
     }
 
-    /// How many values there are.
+    /// Returns the number of values.
     #[must_use]
     pub const fn count(&self) -> u64 {
         self.count
     }
 
-    /// The quantile of a number p of per cent: the ⌈p·n/100⌉-th smallest of n values, counted from 1, off by at most 2⁻⁸ of itself. `None` of no value.
+    /// Returns the quantile of p per cent: the ⌈p·n/100⌉-th smallest of n values, counted from 1, with a relative error of at most 2⁻⁸. Returns `None` without
+    /// values.
     #[must_use]
     pub fn quantile(&self, percent: u64) -> Option<f64> {
         if self.count == 0 {
@@ -78,6 +82,7 @@ impl QuantileSketch {
         for (bin, count) in (FIRST..).zip(&self.bins) {
             below += u128::from(*count);
             if below >= rank {
+                // The middle of the bin.
                 return Some(f64::from_bits(bin << BEHIND | 1 << (BEHIND - 1)));
             }
         }
@@ -100,7 +105,7 @@ mod tests {
         sketch
     }
 
-    /// Values over all octaves and beyond both ends, many of them equal.
+    /// Returns values over all octaves and beyond both ends, many of them equal.
     fn values() -> impl Strategy<Value = Vec<f64>> {
         let value = prop_oneof![
             8 => (-45.0..26.0_f64).prop_map(libm::exp2),

@@ -1,4 +1,4 @@
-//! When copies have come together for good.
+//! Instant from which on copies stay together.
 
 use std::time::Duration;
 
@@ -8,10 +8,12 @@ use cohaptic_units::Instant;
 use super::{Accumulator, Asked, Rows};
 use crate::InstantRow;
 
-/// The first instant from which on the discrepancy has stayed within the band; `None` while it is above.
+/// First instant from which on the discrepancy has stayed within the band.
 #[derive(Clone, Debug)]
 pub(super) struct Settling {
+    /// Largest discrepancy of settled copies \[m\].
     band: f64,
+    /// Begin of the present stay within the band; `None` while the discrepancy is above the band.
     since: Option<Instant>,
 }
 

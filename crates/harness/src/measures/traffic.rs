@@ -1,4 +1,4 @@
-//! What peers offer to the network.
+//! Traffic offered to the network by the peers.
 
 use std::time::Duration;
 
@@ -7,7 +7,7 @@ use cohaptic_scene::Measure;
 use super::{Accumulator, Asked, Rows};
 use crate::SendRow;
 
-/// Packets and their bytes, with one packet for each receiver of a sample.
+/// Packets and bytes so far, with one packet for each receiver of a sample.
 #[derive(Clone, Debug)]
 pub(super) struct Traffic {
     packets: u64,

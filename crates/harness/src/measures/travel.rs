@@ -1,4 +1,4 @@
-//! How long a copy takes to travel a distance.
+//! Time in which a copy travels a distance.
 
 use std::time::Duration;
 
@@ -8,16 +8,19 @@ use cohaptic_units::Instant;
 use super::{Accumulator, Asked, Rows};
 use crate::TickRow;
 
-/// The first tick at which a copy is at least that far from where it was at its first one. A client of a server begins where the server does, whatever position
-/// the scene has for its peer.
+/// First tick at which a copy is at least a given distance from its position at its first tick. The copy of a server's client begins at the server's copy, not
+/// at the
+/// position of its peer in the scene.
 #[derive(Clone, Copy, Default, Debug)]
 pub(crate) struct Travelled {
+    /// Position at the first tick \[m\]; `None` before.
     start: Option<f64>,
+    /// First tick at the distance or beyond; `None` before.
     reached: Option<Instant>,
 }
 
 impl Travelled {
-    /// Takes in a position at a tick. A position that overflowed is not that far away.
+    /// Takes a position at a tick \[m\]. An overflowed position does not count as distant.
     #[inline]
     pub(crate) fn see(&mut self, at: Instant, position: f64, distance: f64) {
         let start = *self.start.get_or_insert(position);
@@ -26,13 +29,13 @@ impl Travelled {
         }
     }
 
-    /// The first tick at which the copy was that far away.
+    /// Returns the first tick at which the copy had travelled the distance; `None` if there is no such tick.
     pub(crate) const fn reached(self) -> Option<Instant> {
         self.reached
     }
 }
 
-/// As `travel` in `[expect]`.
+/// Travel of the peer in `[measure]`. The figure is computed like `travel` in `[expect]`.
 #[derive(Clone, Debug)]
 pub(super) struct Travel {
     travel: MeasureTravel,
@@ -72,7 +75,7 @@ mod tests {
     use crate::measures::Measures;
     use crate::{Model, Observer, Simulation, TickRow};
 
-    /// The instants and positions of one peer's copy.
+    /// Index of a peer, and the instants \[s\] and positions \[m\] of its copy.
     struct Copy(usize, Vec<(f64, f64)>);
 
     impl Observer for Copy {
@@ -90,8 +93,9 @@ mod tests {
         }
     }
 
-    /// The user of a client is 5 cm away from the object, which is the server's and begins at 0. To travel 2 cm takes the client's copy as long as the recorded
-    /// positions say, and not no time at all.
+    /// The user of a client is 5 cm away from the object, which belongs to the server and begins at 0. The client's copy travels 2 cm in the time between the
+    /// recorded
+    /// positions, not in no time.
     #[test]
     fn the_copy_of_a_client_travels_from_where_it_begins() {
         let text = "scene.duration = \"2s\"\nobject.mass = 0.45\nlink.delay = \"8ms\"\ncoordination = { strategy = \"client-server\", stiffness = 0.0, update = \"8ms\" }\n\
