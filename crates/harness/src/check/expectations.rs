@@ -1,4 +1,4 @@
-//! Expectations that a single run can answer.
+//! Expectations decided by a single run.
 
 use std::convert::Infallible;
 use std::time::Duration;
@@ -15,19 +15,22 @@ use crate::measures::travel::Travelled;
 use crate::observer::observe_by_field;
 use crate::{Ending, Observer, Summary, TickRow, Ticks};
 
-/// What was seen of what expectations are about.
+/// Observer of everything that expectations of a scene need.
 #[derive(Debug)]
 pub(crate) struct Watched {
     seen: (Positions, Option<Measures>),
 }
 
-/// What was seen of the positions that expectations are about.
+/// Positions and attitudes seen so far.
 #[derive(Debug)]
 struct Positions {
+    /// Expected positions, with the position seen last up to the expected instant.
     positions: Vec<WatchedPosition>,
+    /// Expected travels.
     travels: Vec<WatchedTravel>,
-    /// Expectations of orientations, and the attitudes that were seen.
+    /// Expected orientations.
     expected: Vec<ExpectOrientation>,
+    /// Attitude seen last up to the expected instant, indexed like `expected`; `None` before the first.
     orientations: Vec<Option<Attitude>>,
 }
 
@@ -71,9 +74,10 @@ impl Positions {
         }
     }
 
-    /// Takes in where copies are at an instant, by peer and axis, and how they are turned; `None` of peers that are not looked at.
+    /// Takes the positions and attitudes of an instant. `position` has the arguments peer and axis; both functions return `None` for peers without a row.
     #[inline]
     fn see(&mut self, at: Instant, position: impl Fn(usize, usize) -> Option<f64>, attitude: impl Fn(usize) -> Option<Attitude>) {
+        // Until the expected instant each position replaces the one before, so the last tick at or before that instant stays.
         for watched in self.positions.iter_mut().filter(|watched| at <= watched.at) {
             watched.seen = position(watched.peer, watched.axis).or(watched.seen);
         }
@@ -118,7 +122,7 @@ impl Watched {
         Self { seen: (Positions::new(expect), measures) }
     }
 
-    /// What came out of each expectation, in the order of the file's sections.
+    /// Returns the outcome of each expectation, in the order of the sections in the file.
     pub(crate) fn outcomes(&self, scene: &Scene, expect: &Expect, summary: &Summary) -> Vec<Outcome> {
         let name = |peer: usize| &scene.peers[peer].name;
         let (watched, measures) = &self.seen;
@@ -131,6 +135,7 @@ impl Watched {
         }
         for (expected, watched) in expect.positions.iter().zip(&watched.positions) {
             let what = format!("position of {}'s copy along {} at {}", name(expected.peer), AXES[expected.axis], expected.at);
+            // Copies move until the end of the scene, after their last tick, so the final state comes from the summary.
             let seen = if expected.at >= reach.end { Some(summary.peers[expected.peer].position[expected.axis]) } else { watched.seen };
             outcomes.push(match seen.filter(|_| reach.why_not(expected.at).is_none()) {
                 None => Outcome::nothing("position", what, "m", &expected.bounds, &unseen(expected.peer, expected.at)),
@@ -171,11 +176,11 @@ impl Watched {
     }
 }
 
-/// How far a run came: a run that ended because its numbers overflowed proves nothing about later instants, nor about the whole scene.
+/// Part of the scene that a run reached. A run with overflowed numbers proves nothing about later instants, nor about the whole scene.
 struct Reach {
-    /// The first instant at which a number was not finite; `None` if the run came to its end.
+    /// First instant with a number that is not finite; `None` if the run reached its end.
     overflow: Option<Instant>,
-    /// The end of the scene.
+    /// End of the scene.
     end: Instant,
 }
 
@@ -195,7 +200,7 @@ impl Reach {
         Some(if overflow < at { format!("the run diverged at {overflow}, before {at}") } else { format!("the run diverged at {overflow}") })
     }
 
-    /// Returns the words for a distance that no copy travelled.
+    /// Returns the text for a distance that the copy did not travel.
     fn not_reached(&self) -> String {
         self.overflow.map_or_else(|| "not reached".to_owned(), |at| format!("not reached before the run diverged at {at}"))
     }
@@ -249,12 +254,12 @@ fn delay(scene: &Scene, expected: &ExpectDelay, summary: &Summary) -> Outcome {
         return Outcome { expected: range, ..Outcome::nothing("delay", what, "s", &bounds, "no packet was delivered") };
     };
     let mean = Duration::from_nanos(u64::try_from(mean).unwrap_or(u64::MAX));
-    // Compared in nanoseconds, which are exact.
+    // Compared in whole nanoseconds, without rounding.
     let passed = expected.min.is_none_or(|min| mean >= min) && expected.max.is_none_or(|max| mean <= max);
     Outcome { passed, expected: range, found: Span(mean).to_string(), ..Outcome::number("delay", what, "s", &bounds, mean.as_secs_f64()) }
 }
 
-/// The counters of the links that are meant, and how many have them.
+/// Returns the counters of the selected links, each with the number of links that have these counters.
 fn selected(link: LinkSelector, summary: &Summary) -> Vec<(LinkStats, u64)> {
     let access = |peer: usize, uplink: bool| {
         summary.access_lines.iter().filter(|line| line.peer == peer && line.uplink == uplink).map(|line| (line.stats, 1)).collect()

@@ -1,4 +1,4 @@
-//! Whether a scene does what its `[expect]` says.
+//! Checks of a scene against its `[expect]`.
 
 mod expectations;
 mod outcome;
@@ -16,44 +16,47 @@ use crate::observer::observe_by_field;
 use crate::{Ending, Model, Observer, Simulation, Summary};
 use expectations::Watched;
 
-/// Runs a scene and gives one line for each expectation that does not hold, in the order of the file's sections; empty if all hold.
+/// Runs a scene and returns one line for each expectation that fails, in the order of the sections in the file. Empty if all hold.
 ///
-/// A scene that is [too large](crate::too_large) to be simulated gives the one line that says so.
+/// A scene [too large](crate::too_large) for a simulation returns the one line with this reason.
 ///
-/// Whether the scene is stable is told by a simulation. `keep_going` is asked about every thousand instants; when it says `false` the check ends with a
-/// line that says so.
+/// A simulation decides whether the scene is stable. `keep_going` is called about every thousand instants. If it returns `false`, the check ends with a line
+/// about
+/// the interruption.
 #[must_use]
 pub fn check(scene: &Scene, model: Model, keep_going: impl FnMut() -> bool) -> Vec<String> {
     check_with(scene, model, |_, _| Judged::Unknown, keep_going).failures()
 }
 
-/// What a caller knows of whether a scene is as stable as it is expected to be.
+/// Knowledge of the caller about the stability of a scene.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Judged {
-    /// What was found.
+    /// The caller has a finding.
     Found(Finding),
-    /// Nothing: a simulation tells.
+    /// The caller has no finding, so a simulation decides.
     Unknown,
 }
 
-/// What came out of a check.
+/// Result of a check.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Checked {
-    /// Of each expectation, in the order of the file's sections.
+    /// Outcomes of all expectations, in the order of the sections in the file.
     pub outcomes: Vec<Outcome>,
-    /// Why the scene could not be checked; `None` if it was.
+    /// Reason why the scene could not be checked; `None` if the scene was checked.
     pub unchecked: Option<String>,
 }
 
 impl Checked {
-    /// One line for each expectation that does not hold, after the reason why the scene could not be checked.
+    /// Returns the reason why the scene could not be checked, if any, and one line for each expectation that fails.
     #[must_use]
     pub fn failures(&self) -> Vec<String> {
         self.unchecked.iter().cloned().chain(self.outcomes.iter().filter_map(Outcome::failure)).collect()
     }
 }
 
-/// [`check`] with what came out of each expectation, where `judge` is asked first whether the scene is stable (`true`) or unstable (`false`), as expected.
+/// Like [`check`], with the outcome of each expectation. `judge` is asked before a simulation whether the scene is stable; its second argument is the
+/// expectation: `true`
+/// for stable, `false` for unstable.
 #[must_use]
 pub fn check_with(scene: &Scene, model: Model, judge: impl FnOnce(&Scene, bool) -> Judged, mut keep_going: impl FnMut() -> bool) -> Checked {
     let Some(expect) = &scene.expect else {
@@ -81,7 +84,7 @@ pub fn check_with(scene: &Scene, model: Model, judge: impl FnOnce(&Scene, bool) 
     Checked { outcomes, unchecked: None }
 }
 
-/// Watches a run for the expectations that a single run can answer: all but `stable`.
+/// Observer for the expectations that a single run decides: all but `stable`.
 #[derive(Debug)]
 pub struct ExpectationWatch<'a> {
     scene: &'a Scene,
@@ -89,13 +92,13 @@ pub struct ExpectationWatch<'a> {
 }
 
 impl<'a> ExpectationWatch<'a> {
-    /// Before the run.
+    /// Returns the observer before the run.
     #[must_use]
     pub fn new(scene: &'a Scene) -> Self {
         Self { scene, watched: scene.expect.as_ref().map(|expect| Watched::new(scene, expect)) }
     }
 
-    /// What came out; nothing of a run that was interrupted.
+    /// Returns the outcomes after the run; empty after an interrupted run.
     #[must_use]
     pub fn outcomes(&self, summary: &Summary) -> Vec<Outcome> {
         match (&self.watched, &self.scene.expect) {
@@ -111,7 +114,7 @@ impl Observer for ExpectationWatch<'_> {
     observe_by_field! { watched }
 }
 
-/// Asks whether to go on.
+/// Observer that only asks whether the run goes on.
 struct Asking<'a, F>(&'a mut F);
 
 impl<F: FnMut() -> bool> Observer for Asking<'_, F> {

@@ -1,33 +1,33 @@
-//! What came out of one expectation, as numbers and as words.
+//! Outcome of one expectation, as numbers and as text.
 
 use cohaptic_scene::Bounds;
 use cohaptic_units::print::{Number, SixDigits};
 
-/// What was expected, what came out, and whether that is as expected.
+/// Expected and measured values of an expectation, and the verdict.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Outcome {
-    /// The section of `[expect]`: `stable`, `discrepancy`, `position`, `travel`, `rotation-discrepancy`, `orientation`, `loss`, `delay` or `measures`.
+    /// Section of `[expect]`: `stable`, `discrepancy`, `position`, `travel`, `rotation-discrepancy`, `orientation`, `loss`, `delay` or `measures`.
     pub key: &'static str,
-    /// The quantity that is compared, in words: `mean delay on left->right`.
+    /// Compared quantity as text: `mean delay on left->right`.
     pub name: String,
-    /// The unit of the numbers below; empty for ratios.
+    /// Unit of the numbers below; empty for ratios.
     pub unit: &'static str,
-    /// The least value that is expected.
+    /// Least expected value; `None` without a lower bound.
     pub low: Option<f64>,
-    /// The greatest value that is expected.
+    /// Greatest expected value; `None` without an upper bound.
     pub high: Option<f64>,
-    /// What came out; `None` where there is no number.
+    /// Measured value; `None` if there is no number.
     pub measured: Option<f64>,
-    /// Whether that is as expected.
+    /// Whether the expectation holds.
     pub passed: bool,
-    /// The expectation in words: `at most 20ms`.
+    /// Expectation as text: `at most 20ms`.
     pub expected: String,
-    /// What came out, in words: `24ms`.
+    /// Measured value as text: `24ms`.
     pub found: String,
 }
 
 impl Outcome {
-    /// The line of an expectation that failed; `None` if it passed.
+    /// Returns the line of a failed expectation; `None` if the expectation holds.
     #[must_use]
     pub fn failure(&self) -> Option<String> {
         let Self { key, name, expected, found, .. } = self;
@@ -38,9 +38,9 @@ impl Outcome {
         (!self.passed).then(line)
     }
 
-    /// A number within bounds, or not: a number that is not finite never passes. `found` says the number in words.
+    /// Returns the outcome of a measured number. A number that is not finite fails. `found` is the number as text.
     pub(super) fn number(key: &'static str, name: String, unit: &'static str, bounds: &Bounds, measured: f64) -> Self {
-        // Six digits, but where these would say that a number lies within bounds from which it differs later.
+        // Six digits, unless the rounded number is within the bounds and the exact number is not, or the other way round.
         let rounded = SixDigits(measured).to_string();
         let says_the_same = rounded.parse().is_ok_and(|rounded| bounds.contain(rounded) == bounds.contain(measured));
         let said = if says_the_same { rounded } else { Number(measured).to_string() };
@@ -53,13 +53,13 @@ impl Outcome {
         }
     }
 
-    /// Nothing came out, because of this.
+    /// Returns the outcome without a number, which fails. `why` is the text of `found`.
     pub(super) fn nothing(key: &'static str, name: String, unit: &'static str, bounds: &Bounds, why: &str) -> Self {
         let (low, high) = (bounds.min, bounds.max);
         Self { key, name, unit, low, high, measured: None, passed: false, expected: range(bounds, unit), found: why.to_owned() }
     }
 
-    /// Whether a scene is stable, as a caller knows it.
+    /// Returns the outcome of the expectation `stable` from a finding.
     pub(super) fn stability(stable: bool, finding: Finding) -> Self {
         let Finding { passed, found, radius } = finding;
         let (low, high) = match radius {
@@ -72,14 +72,14 @@ impl Outcome {
     }
 }
 
-/// What was found of the stability of a scene.
+/// Finding about the stability of a scene.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Finding {
-    /// Whether it is as expected.
+    /// Whether the finding is as expected.
     pub passed: bool,
-    /// What was found, in words that go on after "but": `a small disturbance grows`.
+    /// Finding as text that continues after "but": `a small disturbance grows`.
     pub found: String,
-    /// The radius that tells, below 1 where the scene is stable; `None` where none was computed.
+    /// Computed radius, below 1 if the scene is stable; `None` if no radius was computed.
     pub radius: Option<f64>,
 }
 

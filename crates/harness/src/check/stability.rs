@@ -1,12 +1,15 @@
-//! Whether a scene is stable, as a simulation can tell: by what becomes of a small disturbance.
+//! Stability of a scene by simulation: the fate of a small disturbance.
 //!
-//! The scene runs twice with the same hands, links and random numbers. In the second run every device and every copy begins displaced by up to a
-//! micrometre. The difference of the two runs obeys the scene's autonomous dynamics (exactly, if the scene is linear), whatever the hands do, so it
-//! dies out where the scene is stable and grows where it is not. Only *relative* displacements count: of copies against one another, and of a device
-//! against its copy while it touches it. Where all of them are together has no meaning for stability, because space has no origin.
+//! The scene runs twice with the same hands, links and random numbers. In the second run every device and every copy begins displaced by up to a micrometre.
+//! The
+//! difference of the two runs obeys the scene's autonomous dynamics (exactly, if the scene is linear), independent of the hands. The difference dies out if the
+//! scene
+//! is stable and grows if the scene is unstable. Only *relative* displacements count: between copies, and between a device and its copy while both touch. The
+//! position of all bodies together has no meaning for stability, because space has no origin.
 //!
-//! Limits: with random links the answer holds for the scene's seed, which is almost-sure, not mean-square stability. And the difference of two runs
-//! is only as exact as positions are: with copies that travel beyond 10⁶ m, rounding (10⁻¹⁰ m there) comes near what counts as died out.
+//! Limits: With random links the answer holds for the scene's seed, so this is almost-sure stability, not mean-square stability. The difference of two runs is
+//! only as
+//! exact as positions are: for copies beyond 10⁶ m, rounding (10⁻¹⁰ m there) comes near the size of a disturbance that has died out.
 
 use cohaptic_peer::Contact;
 use cohaptic_peer::coordination::BuiltInStrategy;
@@ -20,16 +23,16 @@ use crate::plan::{Model, Plan};
 use crate::simulation::{Simulation, questions_of};
 use crate::world::{NoRemote, Step, Watch, World};
 
-/// What a disturbance did.
+/// Fate of a disturbance.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Stability {
-    /// It died out.
+    /// The disturbance died out.
     Stable,
-    /// It grew.
+    /// The disturbance grew.
     Unstable,
-    /// It did neither clearly within the scene's duration.
+    /// The disturbance neither clearly grew nor clearly died out within the scene's duration.
     Undecided {
-        /// The largest relative displacement in the last quarter of the scene over that in the second quarter.
+        /// Largest relative displacement in the last quarter of the scene, divided by the largest in the second quarter.
         ratio: f64,
     },
     /// The run was interrupted.
@@ -37,7 +40,7 @@ pub enum Stability {
 }
 
 impl Stability {
-    /// What was found, where the scene is expected to be `stable`, or not.
+    /// Returns the finding for the expectation `stable`: `true` for a stable scene, `false` for an unstable one.
     #[must_use]
     pub fn finding(self, stable: bool) -> Finding {
         let passed = matches!((self, stable), (Self::Stable, true) | (Self::Unstable, false));
@@ -54,22 +57,22 @@ impl Stability {
     }
 }
 
-/// The size of the disturbance \[m\].
+/// Size of the disturbance \[m\].
 const SIZE: f64 = 1e-6;
-/// A disturbance this much smaller than it was has died out, however it went.
+/// Factor of the initial size below which a disturbance has died out, whatever its course.
 const DIED_OUT: f64 = 1e-3;
-/// A disturbance this much larger than it was has grown, even if walls or a one-sided contact bound it in the end.
+/// Factor of the initial size above which a disturbance has grown, even if walls or a one-sided contact bound its size later.
 const GREW: f64 = 1e3;
-/// Otherwise it has died out or grown if it changed by this factor from the second to the last quarter.
+/// Factor between the second and the last quarter that decides all other cases.
 const CLEARLY: f64 = 1.1;
 
-/// What becomes of a small disturbance of the scene within its duration.
+/// Returns the fate of a small disturbance of the scene within its duration.
 #[must_use]
 pub fn stability(scene: &Scene, model: Model, mut keep_going: impl FnMut() -> bool) -> Stability {
     told_by_runs(scene, model, &mut keep_going)
 }
 
-/// [`stability`], compiled here once: for a question of any type, each crate that asks would compile the engine.
+/// Like [`stability`], compiled once here. With a generic closure, each calling crate would compile the engine again.
 fn told_by_runs(scene: &Scene, model: Model, keep_going: &mut dyn FnMut() -> bool) -> Stability {
     let plan = Plan::new(scene, model, false);
     match plan.axes {
@@ -83,7 +86,7 @@ fn pair<const A: usize>(scene: &Scene, model: Model, plan: &Plan) -> (World<A, B
     (Simulation::new(scene, model).world(plan, NoRemote), disturbed.world(plan, NoRemote))
 }
 
-/// Runs the two side by side.
+/// Runs both worlds step by step, and compares their positions after each step.
 fn follow<const A: usize>(
     (mut nominal, mut disturbed): (World<A, BuiltInStrategy<A>>, World<A, BuiltInStrategy<A>>),
     scene: &Scene,
@@ -100,6 +103,7 @@ fn follow<const A: usize>(
         let Ok((one, other)) = Erased::run(&mut NoObserver, |observer| Ok((nominal.step(observer, nothing)?, disturbed.step(observer, nothing)?)));
         if one == Step::Ticked && other == Step::Ticked {
             let size = relative_displacement(&nominal, &disturbed);
+            // Only the second and the last quarter are compared: see `verdict`.
             match quarter(nominal.now()) {
                 1 => early = early.max(size),
                 3 => late = late.max(size),
@@ -109,7 +113,7 @@ fn follow<const A: usize>(
                 return Stability::Unstable;
             }
         } else if one != other || one != Step::Ended(crate::Ending::Complete) {
-            // One of the two diverged.
+            // One of the two diverged, or both did.
             return Stability::Unstable;
         } else {
             return verdict(initial, early, late);
@@ -131,10 +135,10 @@ fn verdict(initial: f64, early: f64, late: f64) -> Stability {
     }
 }
 
-/// The largest difference between the two runs in a relative position along an axis \[m\].
+/// Returns the largest difference between the two runs in a relative position along an axis \[m\].
 fn relative_displacement<const A: usize>(nominal: &World<A, BuiltInStrategy<A>>, disturbed: &World<A, BuiltInStrategy<A>>) -> f64 {
     let (mut low, mut high, mut stretch) = ([f64::INFINITY; A], [f64::NEG_INFINITY; A], 0.0_f64);
-    // How copies that turn differ, in world axes, times a length.
+    // Rotations between the two runs of each copy, in world axes, times the length that converts angles to distances \[m\].
     let (mut least, mut greatest) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     for (one, other) in nominal.bodies().zip(disturbed.bodies()) {
         for axis in 0..A {
