@@ -1,4 +1,4 @@
-//! A curve in bounded memory: its lowest and highest value in each of a fixed number of spans of time.
+//! Curves in bounded memory: the lowest and highest value in each of a fixed number of spans of time.
 
 use std::ops::Range;
 use std::time::Duration;
@@ -7,22 +7,24 @@ use cohaptic_units::Instant;
 
 use crate::arrays::{Ticks, WIDTH, larger, smaller};
 
-/// Curves over the whole of a scene, each as (lowest, highest) in every span. A plot with one pixel for each span is exact.
+/// Curves over the duration of a scene, each with its lowest and highest value in every span. A plot with one pixel for each span is exact.
 #[derive(Clone, Debug)]
 pub struct Bands {
+    /// Duration of the scene.
     duration: Duration,
     spans: usize,
-    /// The width of a span \[ns\]; the last one may be cut short by the end.
+    /// Width of a span \[ns\]. The end of the scene can cut the last span short.
     width: u64,
     curves: usize,
-    /// The lowest and the highest values, eight curves at a time: by span, then by curve. [`Extremes::NONE`] where nothing was added, and beyond the last curve
-    /// nothing that means anything.
+    /// Lowest and highest values in blocks of eight curves, ordered by span, then curve. [`Extremes::NONE`] in spans without a value. Lanes beyond the last
+    /// curve have
+    /// no meaning.
     extremes: Vec<Extremes>,
-    /// The span of the latest value, and the instants in it \[ns\]: finding a span takes a division.
+    /// Span of the latest value, and the instants in this span \[ns\]. Kept because finding a span takes a division.
     latest: (usize, Range<u64>),
 }
 
-/// The lowest and the highest values of eight curves in a span.
+/// Lowest and highest values of eight curves in a span.
 #[derive(Clone, Copy, Debug)]
 struct Extremes {
     low: [f64; WIDTH],
@@ -32,7 +34,7 @@ struct Extremes {
 impl Extremes {
     const NONE: Self = Self { low: [f64::INFINITY; WIDTH], high: [f64::NEG_INFINITY; WIDTH] };
 
-    /// Takes in a value of one curve, if it is finite: a comparison with NaN fails.
+    /// Adds a value to one curve. Ignores a value that is not finite: such a value becomes NaN, and comparisons with NaN are false.
     #[inline(always)]
     fn take_in(&mut self, lane: usize, value: f64) {
         let value = if value.abs() <= f64::MAX { value } else { f64::NAN };
@@ -46,7 +48,7 @@ impl Extremes {
 }
 
 impl Bands {
-    /// A number of curves over a scene of a duration, in a number of spans (at least one each).
+    /// Returns `curves` empty curves over a scene of the given duration, with `spans` spans, at least one.
     #[must_use]
     pub fn new(duration: Duration, spans: usize, curves: usize) -> Self {
         let spans = spans.max(1);
@@ -55,7 +57,7 @@ impl Bands {
         Self { duration, spans, width, curves, extremes: vec![Extremes::NONE; spans * curves.div_ceil(WIDTH)], latest: (0, 0..0) }
     }
 
-    /// Adds a value to a curve. A value that is not finite or beyond the end is left out.
+    /// Adds a value to a curve. Ignores values that are not finite and values at or beyond the end.
     ///
     /// # Panics
     ///
@@ -67,8 +69,7 @@ impl Bands {
         }
     }
 
-    /// Adds to each curve where the copy of a peer is along an axis, in the order of the peers, as [`Bands::add`] does. Eight at a time, this takes half of the
-    /// instructions of one by one for ten peers, a third for fifty.
+    /// Adds the position of each peer's copy along an axis to the curve of the same index, as [`Bands::add`] does, eight curves at a time.
     ///
     /// # Panics
     ///
@@ -82,7 +83,7 @@ impl Bands {
         }
     }
 
-    /// The extremes of all curves in the span of an instant.
+    /// Returns the extremes of all curves in the span of an instant; `None` at the end of the scene and beyond.
     #[inline]
     fn of_span(&mut self, at: Instant) -> Option<&mut [Extremes]> {
         if !self.latest.1.contains(&at.as_nanos()) {
@@ -96,13 +97,14 @@ impl Bands {
         Some(&mut self.extremes[begin..begin + blocks])
     }
 
-    /// The extremes of a curve in a span; none if nothing was added.
+    /// Returns the extremes of a curve in a span; `None` without a value.
     fn extremes(&self, span: usize, curve: usize) -> Option<(f64, f64)> {
         let extremes = self.extremes[span * self.curves.div_ceil(WIDTH) + curve / WIDTH].of(curve % WIDTH);
+        // `NONE` has its lowest value above its highest.
         Some(extremes).filter(|(low, high)| low <= high)
     }
 
-    /// In which span an instant lies; `None` at the end of the scene and beyond.
+    /// Returns the span of an instant; `None` at the end of the scene and beyond.
     #[must_use]
     pub fn span(&self, at: Instant) -> Option<usize> {
         if at >= Instant::ZERO.saturating_add(self.duration) {
@@ -111,14 +113,14 @@ impl Bands {
         usize::try_from(at.as_nanos() / self.width).ok().filter(|span| *span < self.spans)
     }
 
-    /// The middle of a span \[s\].
+    /// Returns the middle of a span \[s\].
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "the number of spans is small")]
     pub fn middle_of(&self, span: usize) -> f64 {
         (span as f64 + 0.5) * (self.width as f64 / 1e9)
     }
 
-    /// The curves in `parts` equal parts, in order.
+    /// Divides the curves into `parts` equal parts, in order.
     #[must_use]
     pub fn split(&self, parts: usize) -> Vec<Self> {
         let size = (self.curves / parts.max(1)).max(1);
@@ -137,25 +139,25 @@ impl Bands {
         (0..self.curves).step_by(size).map(part).collect()
     }
 
-    /// How many curves there are.
+    /// Returns the number of curves.
     #[must_use]
     pub const fn curves(&self) -> usize {
         self.curves
     }
 
-    /// How many spans there are.
+    /// Returns the number of spans.
     #[must_use]
     pub const fn spans(&self) -> usize {
         self.spans
     }
 
-    /// How long the scene is \[s\].
+    /// Returns the duration of the scene \[s\].
     #[must_use]
     pub const fn seconds(&self) -> f64 {
         self.duration.as_secs_f64()
     }
 
-    /// A curve as (middle of the span \[s\], lowest, highest), spans without a value left out.
+    /// Returns a curve as (middle of the span \[s\], lowest, highest), without the spans that have no value.
     ///
     /// # Panics
     ///
@@ -165,16 +167,18 @@ impl Bands {
         (0..self.spans).filter_map(move |span| self.extremes(span, curve).map(|(low, high)| (self.middle_of(span), low, high)))
     }
 
-    /// The extremes of all curves in some spans.
+    /// Returns the extremes of all curves in some spans, where there are any.
     fn all(&self, spans: Range<usize>) -> impl Iterator<Item = (f64, f64)> {
         spans.flat_map(move |span| (0..self.curves).filter_map(move |curve| self.extremes(span, curve)))
     }
 
-    /// The range of values worth showing, with a margin, and whether values beyond it are left out.
+    /// Returns the range of values to show, with a margin, and whether values beyond this range are left out.
     ///
-    /// A scene that diverges ends in numbers that would flatten everything before. So where curves go beyond `sane` from where they began, and a
-    /// thousand times as far as they went in the first tenth, which no motion does that ends well, only three times that first tenth, and at least
-    /// a tenth of `sane`, is shown.
+    /// A scene that diverges ends in numbers that would flatten all earlier values. The range is therefore limited if the curves go farther than `sane` from
+    /// their
+    /// first value and also a thousand times as far as in the first tenth of the scene. The limit is three times the reach in the first tenth, and at least a
+    /// tenth
+    /// of `sane`.
     #[must_use]
     pub fn range(&self, sane: f64) -> (Range<f64>, bool) {
         let start = (0..self.curves()).find_map(|curve| self.curve(curve).next()).map_or(0.0, |(_, low, _)| low);

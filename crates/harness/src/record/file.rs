@@ -1,4 +1,4 @@
-//! The files of records, and the failure to write one.
+//! Files of records, and the error of writing one.
 
 use std::fs;
 use std::io::{self, Write as _};
@@ -7,52 +7,52 @@ use std::path::{Path, PathBuf};
 use cohaptic_files::WholeFile;
 use cohaptic_units::Instant;
 
-/// Why a record could not be written.
+/// Error of writing a record.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write {}: {source}", path.display())]
 pub struct RecordError {
-    /// The file or folder.
+    /// File or folder.
     pub path: PathBuf,
-    /// What the system says.
+    /// Error of the system.
     pub source: io::Error,
 }
 
-/// Beside an observer that never fails.
+/// Conversion for code that joins an observer without errors and a recorder.
 impl From<std::convert::Infallible> for RecordError {
     fn from(never: std::convert::Infallible) -> Self {
         match never {}
     }
 }
 
-/// A record on its way: a [`WholeFile`] whose errors are those of a record. If it cannot be written to its end, its beginning stays under a name that ends in
+/// File of a record during writing: a [`WholeFile`] with the errors of records. If writing fails, the beginning of the file stays under a name with the ending
 /// `.partial`.
 #[derive(Debug)]
 pub struct RecordFile(WholeFile);
 
 impl RecordFile {
-    /// Begins a file of that name.
+    /// Creates a file that will have the name `path`.
     ///
     /// # Errors
     ///
-    /// [`RecordError`] if it cannot be made.
+    /// [`RecordError`] if the file cannot be created.
     pub fn create(path: PathBuf) -> Result<Self, RecordError> {
         WholeFile::create(&path).map(Self).map_err(|source| RecordError { path, source })
     }
 
-    /// Adds to it.
+    /// Appends bytes.
     ///
     /// # Errors
     ///
-    /// [`RecordError`] if that cannot be written.
+    /// [`RecordError`] if the bytes cannot be written.
     pub fn write(&mut self, bytes: &[u8]) -> Result<(), RecordError> {
         self.0.write_all(bytes).map_err(|source| RecordError { path: self.0.written_to().to_path_buf(), source })
     }
 
-    /// Writes the rest and gives the file its name.
+    /// Writes the rest, gives the file its name, and returns the name.
     ///
     /// # Errors
     ///
-    /// [`RecordError`] if that cannot be done.
+    /// [`RecordError`] if the rest cannot be written or the file cannot be renamed.
     pub fn finish(self) -> Result<PathBuf, RecordError> {
         let [path, written_to] = [self.0.path(), self.0.written_to()].map(Path::to_path_buf);
         self.0.finish().map_err(|source| RecordError { path: written_to, source })?;
@@ -60,12 +60,12 @@ impl RecordFile {
     }
 }
 
-/// Makes the folder for records.
+/// Creates the folder for records, with its parents.
 pub(crate) fn create_folder(path: &Path) -> Result<(), RecordError> {
     fs::create_dir_all(path).map_err(|source| RecordError { path: path.to_path_buf(), source })
 }
 
-/// Adds a number with the fewest digits that read back as the same `f64`; `inf`, `-inf` and `NaN` for values that are not finite.
+/// Appends a number with the fewest digits from which the same `f64` is read back; `inf`, `-inf` and `NaN` for values that are not finite.
 pub(crate) fn push_f64(line: &mut Vec<u8>, value: f64) {
     let mut buffer = zmij::Buffer::new();
     let (mantissa, exponent) = parts(&mut buffer, value);
@@ -73,22 +73,22 @@ pub(crate) fn push_f64(line: &mut Vec<u8>, value: f64) {
     line.extend_from_slice(exponent.as_bytes());
 }
 
-/// The text of [`push_f64`], in two parts: the exponents of large numbers have no sign.
+/// Returns the text of [`push_f64`] in two parts, between which the sign of a positive exponent is left out.
 pub(crate) fn parts(buffer: &mut zmij::Buffer, value: f64) -> (&str, &str) {
     let text = buffer.format(value);
-    // Looking for it takes as long as the digits.
+    // Searched only in large numbers, because the search takes as long as formatting.
     match if value.abs() >= 1e16 { text.find("e+") } else { None } {
         Some(at) => (&text[..=at], &text[at + 2..]),
         None => (text, ""),
     }
 }
 
-/// Adds a whole number.
+/// Appends a whole number.
 pub(crate) fn push_whole(line: &mut Vec<u8>, number: u64) {
     line.extend_from_slice(itoa::Buffer::new().format(number).as_bytes());
 }
 
-/// Adds an instant as [`cohaptic_units::print::Seconds`] prints it: that takes most of the time of a row.
+/// Appends an instant \[s\] in the form of [`cohaptic_units::print::Seconds`], without the slow formatting machinery.
 pub(crate) fn push_seconds(line: &mut Vec<u8>, at: Instant) {
     const NANOS: u64 = 1_000_000_000;
     let nanos = at.as_nanos();
@@ -96,7 +96,7 @@ pub(crate) fn push_seconds(line: &mut Vec<u8>, at: Instant) {
     let rest = nanos % NANOS;
     if rest != 0 {
         let point = line.len();
-        // A digit before the nine, which becomes the point.
+        // 10⁹ + rest has ten digits: its first digit is overwritten by the point, and the leading zeros of the rest stay.
         push_whole(line, NANOS + rest);
         line[point] = b'.';
         while line.last() == Some(&b'0') {
@@ -105,7 +105,7 @@ pub(crate) fn push_seconds(line: &mut Vec<u8>, at: Instant) {
     }
 }
 
-/// Adds something that prints itself.
+/// Appends the printed form of a value.
 pub(crate) fn push_display(line: &mut Vec<u8>, value: impl std::fmt::Display) {
     write!(line, "{value}").expect("writing to memory does not fail");
 }
@@ -131,7 +131,7 @@ mod tests {
             }
         }
 
-        /// The fewest digits, as the standard library has them; and an exponent without a sign.
+        /// The digits are those of the standard library, and exponents have no plus sign.
         #[test]
         fn numbers_are_written_with_the_fewest_digits(bits in any::<u64>(), small in -1e3..1e3_f64, large in 1e15..1e25_f64) {
             for value in [f64::from_bits(bits), small, large, -large] {

@@ -1,4 +1,4 @@
-//! `inputs.csv`.
+//! `inputs.csv`: inputs of a live session.
 
 use std::path::{Path, PathBuf};
 
@@ -10,39 +10,41 @@ use crate::Observer;
 use crate::live::{ClosingLine, InputLine, InputRow, RecordedScene};
 use crate::record::RecordError;
 
-/// Writes `inputs.csv`: what comes into a [live session](crate::live) from outside, one line each, from which it can be [replayed](crate::live::replay).
+/// Writes `inputs.csv`: one line for each input of a [live session](crate::live), for a [replay](crate::live::replay).
 #[derive(Debug)]
 pub struct InputRecorder {
     file: RecordFile,
     names: Vec<String>,
     line: Vec<u8>,
-    /// Rows written so far, and the instant of the last one.
+    /// Number of rows written so far.
     rows: u64,
+    /// Instant of the last row.
     last: Instant,
 }
 
 impl InputRecorder {
-    /// Begins to record into a folder, which is made if there is none. `content`: the keys and files of the scene, from [`cohaptic_scene::scene_content`], with
-    /// which a replay with another scene can say what differs.
+    /// Creates the folder if needed and begins the record. `content`: keys and files of the scene, from [`cohaptic_scene::scene_content`], with which a replay
+    /// with a
+    /// different scene can name the differences.
     ///
     /// # Errors
     ///
-    /// [`RecordError`] if the folder or the file cannot be made.
+    /// [`RecordError`] if the folder or the file cannot be created.
     pub fn create(folder: &Path, scene: &Scene, content: SceneContent) -> Result<Self, RecordError> {
         create_folder(folder)?;
         let mut file = RecordFile::create(folder.join("inputs.csv"))?;
         let head = RecordedScene::of(scene, content).to_string();
         file.write(head.as_bytes())?;
         let names = scene.peers.iter().map(|peer| peer.name.clone()).collect();
-        // All lines but the header are rows, also those about the scene: none of them may be missing.
+        // Rows about the scene count too: a reader must notice if one is missing.
         Ok(Self { file, names, line: Vec::new(), rows: (head.lines().count() - 1) as u64, last: Instant::ZERO })
     }
 
-    /// Writes the row that closes the record, without which a reader takes it for one that is cut short, and gives the file its name.
+    /// Writes the closing row and gives the file its name. Without the closing row a reader takes the record for cut short.
     ///
     /// # Errors
     ///
-    /// [`RecordError`] if that cannot be done.
+    /// [`RecordError`] if the row cannot be written or the file cannot be renamed.
     pub fn finish(mut self) -> Result<PathBuf, RecordError> {
         self.file.write(format!("{}\n", ClosingLine { at: self.last, rows: self.rows }).as_bytes())?;
         self.file.finish()

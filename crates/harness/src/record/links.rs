@@ -1,4 +1,4 @@
-//! `links.csv`.
+//! `links.csv`: counters of links.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -11,22 +11,23 @@ use super::file::{RecordFile, push_display, push_seconds, push_whole};
 use crate::Summary;
 use crate::record::RecordError;
 
-/// Rows are handed on in pieces of about this length \[bytes\].
+/// Length from which rows are passed on \[bytes\].
 const PIECE: usize = 1 << 16;
 
-/// Writes `links.csv` into a folder.
+/// Writes `links.csv` into a folder and returns its path.
 pub(crate) fn write(folder: &Path, summary: &Summary) -> Result<PathBuf, RecordError> {
     let mut file = RecordFile::create(folder.join("links.csv"))?;
     links_csv(summary, |rows| file.write(rows))?;
     file.finish()
 }
 
-/// Gives `write` the text of `links.csv` piece by piece: one row a link and access line with what became of its packets, and the mean delay of those delivered
-/// (empty if there is none).
+/// Passes the text of `links.csv` to `write` piece by piece: one row for each link and access line, with the numbers of packets by fate and the mean delay of
+/// the
+/// delivered packets (empty without any).
 ///
 /// # Errors
 ///
-/// The first error of `write`, which is not called again.
+/// The first error of `write`, which is not called again after it.
 pub fn links_csv<E>(summary: &Summary, mut write: impl FnMut(&[u8]) -> Result<(), E>) -> Result<(), E> {
     let causes = DropCause::ALL.map(DropCause::name).join(",");
     let mut rows = format!("link,offered,duplicated,delivered,{causes},in-flight,mean-delay-s\n").into_bytes();
@@ -43,7 +44,7 @@ pub fn links_csv<E>(summary: &Summary, mut write: impl FnMut(&[u8]) -> Result<()
             rows.extend_from_slice(sender.as_str().as_bytes());
             rows.extend_from_slice(name(to).as_bytes());
             let counters = rows.len();
-            // Links that do the same have one entry: their counters are put into words once.
+            // Links with equal counters can share one entry, whose text is then copied.
             match last {
                 Some((last, counters)) if std::ptr::eq(last, stats) => rows.extend_from_within(counters),
                 _ => push_counters(&mut rows, stats),
@@ -59,12 +60,12 @@ pub fn links_csv<E>(summary: &Summary, mut write: impl FnMut(&[u8]) -> Result<()
     write(&rows)
 }
 
-/// The columns of a row behind its name.
+/// Appends the columns of a row after the name of the link.
 fn push_counters(row: &mut Vec<u8>, stats: &LinkStats) {
     let counts = [stats.offered(), stats.duplicated(), stats.delivered()].into_iter();
     let mut zeros = 0;
     for count in counts.chain(DropCause::ALL.map(|cause| stats.dropped(cause))).chain([stats.in_flight()]) {
-        // Most causes drop nothing: their columns are written together.
+        // Most counts are zero: their columns are appended in one piece.
         if count == 0 {
             zeros += 2;
             continue;
@@ -82,7 +83,7 @@ fn push_counters(row: &mut Vec<u8>, stats: &LinkStats) {
     row.push(b'\n');
 }
 
-/// As many columns without a count as a row may have one after the other.
+/// Text of as many columns with the count 0 as a row can have in sequence.
 const ZEROS: [u8; 2 * (DropCause::ALL.len() + 4)] = {
     let mut zeros = [b'0'; 2 * (DropCause::ALL.len() + 4)];
     let mut at = 0;
@@ -93,7 +94,7 @@ const ZEROS: [u8; 2 * (DropCause::ALL.len() + 4)] = {
     zeros
 };
 
-/// Adds a delay as its seconds print as an `f64`. Below a second that is one division, which the nine digits after the point survive.
+/// Appends a delay as an `f64` of seconds prints. Below a second, the nine digits of the nanoseconds are the shortest text of this `f64`.
 fn push_delay(row: &mut Vec<u8>, delay: Duration) {
     if delay.as_secs() == 0 {
         push_seconds(row, Instant::ZERO.saturating_add(delay));

@@ -1,4 +1,4 @@
-//! Records of a run: CSV files and plots, written while it runs, so that a long run does not grow in memory.
+//! Records of a run: CSV files and plots. CSV rows are written during the run and curves are kept in bounded memory, so a long run needs no more memory.
 //!
 //! | file | holds |
 //! | --- | --- |
@@ -10,8 +10,7 @@
 //! | `orientations.svg`, `views.svg` | of an object that turns: rotation vectors over time; the copies from three sides |
 //! | `network.svg` | delays, losses and the distribution of the delay of up to six links |
 //!
-//! A file is written under the name `….partial` and takes its own name when it is whole. Numbers are written with the fewest digits that read back
-//! as the same `f64`.
+//! A file is written under the name `….partial` and gets its final name when complete. Numbers have the fewest digits from which the same `f64` is read back.
 
 mod band;
 mod file;

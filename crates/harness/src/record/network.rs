@@ -1,6 +1,8 @@
-//! `network.svg`: each link as a row of two panels: delays over time with the losses below them, and the distribution of the delay with the configured one.
+//! `network.svg`: a row of two panels for each link. The first panel shows delays over time with the losses below; the second shows the distribution of the
+//! delay, with
+//! the configured distribution.
 //!
-//! Memory is bounded: over time the least and greatest delay of each span are kept, and of the distribution how many delays lie in each ten microseconds.
+//! Memory is bounded: the least and greatest delay of each span, and the number of delays in each step of ten microseconds.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,43 +14,44 @@ use cohaptic_wan::{Delay, Fate};
 use super::band::Bands;
 use crate::PacketRow;
 
-/// The links of a scene that are shown, and what their packets did.
+/// Shown links of a scene, and the delays and losses of their packets.
 #[derive(Debug)]
 pub(super) struct Network {
-    /// All links, by sender, then receiver.
+    /// All links of the scene, by sender, then receiver.
     pairs: Vec<(usize, usize)>,
-    /// Delays by link shown \[s\], over when packets were sent.
+    /// Delays \[s\] over the instant of sending, one curve for each shown link.
     delays: Bands,
     shown: Vec<Shown>,
 }
 
-/// One link.
+/// A shown link.
 #[derive(Debug, Default)]
 struct Shown {
     from: usize,
     to: usize,
-    /// How many packets took how long, in steps of [`STEP`].
+    /// Number of delivered packets, by delay in steps of [`STEP`].
     delays: BTreeMap<u64, u64>,
-    /// The configured propagation delay; `None` if it is a recording, or changes on the way.
+    /// Configured propagation delay. `None` for a recording, and if the timeline of the scene has changes.
     configured: Option<Delay>,
-    /// In which spans packets were sent that never arrived.
+    /// Spans in which lost packets were sent.
     losses: BTreeSet<usize>,
-    /// All packets whose fate is known, and those of them that were dropped.
+    /// Number of packets with a known fate.
     known: u64,
+    /// Number of dropped packets among `known`.
     dropped: u64,
 }
 
-/// A picture shows this many links at most, the first ones by sender, then receiver: all links of three users.
+/// Most links in a picture: the first by sender, then receiver. Enough for all links of three users.
 pub(super) const MOST_LINKS: usize = 6;
 
-/// A note names this many links that are not shown at most.
+/// Most names of links without a panel in a note.
 const MOST_NAMED: usize = 20;
 
-/// Delays nearer to each other than this are one \[ns\]: a hundredth of what a picture could show.
+/// Resolution of the distribution of delays \[ns\], far below a pixel.
 const STEP: u64 = 10_000;
 
 impl Network {
-    /// For a scene, in a number of spans of time.
+    /// Returns the state before the run, with `spans` spans of time.
     pub(super) fn new(scene: &Scene, spans: usize) -> Self {
         let configured = |from: usize, to: usize| {
             let config = scene.links.between(from, to).as_fixed().filter(|_| scene.timeline.is_empty());
@@ -67,6 +70,7 @@ impl Network {
         if matches!(row.fate, Fate::Delivered(_)) {
             let delay = row.at - row.offered;
             self.delays.add(place, row.offered, delay.as_secs_f64());
+            // Rounded to the nearest step.
             let steps = u64::try_from(delay.as_nanos()).unwrap_or(u64::MAX).saturating_add(STEP / 2) / STEP;
             *link.delays.entry(steps).or_default() += 1;
         } else {
@@ -75,7 +79,7 @@ impl Network {
         }
     }
 
-    /// The picture.
+    /// Draws the picture.
     pub(super) fn picture(&self, title: &str, names: &[String]) -> Picture {
         let name = |from: usize, to: usize| format!("{} → {}", names[from], names[to]);
         let longest = self.shown.iter().filter_map(|link| link.delays.last_key_value()).map(|(steps, _)| milliseconds(*steps)).fold(0.0, f64::max);
@@ -83,7 +87,7 @@ impl Network {
         let mut picture = Picture::new(format!("{title}: delays and losses of links")).columns(2).aspect(0.42);
         for (place, link) in self.shown.iter().enumerate() {
             let band: Vec<(f64, f64, f64)> = self.delays.curve(place).collect();
-            // From the least to the greatest delay of each span, and on to the next.
+            // One line through the least and the greatest delay of each span in turn.
             let extremes = band.iter().flat_map(|(t, low, high)| [(*t, 1e3 * low), (*t, 1e3 * high)]);
             let lost = Rug::new(link.losses.iter().map(|span| self.delays.middle_of(*span)), Look::of(1)).named("packets lost");
             let over_time = Panel::new(Axis::new("Time").symbol("t").unit("s").range(0.0, self.delays.seconds()), delay())
@@ -110,9 +114,10 @@ impl Network {
 }
 
 impl Shown {
-    /// The share of the delivered packets that took no longer than each delay \[ms\].
+    /// Returns the share of delivered packets with at most each delay \[ms\].
     fn distribution(&self) -> Vec<(f64, f64)> {
         let all = count(self.delays.values().sum());
+        // The curve begins at share 0 and the least delay, so that the first step is drawn.
         let first = self.delays.first_key_value().map(|(steps, _)| (milliseconds(*steps), 0.0));
         let mut until = 0;
         let rising = self.delays.iter().map(|(steps, packets)| {
@@ -130,17 +135,18 @@ impl Shown {
         }
     }
 
-    /// The least delay that half of the packets do not exceed.
+    /// Returns the text of the median delay: the least delay that at least half of the delivered packets do not exceed.
     fn median_in_words(&self) -> String {
         let median = self.distribution().into_iter().find(|(_, share)| *share >= 0.5);
         median.map_or_else(|| "nothing arrived".to_owned(), |(delay, _)| format!("median {delay:.2} ms"))
     }
 }
 
-/// The points of the configured distribution between its quantiles 0.001 and 0.999.
+/// Number of points of a configured distribution, at evenly spaced probabilities.
 const QUANTILES: u16 = 500;
 
-/// The probability that a packet takes no longer than each delay \[ms\], by the law of the delay alone: queues and other stages come on top of it.
+/// Returns points of the configured distribution: delay \[ms\] and the probability of at most this delay. Only propagation counts; queues and other stages add
+/// to it.
 fn configured_distribution(delay: &Delay) -> Vec<(f64, f64)> {
     let Some(law) = delay.law() else {
         let mean = 1e3 * delay.mean().as_secs_f64();
@@ -182,7 +188,7 @@ mod tests {
         link = { delay = "24ms" }
     "#;
 
-    /// What ten spans of a second hold of these packets from the first peer: (to, sent \[ms\], delay \[ms\], none if it was lost).
+    /// Returns ten spans of a second with the given packets of the first peer: (receiver, sent \[ms\], delay \[ms\] or `None` for a lost packet).
     fn network(peers: usize, packets: &[(usize, u64, Option<u64>)]) -> (Network, String) {
         let scene = Scene::parse(&SCENE.replace("COUNT", &peers.to_string()), "scene.toml".as_ref(), &[]).unwrap();
         let mut network = Network::new(&scene, 10);
@@ -208,7 +214,7 @@ mod tests {
         (network, svg)
     }
 
-    /// Delays of 10, 20, 20 and 40 ms: a quarter takes no longer than 10, three quarters no longer than 20.
+    /// Delays of 10, 20, 20 and 40 ms: a quarter of the packets took at most 10 ms, three quarters at most 20 ms.
     #[test]
     fn each_link_has_its_own_delays_losses_and_distribution() {
         let packets = [(1, 0, Some(10)), (1, 120, Some(20)), (1, 130, None), (1, 240, Some(20)), (1, 900, Some(40)), (2, 0, Some(5))];
@@ -224,7 +230,7 @@ mod tests {
         assert!(!svg.contains("Not shown"));
     }
 
-    /// Uniform from 20 to 30 ms: a straight line between the two; a constant delay is a step.
+    /// A uniform delay from 20 to 30 ms is a straight line; a constant delay is a step.
     #[test]
     fn the_configured_distribution_is_that_of_the_law() {
         let sd = Duration::from_nanos(2_886_751);
@@ -237,7 +243,7 @@ mod tests {
         assert_eq!(svg.matches(">configured delay</text>").count(), 1, "{svg}");
     }
 
-    /// After a change on the way a link has more than one configured delay.
+    /// A link that changes during the run has several configured delays.
     #[test]
     fn a_link_that_changes_has_no_configured_distribution() {
         let text = SCENE.replace("COUNT", "2") + "timeline = [{ at = \"0.5s\", link = \"all\", set = { delay = \"48ms\" } }]\n";

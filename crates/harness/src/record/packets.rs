@@ -1,4 +1,4 @@
-//! `packets.csv`.
+//! `packets.csv`: fates of packets.
 
 use std::path::{Path, PathBuf};
 
@@ -8,12 +8,15 @@ use super::file::{RecordFile, push_seconds, push_whole};
 use crate::PacketRow;
 use crate::record::RecordError;
 
-/// Columns `link,sequence,sent,arrived,fate`. `arrived` is empty for a packet that was dropped; a packet on the way at the end has no row. A copy has a row of its own, with the number of its packet.
+/// Writes the columns `link,sequence,sent,arrived,fate`. `arrived` is empty for a dropped packet. A packet in flight at the end has no row. A copy has a row of
+/// its own,
+/// with the sequence number of its packet.
 #[derive(Debug)]
 pub(crate) struct Packets {
     file: RecordFile,
-    /// The beginning of the names of the links from each peer.
+    /// Text of a link's name up to the receiver, indexed by sender.
     senders: Vec<LinkName>,
+    /// Names of the peers, indexed by peer.
     names: Vec<String>,
     line: Vec<u8>,
 }

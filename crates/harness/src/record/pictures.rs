@@ -1,4 +1,4 @@
-//! The pictures of a run.
+//! Pictures of a run.
 
 use std::convert::Infallible;
 
@@ -12,37 +12,39 @@ use super::plot::{Panel, Plot};
 use super::views::Views;
 use crate::{Observer, PacketRow, TickRow};
 
-/// The name of a file, and the picture in it as SVG.
+/// Name of a file, and its picture as SVG.
 pub type RecordedPicture = (&'static str, String);
 
-/// Sees a run and draws it, without a file. Memory is bounded: curves keep the least and the greatest value of each span of time.
+/// Observer that draws a run in memory, without files. Memory is bounded: curves keep the least and the greatest value of each span of time.
 #[derive(Debug)]
 pub struct Pictures {
     title: String,
     names: Vec<String>,
-    /// Curves are ordered by axis, then peer.
+    /// Positions of the copies \[m\]. Curves are ordered by axis, then peer.
     positions: Bands,
+    /// Coordination forces on the copies \[N\], in the same order.
     forces: Bands,
     network: Network,
-    /// The rotation vectors of the copies and their lengths, if the object turns.
+    /// Rotation vectors of the copies and their lengths \[rad\], ordered by component as in [`TURNS`], then peer. `None` if the object does not turn.
     orientations: Option<Bands>,
-    /// Their poses, if it turns.
+    /// Poses of the copies; `None` if the object does not turn.
     views: Option<Views>,
 }
 
-/// The spans of time of a plot, and the most numbers that all curves of a plot may hold together.
+/// Spans of time in a plot, as long as its curves are few.
 const SPANS: usize = 1000;
+/// Most numbers in all curves of a plot together. With many curves, spans are fewer.
 const MOST_NUMBERS: usize = 200_000;
 
-/// No desktop device and no person at it gives more force \[N\].
+/// Force \[N\] beyond the abilities of desktop devices and of people at them.
 const SANE_FORCE: f64 = 1000.0;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
-/// The components of a rotation vector, in world axes, and its length.
+/// Components of a rotation vector, in world axes, and its length.
 const TURNS: [&str; 4] = ["about x", "about y", "about z", "angle"];
 
 impl Pictures {
-    /// Before the run.
+    /// Returns the observer before the run.
     #[must_use]
     pub fn new(scene: &Scene) -> Self {
         let names: Vec<String> = scene.peers.iter().map(|peer| peer.name.clone()).collect();
@@ -60,7 +62,7 @@ impl Pictures {
         }
     }
 
-    /// The pictures under the names of their files.
+    /// Draws the pictures and returns them with the names of their files.
     #[must_use]
     pub fn drawn(&self, size: Size) -> Vec<RecordedPicture> {
         let Self { title, names, positions, forces, network, orientations, views } = self;

@@ -1,4 +1,4 @@
-//! Plots over time as SVG.
+//! Plots over time.
 
 use std::path::PathBuf;
 
@@ -8,29 +8,29 @@ use super::band::Bands;
 use super::file::RecordFile;
 use crate::record::RecordError;
 
-/// A plot: panels over one axis of time, below one another.
+/// A plot: panels below one another with a common axis of time.
 pub(crate) struct Plot<'a> {
     pub(crate) title: String,
     pub(crate) panels: Vec<Panel<'a>>,
 }
 
-/// One panel of a plot: curves over time with their names, or without.
+/// Panel of a plot: curves over time, with or without names.
 pub(crate) struct Panel<'a> {
     pub(crate) title: String,
-    /// The vertical axis, in the unit of the values times `scale`.
+    /// Vertical axis, in the unit of the values times `scale`.
     pub(crate) axis: Axis,
     pub(crate) names: &'a [String],
     pub(crate) bands: &'a Bands,
-    /// What values are multiplied by before they are shown: 100 to show metres in centimetres.
+    /// Factor of the values before drawing: 100 to show metres in centimetres.
     pub(crate) scale: f64,
-    /// What curves do not exceed in a scene that does not diverge: see [`Bands::range`].
+    /// Bound of the curves in a scene that does not diverge: see [`Bands::range`].
     pub(crate) sane: f64,
 }
 
-/// More curves than this are drawn in one look and not named.
+/// Most curves with names and different looks. More curves have one look and no names.
 pub(super) const MOST_NAMED: usize = 10;
 
-/// Writes a picture.
+/// Writes a picture to a file and returns its path.
 pub(crate) fn write(path: PathBuf, svg: &str) -> Result<PathBuf, RecordError> {
     let mut file = RecordFile::create(path)?;
     file.write(svg.as_bytes())?;
@@ -38,7 +38,7 @@ pub(crate) fn write(path: PathBuf, svg: &str) -> Result<PathBuf, RecordError> {
 }
 
 impl Plot<'_> {
-    /// The picture.
+    /// Draws the picture.
     pub(crate) fn picture(&self) -> Picture {
         let mut picture = Picture::new(self.title.as_str()).shared_x().aspect(0.38);
         for panel in &self.panels {
@@ -54,7 +54,7 @@ impl Plot<'_> {
 
 pub(super) const CUT: &str = "What goes far beyond is cut off.";
 
-/// The panel, and whether something is cut off.
+/// Returns the panel, and whether values are cut off.
 fn drawn(panel: &Panel<'_>) -> (cohaptic_picture::Panel, bool) {
     let (range, cut) = panel.bands.range(panel.sane);
     let range = range.start * panel.scale..range.end * panel.scale;
@@ -69,7 +69,7 @@ fn drawn(panel: &Panel<'_>) -> (cohaptic_picture::Panel, bool) {
     (drawn, cut)
 }
 
-/// The parts of a curve that lie in the range shown: lowest and highest value of each span, in the order that continues the line.
+/// Returns the parts of a curve within the shown range: lowest and highest value of each span.
 fn visible_runs(panel: &Panel<'_>, curve: usize, range: &std::ops::Range<f64>) -> Vec<Vec<(f64, f64)>> {
     let mut runs = vec![Vec::new()];
     let mut last = f64::NAN;
@@ -80,6 +80,7 @@ fn visible_runs(panel: &Panel<'_>, curve: usize, range: &std::ops::Range<f64>) -
             continue;
         }
         let run = runs.last_mut().expect("there is always a run");
+        // Begin with the value nearer to the end of the line so far, so that the line has no needless strokes.
         let rising = (last - low).abs() <= (last - high).abs() || last.is_nan();
         let (first, second) = if rising { (low, high) } else { (high, low) };
         run.push((t, first));
@@ -101,7 +102,7 @@ mod tests {
 
     use super::*;
 
-    /// The faults of the pictures on the first page of the README: a title cut off at both ends, and two curves that were one.
+    /// A long title must not be cut off at either end, and two coincident curves must be told apart.
     #[test]
     fn no_title_is_cut_off_and_curves_that_coincide_are_told_apart() {
         let mut bands = Bands::new(Duration::from_secs(10), 1000, 2);

@@ -1,4 +1,4 @@
-//! The observer that writes everything down.
+//! The observer that writes all records of a run.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ use super::plot;
 use super::trajectory::{Trajectory, Turns};
 use crate::{Observer, PacketRow, Summary, TickRow};
 
-/// Writes `trajectory.csv` and `packets.csv` while the scene runs, and with [`Recorder::finish`] the rest.
+/// Writes `trajectory.csv` and `packets.csv` during the run, and the remaining files in [`Recorder::finish`].
 #[derive(Debug)]
 pub struct Recorder {
     folder: PathBuf,
@@ -23,15 +23,15 @@ pub struct Recorder {
     size: Size,
 }
 
-/// Farther from where it began no copy is moved by people at desktop devices \[m\].
+/// Distance from its initial position beyond which no person at a desktop device moves a copy \[m\].
 pub const SANE_POSITION: f64 = 1.0;
 
 impl Recorder {
-    /// Begins to record a scene into a folder, which is made if there is none. Records of an earlier run in it are replaced when this one is whole.
+    /// Creates the folder if needed and begins the records. Records of an earlier run in the folder are replaced by [`Recorder::finish`].
     ///
     /// # Errors
     ///
-    /// [`RecordError`] if the folder or a file cannot be made.
+    /// [`RecordError`] if the folder or a file cannot be created.
     pub fn create(folder: &Path, scene: &Scene) -> Result<Self, RecordError> {
         create_folder(folder)?;
         let names: Vec<String> = scene.peers.iter().map(|peer| peer.name.clone()).collect();
@@ -44,13 +44,13 @@ impl Recorder {
         })
     }
 
-    /// With pictures of this size. Without it, a page on a screen.
+    /// Sets the size of the pictures. The default is a page on a screen.
     #[must_use]
     pub fn sized(self, size: Size) -> Self {
         Self { size, ..self }
     }
 
-    /// Writes the rest and gives every file its name; gives the files.
+    /// Writes the remaining files, gives every file its name, and returns the paths.
     ///
     /// # Errors
     ///
@@ -59,7 +59,7 @@ impl Recorder {
         self.finish_with_pictures(summary).map(|(files, _)| files)
     }
 
-    /// [`finish`](Self::finish), with the pictures of the files under the names of the files.
+    /// Like [`finish`](Self::finish), and also returns the pictures with the names of their files.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! `trajectory.csv`.
+//! `trajectory.csv`: states and forces at each tick of each peer.
 
 use std::path::Path;
 
@@ -10,13 +10,13 @@ use super::file::{RecordFile, push_f64, push_seconds};
 use crate::TickRow;
 use crate::record::RecordError;
 
-/// What turns in a scene.
+/// Rotating bodies of a scene.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Turns {
     Nothing,
-    /// The copies of the object.
+    /// Copies of the object.
     Copies,
-    /// Copies, and at least one device.
+    /// Copies of the object, and at least one device.
     Devices,
 }
 
@@ -37,15 +37,17 @@ fn push_attitude(line: &mut Vec<u8>, attitude: &Attitude) {
     }
 }
 
-/// Columns `t,peer,xh,vh,xo,vo,xd,vd,fc,ft`; with more axes, `yh,vyh,yo,vyo,yd,vyd,fcy,fty` and the same with z behind them. Where the object turns, the
-/// attitude of the copy and the torques follow, and if any device turns its attitude, empty for others.
+/// Writes the columns `t,peer,xh,vh,xo,vo,xd,vd,fc,ft`. A second axis adds `yh,vyh,yo,vyo,yd,vyd,fcy,fty`, and a third axis the same columns with z. If the
+/// object turns,
+/// the attitude of the copy and the torques follow. If any device turns, the attitude of the device follows, empty for devices that do not turn.
 #[derive(Debug)]
 pub(crate) struct Trajectory {
     file: RecordFile,
     names: Vec<String>,
     turn: Turns,
-    /// The instant of the latest row, and how the row begins.
+    /// Instant of the latest row.
     at: Option<Instant>,
+    /// Text of `at` with its comma, which begins all rows of that instant.
     beginning: Vec<u8>,
     line: Vec<u8>,
 }
@@ -70,7 +72,7 @@ impl Trajectory {
     pub(crate) fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), RecordError> {
         let line = &mut self.line;
         line.clear();
-        // All peers of an instant have one beginning.
+        // All rows of an instant begin with the same text, which is formatted once.
         if self.at != Some(row.at) {
             self.at = Some(row.at);
             self.beginning.clear();

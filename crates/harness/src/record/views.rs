@@ -1,4 +1,4 @@
-//! `views.svg`: the copies of an object that turns, from above, from the front and from the side.
+//! `views.svg`: copies of a rotating object, from above, from the front and from the side.
 
 use cohaptic_peer::State;
 use cohaptic_peer::rotation::{Attitude, Triple};
@@ -10,35 +10,41 @@ use super::band::Bands;
 use super::plot::{CUT, MOST_NAMED};
 use super::recorder::SANE_POSITION;
 
-/// The poses of all copies: at the first tick of each of a fixed number of spans of time, and at the last tick.
+/// Poses of all copies: at the first tick in each of a fixed number of spans of time, and at the last tick.
 #[derive(Debug)]
 pub(crate) struct Views {
+    /// Edges of the box with the mass and the inertia of the object \[m\], along the body axes.
     edges: Triple,
-    /// The points of each copy whose traces are drawn, in body axes: where it is grasped, or, if at its centre of mass, the ends of its three body axes.
+    /// Points of each copy with drawn traces, in body axes \[m\], indexed by peer: the grasped point, or the ends of the three body axes if the copy is grasped
+    /// at its
+    /// centre of mass.
     traced: Vec<Vec<Triple>>,
+    /// Spans of time, without curves.
     spans: Bands,
-    /// By peer, then span.
+    /// First pose in each span, indexed by peer, then span; `None` in spans without a tick.
     poses: Vec<Vec<Option<Pose>>>,
+    /// Pose at the last tick, indexed by peer.
     last: Vec<Option<Pose>>,
 }
 
-/// Where a copy is, and how it is turned.
+/// Position and orientation of a copy.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Pose {
     centre: Triple,
     orientation: [f64; 4],
 }
 
-/// A plane of the world that is looked at: title, the axis to the right and the axis upwards.
+/// Views: title, axis to the right, axis upwards.
 const PLANES: [(&str, usize, usize); 3] = [("top", 0, 1), ("front", 0, 2), ("side", 1, 2)];
+/// Names of the axes.
 const NAMES: [&str; 3] = ["x", "y", "z"];
-/// Metres are shown in centimetres.
+/// Factor from metres to centimetres.
 const SCALE: f64 = 100.0;
 const ABOUT: &str = "Boxes of even density with the mass and the inertia of the object: at the beginning, after one and two thirds (thin), and at the end (filled). \
                      Curves: where it is grasped (at the end, a disc), or the ends of the body axes of a copy that is not held off its centre.";
 
 impl Views {
-    /// `None` if the object does not turn.
+    /// Returns the state before the run; `None` if the object does not turn.
     pub(crate) fn new(scene: &Scene, spans: usize) -> Option<Self> {
         let (rotation, edges) = scene.rotation.as_ref().zip(scene.even_box())?;
         let along = |axis: usize| std::array::from_fn(|other| if axis == other { 0.5 * edges[axis] } else { 0.0 });
@@ -53,7 +59,7 @@ impl Views {
         })
     }
 
-    /// Takes in a copy at a tick. Positions that are not finite are left out.
+    /// Adds the pose of a copy at a tick. Ignores poses that are not finite.
     pub(crate) fn add(&mut self, peer: usize, at: Instant, centre: &[f64], attitude: &Attitude) {
         let (Some(span), Ok(centre)) = (self.spans.span(at), Triple::try_from(centre)) else { return };
         if attitude.is_finite() && centre.iter().all(|x| x.is_finite()) {
@@ -63,7 +69,7 @@ impl Views {
         }
     }
 
-    /// The picture. `positions` are the curves of all copies by axis, then peer: their range decides which points are far beyond.
+    /// Draws the picture. `positions` are the curves of all copies by axis, then peer. Their range decides which poses are left out as far beyond.
     pub(crate) fn picture(&self, title: &str, names: &[String], positions: &Bands) -> Picture {
         let ranges: Vec<_> = positions.split(3).iter().map(|axis| axis.range(SANE_POSITION)).collect();
         let cut = ranges.iter().any(|(_, cut)| *cut);
@@ -80,7 +86,7 @@ impl Views {
             for peer in 0..self.traced.len() {
                 let (thin, last) = (look(peer).thin(), self.last[peer].as_ref().filter(|pose| sane(pose)));
                 for arm in &self.traced[peer] {
-                    // A peer that ticks less often than spans end has none in some.
+                    // A peer with ticks longer than a span has spans without a pose.
                     let trace = poses(peer).flatten().map(|pose| flat(pose.point(*arm)));
                     panel = panel.with(Line::new(trace, thin));
                 }
@@ -105,7 +111,7 @@ impl Views {
 }
 
 impl Pose {
-    /// Where a point of the body is, in world axes.
+    /// Returns the position of a body point in world axes \[m\].
     fn point(&self, arm: Triple) -> Triple {
         let attitude = Attitude { orientation: self.orientation, rate: [0.0; 3] };
         attitude.point(arm, &State { position: self.centre, velocity: [0.0; 3] }).position
@@ -121,7 +127,7 @@ fn closed(mut outline: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     outline
 }
 
-/// The corners of the smallest convex area that holds these points, counterclockwise (Andrew 1979).
+/// Returns the corners of the convex hull of the points, counterclockwise (Andrew 1979).
 fn hull(mut points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     points.sort_by(|one, other| one.0.total_cmp(&other.0).then(one.1.total_cmp(&other.1)));
     let chain = |points: &mut dyn Iterator<Item = (f64, f64)>| {
@@ -159,7 +165,7 @@ mod tests {
         Scene::parse(&text, Path::new("x.toml"), &[]).unwrap()
     }
 
-    /// A tray of 0.4 m × 0.3 m that is turned by 45° about z reaches (0.4 + 0.3)/√8 = 0.2475 m along x and y.
+    /// A tray of 0.4 m × 0.3 m turned by 45° about z reaches (0.4 + 0.3)/√8 = 0.2475 m along x and y.
     #[test]
     fn an_outline_is_that_of_the_box_as_it_is_turned() {
         let mut attitude = Attitude::REST;
