@@ -1,4 +1,4 @@
-//! What a run is expected to cost, by how it is run.
+//! Tests of the expected cost of a run, by the way of running.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use cohaptic_scene::Scene;
 
 use super::explain;
 
-/// Processor time of a simulated second of ten peers [ms].
+/// Returns the processor time of a simulated second of ten peers [ms].
 fn busy(link: &str, clock: &str) -> f64 {
     let text = format!(
         "scene = {{ duration = \"1s\", count = 10 }}\nobject.mass = 1\npeer = {{ contact = \"none\", device.mass = 1 }}\nlink = {{ {link} }}\n\
@@ -16,7 +16,7 @@ fn busy(link: &str, clock: &str) -> f64 {
     1e3 / explain(&scene).cost.realtime_factor
 }
 
-/// 10,000 ticks and 9,000 packets a second.
+/// Each second has 10,000 ticks and 9,000 packets.
 #[test]
 fn lockstep_costs_less_than_events() {
     for (link, clock, nanos) in [

@@ -1,11 +1,11 @@
-//! Links in words: each stage that is configured, with its numbers, and how queues are simulated.
+//! Tests of the texts for links: each configured stage with its numbers, and the simulation of queues.
 
 use cohaptic_scene::Scene;
 use std::path::Path;
 
 use super::explain;
 
-/// Two peers that send 64 bytes every 8 ms over links with these keys.
+/// Returns a scene of two peers with samples of 64 bytes every 8 ms, over links with the given keys.
 fn scene(keys: &str) -> Scene {
     let text = format!(
         "modulators = [{{ name = \"cell\", states = [{{ name = \"a\", sojourn = \"2s\" }}, {{ name = \"b\", sojourn = {{ fixed = \"1s\" }} }}] }}]\n\
@@ -19,7 +19,7 @@ fn described(keys: &str) -> String {
     scene(keys).links.between(0, 1).words()
 }
 
-/// A line of 64 kbit/s sends a sample just before the next one comes.
+/// A line of 64 kbit/s takes 8 ms for a sample, just the time until the next sample.
 #[test]
 fn queues_in_which_no_sample_waits_are_left_out() {
     let queues = |keys: &str| {
@@ -41,7 +41,7 @@ fn queues_in_which_no_sample_waits_are_left_out() {
     let until = "samples of a link come at least 8ms apart: until then nothing new can be known";
     told(&format!("rate = \"63kbit\"\n{codel}"), "from one sample of a link to its next", until, "a calendar queue");
     assert_eq!(queues("delay = \"9ms\"").0, None);
-    // With events there is no such run.
+    // A limit needs events, and runs with events have no such row.
     assert_eq!(queues("rate = \"64kbit\"\nlimit = \"9 packets\""), (None, Some("a calendar queue".to_owned())));
 }
 

@@ -1,4 +1,4 @@
-//! What a scene makes the program model, what it leaves out, and why.
+//! Explanation of a scene: which parts the program models, which parts the program leaves out, and why.
 
 #[cfg(test)]
 mod costs;
@@ -16,57 +16,56 @@ use crate::measures::Measures;
 use crate::plan::{DeviceChoice, Model, Plan, Ticking};
 use crate::world::Watch;
 
-/// What `cohaptic explain` shows.
+/// Content of the answer to `cohaptic explain`.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Explanation {
-    /// The parts that are modelled, and how.
+    /// Modelled parts with their models.
     pub models: Vec<ModelRow>,
-    /// The parts that are not modelled, and why.
+    /// Parts left out, each with a reason.
     pub left_out: Vec<String>,
-    /// The sizes of the state.
+    /// Sizes of the state.
     pub dimensions: Dimensions,
-    /// What a run is expected to cost.
+    /// Expected cost of a run.
     pub cost: Cost,
 }
 
 /// One part of the scene and its model.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct ModelRow {
-    /// Which part.
+    /// Name of the part.
     pub part: String,
-    /// How it is modelled.
+    /// Model of the part.
     pub model: String,
-    /// Why so.
+    /// Reason for the model.
     pub reason: String,
 }
 
-/// The sizes of the state of the running scene.
+/// Sizes of the state of the running scene.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Dimensions {
-    /// Positions and velocities of devices and copies.
+    /// Number of positions and velocities of devices and copies.
     pub plant: u64,
-    /// Numbers in the samples held from other peers.
+    /// Number of numbers in the samples held from other peers.
     pub held: u64,
-    /// Packets on the way at once, about: sent per second times the mean delay.
+    /// Approximate number of packets in flight at once: packets per second times the mean delay.
     pub in_flight: u64,
 }
 
-/// The estimated cost of a run, from the speeds in `docs/measured-speed.md`.
+/// Estimated cost of a run, from the speeds in `docs/measured-speed.md`.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Cost {
     /// Control ticks of all peers in a simulated second.
     pub peer_ticks_per_s: f64,
     /// Packets sent in a simulated second.
     pub packets_per_s: f64,
-    /// Simulated seconds per second of processor time with nothing recorded, within a factor of two on a present-day core. Access lines are not
-    /// counted.
+    /// Simulated seconds per second of processor time without records, within a factor of two on a present-day core. Access lines are not counted.
     pub realtime_factor: f64,
-    /// What `--out` writes in a simulated second, about \[byte\].
+    /// Approximate bytes written by `--out` in a simulated second.
     pub record_bytes_per_s: f64,
 }
 
-/// Nanoseconds for a control tick of one peer with one axis, for a packet over a link of constant delay, and for one over a link with more
-/// impairments: see `docs/measured-speed.md`.
+/// Times \[ns\] of a control tick of one peer with one axis, of a packet over a link of constant delay, and of a packet over a link with more impairments: see
+/// `docs/measured-speed.md`.
 struct Nanos {
     a_tick: f64,
     a_packet: f64,
@@ -76,12 +75,14 @@ struct Nanos {
 const WITH_EVENTS: Nanos = Nanos { a_tick: 12.0, a_packet: 20.0, an_impaired_packet: 45.0 };
 const IN_ARRAYS: Nanos = Nanos { a_tick: 8.0, a_packet: 1.0, an_impaired_packet: 25.0 };
 
-/// Bytes of a row of `trajectory.csv` (for its first axis and for each further one) and of `packets.csv`, in scenes of ordinary size.
+/// Approximate bytes of a row of `trajectory.csv` without its axes, in scenes of ordinary size.
 const BYTES_A_TICK: f64 = 20.0;
+/// Approximate bytes of each axis in a row of `trajectory.csv`.
 const BYTES_AN_AXIS: f64 = 145.0;
+/// Approximate bytes of a row of `packets.csv`.
 const BYTES_A_PACKET: f64 = 40.0;
 
-/// Says what the scene makes the program model.
+/// Explains which parts of a scene the program models, and why.
 #[must_use]
 pub fn explain(scene: &Scene) -> Explanation {
     let watch = Watch::of(&Measures::of(scene));
@@ -279,7 +280,7 @@ impl Rows {
         );
     }
 
-    /// How the stability of an object that turns is analysed.
+    /// Adds the analysis of stability of a rotating object.
     fn turns(&mut self, scene: &Scene) {
         match scene.rotation_parts() {
             None => {}
@@ -338,7 +339,7 @@ impl Rows {
     }
 }
 
-/// Peers of the same kind together, in the order of their first.
+/// Groups the peers with the same device model and description, in the order of their first peers.
 fn groups<'a>(scene: &'a Scene, plan: &Plan) -> Vec<(DeviceChoice, Vec<&'a PeerSpec>)> {
     let mut groups: Vec<(DeviceChoice, Vec<&PeerSpec>)> = Vec::new();
     for (peer, choice) in scene.peers.iter().zip(&plan.devices) {
@@ -372,7 +373,7 @@ fn describe(peer: &PeerSpec) -> String {
     format!("device of {} kg that {contact}, {hand}", Number(peer.device.mass))
 }
 
-/// The configurations that links between different peers have, and how many links have each.
+/// Returns the configurations of the links between different peers, each with the number of links.
 fn used_links(scene: &Scene) -> Vec<(&LinkModel, u64)> {
     scene.used_links().into_iter().map(|(config, count)| (config.as_ref(), count)).collect()
 }
@@ -417,7 +418,7 @@ fn count_f64(count: u64) -> f64 {
     count as f64
 }
 
-/// When samples are sent, if not always, in words that go on.
+/// Returns the text of the send condition, as a continuation of a sentence; empty without a condition.
 fn dead_bands(when: Option<&SendWhen>) -> String {
     let Some(SendWhen { velocity, position, heartbeat }) = when else { return String::new() };
     let conditions = [
