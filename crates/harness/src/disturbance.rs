@@ -1,22 +1,22 @@
-//! A small displacement of where everything begins, to see whether it dies out.
+//! A small displacement of all initial states, to see whether the displacement dies out.
 
 use cohaptic_peer::State;
 use cohaptic_peer::rotation::{Attitude, Rotation};
 
-/// Beyond the places of all peers, so that no turn is like a displacement.
+/// Offset of the indices of turns, beyond the indices of all peers, so that no turn equals a displacement.
 const TURNS: usize = 1 << 24;
 
-/// Displaces each device and each copy by up to `size`, each differently, so that every mode of the relative motion is excited.
+/// Displacement of each device and each copy by up to `size`, different for each body, so that every mode of the relative motion is excited.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Disturbance {
-    /// \[m\]
+    /// Largest displacement along an axis \[m\].
     pub(crate) size: f64,
 }
 
 impl Disturbance {
-    /// The displaced state of a peer's device (`body` 0) or copy (`body` 1), along the first `axes` axes.
+    /// Returns the displaced state of a peer's device (`body` 0) or copy (`body` 1), along the first `axes` axes.
     ///
-    /// Steps of the golden angle spread over the circle without repeating, so no two bodies of any number move alike.
+    /// Multiples of the golden angle cover the circle without repetition, so all bodies have different displacements.
     pub(crate) fn displace<const A: usize>(self, state: State<A>, axes: usize, place: usize, body: usize) -> State<A> {
         const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
         let mut displaced = state;
@@ -27,7 +27,7 @@ impl Disturbance {
         displaced
     }
 
-    /// Turns a peer's copy and device; angles times `length` are lengths \[m\].
+    /// Turns a peer's copy and device by angles of up to `size` / `length` \[rad\].
     pub(crate) fn turn(self, rotation: &mut Rotation, length: f64, place: usize) {
         let turned = |mut attitude: Attitude, body: usize| {
             let State { position, .. } = self.displace(State::<3>::REST, 3, TURNS + place, body);

@@ -1,42 +1,45 @@
-//! The samples on their way: what all receivers get is stored once, however many there are.
+//! Samples in flight. A sample for several receivers is stored once.
 
 use std::num::NonZeroU32;
 
 use cohaptic_peer::rotation::Attitude;
 use cohaptic_peer::wire::{Extra, Sample, SampleKind};
 
-/// A sample in the store.
+/// Index + 1 of a sample in the store. Valid until the last copy of the sample is released.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Handle(NonZeroU32);
 
-/// Stores samples until their last copy has arrived or was dropped. Its memory is bounded by the samples on the way at once.
+/// Store of samples, each until its last copy has arrived or was dropped. The memory is bounded by the largest number of samples in flight at once.
 ///
-/// A sample is stored as its numbers. Its bytes are made where somebody reads them: by a receiver of a damaged packet, or by a socket.
+/// A sample is stored as numbers. Bytes are made where they are read: for the receiver of a damaged packet, or for a socket.
 #[derive(Clone, Debug)]
 pub(crate) struct SamplesInFlight<const A: usize> {
     kind: SampleKind,
+    /// Samples, indexed by handle − 1.
     slots: Vec<Slot<A>>,
+    /// Handles of slots without a sample, the latest last.
     free: Vec<Handle>,
-    /// For each slot the numbers beyond position and velocity. Empty where samples have none.
+    /// Numbers beyond position and velocity, indexed like `slots`. Empty if the kind of sample has none.
     extended: Vec<Extended<A>>,
 }
 
 #[derive(Clone, Debug)]
 struct Slot<const A: usize> {
+    /// Copies in flight, at least 1 in a used slot.
     sample: Sample<A>,
     copies: usize,
 }
 
-/// What a sample says beyond position and velocity.
+/// Content of a sample beyond position and velocity.
 #[derive(Clone, Debug)]
 struct Extended<const A: usize> {
-    /// By the place of the receiver, or a single entry where all receivers get the same.
+    /// Extra numbers, indexed by receiver, or a single entry for all receivers.
     numbers: Vec<[f64; A]>,
     attitude: Attitude,
 }
 
 impl<const A: usize> SamplesInFlight<A> {
-    /// Returns an empty store for samples of that kind.
+    /// Returns an empty store for samples of the given kind.
     pub(crate) const fn new(kind: SampleKind) -> Self {
         Self { kind, slots: Vec::new(), free: Vec::new(), extended: Vec::new() }
     }
@@ -60,9 +63,9 @@ impl<const A: usize> SamplesInFlight<A> {
         }
     }
 
-    /// Stores a sample with an attitude and with the extra numbers that `write` appends: by the place of the receiver, or one entry for all.
+    /// Stores a sample with an attitude and with the extra numbers that `write` appends: one entry for each receiver, by index, or one entry for all.
     ///
-    /// `None` if an extra number of the first `axes` axes is not finite: no receiver would take the sample.
+    /// Returns `None` if an extra number of the first `axes` axes is not finite: no receiver would accept the sample.
     pub(crate) fn store_extended(
         &mut self,
         (copies, axes): (usize, usize),
@@ -82,11 +85,12 @@ impl<const A: usize> SamplesInFlight<A> {
         if extended.numbers.iter().flat_map(|numbers| &numbers[..axes]).all(|number| number.is_finite()) {
             return Some(handle);
         }
+        // The slot becomes free again: no packet refers to this sample.
         self.free.push(handle);
         None
     }
 
-    /// Returns what a sample says beyond position and velocity to the receiver in that place of the session.
+    /// Returns the content of a sample beyond position and velocity, for the receiver at the given index of the session.
     #[inline(always)]
     pub(crate) fn extra(&self, handle: Handle, receiver: usize) -> Extra<A> {
         if self.kind == SampleKind::State { Extra::NONE } else { self.stored_extra(handle, receiver) }
@@ -99,18 +103,18 @@ impl<const A: usize> SamplesInFlight<A> {
         Extra { receiver, numbers, attitude: *attitude }
     }
 
-    /// Returns position and velocity of a sample, and what names it.
+    /// Returns position and velocity of a sample, with its session, sender, sequence number and instant.
     #[inline]
     pub(crate) fn sample(&self, handle: Handle) -> &Sample<A> {
         &self.slots[handle.place()].sample
     }
 
-    /// One copy more is on the way.
+    /// Adds a copy in flight.
     pub(crate) fn retain(&mut self, handle: Handle) {
         self.slot_mut(handle).copies += 1;
     }
 
-    /// One copy less is on the way.
+    /// Removes a copy in flight. The last copy frees the slot.
     #[inline]
     pub(crate) fn release(&mut self, handle: Handle) {
         let slot = self.slot_mut(handle);
@@ -163,7 +167,7 @@ mod tests {
         assert_eq!(samples.slots.len(), 2);
     }
 
-    /// A number of an axis that the scene does not have goes to nobody.
+    /// A number beyond the axes of the scene is not sent, so its value does not matter.
     #[test]
     fn a_number_that_is_not_finite_takes_no_slot() {
         let mut samples = SamplesInFlight::<3>::new(SampleKind::Wave);

@@ -1,4 +1,4 @@
-//! The observer of a run.
+//! Observers of a run, and the rows that observers see.
 
 use cohaptic_peer::rotation::Attitude;
 use cohaptic_units::{Bytes, Instant};
@@ -7,23 +7,26 @@ use cohaptic_wan::{PacketRecord, Path};
 use crate::arrays::Ticks;
 use crate::live::InputRow;
 
-/// The most instants, or ticks in arrays, between two calls of [`Observer::keep_going`].
+/// Most instants, or ticks in arrays, between two calls of [`Observer::keep_going`].
 pub(crate) const MOST_INSTANTS_BETWEEN_QUESTIONS: u32 = 1024;
 
-/// Ticks of peers, or packets, between two calls of [`Observer::keep_going`] at most, unless more happen at one instant: a part of a second.
+/// Most ticks of peers, or packets, between two calls of [`Observer::keep_going`], unless a single instant has more. Takes a part of a second.
 pub(crate) const MOST_WORK_BETWEEN_QUESTIONS: usize = 1 << 22;
 
-/// Instants, or ticks in arrays, between two calls of [`Observer::keep_going`]: a power of two. `work`: ticks of peers, or packets, at an instant at most.
+/// Returns the number of instants, or of ticks in arrays, between two calls of [`Observer::keep_going`]: a power of two. `work`: most ticks of peers, or
+/// packets, at an
+/// instant.
 pub(crate) fn instants_between_questions(work: usize) -> u32 {
     let instants = u32::try_from(MOST_WORK_BETWEEN_QUESTIONS / work.max(1)).unwrap_or(u32::MAX);
-    // Rounded down to a power of two, so that no tick of a small scene pays for a division.
+    // A power of two, so that the loop over ticks needs no division.
     1 << instants.clamp(1, MOST_INSTANTS_BETWEEN_QUESTIONS).ilog2()
 }
 
-/// Sees what happens in a run, while it happens, in the order in which it happens.
+/// Observes a run while it happens, in the order of events.
 ///
-/// Peers are named by their place in [`cohaptic_scene::Scene::peers`]. The rows borrow from the running scene: copy what you keep. By default an
-/// observer wants to see nothing; what it does not want costs nothing.
+/// Peers are indices of [`cohaptic_scene::Scene::peers`]. Rows borrow from the running scene, so an observer copies the parts that it keeps. By default an
+/// observer wants
+/// no rows. Rows that an observer does not want are not made.
 ///
 /// ```no_run
 /// use std::convert::Infallible;
@@ -56,115 +59,118 @@ pub(crate) fn instants_between_questions(work: usize) -> u32 {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait Observer {
-    /// Why the run must end: a file that cannot be written, for instance. An observer that never fails has [`std::convert::Infallible`].
+    /// Reason for which the run must end, for example a file that cannot be written. [`std::convert::Infallible`] for an observer that never fails.
     type Error;
 
-    /// Whether [`Observer::on_tick`] or [`Observer::on_ticks`] is to be called. Asked at the start; the answer must stay.
+    /// Returns whether [`Observer::on_tick`] or [`Observer::on_ticks`] is to be called. Asked at the start; the answer must not change.
     fn wants_ticks(&self) -> bool {
         false
     }
 
-    /// Whether [`Observer::on_packet`] is to be called. Asked once, at the start.
+    /// Returns whether [`Observer::on_packet`] is to be called. Asked once, at the start.
     fn wants_packets(&self) -> bool {
         false
     }
 
-    /// Whether [`Observer::on_step`] is to be called. Asked once, at the start.
+    /// Returns whether [`Observer::on_step`] is to be called. Asked once, at the start.
     fn wants_steps(&self) -> bool {
         false
     }
 
-    /// Whether [`Observer::on_instant`] is to be called. Asked once, at the start.
+    /// Returns whether [`Observer::on_instant`] is to be called. Asked once, at the start.
     fn wants_instants(&self) -> bool {
         false
     }
 
-    /// Whether [`Observer::on_send`] is to be called. Asked once, at the start.
+    /// Returns whether [`Observer::on_send`] is to be called. Asked once, at the start.
     fn wants_sends(&self) -> bool {
         false
     }
 
-    /// Whether [`Observer::on_hold`] is to be called. Asked once, at the start.
+    /// Returns whether [`Observer::on_hold`] is to be called. Asked once, at the start.
     fn wants_holds(&self) -> bool {
         false
     }
 
-    /// A peer has computed its forces at a tick.
+    /// Called when a peer has computed its forces at a tick, before the peer moves.
     ///
     /// # Errors
     ///
-    /// Ends the run.
+    /// An error ends the run.
     fn on_tick(&mut self, _row: &TickRow<'_>) -> Result<(), Self::Error> {
         Ok(())
     }
 
-    /// All peers have computed their forces at an instant at which all of them tick: [`Observer::on_tick`] of each, in one call.
+    /// Called when all peers have computed their forces at an instant at which all of them tick: [`Observer::on_tick`] for each peer, in one call.
     ///
-    /// A run of which only ticks and instants are wanted calls this where it needs no events and all peers tick together; all others call
-    /// [`Observer::on_tick`]. An observer with an `on_ticks` of its own, which may look at less than whole rows, must come to the same with either.
+    /// Called only in a run without events, whose observer wants no more than ticks and instants; other runs call [`Observer::on_tick`]. An observer that
+    /// overrides
+    /// `on_ticks`, for example to read less than whole rows, must get the same result from both.
     ///
     /// # Errors
     ///
-    /// Ends the run.
+    /// An error ends the run.
     fn on_ticks(&mut self, ticks: &Ticks<'_>) -> Result<(), Self::Error> {
         ticks.each(|row| self.on_tick(row))
     }
 
-    /// A packet, or a copy that a link made of one, has arrived or was dropped.
+    /// Called when a packet, or a copy of a packet made by a link, has arrived or was dropped.
     ///
     /// # Errors
     ///
-    /// Ends the run.
+    /// An error ends the run.
     fn on_packet(&mut self, _row: &PacketRow) -> Result<(), Self::Error> {
         Ok(())
     }
 
-    /// A peer has moved from a tick to its next one.
+    /// Called when a peer has moved from a tick to its next tick.
     ///
     /// # Errors
     ///
-    /// Ends the run.
+    /// An error ends the run.
     fn on_step(&mut self, _row: &StepRow<'_>) -> Result<(), Self::Error> {
         Ok(())
     }
 
-    /// All peers that tick at an instant have ticked.
+    /// Called when all peers that tick at an instant have ticked.
     ///
     /// # Errors
     ///
-    /// Ends the run.
+    /// An error ends the run.
     fn on_instant(&mut self, _row: &InstantRow) -> Result<(), Self::Error> {
         Ok(())
     }
 
-    /// A peer has sent a sample.
+    /// Called when a peer has sent a sample.
     ///
     /// # Errors
     ///
-    /// Ends the run.
+    /// An error ends the run.
     fn on_send(&mut self, _row: &SendRow) -> Result<(), Self::Error> {
         Ok(())
     }
 
-    /// A peer holds a newer sample of another one, from its next tick on, which may be at this instant.
+    /// Called when a peer holds a newer sample of another peer, which takes effect at the receiver's next tick. This tick may be at the same instant.
     ///
     /// # Errors
     ///
-    /// Ends the run.
+    /// An error ends the run.
     fn on_hold(&mut self, _row: &HoldRow) -> Result<(), Self::Error> {
         Ok(())
     }
 
-    /// Something has come into a [live session](crate::live) from outside: a replay needs the rows seen here, in this order.
+    /// Called for each input of a [live session](crate::live) from outside. A replay needs these rows in the same order.
     ///
     /// # Errors
     ///
-    /// Ends the run.
+    /// An error ends the run.
     fn on_input(&mut self, _row: &InputRow<'_>) -> Result<(), Self::Error> {
         Ok(())
     }
 
-    /// Called about every thousand instants, of thousands of peers up to every instant, for progress and interruption; `false` ends the run early, in good order.
+    /// Called about every thousand instants, and with thousands of peers up to every instant, for progress and interruption. `false` ends the run early; the
+    /// run then
+    /// returns its results so far.
     fn keep_going(&mut self, _now: Instant) -> bool {
         true
     }
@@ -179,79 +185,79 @@ pub struct StateRow<'a> {
     pub velocity: &'a [f64],
 }
 
-/// One peer at one tick: the state at that instant and the forces computed at it. Slices have as many entries as the scene has axes.
+/// State of one peer at a tick and the forces computed at this tick. Slices have as many entries as the scene has axes.
 #[derive(Clone, Copy, Debug)]
 pub struct TickRow<'a> {
-    /// The instant of the tick.
+    /// Instant of the tick.
     pub at: Instant,
-    /// The peer.
+    /// Index of the peer.
     pub peer: usize,
-    /// Its device.
+    /// State of the device.
     pub device: StateRow<'a>,
-    /// Its copy of the object.
+    /// State of the copy of the object.
     pub object: StateRow<'a>,
-    /// Where its strategy wants the copy to be.
+    /// State at which the strategy wants the copy to be.
     pub target: StateRow<'a>,
-    /// FC \[N\].
+    /// Coupling force FC \[N\].
     pub coupling_force: &'a [f64],
-    /// FT \[N\].
+    /// Coordination force FT \[N\].
     pub coordination_force: &'a [f64],
-    /// How the peer is turned, if the object turns.
+    /// Attitudes and torques; `None` if the object does not turn.
     pub turn: Option<TurnRow<'a>>,
 }
 
-/// The turning part of one peer at one tick.
+/// Attitudes and torques of one peer at one tick.
 #[derive(Clone, Copy, Debug)]
 pub struct TurnRow<'a> {
-    /// The attitude of its copy.
+    /// Attitude of the copy.
     pub object: &'a Attitude,
-    /// The attitude of its device; `None` for one that does not turn.
+    /// Attitude of the device; `None` for a device that does not turn.
     pub device: Option<&'a Attitude>,
-    /// r×RᵀFC + τC: the torque of device and coupling on the copy, in its body axes \[N·m\].
+    /// Torque of device and coupling on the copy, r×RᵀFC + τC, in body axes of the copy \[N·m\].
     pub coupling_torque: &'a [f64; 3],
-    /// τT, in the body axes of the copy, on which it acts with the opposite sign \[N·m\].
+    /// Coordination torque τT in body axes of the copy \[N·m\]. Acts on the copy with the opposite sign.
     pub coordination_torque: &'a [f64; 3],
 }
 
-/// One peer over one step of its copy, from a tick to the next one of this peer. Slices have as many entries as the scene has axes.
+/// Step of one peer's copy, from a tick to the next tick of this peer. Slices have as many entries as the scene has axes.
 ///
-/// Of a client of a server, which has no copy, it is the step of the device, and F is the coupling force that the server returns or the client computes.
+/// For a client of a server, which has no copy, this is the step of the device, and F is the coupling force that the server returns or the client computes.
 #[derive(Clone, Copy, Debug)]
 pub struct StepRow<'a> {
-    /// The instant of the tick at which the step begins.
+    /// Instant of the tick at which the step begins.
     pub at: Instant,
-    /// The peer.
+    /// Index of the peer.
     pub peer: usize,
-    /// Its copy of the object at the beginning of the step.
+    /// State of the copy at the beginning of the step.
     pub before: StateRow<'a>,
-    /// Its copy of the object at the end of the step.
+    /// State of the copy at the end of the step.
     pub after: StateRow<'a>,
-    /// The sum of all forces that are held on the copy over the step \[N\]: FC − F and the walls. Damping is no held force.
+    /// Sum of all forces held on the copy over the step \[N\]: FC − F and the walls. Damping is no held force.
     pub held_force: &'a [f64],
-    /// F \[N\], the held part of the coordination force as it is applied, which acts on the copy with the opposite sign: all of FT but the damping of the strategy.
+    /// Held part F of the coordination force as applied \[N\]: FT without the strategy's own damping. Acts on the copy with the opposite sign.
     pub coordination_force: &'a [f64],
-    /// β, by how much the strategy damps the copy over the step [N·s/m].
+    /// Damping β of the copy by the strategy over the step [N·s/m].
     pub own_damping: f64,
-    /// The turn of the copy over the step, if the object turns.
+    /// Turn of the copy over the step; `None` if the object does not turn.
     pub turn: Option<TurnStepRow>,
 }
 
-/// The turn of one copy over one of its steps, all in its body axes.
+/// Turn of one copy over one of its steps, in body axes.
 #[derive(Clone, Copy, Debug)]
 pub struct TurnStepRow {
-    /// How long the step takes.
+    /// Duration of the step.
     pub span: std::time::Duration,
     /// Angular velocity at the beginning [rad/s].
     pub before: [f64; 3],
     /// Angular velocity at the end [rad/s].
     pub after: [f64; 3],
-    /// The integral of the angular velocity over the step \[rad\].
+    /// Integral of the angular velocity over the step \[rad\].
     pub travel: [f64; 3],
-    /// The sum of all torques that are held on the copy over the step \[N·m\]. Damping is no held torque.
+    /// Sum of all torques held on the copy over the step \[N·m\]. Damping is no held torque.
     pub held_torque: [f64; 3],
-    /// The held part of the torque of the coordination as it is applied, which acts with the opposite sign \[N·m\].
+    /// Held part of the coordination torque as applied \[N·m\]. Acts on the copy with the opposite sign.
     pub coordination_torque: [f64; 3],
-    /// β about each axis, by how much the strategy damps the turn over the step [N·m·s/rad].
+    /// Damping β of the turn by the strategy, about each axis [N·m·s/rad].
     pub own_damping: [f64; 3],
 }
 
@@ -260,40 +266,40 @@ pub struct TurnStepRow {
 pub struct InstantRow {
     /// The instant.
     pub at: Instant,
-    /// The largest distance along an axis between two copies of the object at their latest ticks \[m\].
+    /// Largest distance along an axis between two copies of the object at their latest ticks \[m\].
     pub discrepancy: f64,
 }
 
-/// One sample that a peer sends.
+/// A sample sent by a peer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct SendRow {
-    /// The instant.
+    /// Instant of sending.
     pub at: Instant,
-    /// The sender.
+    /// Index of the sender.
     pub peer: usize,
-    /// The packets that are offered to the network, each with the sample.
+    /// Number of packets offered to the network, each with the sample.
     pub packets: u64,
-    /// The size of each packet.
+    /// Size of each packet.
     pub size: Bytes,
 }
 
-/// One sample that a peer holds from now on.
+/// A sample that a peer holds from now on.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct HoldRow {
-    /// The instant at which it was taken in: that of a tick of some peer, at or after the arrival.
+    /// Instant at which the receiver took the sample: a tick of some peer, at or after the arrival.
     pub at: Instant,
-    /// The sender.
+    /// Index of the sender.
     pub from: usize,
-    /// The peer that holds it.
+    /// Index of the receiver.
     pub to: usize,
-    /// The instant at which it was sampled, and sent.
+    /// Instant at which the sample was taken and sent.
     pub sampled: Instant,
 }
 
-/// What became of one packet between two peers, whose places are those of the nodes, or of one copy of it.
+/// Fate of one packet between two peers, or of one copy of a packet. Nodes of the path are indices of peers.
 pub type PacketRow = PacketRecord<Path>;
 
-/// Sees nothing, and costs nothing.
+/// Observer that wants no rows.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct NoObserver;
 
@@ -301,7 +307,7 @@ impl Observer for NoObserver {
     type Error = std::convert::Infallible;
 }
 
-/// All of an observer but its error, by an observer in a field; `map` makes of the result of each call what it is here.
+/// Implements all of [`Observer`] but its error by the observer in a field. `map` converts the result of each call.
 macro_rules! observe_by_field {
     ($field:ident) => {
         $crate::observer::observe_by_field! { $field, |_: &mut Self, result| result }
@@ -381,27 +387,27 @@ macro_rules! observe_by_field {
 }
 pub(crate) use observe_by_field;
 
-/// The observer has ended the run; [`Erased`] keeps its error.
+/// Mark that the observer has ended the run. [`Erased`] keeps the error.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Ended;
 
-/// Any observer. The loops of a run are compiled for this one, and once more for measures: a call through a table for each row costs less than the row, but a
-/// tenth of the instructions of all measures of three peers.
+/// Any observer, as a trait object. The loops of a run are compiled for this type and once more for measures, whose rows are cheaper than a dynamic call.
 pub(crate) type AnyObserver<'o> = dyn Observer<Error = Ended> + 'o;
 
-/// An observer without its error, which is kept.
+/// Observer with a uniform error type, for [`AnyObserver`]. Keeps the error of the inner observer.
 pub(crate) struct Erased<'o, O: Observer> {
     observer: &'o mut O,
+    /// Error with which the inner observer ended the run.
     error: Option<O::Error>,
 }
 
 impl<'o, O: Observer> Erased<'o, O> {
-    /// What `run` gives, or the error with which the observer has ended it.
+    /// Calls `run` with the erased observer and returns its value, or the error with which the observer ended the run.
     pub(crate) fn run<T>(observer: &'o mut O, run: impl FnOnce(&mut AnyObserver<'_>) -> Result<T, Ended>) -> Result<T, O::Error> {
         Self::run_as_itself(observer, |observer| run(observer))
     }
 
-    /// [`Erased::run`], where `run` is compiled for this observer.
+    /// Like [`Erased::run`], with `run` compiled for this type of observer.
     pub(crate) fn run_as_itself<T>(observer: &'o mut O, run: impl FnOnce(&mut Self) -> Result<T, Ended>) -> Result<T, O::Error> {
         let mut erased = Self { observer, error: None };
         let result = run(&mut erased);
@@ -426,7 +432,7 @@ impl<O: Observer> Observer for Erased<'_, O> {
     observe_by_field! { observer, Self::keep }
 }
 
-/// An observer that may be missing.
+/// Optional observer. `None` wants no rows.
 impl<O: Observer> Observer for Option<O> {
     type Error = O::Error;
 
@@ -491,7 +497,7 @@ impl<O: Observer> Observer for Option<O> {
     }
 }
 
-/// Two observers side by side; the first sees everything first, and either can end the run. Errors of the second become those of the first.
+/// Two observers of one run. The first gets every row before the second, and either can end the run. Errors of the second are converted to errors of the first.
 impl<A: Observer<Error: From<B::Error>>, B: Observer> Observer for (A, B) {
     type Error = A::Error;
 
@@ -525,7 +531,7 @@ impl<A: Observer<Error: From<B::Error>>, B: Observer> Observer for (A, B) {
     }
 
     fn on_ticks(&mut self, ticks: &Ticks<'_>) -> Result<(), Self::Error> {
-        // Rows of all peers are work, which one that does not want them is to be spared.
+        // Making the rows of all peers is work, so an observer that does not want ticks is not called.
         if self.0.wants_ticks() {
             self.0.on_ticks(ticks)?;
         }
@@ -566,7 +572,7 @@ impl<A: Observer<Error: From<B::Error>>, B: Observer> Observer for (A, B) {
     }
 
     fn keep_going(&mut self, now: Instant) -> bool {
-        // Both are asked, so that both can show progress.
+        // Both are asked, even after `false`, so that both can show progress.
         let first = self.0.keep_going(now);
         self.1.keep_going(now) && first
     }

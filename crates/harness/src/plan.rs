@@ -1,46 +1,48 @@
-//! The scene compiled to the least that it needs: how each part is simulated, and why. Whatever is chosen, the answer is the same to the bit.
+//! Compilation of a scene to the least that its run needs: the model of each part. Every choice gives the same results to the bit.
 
 use cohaptic_peer::{Contact, Drift};
 use cohaptic_scene::{Axes, ChangeKind, PeerSpec, Scene};
 
-/// How much of the machinery a run uses.
+/// Extent of the machinery in a run.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Model {
     /// The least that the scene needs.
     #[default]
     Least,
-    /// Everything the program has: three axes, an event for each tick of each peer, every device, and the chain of stages for every link, however
-    /// few it has. Slower, with the same answer: this is how the choices of [`Model::Least`] are tested.
+    /// Everything in the program: three axes, an event for each tick of each peer, every device, and the complete chain of stages for every link, even for
+    /// links with
+    /// few stages. Slower, with the same results. Serves to test the choices of [`Model::Least`].
     General,
 }
 
-/// How each part is simulated.
+/// Models of the parts of a scene.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Plan {
     pub(crate) axes: Axes,
     pub(crate) ticking: Ticking,
+    /// Choice for the device of each peer, indexed by peer.
     pub(crate) devices: Vec<DeviceChoice>,
-    /// Whether links of nothing but a constant delay take the general path too.
+    /// Whether links with nothing but a constant delay use the complete chain of stages too.
     pub(crate) general_links: bool,
 }
 
-/// How ticks are scheduled.
+/// Scheduling of ticks.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Ticking {
-    /// All peers tick at the same instants: a loop.
+    /// All peers tick at the same instants, in a loop.
     Lockstep,
-    /// Each peer has its own instants: an event queue.
+    /// Each peer has its own instants, in an event queue.
     EventDriven,
 }
 
-/// What stands for a peer's device.
+/// Choice for a peer's device.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum DeviceChoice {
     /// The device is simulated.
     Simulated,
-    /// Nobody moves it and it touches nothing.
+    /// The device touches nothing and never moves, so a point replaces the device.
     Resting,
-    /// It touches nothing and nobody looks at it.
+    /// The device moves but touches nothing, and no observer sees the device.
     Unobserved,
 }
 
@@ -63,14 +65,14 @@ impl Plan {
     }
 }
 
-/// How peers tick that have nothing to do with the ticks of any others.
+/// Returns the scheduling for some peers of a scene, which need not be all.
 pub(crate) fn ticking<'a>(peers: impl Iterator<Item = &'a PeerSpec> + Clone) -> Ticking {
     let first = peers.clone().next().map(|peer| peer.clock.tick);
     let together = |peer: &PeerSpec| peer.clock.offset.is_zero() && peer.clock.drift == Drift::default() && Some(peer.clock.tick) == first;
     if first.is_some() && peers.clone().all(together) { Ticking::Lockstep } else { Ticking::EventDriven }
 }
 
-/// Whether the device of a peer ever touches its copy.
+/// Returns whether the device of a peer touches its copy at any time of the run.
 pub(crate) fn touches(scene: &Scene, peer: usize) -> bool {
     let touches_later =
         |what: &ChangeKind| matches!(what, ChangeKind::Contact { peer: changed, contact } if *changed == peer && *contact != Contact::None);
@@ -79,7 +81,7 @@ pub(crate) fn touches(scene: &Scene, peer: usize) -> bool {
 
 fn device(scene: &Scene, peer: usize, ticks_are_observed: bool) -> DeviceChoice {
     let spec = &scene.peers[peer];
-    // A device that turns, or that begins with the motion of a point of a turning copy, is not at rest.
+    // A device that turns, or that starts with the motion of a point of a turning copy, is not at rest.
     let turns = scene.rotation.as_ref().map(|rotation| &rotation.peers[peer]);
     let moves = spec.velocity.iter().any(|v| *v != 0.0)
         || turns.is_some_and(|turns| turns.device.is_some() || turns.attitude.rate.iter().any(|rate| *rate != 0.0));

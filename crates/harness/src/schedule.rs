@@ -1,4 +1,4 @@
-//! When which peer ticks.
+//! Schedule of the ticks of peers.
 
 use std::time::Duration;
 
@@ -8,16 +8,16 @@ use cohaptic_wan::{Event, EventQueue};
 
 use crate::plan::Ticking;
 
-/// The instants of the scene at which peers tick.
+/// Instants of the scene at which peers tick.
 #[derive(Clone, Debug)]
 pub(crate) enum Schedule {
-    /// All peers tick together, every `tick`.
+    /// All peers tick together, every `tick`, next at `next`.
     Lockstep { tick: Duration, next: Instant },
-    /// One event for the next tick of each peer.
+    /// An event for the next tick of each peer.
     EventDriven(Box<EventQueue<Tick>>),
 }
 
-/// A peer's next tick. Simultaneous ticks come in the order of the peers.
+/// Next tick of a peer. Simultaneous ticks are ordered by peer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tick {
     at: Instant,
@@ -37,7 +37,7 @@ impl Event for Tick {
 }
 
 impl Schedule {
-    /// The ticks of peers with these places and clocks; in lockstep at least one.
+    /// Returns the schedule of peers with the given indices and clocks. In lockstep there must be at least one.
     pub(crate) fn new<'a>(ticking: Ticking, clocks: impl IntoIterator<Item = (usize, &'a Clock)>) -> Self {
         let mut clocks = clocks.into_iter();
         match ticking {
@@ -49,6 +49,7 @@ impl Schedule {
                 let mut queue = EventQueue::new();
                 for (peer, clock) in clocks {
                     if let Some(at) = clock.instant(0) {
+                        // A clock whose first tick is beyond the range of instants never ticks.
                         queue.push(Tick { at, peer });
                     }
                 }
@@ -57,7 +58,7 @@ impl Schedule {
         }
     }
 
-    /// The next instant at which any peer ticks; `None` beyond the end of time.
+    /// Returns the next instant at which any peer ticks; `None` beyond the range of instants.
     #[inline(always)]
     pub(crate) fn next_instant(&self) -> Option<Instant> {
         match self {
@@ -66,7 +67,7 @@ impl Schedule {
         }
     }
 
-    /// Writes down which peers tick at that instant, in order. Each must be put back with [`Schedule::tick_again`].
+    /// Replaces `peers` by the peers that tick at `at`, in order. In lockstep `peers` stays unchanged. [`Schedule::tick_again`] must follow for each of them.
     #[inline(always)]
     pub(crate) fn take(&mut self, at: Instant, peers: &mut Vec<usize>) {
         if let Self::EventDriven(queue) = self {

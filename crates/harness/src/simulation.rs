@@ -1,4 +1,4 @@
-//! A scene in virtual time.
+//! Scenes in virtual time.
 
 use cohaptic_peer::Strategy;
 use cohaptic_peer::coordination::BuiltIn;
@@ -13,21 +13,24 @@ use crate::plan::{Model, Plan};
 use crate::summary::{Ending, Summary};
 use crate::world::{NoRemote, Remote, Step, Watch, World};
 
-/// A scene in virtual time, as fast as the processor goes.
+/// A scene in virtual time, as fast as the processor allows.
 ///
-/// At one instant, in this order: changes of the timeline; peers that tick sample and send; packets that have arrived are applied; forces are
-/// computed; each peer that ticks moves to the next tick. Ties are broken by (instant, step, peer) and (instant, link, sequence).
+/// Each instant has this order: changes of the timeline; peers that tick sample and send; arrived packets are applied; forces are computed; each peer that
+/// ticks moves
+/// to its next tick. Ties are broken by (instant, step, peer) and (instant, link, sequence).
 #[derive(Debug)]
 pub struct Simulation<'a, S = FromScene> {
     scene: &'a Scene,
     model: Model,
+    /// Displacement of the initial states; `None` for the scene as written.
     disturbance: Option<Disturbance>,
+    /// Largest number of threads of a run.
     threads: usize,
     strategies: S,
 }
 
 impl<'a> Simulation<'a> {
-    /// A scene that is ready to run with the strategy that it names.
+    /// Returns a scene that is ready to run with its own strategy.
     #[must_use]
     pub const fn new(scene: &'a Scene, model: Model) -> Self {
         Self { scene, model, disturbance: None, threads: 1, strategies: FromScene }
@@ -37,7 +40,7 @@ impl<'a> Simulation<'a> {
         Self { scene, model, disturbance: Some(disturbance), threads: 1, strategies: FromScene }
     }
 
-    /// [`Simulation::run`], with loops of events that are compiled for measures.
+    /// Like [`Simulation::run`], with an event loop compiled for measures.
     pub(crate) fn run_measured(&self, measures: &mut Measures) -> Summary {
         let plan = Plan::new(self.scene, self.model, measures.wants_ticks());
         let run = |observer: &mut Erased<'_, Measures>| self.run_in_arrays(&plan, observer).unwrap_or_else(|| self.run_with_events(&plan, observer));
@@ -47,13 +50,13 @@ impl<'a> Simulation<'a> {
 }
 
 impl<'a, S: Strategies> Simulation<'a, S> {
-    /// A scene that is ready to run with strategies of the caller's own in place of the one that it names.
+    /// Returns a scene that is ready to run with strategies of the caller instead of its own.
     #[must_use]
     pub const fn with_strategies(scene: &'a Scene, model: Model, strategies: S) -> Self {
         Self { scene, model, disturbance: None, threads: 1, strategies }
     }
 
-    /// Takes up to that number of threads for a run, where they pay: the same to the bit for any number.
+    /// Sets the largest number of threads of a run. Threads are used only if they shorten the run. The result is the same to the bit for any number.
     #[must_use]
     pub const fn on_threads(self, threads: usize) -> Self
     where
@@ -62,17 +65,18 @@ impl<'a, S: Strategies> Simulation<'a, S> {
         Self { threads, ..self }
     }
 
-    /// Runs the scene from its beginning to its end, until it diverges, or until the observer ends it.
+    /// Runs the scene to its end, until its numbers overflow, or until the observer ends the run.
     ///
     /// # Errors
     ///
-    /// What the observer's error is.
+    /// The error of the observer.
     ///
     /// # Panics
     ///
     /// If the scene needs events and has more than 23,170 peers; see [`crate::too_large`].
     pub fn run<O: Observer>(&self, observer: &mut O) -> Result<Summary, O::Error> {
         Erased::run(observer, |observer| {
+            // The scene's own strategies have one compiled engine in this crate; only strategies of the caller compile another.
             if S::OF_SCENE {
                 let Self { scene, model, disturbance, threads, .. } = *self;
                 run_with_strategies_of_scene(&Simulation { scene, model, disturbance, threads, strategies: FromScene }, observer)
@@ -87,7 +91,7 @@ impl<'a, S: Strategies> Simulation<'a, S> {
         self.run_in_arrays(&plan, observer).unwrap_or_else(|| self.run_with_events(&plan, observer))
     }
 
-    /// `None` if the run needs events: the observer has seen nothing.
+    /// Runs the scene in arrays. Returns `None` if the run needs events; the observer has then seen nothing.
     fn run_in_arrays(&self, plan: &Plan, observer: &mut AnyObserver<'_>) -> Option<Result<Summary, Ended>> {
         let watch = Watch::of(observer);
         let law = self.arrays(plan, watch)?;
@@ -98,7 +102,7 @@ impl<'a, S: Strategies> Simulation<'a, S> {
         if watch == Watch::NOTHING {
             let threads = self.threads.clamp(1, shape.threads().0);
             if (threads > 1 || shape.pays_in_groups())
-                // Groups that diverge know it later than it happens: then all run together from the beginning.
+                // Groups notice a divergence only at their next meeting. The run is then repeated with all peers together, which finds the instant.
                 && let Some(summary) = arrays::run_on_threads(self.scene, &shape, law, threads, &mut |now| observer.keep_going(now))
             {
                 return Ok(summary);
@@ -118,7 +122,7 @@ impl<'a, S: Strategies> Simulation<'a, S> {
         }
     }
 
-    /// The shape of the scene, if it needs no events and nobody watches more than ticks and instants.
+    /// Returns the shape and the law of the scene if its run needs no events and only ticks and instants are watched; else `None`.
     fn arrays(&self, plan: &Plan, watch: Watch) -> Option<(Shape, BuiltIn)> {
         let fits = watch.is_of_ticks() && self.disturbance.is_none() && self.model == Model::Least;
         if fits { Shape::of(self.scene, plan, &self.strategies).ok() } else { None }
@@ -129,15 +133,16 @@ impl<'a, S: Strategies> Simulation<'a, S> {
     }
 }
 
-/// A run with the strategy that its scene names: compiled here, once for all crates.
+/// Runs a scene with its own strategy. Not generic, so the engine is compiled once, in this crate.
 fn run_with_strategies_of_scene(simulation: &Simulation<'_>, observer: &mut AnyObserver<'_>) -> Result<Summary, Ended> {
     simulation.run_observed(observer)
 }
 
-/// An observer of a run in arrays, and whether it has ended the run.
+/// Onlooker of a run in arrays that passes rows to an observer and keeps its error.
 struct Watching<'o, 'a> {
     observer: &'o mut AnyObserver<'a>,
     watch: Watch,
+    /// First error of the observer.
     result: Result<(), Ended>,
 }
 
@@ -160,7 +165,7 @@ impl Onlooker for Watching<'_, '_> {
     }
 }
 
-/// Instants between two calls of [`Observer::keep_going`] in a run with events.
+/// Returns the number of instants between two calls of [`Observer::keep_going`] in a run with events.
 pub(crate) fn questions_of(scene: &Scene) -> u32 {
     let peers = scene.peers.len();
     let links = scene.topology.as_ref().map_or_else(|| peers.saturating_mul(peers), |topology| topology.links());

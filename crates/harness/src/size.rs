@@ -1,4 +1,4 @@
-//! Which scenes are too large to be simulated.
+//! Detection of scenes that are too large for a simulation.
 
 use std::fs;
 
@@ -8,41 +8,45 @@ use cohaptic_wan::MOST_NODES;
 use crate::arrays::Shape;
 use crate::plan::{Model, Plan};
 
-/// Scenes of up to this many peers are not looked at: they take some hundred megabytes, and more only with much on the way.
+/// Number of peers up to which the memory is not checked: such scenes take some hundred megabytes, more only with many packets in flight.
 const SMALL: usize = 500;
 
-/// What a run takes at least \[bytes\]; measured, and rounded down.
+/// Measured least memory of a run for each peer \[bytes\], rounded down.
 const A_PEER: u64 = 1300;
+/// Measured least memory of a run in arrays for each link \[bytes\], rounded down.
 const A_LINK_IN_ARRAYS: u64 = 250;
+/// Measured least memory of a run with events for each link \[bytes\], rounded down.
 const A_LINK_WITH_EVENTS: u64 = 1000;
 
-/// Why a scene is too large to be simulated.
+/// Reason why a scene is too large for a simulation.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct TooLarge {
-    /// The first peer that is too many, by its place in the scene; the last one if it is the memory that does not suffice.
+    /// Index of the first excess peer, or of the last peer of the scene if the memory is too small.
     pub peer: usize,
-    /// Which part is too large, and a cure.
+    /// Text with the part that is too large, and a cure.
     pub reason: String,
 }
 
-/// How a scene is run, as far as its memory is concerned.
+/// Way of running a scene, as far as its memory is concerned.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Way {
-    /// In arrays; all links have one constant delay and take no memory.
+    /// In arrays, with one constant delay of all links, so links take no memory.
     Broadcast,
     /// In arrays, with numbers for each link.
     Packets,
-    /// With events, each link a state machine.
+    /// With events; each link is a state machine.
     Events,
 }
 
-/// Why a simulation of the scene does not fit into this program, or into the memory that is free as far as the system says; `None` if it may fit.
+/// Returns why a simulation of the scene does not fit into this program or into the free memory reported by the system; `None` if the scene may fit.
 ///
-/// `watched`: whether an observer asks for anything but [`crate::Observer::keep_going`]. The memory is a lower bound: with jitter, queues or many packets on
-/// the way a run takes more. It is not looked at in scenes of up to 500 peers.
+/// `watched`: whether an observer uses anything but [`crate::Observer::keep_going`]. The memory is a lower bound: jitter, queues or many packets in flight take
+/// more.
+/// Scenes of up to 500 peers are not checked.
 ///
-/// 23,170 peers are the most with events, or 65,535 on a topology. In arrays there are up to 65,535 peers, and any number where all links have one constant delay
-/// and lead from all to all.
+/// Runs with events have at most 23,170 peers, or 65,535 on a topology. Runs in arrays have at most 65,535 peers, and any number if all links have one constant
+/// delay
+/// and lead from every peer to all others.
 #[must_use]
 pub fn too_large(scene: &Scene, model: Model, watched: bool) -> Option<TooLarge> {
     if scene.peers.len() <= SMALL { None } else { too_large_for(scene, Way::of(scene, model, watched), free_memory()) }
@@ -62,6 +66,7 @@ fn too_large_for(scene: &Scene, way: Way, free: Option<u64>) -> Option<TooLarge>
             format!("too many to be simulated in the memory that is free: {} of at least {} that it takes", Megabytes(free), Megabytes(needed)),
         )
     };
+    // The message names the cheapest way to run this scene, if that way is cheaper.
     let least = Way::of(scene, Model::Least, false);
     let cure = if least.bytes(peers, links) < needed {
         let needed = Megabytes(least.bytes(peers, links));
@@ -92,16 +97,17 @@ impl Way {
     }
 }
 
-/// The memory that the system and the group of this process leave to it, in bytes, where they say it.
+/// Returns the memory that the system and the control group leave to this process \[bytes\]; `None` if the system does not report it.
 fn free_memory() -> Option<u64> {
     let text = fs::read_to_string("/proc/meminfo").ok()?;
     let kibibytes = text.lines().find_map(|line| line.strip_prefix("MemAvailable:")?.trim().strip_suffix("kB")?.trim().parse::<u64>().ok())?;
     let of_group = |name: &str| fs::read_to_string(format!("/sys/fs/cgroup/memory.{name}")).ok()?.trim().parse::<u64>().ok();
+    // Without a control group, or with the limit `max`, only the system's number counts.
     let in_group = of_group("max").zip(of_group("current")).map_or(u64::MAX, |(most, now)| most.saturating_sub(now));
     Some(kibibytes.saturating_mul(1024).min(in_group))
 }
 
-/// Bytes in words.
+/// Bytes, printed in megabytes.
 struct Megabytes(u64);
 
 impl std::fmt::Display for Megabytes {
@@ -143,11 +149,11 @@ mod tests {
         assert_eq!(peer, 23_170);
         assert!(reason.contains("at most 23170 peers: expected fewer peers, or to look at nothing but counters"), "{reason}");
         assert!(reason.contains("takes 39 MB"), "{reason}");
-        // Peers with clocks of their own need events.
+        // Drifting clocks need events.
         let mut drifting = constant.clone();
         drifting.peers.iter_mut().for_each(|peer| peer.clock.drift = Drift::from_fraction(1e-5).unwrap());
         assert_eq!(refused(&drifting, false, u64::MAX).map(|(peer, _)| peer), Some(23_170));
-        // Packets that share an access line need events.
+        // A shared access line needs events.
         let mut sharing = constant.clone();
         sharing.peers[0].uplink = Some(Arc::clone(&sharing.links.configs()[0]));
         assert_eq!(refused(&sharing, false, u64::MAX).map(|(peer, _)| peer), Some(23_170));

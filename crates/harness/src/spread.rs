@@ -1,21 +1,27 @@
-//! The largest angle between two of the copies of an object that turns.
+//! Largest angle between two copies of a rotating object.
 
-/// The largest angle between two copies so far.
+/// Largest angle between two copies so far.
 ///
-/// Angles grow with the chords between quaternions, 2·sin(θ/4), which are compared instead. A chord is at most the sum of the chords to a third copy, which
-/// spares most pairs: one copy is the reference, and pairs are looked at only where the two longest chords to it are together longer than the longest so far.
-/// Then the copy that is farthest from the reference is another one.
+/// Angles grow with the chords between quaternions, 2·sin(θ/4), so chords are compared instead of angles. A chord is at most the sum of the chords to a third
+/// copy,
+/// which excludes most pairs: one copy is the reference, and pairs are examined only if the two longest chords to the reference are together longer than the
+/// longest
+/// chord so far. The copy farthest from the reference can then become the new reference.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Spread {
-    /// The square of the longest chord.
+    /// Square of the longest chord so far.
     longest: f64,
+    /// Index in `copies` of the reference.
     reference: usize,
+    /// Orientations of the present copies, as quaternions.
     copies: Vec<[f64; 4]>,
+    /// Squares of the chords to the reference, indexed like `copies`.
     near: Vec<f64>,
+    /// Squares of the chords to the copy farthest from the reference, indexed like `copies`.
     far: Vec<f64>,
 }
 
-/// The square of the chord between two orientations, of which q and −q are one.
+/// Returns the square of the chord between two orientations. The quaternions q and −q are the same orientation, so the shorter chord counts.
 #[inline(always)]
 fn squared_chord(one: &[f64; 4], other: &[f64; 4]) -> f64 {
     let square = |sign: f64| {
@@ -26,7 +32,7 @@ fn squared_chord(one: &[f64; 4], other: &[f64; 4]) -> f64 {
     if equal < opposite { equal } else { opposite }
 }
 
-/// The longest and the next of some chords, of which these are the squares.
+/// Returns the longest and the second longest of some chords, from their squares.
 #[inline(always)]
 fn two_longest(squares: &[f64]) -> [f64; 2] {
     let two = squares.iter().fold([0.0, 0.0], |[first, second], square| {
@@ -42,12 +48,12 @@ fn two_longest(squares: &[f64]) -> [f64; 2] {
 }
 
 impl Spread {
-    /// The largest angle \[rad\].
+    /// Returns the largest angle so far \[rad\].
     pub(crate) fn angle(&self) -> f64 {
         4.0 * libm::asin((0.5 * libm::sqrt(self.longest)).min(1.0))
     }
 
-    /// Takes in all pairs of the copies that are there now.
+    /// Takes all pairs of the present copies.
     pub(crate) fn take(&mut self, copies: impl Iterator<Item = [f64; 4]>) {
         self.copies.clear();
         self.copies.extend(copies);
@@ -55,6 +61,7 @@ impl Spread {
         let Some(of_reference) = self.copies.get(reference) else { return };
         chords(of_reference, &self.copies, &mut self.near);
         let near = two_longest(&self.near);
+        // Every pair has a chord of at most the sum of its chords to the reference, and no such sum is larger than this one.
         if near[0] + near[1] <= self.longest.sqrt() {
             return;
         }
@@ -63,12 +70,15 @@ impl Spread {
         let far = two_longest(&self.far);
         self.longest = self.near.iter().chain(&self.far).fold(self.longest, |longest, square| longest.max(*square));
         self.look_at_pairs();
+        // The reference with the smaller sum excludes more pairs at the next instant.
         if far[0] + far[1] < near[0] + near[1] {
             self.reference = farthest;
         }
     }
 
-    /// The pairs that chords to reference and farthest copy do not rule out. One of a pair is at least half of the pair's chord away from either.
+    /// Examines the pairs that chords to the reference and to the farthest copy do not exclude. In a pair beyond the longest chord, at least one copy is more
+    /// than half
+    /// of the longest chord away from the reference, and likewise from the farthest copy.
     fn look_at_pairs(&mut self) {
         let Self { longest, copies, near, far, .. } = self;
         let count = |squares: &[f64]| squares.iter().filter(|square| 4.0 * **square > *longest).count();
@@ -101,7 +111,7 @@ mod tests {
         attitude
     }
 
-    /// Copies that wander, with outliers at the first and at the last place: over time, the largest angle of all pairs at all instants.
+    /// Moving copies with an outlier at the first, a middle or the last index: the result is the largest angle of all pairs at all instants.
     #[test]
     fn the_largest_angle_is_that_of_all_pairs() {
         for outlier in [0, 4, 8] {

@@ -1,4 +1,4 @@
-//! What a run comes to.
+//! Results of a run.
 
 mod links;
 
@@ -10,24 +10,24 @@ use cohaptic_wan::LinkStats;
 
 pub use links::{EachLink, LinkQuantiles, LinkSummaries, LinkSummary};
 
-/// The result of a run.
+/// Results of a run.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Summary {
-    /// How it ended.
+    /// Ending of the run.
     pub ending: Ending,
-    /// How much of the scene was simulated.
+    /// Simulated part of the scene.
     pub duration: Duration,
-    /// The number of control ticks of the peer that made the most.
+    /// Largest number of control ticks of a peer.
     pub ticks: u64,
-    /// The peers, in the order of the scene.
+    /// Results of the peers, in the order of the scene.
     pub peers: Vec<PeerSummary>,
-    /// The links between peers, by sender, then receiver.
+    /// Counters of the links between peers, by sender, then receiver.
     pub links: LinkSummaries,
-    /// The access lines that peers have.
+    /// Counters of the access lines of the scene.
     pub access_lines: Vec<AccessSummary>,
-    /// The largest distance along an axis between two copies of the object at their latest ticks, over the whole run \[m\].
+    /// Largest distance along an axis between two copies of the object at their latest ticks, over the whole run \[m\].
     pub max_discrepancy: f64,
-    /// The largest angle between two copies at their latest ticks, over the whole run \[rad\]; `None` if the object does not turn.
+    /// Largest angle between two copies at their latest ticks, over the whole run \[rad\]; `None` if the object does not turn.
     pub max_rotation_discrepancy: Option<f64>,
 }
 
@@ -42,7 +42,7 @@ impl Summary {
         matches!(self.ending, Ending::Diverged(_)) || self.max_discrepancy.is_nan() || self.max_discrepancy > DIVERGED_DISTANCE
     }
 
-    /// Returns one word for how the run ended: `interrupted`, or `diverged` if the run [has diverged](Self::has_diverged), or `complete`.
+    /// Returns the ending as one word: `interrupted`, or `diverged` if the run [has diverged](Self::has_diverged), or `complete`.
     #[must_use]
     pub fn ending_name(&self) -> &'static str {
         match self.ending {
@@ -58,41 +58,41 @@ impl Summary {
     }
 }
 
-/// How a run ended.
+/// Ending of a run.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Ending {
     /// The scene ran to its end.
     Complete,
-    /// At this tick a position or a velocity was not finite: the scene diverged until its numbers overflowed, and was not simulated further.
+    /// At this tick a position or a velocity was not finite: the numbers of the scene overflowed, and the run stopped.
     Diverged(Instant),
     /// The observer ended the run after this tick.
     Interrupted(Instant),
 }
 
-/// One peer at the end of a run: at its first tick at or after the end, which is the state that its last tick leads to.
+/// Results of one peer: its state at its first tick at or after the end, to which its last tick leads.
 #[derive(Clone, PartialEq, Debug)]
 pub struct PeerSummary {
-    /// Its name.
+    /// Name of the peer.
     pub name: String,
     /// Position of its copy along each axis \[m\].
     pub position: Vec<f64>,
     /// Velocity of its copy along each axis [m/s].
     pub velocity: Vec<f64>,
-    /// How its copy is turned; `None` if the object does not turn.
+    /// Attitude of its copy; `None` if the object does not turn.
     pub attitude: Option<Attitude>,
-    /// How many samples arrived too late or repeated, and changed nothing.
+    /// Number of samples that arrived late or repeated, without effect.
     pub stale_samples: u64,
-    /// Samples that arrived damaged and were refused by the decoder.
+    /// Number of damaged samples that the decoder refused.
     pub refused_samples: u64,
 }
 
-/// One access line at the end of a run.
+/// Results of one access line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct AccessSummary {
-    /// The peer's place in the scene.
+    /// Index of the peer in the scene.
     pub peer: usize,
-    /// Whether it is the line that the peer sends through.
+    /// Whether the peer sends through this line; else the peer receives through it.
     pub uplink: bool,
-    /// Its counters.
+    /// Counters of the line.
     pub stats: LinkStats,
 }

@@ -1,4 +1,4 @@
-//! What links did, each and together.
+//! Counters of links, for each link and in total.
 
 use std::fmt;
 use std::sync::Arc;
@@ -7,100 +7,101 @@ use std::time::Duration;
 use cohaptic_scene::Topology;
 use cohaptic_wan::LinkStats;
 
-/// One link at the end of a run.
+/// Results of one link.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct LinkSummary {
-    /// The sender's place in the scene.
+    /// Index of the sender in the scene.
     pub from: usize,
-    /// The receiver's place in the scene.
+    /// Index of the receiver in the scene.
     pub to: usize,
-    /// Its counters.
+    /// Counters of the link.
     pub stats: LinkStats,
 }
 
-/// The N·(N−1) links between N peers at the end of a run, or those of a topology, by sender, then receiver.
+/// Counters of the N·(N−1) links between N peers, or of the links of a topology, by sender, then receiver.
 ///
-/// Where all links of a sender did the same, their counters are kept once. Equality and [`fmt::Debug`] are those of the list of all links, however it is kept.
+/// If all links of a sender have equal counters, these are stored once. Equality and [`fmt::Debug`] are those of the list of all links, whatever the storage.
 #[derive(Clone)]
 pub struct LinkSummaries {
     peers: usize,
-    /// By sender, and then by receiver if each link has an entry of its own.
+    /// Counters by sender, and then by receiver if each link has its own entry.
     stats: Vec<LinkStats>,
-    /// How many links of a sender have an entry together: one, or all N − 1.
+    /// Number of links of a sender with a common entry: 1, or N − 1.
     together: usize,
-    /// Which links there are, if not all.
+    /// Links that exist; `None` if every peer has a link to every other peer.
     topology: Option<Arc<Topology>>,
 }
 
-/// Quantiles over links, each a value that some link has: of n values, the quantile of p is the ⌈p·n⌉-th, counted from the least.
+/// Quantiles over links, each the value of some link: of n values, the quantile p is the ⌈p·n⌉-th, counted from the least.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LinkQuantiles {
-    /// The least.
+    /// Least value.
     pub min: f64,
-    /// That of 1 %.
+    /// Quantile of 1 %.
     pub p01: f64,
-    /// The median.
+    /// Median.
     pub p50: f64,
-    /// That of 99 %.
+    /// Quantile of 99 %.
     pub p99: f64,
-    /// The greatest.
+    /// Greatest value.
     pub max: f64,
 }
 
 impl LinkSummaries {
-    /// What each link did, by sender, then receiver.
+    /// Stores the counters of each link, by sender, then receiver.
     ///
     /// # Panics
     ///
-    /// If these are not N·(N−1).
+    /// If the number of entries is not N·(N−1).
     #[must_use]
     pub fn each(peers: usize, stats: Vec<LinkStats>) -> Self {
         assert_eq!(stats.len(), peers * peers.saturating_sub(1), "every pair of {peers} peers has a link in either direction");
         Self { peers, stats, together: 1, topology: None }
     }
 
-    /// What each link of a topology did, by sender, then receiver.
+    /// Stores the counters of each link of a topology, by sender, then receiver.
     ///
     /// # Panics
     ///
-    /// If these are not as many as it has.
+    /// If the number of entries is not the number of links of the topology.
     #[must_use]
     pub fn on(topology: Arc<Topology>, stats: Vec<LinkStats>) -> Self {
         assert_eq!(stats.len(), topology.links(), "each link of a topology has counters");
         Self { peers: topology.peers(), stats, together: 1, topology: Some(topology) }
     }
 
-    /// What each of the links of a sender did, by sender.
+    /// Stores the common counters of the links of each sender, by sender.
     #[must_use]
     pub fn by_sender(stats: Vec<LinkStats>) -> Self {
         let peers = stats.len();
         Self { peers, stats, together: peers.saturating_sub(1).max(1), topology: None }
     }
 
-    /// How many there are.
+    /// Returns the number of links.
     #[must_use]
     pub fn len(&self) -> u64 {
         let all = || self.peers as u64 * (self.peers as u64).saturating_sub(1);
         self.topology.as_ref().map_or_else(all, |topology| topology.links() as u64)
     }
 
-    /// Whether there is none.
+    /// Returns whether there are no links.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The counters of the link from one peer to another; `None` if there is no such link.
+    /// Returns the counters of the link from one peer to another; `None` if there is no such link.
     #[must_use]
     pub fn between(&self, from: usize, to: usize) -> Option<&LinkStats> {
         if let Some(topology) = &self.topology {
             return self.stats.get(topology.place(from, to)? + topology.places(from).start);
         }
+        // Row `from` has no entry for `from` itself, so receivers after it move down by one. With common entries the quotient is the sender.
         let is_link = from != to && from < self.peers && to < self.peers;
         if is_link { self.stats.get((from * (self.peers - 1) + to - usize::from(to > from)) / self.together) } else { None }
     }
 
-    /// The links from a peer of the scene, by receiver, without looking for each.
+    /// Returns the receivers and counters of the links from a peer, by receiver. Faster than [`LinkSummaries::between`] for each.
     pub(crate) fn sent_by(&self, from: usize) -> impl Iterator<Item = (usize, &LinkStats)> {
         let (neighbours, stats) = match &self.topology {
             Some(topology) => (Some(topology.neighbours(from)), &self.stats[topology.places(from)]),
@@ -114,18 +115,18 @@ impl LinkSummaries {
         (0..links).map(receiver).zip(stats.iter().cycle())
     }
 
-    /// All of them, one by one.
+    /// Returns an iterator over all links.
     #[must_use]
     pub const fn iter(&self) -> EachLink<'_> {
         EachLink { links: self, from: 0, place: 0 }
     }
 
-    /// The counters of links, and how many neighbours have them: all links, in no more steps than counters are kept.
+    /// Returns the stored counters, each with the number of links that have these counters. Covers all links, in as few steps as entries are stored.
     pub fn counted(&self) -> impl Iterator<Item = (&LinkStats, u64)> + Clone {
         self.stats.iter().map(|stats| (stats, self.together as u64))
     }
 
-    /// The counters of all of them together.
+    /// Returns the sum of the counters of all links.
     #[must_use]
     pub fn total(&self) -> LinkStats {
         let mut total = LinkStats::default();
@@ -133,8 +134,9 @@ impl LinkSummaries {
         total
     }
 
-    /// Quantiles of the packets delivered, copies included, as parts of those offered, over the links that were offered any. A packet on the way at the end is
-    /// not delivered. `None` if no link was offered a packet.
+    /// Returns quantiles of the delivered packets, copies included, as a fraction of the offered packets, over the links with offered packets. A packet in
+    /// flight at the
+    /// end is not delivered. Returns `None` if no link was offered a packet.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "packet counts below 2^53")]
     pub fn delivered_fraction(&self) -> Option<LinkQuantiles> {
@@ -142,14 +144,14 @@ impl LinkSummaries {
         self.quantiles(fraction)
     }
 
-    /// Quantiles of [`LinkStats::mean_delay`] \[s\], over the links that delivered a packet. `None` if none did.
+    /// Returns quantiles of [`LinkStats::mean_delay`] \[s\], over the links with delivered packets. Returns `None` if no link delivered a packet.
     #[must_use]
     pub fn mean_delay(&self) -> Option<LinkQuantiles> {
         self.quantiles(|stats| stats.mean_delay().as_ref().map(Duration::as_secs_f64))
     }
 
     fn quantiles(&self, value: impl Fn(&LinkStats) -> Option<f64>) -> Option<LinkQuantiles> {
-        // Each entry stands for equally many links, so that the quantiles of entries are those of links.
+        // Each entry stands for the same number of links, so the quantiles of entries are the quantiles of links.
         let mut values: Vec<f64> = self.stats.iter().filter_map(value).collect();
         let last = values.len().checked_sub(1)?;
         values.sort_unstable_by(f64::total_cmp);
@@ -182,9 +184,10 @@ impl<'a> IntoIterator for &'a LinkSummaries {
     }
 }
 
-/// The links of [`LinkSummaries`], one by one.
+/// Iterator over the links of [`LinkSummaries`].
 #[derive(Clone, Debug)]
 pub struct EachLink<'a> {
+    // `from`: present sender. `place`: number of links of this sender returned so far.
     links: &'a LinkSummaries,
     from: usize,
     place: usize,
@@ -245,7 +248,7 @@ mod tests {
 
     #[test]
     fn totals_and_quantiles_are_those_of_the_list() {
-        // Three peers, six links: one was offered nothing, one delivered nothing.
+        // Three peers, six links: one link was offered nothing, one link delivered nothing.
         let links =
             LinkSummaries::each(3, [(0, 0), (4, 0), (4, 1), (4, 2), (4, 3), (4, 8)].map(|(offered, delivered)| stats(offered, delivered)).to_vec());
         assert_eq!(links.total(), stats(20, 14));
@@ -253,7 +256,7 @@ mod tests {
         assert_eq!(links.mean_delay(), Some(LinkQuantiles { min: 7e-9, p01: 7e-9, p50: 7e-9, p99: 7e-9, max: 7e-9 }));
         let idle = LinkSummaries::by_sender(vec![stats(0, 0); 4]);
         assert_eq!((idle.delivered_fraction(), idle.mean_delay()), (None, None));
-        // Of 342 links the fourth is the quantile of one in a hundred.
+        // Of 342 links the fourth is the quantile of 1 %.
         let many: Vec<LinkStats> = (1..=19 * 18).map(|delivered| stats(1, delivered)).collect();
         let quantiles = LinkSummaries::each(19, many).delivered_fraction();
         assert_eq!(quantiles, Some(LinkQuantiles { min: 1.0, p01: 4.0, p50: 171.0, p99: 339.0, max: 342.0 }));
@@ -271,7 +274,7 @@ mod tests {
         assert_eq!((numbers(0), numbers(1), numbers(3)), (vec![(1, 0)], vec![(0, 1), (2, 2), (3, 3)], vec![(1, 5)]));
     }
 
-    /// Counts of links are those of 10¹⁰ of them.
+    /// Totals of 10¹⁰ links fit into 64 bits.
     #[test]
     fn links_of_a_hundred_thousand_peers_are_counted_in_64_bits() {
         let links = LinkSummaries::by_sender(vec![stats(125, 122); 100_000]);
