@@ -3,15 +3,13 @@
 //! Use this crate if you run scenes from Rust: to record them, to watch every tick, or to drive a session.
 //!
 //! [`Simulation`] is the scene in virtual time: N [`cohaptic_peer::Peer`]s that send samples through a [`cohaptic_wan::Network`]. A sample has the size of its
-//! datagram but
-//! travels as numbers; bytes are made only for a damaged packet or a socket. A scene without need for events, and with an observer of no more than ticks, runs
-//! in
-//! arrays, which hold numbers only: no peers, no datagrams, no packets. An [`Observer`] sees every tick and every packet; [`record`] has observers that write
-//! CSV
-//! files and plots during the run. [`check`] compares a run with the scene's expectations. [`mod@explain`] lists the parts that the program models for a scene.
-//! [`live`] runs scenes with remote peers.
-//! Nothing here reads a clock: the same scene and seed give the same bytes, whatever the machine.
+//! datagram but travels as numbers; bytes are made only for a damaged packet or a socket. A scene without need for events, and with an observer of no more than
+//! ticks, runs in arrays, which hold numbers only: no peers, no datagrams, no packets. An [`Observer`] sees every tick and every packet; [`record`] has
+//! observers that write CSV files and plots during the run. [`check`] compares a run with the scene's expectations. [`mod@explain`] lists the parts that the
+//! program models for a scene. [`live`] runs scenes with remote peers.
+//!
 //! This crate reads no clock: the same scene and seed give the same bytes on every machine.
+//!
 //! ```
 //! use cohaptic_harness::{Model, NoObserver, Simulation};
 //! use cohaptic_scene::Scene;

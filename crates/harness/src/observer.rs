@@ -14,8 +14,7 @@ pub(crate) const MOST_INSTANTS_BETWEEN_QUESTIONS: u32 = 1024;
 pub(crate) const MOST_WORK_BETWEEN_QUESTIONS: usize = 1 << 22;
 
 /// Returns the number of instants, or of ticks in arrays, between two calls of [`Observer::keep_going`]: a power of two. `work`: most ticks of peers, or
-/// packets, at an
-/// instant.
+/// packets, at an instant.
 pub(crate) fn instants_between_questions(work: usize) -> u32 {
     let instants = u32::try_from(MOST_WORK_BETWEEN_QUESTIONS / work.max(1)).unwrap_or(u32::MAX);
     // A power of two, so that the loop over ticks needs no division.
@@ -25,8 +24,7 @@ pub(crate) fn instants_between_questions(work: usize) -> u32 {
 /// Observes a run while it happens, in the order of events.
 ///
 /// Peers are indices of [`cohaptic_scene::Scene::peers`]. Rows borrow from the running scene, so an observer copies the parts that it keeps. By default an
-/// observer wants
-/// no rows. Rows that an observer does not want are not made.
+/// observer wants no rows. Rows that an observer does not want are not made.
 ///
 /// ```no_run
 /// use std::convert::Infallible;
@@ -104,8 +102,7 @@ pub trait Observer {
     /// Called when all peers have computed their forces at an instant at which all of them tick: [`Observer::on_tick`] for each peer, in one call.
     ///
     /// Called only in a run without events, whose observer wants no more than ticks and instants; other runs call [`Observer::on_tick`]. An observer that
-    /// overrides
-    /// `on_ticks`, for example to read less than whole rows, must get the same result from both.
+    /// overrides `on_ticks`, for example to read less than whole rows, must get the same result from both.
     ///
     /// # Errors
     ///
@@ -169,8 +166,7 @@ pub trait Observer {
     }
 
     /// Called about every thousand instants, and with thousands of peers up to every instant, for progress and interruption. `false` ends the run early; the
-    /// run then
-    /// returns its results so far.
+    /// run then returns its results so far.
     fn keep_going(&mut self, _now: Instant) -> bool {
         true
     }

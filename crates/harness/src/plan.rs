@@ -10,8 +10,7 @@ pub enum Model {
     #[default]
     Least,
     /// Everything in the program: three axes, an event for each tick of each peer, every device, and the complete chain of stages for every link, even for
-    /// links with
-    /// few stages. Slower, with the same results. Serves to test the choices of [`Model::Least`].
+    /// links with few stages. Slower, with the same results. Serves to test the choices of [`Model::Least`].
     General,
 }
 

@@ -16,8 +16,7 @@ use crate::world::{NoRemote, Remote, Step, Watch, World};
 /// A scene in virtual time, as fast as the processor allows.
 ///
 /// Each instant has this order: changes of the timeline; peers that tick sample and send; arrived packets are applied; forces are computed; each peer that
-/// ticks moves
-/// to its next tick. Ties are broken by (instant, step, peer) and (instant, link, sequence).
+/// ticks moves to its next tick. Ties are broken by (instant, step, peer) and (instant, link, sequence).
 #[derive(Debug)]
 pub struct Simulation<'a, S = FromScene> {
     scene: &'a Scene,

@@ -41,12 +41,10 @@ enum Way {
 /// Returns why a simulation of the scene does not fit into this program or into the free memory reported by the system; `None` if the scene may fit.
 ///
 /// `watched`: whether an observer uses anything but [`crate::Observer::keep_going`]. The memory is a lower bound: jitter, queues or many packets in flight take
-/// more.
-/// Scenes of up to 500 peers are not checked.
+/// more. Scenes of up to 500 peers are not checked.
 ///
 /// Runs with events have at most 23,170 peers, or 65,535 on a topology. Runs in arrays have at most 65,535 peers, and any number if all links have one constant
-/// delay
-/// and lead from every peer to all others.
+/// delay and lead from every peer to all others.
 #[must_use]
 pub fn too_large(scene: &Scene, model: Model, watched: bool) -> Option<TooLarge> {
     if scene.peers.len() <= SMALL { None } else { too_large_for(scene, Way::of(scene, model, watched), free_memory()) }

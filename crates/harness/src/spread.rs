@@ -3,10 +3,8 @@
 /// Largest angle between two copies so far.
 ///
 /// Angles grow with the chords between quaternions, 2·sin(θ/4), so chords are compared instead of angles. A chord is at most the sum of the chords to a third
-/// copy,
-/// which excludes most pairs: one copy is the reference, and pairs are examined only if the two longest chords to the reference are together longer than the
-/// longest
-/// chord so far. The copy farthest from the reference can then become the new reference.
+/// copy, which excludes most pairs: one copy is the reference, and pairs are examined only if the two longest chords to the reference are together longer than
+/// the longest chord so far. The copy farthest from the reference can then become the new reference.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Spread {
     /// Square of the longest chord so far.
@@ -77,8 +75,7 @@ impl Spread {
     }
 
     /// Examines the pairs that chords to the reference and to the farthest copy do not exclude. In a pair beyond the longest chord, at least one copy is more
-    /// than half
-    /// of the longest chord away from the reference, and likewise from the farthest copy.
+    /// than half of the longest chord away from the reference, and likewise from the farthest copy.
     fn look_at_pairs(&mut self) {
         let Self { longest, copies, near, far, .. } = self;
         let count = |squares: &[f64]| squares.iter().filter(|square| 4.0 * **square > *longest).count();

@@ -1,6 +1,6 @@
 //! Bodies of all peers and their motion, eight lanes at a time.
 //!
-//! A lane computes [`cohaptic_peer::tick`] and the scene's law, as [`cohaptic_peer::Peer`] does, so that every bit is the same. Each tick is a loop over lanes
+//! A lane computes [`cohaptic_peer::tick`] and the scene's law, as [`cohaptic_peer::Peer`] does, so every bit is the same. Each tick is a loop over lanes
 //! without branches, which the compiler turns into vector instructions.
 
 mod block;
@@ -37,15 +37,14 @@ pub(super) struct Blocks {
     oldest: usize,
     /// Step map of the copies. One map for all peers, which differs only between runs.
     object_map: StepMap<Lanes>,
-    /// Forces computed at the latest tick, indexed by block. `None` if no peer applies its forces a tick late.
+    /// Forces computed at the latest tick, indexed by block. `None` if all peers apply forces without delay.
     late: Option<Vec<Late>>,
     /// Walls of the object, indexed by run. `None` if no run has walls.
     walls: Option<Vec<Option<Enclosure>>>,
-    /// Lanes of runs that have not ended. Other lanes are not checked for finite numbers.
+    /// Lanes of running runs. Lanes of ended runs are not checked for finite numbers.
     pub(super) goes_on: Mask,
     /// Least and greatest positions along the axis that is computed at present \[m\]. A field, not local variables of the loop over blocks, because the
-    /// compiler
-    /// vectorises this form only.
+    /// compiler vectorises this form only.
     extremes: [Lanes; 2],
 }
 
@@ -87,8 +86,7 @@ fn set_lane(motions: &mut Motions, lane: usize, motion: Motion) {
 
 impl Blocks {
     /// Returns the bodies of runs of these scenes, which share the kind of `law` and may differ in its coefficients. `devices` is the choice for each peer's
-    /// device if
-    /// an observer sees devices. With `None` only those devices move that ever touch their copies.
+    /// device if an observer sees devices. With `None` only those devices move that ever touch their copies.
     pub(super) fn new<const A: usize>(places: Places, scenes: &[&Scene], law: &BuiltIn, devices: Option<&[DeviceChoice]>) -> Self {
         let mut blocks = Vec::with_capacity(A * places.blocks());
         let mut late = Vec::with_capacity(A * places.blocks());
@@ -105,7 +103,7 @@ impl Blocks {
                 late[spot.block].is_late.set(spot.lane, config.compute_delay);
                 block.touch(spot.lane, config.contact);
                 if !moves(scenes[run], member, devices) {
-                    // The device stays at rest: no force on the copy depends on it, and no observer sees it.
+                    // The device stays at rest: no force on the copy depends on this device, and no observer sees the device.
                     set_map(&mut block.device_map, spot.lane, &RESTING);
                     continue;
                 }
@@ -119,7 +117,7 @@ impl Blocks {
                 block.hand.0[spot.lane] = force.map_or(0.0, |force| force[axis]);
             }
         }
-        // Lists for delays and walls are kept only if a peer or a run has one, so that the usual tick skips both.
+        // Lists for delays and walls are kept only if a peer or a run has one, so the usual tick skips both.
         let any_late = scenes.iter().any(|scene| scene.peers.iter().any(|peer| peer.compute_delay));
         let walls: Vec<Option<Enclosure>> = scenes.iter().map(|scene| scene.object.enclosure).collect();
         Self {
@@ -200,7 +198,7 @@ impl Blocks {
             let Spot { block, lane } = self.places.spot(axis, peer, run);
             set_lane(&mut self.blocks[block].mean, lane, Motion { position: x[run], velocity: v[run] });
         }
-        // The last run of the last peer fills the unused lanes, which move like it.
+        // The last run of the last peer fills the unused lanes, which move alike.
         if L < WIDTH && peer + 1 == self.places.peers {
             let Spot { block, lane } = self.places.spot(axis, peer, L - 1);
             let mean = &mut self.blocks[block].mean;
@@ -227,7 +225,7 @@ impl Blocks {
         }
     }
 
-    /// Replaces the damping of the copies by that of these scenes, indexed by run.
+    /// Replaces the damping of the copies by the damping of these scenes, indexed by run.
     pub(super) fn set_damping(&mut self, scenes: &[&Scene]) {
         self.object_map = object_map(scenes);
     }
@@ -245,7 +243,7 @@ impl Blocks {
             let Spot { block, lane } = self.places.spot(axis, peer, run);
             let hands = &mut self.blocks[block].hand.0;
             hands[lane] = force;
-            // The last run of the last peer fills the unused lanes, which move like it.
+            // The last run of the last peer fills the unused lanes, which move alike.
             if peer + 1 == self.places.peers && run + 1 == self.places.runs {
                 hands[lane..].fill(force);
             }
@@ -268,7 +266,7 @@ impl Blocks {
 
     /// Computes the forces of all peers by the law and moves all bodies to the next tick.
     ///
-    /// The law is chosen here at each tick, so that all loops over ticks share one compiled function for each law.
+    /// The law is chosen here at each tick, so all loops over ticks share one compiled function for each law.
     #[inline(always)]
     pub(super) fn advance<const L: usize>(&mut self, processor: pulp::Arch, law: &BuiltIn<Lanes>) -> Moved<L> {
         law.visit(Advance::<L> { blocks: self, processor })
@@ -284,7 +282,7 @@ impl Blocks {
             self.extremes = [Lanes::splat(f64::INFINITY), Lanes::splat(f64::NEG_INFINITY)];
             for place in axis * per_axis..(axis + 1) * per_axis {
                 let block = &mut self.blocks[place];
-                // Most laws use none of the three, and the compiler then leaves them out.
+                // Most laws use neither past, lead nor memory, and the compiler then leaves out this code.
                 let past = if lag > 0 { std::mem::replace(&mut self.past[oldest + place], block.object) } else { block.object };
                 let lead = self.leads.get(place).unwrap_or(&Lanes::ZERO);
                 let memory = if remembered > 0 { &mut self.memory[place * remembered..(place + 1) * remembered] } else { &mut [] };
@@ -321,7 +319,7 @@ impl Blocks {
     /// Returns whether all numbers of each run are finite. `size` is the sum of the magnitudes of all positions and velocities, by lane.
     #[inline(always)]
     fn finite<const L: usize>(&self, size: Lanes) -> [bool; L] {
-        // A finite sum means that every magnitude is finite. An infinite sum can also come from overflow, so that each number is then checked.
+        // A finite sum means that every magnitude is finite. An infinite sum can also come from overflow, so each number is then checked.
         let [a, b, c, d, e, f, g, h] = (size & self.goes_on).0;
         if ((a + e) + (b + f)) + ((c + g) + (d + h)) < f64::INFINITY { [true; L] } else { self.look_at_each() }
     }
@@ -340,7 +338,7 @@ impl Blocks {
     }
 }
 
-/// Returns whether a device must be moved: it may touch its copy, or an observer sees it.
+/// Returns whether a device must be moved: the device may touch its copy, or an observer sees the device.
 pub(super) fn moves(scene: &Scene, peer: usize, devices: Option<&[DeviceChoice]>) -> bool {
     touches(scene, peer) || devices.is_some_and(|devices| devices[peer] == DeviceChoice::Simulated)
 }

@@ -1,4 +1,4 @@
-//! Bodies of all peers, which are copies and devices, and the hands that push the devices.
+//! Bodies of all peers (copies and devices), and the hands on the devices.
 
 use cohaptic_peer::coordination::BuiltIn;
 use cohaptic_peer::{Hand, HandForce};

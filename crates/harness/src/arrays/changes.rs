@@ -1,6 +1,6 @@
 //! Changes of the timeline in runs in arrays.
 //!
-//! A run goes in stretches from one change to the next. Nothing changes within a stretch, so that the law is a constant of the loop over ticks.
+//! A run goes in stretches from one change to the next. Nothing changes within a stretch, so the law is a constant of the loop over ticks.
 
 use std::slice;
 
@@ -12,7 +12,7 @@ use cohaptic_wan::LinkModel;
 use super::blocks::law_of_lanes;
 use super::{Arrays, Samples};
 
-/// Changes that are still to come, which are the same in all runs, and the laws that follow from them in each run.
+/// Changes still to come, equal in all runs, and the law of each run after each change.
 #[derive(Debug)]
 pub(super) struct Changes<'a, const L: usize> {
     to_come: slice::Iter<'a, Change>,
@@ -38,7 +38,7 @@ impl<'a, const L: usize> Changes<'a, L> {
     }
 }
 
-/// Collects the items that the iterators return together, until one of them ends.
+/// Collects the items of the iterators in groups of L, until any iterator ends.
 fn side_by_side<T, I: Iterator<Item = T>, const L: usize>(mut iterators: [I; L]) -> Vec<[T; L]> {
     let mut together = Vec::new();
     while let Ok(items) = <[T; L]>::try_from(iterators.iter_mut().map_while(Iterator::next).collect::<Vec<T>>()) {
@@ -54,14 +54,13 @@ impl<const A: usize, const L: usize> Arrays<'_, A, L> {
     }
 
     /// Applies the changes up to the instant `until`, which is at the tick `tick` or, at the end of the scene, before it. Each change of a link takes effect at
-    /// its
-    /// own instant. Calls `damped` with the scene whose damping the copies have from then on.
+    /// its own instant. Calls `damped` with the scene whose damping the copies have from then on.
     #[cold]
     pub(super) fn change(&mut self, tick: u64, until: Instant, damped: &mut dyn FnMut(&Scene)) {
         while self.changes.next_at() <= until
             && let Some(change) = self.changes.to_come.next()
         {
-            // One entry for each change of the timeline, so that an entry is popped even if this change keeps the law.
+            // One entry for each change of the timeline, so an entry is popped even if this change keeps the law.
             let laws = self.changes.laws.pop();
             match &change.what {
                 ChangeKind::Link(link) => self.set_links(tick, change.at, &[(link.from, link.to)], |_, _| &link.config),
@@ -98,7 +97,7 @@ impl<const A: usize, const L: usize> Arrays<'_, A, L> {
         }
     }
 
-    /// Returns the index of a peer of the scene among the members; `None` if other arrays hold this peer.
+    /// Returns the index of a peer of the scene among the members; `None` for a peer in different arrays.
     fn member(&self, peer: usize) -> Option<usize> {
         self.members.contains(&peer).then(|| peer - self.members.start)
     }

@@ -5,7 +5,7 @@ use std::ops::{Add, BitAnd, Div, Mul, Sub};
 /// Numbers computed at once: a cache line, and a register of the widest processors.
 pub(crate) const WIDTH: usize = 8;
 
-/// Eight numbers that undergo the same operations. Each number is rounded as it would be alone, so that the other lanes change no bit.
+/// Eight numbers that undergo the same operations. Each number is rounded as it would be alone, so the other lanes change no bit.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 pub(super) struct Lanes(pub(super) [f64; WIDTH]);
@@ -41,13 +41,13 @@ impl Lanes {
     }
 }
 
-/// Returns the smaller of two numbers; the second if both are equal or one is NaN. Compiles to one instruction, unlike [`f64::min`].
+/// Returns the smaller of two numbers; the second if both are equal or either is NaN. Compiles to one instruction, unlike [`f64::min`].
 #[inline(always)]
 pub(crate) fn smaller(one: f64, other: f64) -> f64 {
     if one < other { one } else { other }
 }
 
-/// Returns the larger of two numbers; the second if both are equal or one is NaN.
+/// Returns the larger of two numbers; the second if both are equal or either is NaN.
 #[inline(always)]
 pub(crate) fn larger(one: f64, other: f64) -> f64 {
     if one > other { one } else { other }

@@ -1,10 +1,9 @@
-//! Runs of scenes that need no events: all numbers of all peers in arrays, for one scene or for several scenes of one shape side by side.
+//! Runs of scenes without need for events: all numbers of all peers in arrays, for one scene or for several scenes of one shape side by side.
 //!
 //! If all peers tick together and the observer wants no more than ticks, a run is a loop over ticks: samples are sent, samples arrive, forces are computed,
-//! bodies
-//! move. This loop works on arrays, eight numbers at a time: eight peers of one run, or one peer of eight runs. [`crate::world::World`] computes the same with
-//! events. Both do the same operations in the same order on each number, draw the same random numbers at the same addresses and keep the same counters, so
-//! that both return the same [`Summary`] to the bit.
+//! bodies move. This loop works on arrays, eight numbers at a time: eight peers of one run, or one peer of eight runs. [`crate::world::World`] computes the
+//! same with events. Both do the same operations in the same order on each number, draw the same random numbers at the same addresses and keep the same
+//! counters, so both return the same [`Summary`] to the bit.
 
 mod blocks;
 mod bodies;
@@ -91,7 +90,7 @@ struct Arrays<'a, const A: usize, const L: usize> {
     scenes: [&'a Scene; L],
     shape: Shape,
     law: BuiltIn<Lanes>,
-    /// Peers of the scene that these arrays hold. Unless a comment says otherwise, a peer is counted from the first of these members.
+    /// Peers of the scene in these arrays. Unless a comment says otherwise, a peer is counted from the first of these members.
     members: Range<usize>,
     bodies: Bodies<A>,
     samples: Samples<A, L>,
@@ -228,8 +227,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
     }
 
     /// Begins a tick: takes the samples of the peers that send now. Returns whether any peer sends; then `senders` lists the sending peers of the scene, and
-    /// `sent`
-    /// holds the samples of those among them that are members.
+    /// `sent` holds the samples of the members among them.
     #[inline(always)]
     fn begin(&mut self, tick: u64) -> bool {
         let sends = tick == self.earliest_send;
@@ -273,7 +271,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
     #[inline(never)]
     fn extrapolate(&mut self, now: Instant) {
         let Shape { tick, send_every, phases, .. } = &self.shape;
-        // A link is offered every sample of its sender, so that the sequence number of a sample gives its instant.
+        // A link is offered every sample of its sender, so the sequence number of a sample gives its instant.
         let sent = |sender: usize, sequence: u64| Instant::from_nanos((phases[sender] + sequence * send_every) * nanos(*tick));
         let Some((horizons, leads)) = &mut self.leads else { return };
         for (peer, leads) in leads.iter_mut().enumerate() {
@@ -296,7 +294,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         }
     }
 
-    /// Takes the samples of the peers that send at this tick, and sets the tick at which each of them sends next.
+    /// Takes the samples of the peers that send at this tick, and sets the next tick of sending for each.
     fn gather(&mut self, tick: u64) {
         self.senders.clear();
         for (peer, next) in self.next_send.iter_mut().enumerate() {
@@ -391,8 +389,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
     }
 
     /// Returns the counters of each link from `from` after the given number of ticks, if all links have the constant delay `delay` and packets that arrive up
-    /// to
-    /// `until` are delivered.
+    /// to `until` are delivered.
     fn broadcast_stats(&self, from: usize, delay: Duration, ticks: u64, until: Instant) -> LinkStats {
         let delay = nanos(delay);
         // Such a link keeps no counters: its packets are sent at ticks phase, phase + M, phase + 2M, … with M = `send_every`.
@@ -410,7 +407,7 @@ fn links<const A: usize, const L: usize>(parts: &[Arrays<'_, A, L>], run: usize,
     if let Some(delay) = parts[0].shape.delay {
         return LinkSummaries::by_sender((0..peers).map(|from| parts[0].broadcast_stats(from, delay, ticks, until)).collect());
     }
-    // Capacity for all links, so that the vector of a large mesh does not grow several times.
+    // Capacity for all links, so the vector of a large mesh does not grow several times.
     let mut stats = Vec::with_capacity(parts[0].shape.topology.as_ref().map_or(peers * (peers - 1), |topology| topology.links()));
     for (from, part) in (0..peers).flat_map(|from| parts.iter().map(move |part| (from, part))) {
         let Samples::PerPacket(samples) = &part.samples else { continue };
@@ -489,7 +486,7 @@ fn next_offer(shape: &Shape, next_send: u64) -> Instant {
     Instant::from_nanos(next_send.saturating_mul(nanos(shape.tick)))
 }
 
-/// Returns a span in nanoseconds. Spans here are at most a year, so that the conversion never saturates.
+/// Returns a span in nanoseconds. Spans here are at most a year, so the conversion never saturates.
 fn nanos(span: Duration) -> u64 {
     u64::try_from(span.as_nanos()).unwrap_or(u64::MAX)
 }

@@ -9,8 +9,7 @@ pub(super) struct Spot {
     pub(super) lane: usize,
 }
 
-/// Layout of the bodies of some or all peers of a scene, counted from 0: by axis, then peer, then run. Each axis begins a new block, so that work along an axis
-/// is
+/// Layout of the bodies of some or all peers of a scene, counted from 0: by axis, then peer, then run. Each axis begins a new block, so work along an axis is
 /// work on whole blocks.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Places {
@@ -32,8 +31,8 @@ impl Places {
         Spot { block: axis * self.blocks() + number / WIDTH, lane: number % WIDTH }
     }
 
-    /// Returns every spot of an axis with its peer and run. Spots beyond the last run of the last peer repeat that peer and run, and move alike, so that whole
-    /// blocks can be computed and compared.
+    /// Returns every spot of an axis with its peer and run. Spots beyond the last run of the last peer repeat this run and move alike, so whole blocks can be
+    /// computed and compared.
     pub(super) fn all(self, axis: usize) -> impl Iterator<Item = (Spot, usize, usize)> {
         let last = self.peers * self.runs - 1;
         (0..self.blocks() * WIDTH).map(move |number| {

@@ -10,7 +10,7 @@ use super::lanes::{Lanes, WIDTH};
 use super::ticks::{Source, Ticks};
 use crate::observer::{InstantRow, StateRow, TickRow};
 
-/// Observer of a run in arrays. The loop over ticks is compiled for each implementation, so that an unwatched run makes no rows.
+/// Observer of a run in arrays. The loop over ticks is compiled for each implementation, so an unwatched run makes no rows.
 pub(super) trait RunWatch<const A: usize> {
     /// Called as [`crate::Observer::keep_going`] is.
     fn keep_going(&mut self, now: Instant) -> bool;
@@ -38,7 +38,7 @@ impl<const A: usize> RunWatch<A> for Unwatched<'_> {
     }
 }
 
-/// Observer of ticks and instants behind a trait object, so that the loops are not compiled for every type of observer.
+/// Observer of ticks and instants behind a trait object, so the loops are not compiled for every type of observer.
 pub(crate) trait Onlooker {
     /// See [`crate::Observer::on_ticks`].
     fn on_ticks(&mut self, ticks: &Ticks<'_>);
@@ -55,7 +55,7 @@ pub(super) struct WatchedTicks<'a> {
     onlooker: &'a mut dyn Onlooker,
     /// Own damping of the law \[N·s/m\], indexed by peer.
     damping: Vec<f64>,
-    /// Number of axes in rows, which is that of the scene. The run may simulate more axes.
+    /// Number of axes in rows: the axes of the scene. The run may simulate more axes.
     shown: usize,
 }
 
@@ -91,7 +91,7 @@ impl<const A: usize> RunWatch<A> for WatchedTicks<'_> {
     }
 }
 
-/// Peer at one of its ticks.
+/// A peer at a tick.
 struct Place {
     at: Instant,
     peer: usize,
@@ -106,7 +106,7 @@ impl Place {
     fn hand_on<const A: usize>(&self, axes: &[Seen; A], on: &mut dyn FnMut(&TickRow<'_>) -> bool) -> bool {
         let lane = self.peer % WIDTH;
         let object = StateOfLane::of(axes.each_ref().map(|seen| &seen.object), lane);
-        // The law's own damping is part of the copy's step map, not of the force that the law computes, so that it is added for the row.
+        // The law's own damping is part of the copy's step map, not of the force that the law computes, so it is added for the row.
         let recorded = |axis: usize| {
             let held = axes[axis].coordination.0[lane];
             if self.damping > 0.0 { held + self.damping * object.velocity[axis] } else { held }

@@ -1,4 +1,4 @@
-//! Decides which scenes can run in arrays, and which of these scenes can run side by side.
+//! Selection of the scenes for arrays, and of scenes that can run side by side.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -48,7 +48,7 @@ pub(crate) struct Shape {
 pub(super) enum Way {
     /// The fate of each packet is known as the packet is sent.
     Direct,
-    /// The fate of each packet is known before its sender sends the next packet. It can depend on later packets, or on a change of the timeline.
+    /// The fate of each packet is known before its sender sends the next packet. The fate can depend on later packets, or on a change of the timeline.
     Stepped,
 }
 
@@ -78,7 +78,7 @@ impl Shape {
         Instant::from_nanos(tick * nanos(self.tick))
     }
 
-    /// Returns whether a sample reaches all other peers at the same tick, so that links take no memory.
+    /// Returns whether a sample reaches all other peers at the same tick, so links take no memory.
     pub(crate) const fn is_broadcast(&self) -> bool {
         self.delay.is_some()
     }
@@ -122,7 +122,7 @@ impl Shape {
 
     /// Returns the shape and the law of a scene, or the reason for which the scene cannot run in arrays.
     pub(crate) fn of<S: Strategies>(scene: &Scene, plan: &Plan, strategies: &S) -> Result<(Self, BuiltIn), &'static str> {
-        // All peers tick together, so that the law of the first peer is the law of all.
+        // All peers tick together, so the law of the first peer is the law of all.
         let law = strategies.law(scene, 0).ok_or("the strategy is not a law of the registry")?;
         let clock = scene.peers[0].clock;
         let load = load(scene);
@@ -211,7 +211,7 @@ fn why_known_late(link: &LinkModel) -> Option<&'static str> {
     })
 }
 
-/// Returns the samples that each link of a scene is offered: their size, and the least time between two of them.
+/// Returns the load of each link of a scene: the size of a sample, and the least time between two samples.
 fn load(scene: &Scene) -> Load {
     let ticks = |peer: usize| u32::try_from(scene.samples_every(peer)).unwrap_or(u32::MAX);
     let gaps = scene.peers.iter().enumerate().map(|(peer, spec)| spec.clock.tick.saturating_mul(ticks(peer)));

@@ -12,8 +12,7 @@ use crate::{NoObserver, Simulation, Summary};
 /// Runs scenes without observers and returns their summaries in the order of the scenes, each the same to the bit as [`Simulation::run`] of that scene alone.
 ///
 /// Consecutive scenes of one shape ([`same_shape`]) run up to eight at a time if this is faster: scenes with the same peers, ticks, duration, timeline and
-/// delays
-/// that differ in seed, gains, masses, hands, jitter or loss. All other scenes run alone.
+/// delays that differ in seed, gains, masses, hands, jitter or loss. All other scenes run alone.
 ///
 /// # Panics
 ///
@@ -40,8 +39,7 @@ pub fn run_side_by_side(scenes: &[Scene]) -> Vec<Summary> {
 
 /// Returns whether `alike` scenes of a shape run faster in eight lanes than one after the other.
 ///
-/// Unused lanes cost as much as used lanes, so that a minimum of scenes is needed. If all samples travel together, lanes share all work up to the number of
-/// peers
+/// Unused lanes cost as much as used lanes, so a minimum of scenes is needed. If all samples travel together, lanes share all work up to the number of peers
 /// from which means are exact; exact means are computed for a single run. If each packet has an arrival of its own, packets are most of the work and are
 /// computed for each run by itself. With many peers, the samples in flight of eight runs then no longer fit into the nearest cache.
 fn pays(shape: &Shape, alike: usize) -> bool {
@@ -59,7 +57,7 @@ fn shape(scene: &Scene) -> Option<(Shape, &[Change])> {
     Shape::of(scene, &Plan::new(scene, Model::Least, false), &FromScene).ok().map(|(shape, _)| (shape, &scene.timeline[..]))
 }
 
-/// Runs up to eight scenes of one shape. The last scene fills the unused lanes, whose results are discarded.
+/// Runs up to eight scenes of one shape. The last scene fills the unused lanes; results of unused lanes are discarded.
 fn run_eight(scenes: &[Scene], shape: Shape) -> Vec<Summary> {
     let lanes: [&Scene; WIDTH] = std::array::from_fn(|lane| &scenes[lane.min(scenes.len() - 1)]);
     let laws = lanes.map(|scene| scene.law(0).expect("scenes of a shape have a law"));

@@ -1,11 +1,11 @@
-//! One run on several threads, or with groups of peers on one thread. Results equal those of all peers together, to the bit.
+//! One run on several threads, or with groups of peers on one thread. Results equal the results of all peers together, to the bit.
 //!
-//! Each thread has some of the peers: it moves these peers, and has the links to them with the samples in flight. Peers act on each other by their samples
-//! alone, so that threads need to meet only at ticks at which some peer sends, to exchange the samples. The fate of a packet is drawn at an address of its own,
-//! so that any thread can draw the fate.
+//! Each thread moves some of the peers, and has the links to its peers with the samples in flight. Peers act on each other by their samples alone, so threads
+//! need to meet only at ticks at which some peer sends, to exchange the samples. The fate of a packet is drawn at an address of its own, so any thread can draw
+//! the fate.
 //!
 //! For the same reason a thread need not move all its peers tick by tick. A thread computes one group of peers from one meeting to the next, then the next
-//! group, so that the samples that a group holds stay in the cache.
+//! group, so the samples that a group holds stay in the cache.
 
 mod barrier;
 mod exchange;
@@ -25,7 +25,7 @@ use super::shape::Shape;
 use super::{Arrays, Samples, bodies_of, summary};
 use crate::summary::{Ending, Summary};
 
-/// Least number of peers for each thread. With fewer peers, threads wait for each other longer than they work.
+/// Least number of peers for each thread. With fewer peers, threads wait longer than they work.
 const PEERS_A_THREAD: usize = 8;
 
 /// Memory of the samples that a group holds \[bytes\]: half of a typical second-level cache, which links and packets share.
@@ -54,8 +54,7 @@ pub(super) fn groups_pay(shape: &Shape) -> bool {
 }
 
 /// Divides the peers of a thread into groups of whole registers. The held samples of a group take at most `held_by_a_group` bytes, unless one register of peers
-/// takes
-/// more.
+/// takes more.
 fn groups(shape: &Shape, members: &Range<usize>, held_by_a_group: usize) -> Vec<Range<usize>> {
     let heard = shape.topology.as_ref().map_or(shape.peers - 1, |topology| topology.links().div_ceil(shape.peers));
     let held_by_a_peer = heard.max(1) * (size_of::<u64>() + shape.axes * size_of::<[f64; 2]>());
@@ -86,7 +85,7 @@ fn run_in_groups<const A: usize>(
     let groups: Vec<Vec<Range<usize>>> = shares.map(|share| groups(shape, &share, held_by_a_group)).collect();
     let bodies: Vec<Vec<Bodies<A>>> =
         groups.iter().map(|groups| groups.iter().map(|members| bodies_of::<A, 1>(&[scene], members, &[law], None)).collect()).collect();
-    // Every part begins with the initial states of all peers, so that all bodies are made before any thread starts.
+    // Every part begins with the initial states of all peers, so all bodies are made before any thread starts.
     let all = bodies.iter().flatten().zip(groups.iter().flatten());
     let initial: Vec<Sample<A, 1>> = all.flat_map(|(bodies, members)| (0..members.len()).map(|peer| bodies.sample(peer))).collect();
     let exchange = Exchange::new(threads);

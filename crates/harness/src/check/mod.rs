@@ -21,8 +21,7 @@ use expectations::Watched;
 /// A scene [too large](crate::too_large) for a simulation returns the one line with this reason.
 ///
 /// A simulation decides whether the scene is stable. `keep_going` is called about every thousand instants. If it returns `false`, the check ends with a line
-/// about
-/// the interruption.
+/// about the interruption.
 #[must_use]
 pub fn check(scene: &Scene, model: Model, keep_going: impl FnMut() -> bool) -> Vec<String> {
     check_with(scene, model, |_, _| Judged::Unknown, keep_going).failures()
@@ -55,8 +54,7 @@ impl Checked {
 }
 
 /// Like [`check`], with the outcome of each expectation. `judge` is asked before a simulation whether the scene is stable; its second argument is the
-/// expectation: `true`
-/// for stable, `false` for unstable.
+/// expectation: `true` for stable, `false` for unstable.
 #[must_use]
 pub fn check_with(scene: &Scene, model: Model, judge: impl FnOnce(&Scene, bool) -> Judged, mut keep_going: impl FnMut() -> bool) -> Checked {
     let Some(expect) = &scene.expect else {

@@ -1,15 +1,12 @@
 //! Stability of a scene by simulation: the fate of a small disturbance.
 //!
 //! The scene runs twice with the same hands, links and random numbers. In the second run every device and every copy begins displaced by up to a micrometre.
-//! The
-//! difference of the two runs obeys the scene's autonomous dynamics (exactly, if the scene is linear), independent of the hands. The difference dies out if the
-//! scene
-//! is stable and grows if the scene is unstable. Only *relative* displacements count: between copies, and between a device and its copy while both touch. The
-//! position of all bodies together has no meaning for stability, because space has no origin.
+//! The difference of the two runs obeys the scene's autonomous dynamics (exactly, if the scene is linear), independent of the hands. The difference dies out if
+//! the scene is stable and grows if the scene is unstable. Only *relative* displacements count: between copies, and between a device and its copy while both
+//! touch. The position of all bodies together has no meaning for stability, because space has no origin.
 //!
 //! Limits: With random links the answer holds for the scene's seed, so this is almost-sure stability, not mean-square stability. The difference of two runs is
-//! only as
-//! exact as positions are: for copies beyond 10⁶ m, rounding (10⁻¹⁰ m there) comes near the size of a disturbance that has died out.
+//! only as exact as positions are: for copies beyond 10⁶ m, rounding (10⁻¹⁰ m there) comes near the size of a disturbance that has died out.
 
 use cohaptic_peer::Contact;
 use cohaptic_peer::coordination::BuiltInStrategy;

@@ -10,15 +10,13 @@ use super::pulled::PulledDevice;
 /// Device of a person in a live session, or pointer that pulls a simulated device. Components beyond the axes of the scene are zero and are ignored.
 pub trait LiveDevice: Send {
     /// Returns position \[m\] and velocity \[m/s\] at the tick at `now`, in the coordinates of the scene; for a peer of kind `pointer`, those of the pointer.
-    /// Called once
-    /// a tick. Returns `None` if there is no device, or if the device does not answer or is not homed.
+    /// Called once a tick. Returns `None` if there is no device, or if the device does not answer or is not homed.
     ///
     /// A peer whose device is silent for long lets go of the object gradually, and takes the object up again gradually when the device is back.
     fn read(&mut self, now: Instant) -> Option<State<3>>;
 
     /// Applies the force FC \[N\] until the next tick, `span` after `now`. The hand feels FC with the opposite sign. Called once a tick, after
-    /// [`LiveDevice::read`],
-    /// and with zero forces when the session ends.
+    /// [`LiveDevice::read`], and with zero forces when the session ends.
     fn hold(&mut self, now: Instant, span: Duration, coupling_force: [f64; 3]);
 }
 

@@ -89,8 +89,7 @@ const KINDS: [&str; 4] = ["program", "scene", "file", "key"];
 
 impl RecordedScene {
     /// Returns the identity of a scene. `content`: keys and files from [`cohaptic_scene::scene_content`]. With empty content, a replay can notice a different
-    /// scene but
-    /// cannot name the difference.
+    /// scene but cannot name the difference.
     #[must_use]
     pub fn of(scene: &Scene, content: SceneContent) -> Self {
         // Expectations do not change a run.

@@ -13,8 +13,7 @@
 //! The last row closes the record with the number of rows before it and the instant of the last of these rows. A file without this row was cut short.
 //!
 //! A sample is written in hexadecimal. A device or pointer has position and velocity along each axis in turn (`x vx y vy`), with digits from which the same
-//! numbers
-//! are read back, or `none`. A link has all its keys, as a TOML table. The first rows name [the recorded scene](super::RecordedScene).
+//! numbers are read back, or `none`. A link has all its keys, as a TOML table. The first rows name [the recorded scene](super::RecordedScene).
 
 use std::fmt;
 use std::path::Path;
@@ -95,8 +94,7 @@ impl Inputs {
     }
 
     /// Reads a record as [`Inputs::read`] does, or an incomplete one, as a killed session leaves behind. For an incomplete record the second value is the
-    /// reason, and
-    /// the inputs end the session at the last whole line.
+    /// reason, and the inputs end the session at the last whole line.
     ///
     /// # Errors
     ///

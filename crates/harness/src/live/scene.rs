@@ -25,12 +25,9 @@ const NANOSECOND: Duration = Duration::from_nanos(1);
 /// A running session of a scene with or without remote peers.
 ///
 /// The driver passes samples with [`LiveScene::handle_sample`], each with the logical instant of its arrival. [`LiveScene::poll_timeout`] returns the instant
-/// at
-/// which to call [`LiveScene::handle_timeout`]. After every call the driver drains [`LiveScene::poll_transmit`]. A late call changes no result: everything due
-/// is
-/// computed instant by instant, in the order of `docs/model.md`, with the instant at which it was due. Many short steps of time give the same result as one
-/// long
-/// step.
+/// at which to call [`LiveScene::handle_timeout`]. After every call the driver drains [`LiveScene::poll_transmit`]. A late call changes no result: everything
+/// due is computed instant by instant, in the order of `docs/model.md`, with the instant at which it was due. Many short steps of time give the same result as
+/// one long step.
 ///
 /// Time is *open* from some instant on: everything before that instant has happened. An input takes effect at its own instant, before anything else at that
 /// instant. If its instant has passed, the input takes effect at the first open instant.
@@ -112,12 +109,10 @@ impl LiveScene {
     }
 
     /// Takes a sample of a peer of kind `udp`, which arrived at `at`, and sends the sample over the links of that peer. Returns the instant at which the sample
-    /// takes
-    /// effect: `at`, or the first open instant if `at` has passed.
+    /// takes effect: `at`, or the first open instant if `at` has passed.
     ///
     /// The caller has verified the origin of the datagram; its content is checked here. A refused sample is counted and changes nothing else. Sequence numbers
-    /// of a
-    /// peer must rise, but may start again after a silence. The receivers see continuous numbers.
+    /// of a peer must rise, but may start again after a silence. The receivers see continuous numbers.
     ///
     /// # Errors
     ///
@@ -159,8 +154,7 @@ impl LiveScene {
     }
 
     /// Changes a link from `at` on, or from the first open instant if `at` has passed. Returns the instant of the change; `None` if there is no such link or if
-    /// the
-    /// session has ended. `model` is the model of `keys`: see [`LinkKeys::model`]. Packets in flight keep their delay.
+    /// the session has ended. `model` is the model of `keys`: see [`LinkKeys::model`]. Packets in flight keep their delay.
     ///
     /// # Errors
     ///
@@ -195,8 +189,7 @@ impl LiveScene {
     }
 
     /// Returns the instant of the next call of [`LiveScene::handle_timeout`], for a tick or for a peer in another process; `None` once the session has ended.
-    /// Packets
-    /// for simulated peers wait for the next tick, at which these peers read them.
+    /// Packets for simulated peers wait for the next tick, at which these peers read them.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         if self.ended.is_some() { None } else { Some(each!(&self.world, world => world.next_wake())) }

@@ -1,6 +1,5 @@
 //! Ages of the samples that peers hold: at each tick of a peer and for each sender with an arrived sample, the instant of the tick less the instant of
-//! sampling. Both
-//! are instants of the scene, so drifting clocks do not change an age.
+//! sampling. Both are instants of the scene, so drifting clocks do not change an age.
 
 use std::time::Duration;
 
@@ -39,8 +38,7 @@ struct Receiver {
 
 impl Receiver {
     /// Returns the index of a sender in `sampled`, or the index for its insertion. First tries the index that the sender has if all other peers send, and
-    /// searches only
-    /// if a different sender is found there.
+    /// searches only if a different sender is found there.
     #[inline]
     fn place_of(&self, from: usize, to: usize) -> Result<usize, usize> {
         let likely = from - usize::from(from > to);

@@ -1,27 +1,23 @@
 //! Energy that the coordination injects into the copies.
 //!
 //! Over a step a copy moves by d under held forces, so the work of each force is exact: the held part F of the coordination force does the work −F·d. A law
-//! with own
-//! damping β takes energy between ticks too. All damping, bO + β, takes f·d − ½·m·(v₁² − v₀²) in a step, with f the sum of the held forces, and β takes its
-//! share
-//! β/(bO + β):
+//! with own damping β takes energy between ticks too. All damping, bO + β, takes f·d − ½·m·(v₁² − v₀²) in a step, with f the sum of the held forces, and β
+//! takes its share β/(bO + β):
 //!
 //! ```text
 //! W = Σᵢ Σₖ (−F·d − β/(bO + β)·(f·d − ½·m·Δv²))
 //! ```
 //!
 //! A rotating object adds the same for its turns, with the held part T of the coordination torque, the sum τ of the held torques and the integral Θ of ω, all
-//! in body
-//! axes. The loss about one axis includes the work of the gyroscopic term, (Jⱼ − Jₖ)·∫ωxωyωz dt, by Simpson's rule. The sum of this term over all three axes is
-//! zero.
+//! in body axes. The loss about one axis includes the work of the gyroscopic term, (Jⱼ − Jₖ)·∫ωxωyωz dt, by Simpson's rule. The sum of this term over all three
+//! axes is zero.
 //!
 //! ```text
 //! W += −T·Θ − Σᵢ β/(bR + β)·(τ·Θ − ½·J·Δω² + (Jⱼ − Jₖ)·∫ωxωyωz dt)ᵢ
 //! ```
 //!
 //! If only a server has the object, F of the server is −Σ FC of its clients. Each client adds −FC·dH, with dH the motion of its device, because the step rows
-//! of a
-//! client describe its device.
+//! of a client describe its device.
 
 use std::time::Duration;
 

@@ -1,8 +1,7 @@
 //! Impedance felt by the hand of a probe, at the frequency of its push.
 //!
 //! Force and velocity of the device, at its ticks in the second half of the scene, are fitted by c₀ + c·cos ωt + s·sin ωt with least squares. The phasors c −
-//! j·s give
-//! Z = F/v, with the viscosity Re Z and the effective mass Im Z/ω.
+//! j·s give Z = F/v, with the viscosity Re Z and the effective mass Im Z/ω.
 
 use std::cmp::Ordering;
 use std::time::Duration;

@@ -1,8 +1,7 @@
 //! Quantiles of any number of values in constant memory.
 //!
 //! Values are counted in bins, 128 in each octave from 2⁻⁴⁰ to 2²⁴. The bin of a value is its exponent with the first seven bits of its mantissa. No logarithm
-//! is
-//! needed, so a value has the same bin on every machine. The middle of a bin differs from each value in the bin by at most 2⁻⁸ of the value. Two sketches
+//! is needed, so a value has the same bin on every machine. The middle of a bin differs from each value in the bin by at most 2⁻⁸ of the value. Two sketches
 //! [add up](QuantileSketch::merge): their sum is the sketch of all values.
 
 /// Least value of the bins. Smaller values count as zero.

@@ -9,8 +9,7 @@ use super::{Accumulator, Asked, Rows};
 use crate::TickRow;
 
 /// First tick at which a copy is at least a given distance from its position at its first tick. The copy of a server's client begins at the server's copy, not
-/// at the
-/// position of its peer in the scene.
+/// at the position of its peer in the scene.
 #[derive(Clone, Copy, Default, Debug)]
 pub(crate) struct Travelled {
     /// Position at the first tick \[m\]; `None` before.
@@ -94,8 +93,7 @@ mod tests {
     }
 
     /// The user of a client is 5 cm away from the object, which belongs to the server and begins at 0. The client's copy travels 2 cm in the time between the
-    /// recorded
-    /// positions, not in no time.
+    /// recorded positions, not in no time.
     #[test]
     fn the_copy_of_a_client_travels_from_where_it_begins() {
         let text = "scene.duration = \"2s\"\nobject.mass = 0.45\nlink.delay = \"8ms\"\ncoordination = { strategy = \"client-server\", stiffness = 0.0, update = \"8ms\" }\n\

@@ -17,8 +17,7 @@ pub struct Bands {
     width: u64,
     curves: usize,
     /// Lowest and highest values in blocks of eight curves, ordered by span, then curve. [`Extremes::NONE`] in spans without a value. Lanes beyond the last
-    /// curve have
-    /// no meaning.
+    /// curve have no meaning.
     extremes: Vec<Extremes>,
     /// Span of the latest value, and the instants in this span \[ns\]. Kept because finding a span takes a division.
     latest: (usize, Range<u64>),
@@ -175,10 +174,8 @@ impl Bands {
     /// Returns the range of values to show, with a margin, and whether values beyond this range are left out.
     ///
     /// A scene that diverges ends in numbers that would flatten all earlier values. The range is therefore limited if the curves go farther than `sane` from
-    /// their
-    /// first value and also a thousand times as far as in the first tenth of the scene. The limit is three times the reach in the first tenth, and at least a
-    /// tenth
-    /// of `sane`.
+    /// their first value and also a thousand times as far as in the first tenth of the scene. The limit is three times the reach in the first tenth, and at
+    /// least a tenth of `sane`.
     #[must_use]
     pub fn range(&self, sane: f64) -> (Range<f64>, bool) {
         let start = (0..self.curves()).find_map(|curve| self.curve(curve).next()).map_or(0.0, |(_, low, _)| low);

@@ -24,8 +24,7 @@ pub struct InputRecorder {
 
 impl InputRecorder {
     /// Creates the folder if needed and begins the record. `content`: keys and files of the scene, from [`cohaptic_scene::scene_content`], with which a replay
-    /// with a
-    /// different scene can name the differences.
+    /// with a different scene can name the differences.
     ///
     /// # Errors
     ///

@@ -22,8 +22,7 @@ pub(crate) fn write(folder: &Path, summary: &Summary) -> Result<PathBuf, RecordE
 }
 
 /// Passes the text of `links.csv` to `write` piece by piece: one row for each link and access line, with the numbers of packets by fate and the mean delay of
-/// the
-/// delivered packets (empty without any).
+/// the delivered packets (empty without any).
 ///
 /// # Errors
 ///

@@ -1,6 +1,5 @@
 //! `network.svg`: a row of two panels for each link. The first panel shows delays over time with the losses below; the second shows the distribution of the
-//! delay, with
-//! the configured distribution.
+//! delay, with the configured distribution.
 //!
 //! Memory is bounded: the least and greatest delay of each span, and the number of delays in each step of ten microseconds.
 

@@ -9,8 +9,7 @@ use crate::PacketRow;
 use crate::record::RecordError;
 
 /// Writes the columns `link,sequence,sent,arrived,fate`. `arrived` is empty for a dropped packet. A packet in flight at the end has no row. A copy has a row of
-/// its own,
-/// with the sequence number of its packet.
+/// its own, with the sequence number of its packet.
 #[derive(Debug)]
 pub(crate) struct Packets {
     file: RecordFile,

@@ -38,8 +38,7 @@ fn push_attitude(line: &mut Vec<u8>, attitude: &Attitude) {
 }
 
 /// Writes the columns `t,peer,xh,vh,xo,vo,xd,vd,fc,ft`. A second axis adds `yh,vyh,yo,vyo,yd,vyd,fcy,fty`, and a third axis the same columns with z. If the
-/// object turns,
-/// the attitude of the copy and the torques follow. If any device turns, the attitude of the device follows, empty for devices that do not turn.
+/// object turns, the attitude of the copy and the torques follow. If any device turns, the attitude of the device follows, empty for devices that do not turn.
 #[derive(Debug)]
 pub(crate) struct Trajectory {
     file: RecordFile,

@@ -16,8 +16,7 @@ pub(crate) struct Views {
     /// Edges of the box with the mass and the inertia of the object \[m\], along the body axes.
     edges: Triple,
     /// Points of each copy with drawn traces, in body axes \[m\], indexed by peer: the grasped point, or the ends of the three body axes if the copy is grasped
-    /// at its
-    /// centre of mass.
+    /// at its centre of mass.
     traced: Vec<Vec<Triple>>,
     /// Spans of time, without curves.
     spans: Bands,

@@ -135,8 +135,7 @@ impl LinkSummaries {
     }
 
     /// Returns quantiles of the delivered packets, copies included, as a fraction of the offered packets, over the links with offered packets. A packet in
-    /// flight at the
-    /// end is not delivered. Returns `None` if no link was offered a packet.
+    /// flight at the end is not delivered. Returns `None` if no link was offered a packet.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "packet counts below 2^53")]
     pub fn delivered_fraction(&self) -> Option<LinkQuantiles> {

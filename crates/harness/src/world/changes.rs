@@ -45,7 +45,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                         None => {
                             let places = 0..self.members.len();
                             places.clone().flat_map(|from| places.clone().map(move |to| (from, to))).filter(|(from, to)| from != to).collect()
-                            // A strategy counts the other peers without its own peer, so that peers after `place` move down by one.
+                            // A strategy counts the other peers without its own peer, so peers after `place` move down by one.
                         }
                     };
                     for (from, to) in pairs {
@@ -57,7 +57,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                     for (place, member) in self.members.iter_mut().enumerate().filter(|(place, _)| *place != peer) {
                         member.peer.strategy_mut().set_contact(if peer < place { peer } else { peer - 1 }, contact);
                     }
-                    // A peer whose device is not simulated has no hand that could change.
+                    // A device without simulation has no hand.
                 }
                 ChangeKind::Hand { peer, hand } => match self.members[peer].peer.device_mut() {
                     DeviceModel::Simulated(device) => device.set_hand(hand.as_ref()),

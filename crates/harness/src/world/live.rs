@@ -54,8 +54,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
     /// Returns the next instant at which anything happens, at latest the end of the scene.
     ///
     /// Without peers in other processes this is a tick, as in virtual time: a packet that arrives between two ticks is read at the later tick anyway. With such
-    /// a
-    /// peer, every arrival is an instant of its own, because the record of the session has one order for all receivers.
+    /// a peer, every arrival is an instant of its own, because the record of the session has one order for all receivers.
     pub(crate) fn next_instant(&self) -> Instant {
         let tick = self.next_tick();
         if !self.remote.has_processes {
@@ -206,7 +205,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
 
     fn notice_silence(&mut self, now: Instant) {
         let (latest, members) = (&mut self.latest, &self.members);
-        // The position of a silent peer is unknown, so that the discrepancy leaves it out. A device in a hand keeps its copy in this process.
+        // The position of a silent peer is unknown, so the discrepancy leaves it out. A device in a hand keeps its copy in this process.
         self.remote.notice_silence(now, |place| {
             if !matches!(members[place].peer.device(), DeviceModel::Unsimulated(UnsimulatedDevice::InHand(_))) {
                 latest[place] = [f64::NAN; A];
@@ -275,7 +274,7 @@ impl<const A: usize> Remote<A> for RemotePeers<A> {
             observer.on_input(&InputRow { at: now, what: Input::Device { peer: place, state: read.as_ref().map(|state| row(state, axes)) } })?;
             if let Some(state) = read {
                 let joins = seat.hear(now);
-                // A device that comes back fades in, and so do the forces of the peers that it follows.
+                // A device that comes back fades in, and so do all fades that follow its presence.
                 if joins {
                     device.keep();
                     seat.fades[place].moved(now);

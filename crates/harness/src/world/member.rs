@@ -1,4 +1,4 @@
-//! A peer of a run with its clock, its device and its counters.
+//! A peer of a run with clock, device and counters.
 
 use std::time::Duration;
 
@@ -13,7 +13,7 @@ use crate::disturbance::Disturbance;
 use crate::observer::{Ended, Observer, StepRow, TurnStepRow};
 use crate::plan::{DeviceChoice, Plan};
 
-/// A peer with its clock and the counters of its ticks and samples.
+/// A peer with a clock and the counters of ticks and samples.
 pub(super) struct Member<const A: usize, S, D> {
     pub(super) peer: Peer<A, DeviceModel<A, D>, S>,
     pub(super) clock: Clock,
@@ -27,7 +27,7 @@ pub(super) struct Member<const A: usize, S, D> {
     pub(super) last_sent: Option<LastSent<A>>,
     /// Samples that arrived after a newer sample of the same sender.
     pub(super) stale_samples: u64,
-    /// Samples that were refused because damage made them undecodable.
+    /// Damaged samples that the decoder refused.
     pub(super) refused_samples: u64,
     /// Held part of the coordination force that was computed at the latest tick \[N\]. Updated only if steps are watched.
     pub(super) commanded: [f64; A],
@@ -72,13 +72,13 @@ impl<const A: usize, S: Strategy<A>, D: Device<A>> Member<A, S, D> {
         observer: &mut (impl Observer<Error = Ended> + ?Sized),
     ) -> Result<(), Ended> {
         match self.peer.role() {
-            // The most frequent case passes a constant role and no turn, so that the compiler specialises the inlined function.
+            // The most frequent case passes a constant role and no turn, so the compiler specialises the inlined function.
             Role::Copy if self.peer.rotation().is_none() => self.advance_as(now, span, commanded, (row, Role::Copy), observer, None),
             role @ (Role::Copy | Role::Client { .. }) => self.advance_otherwise(now, span, commanded, (row, role), observer),
         }
     }
 
-    /// Like [`Member::advance_watched`], for a client or for a peer that turns. Not inlined, so that the frequent case stays small.
+    /// Like [`Member::advance_watched`], for a client or for a peer that turns. Not inlined, so the frequent case stays small.
     #[inline(never)]
     fn advance_otherwise(
         &mut self,
@@ -115,7 +115,7 @@ impl<const A: usize, S: Strategy<A>, D: Device<A>> Member<A, S, D> {
         // With a compute delay, the force of the previous tick acts during this step.
         let coordination = if self.peer.compute_delay() { late } else { commanded };
         let before = self.moved_by_coordination(role);
-        // `advance` may replace the applied forces, so that they are copied first.
+        // `advance` may replace the applied forces, so they are copied first.
         let acting = *self.peer.applied();
         self.peer.advance(now, span);
         let turn = turn.map(|turn| TurnStepRow { after: self.peer.attitude().rate, ..turn });

@@ -1,4 +1,4 @@
-//! A running scene in virtual time or in a session: its peers, its network and its schedule, with A simulated axes.
+//! A running scene in virtual time or in a session: peers, network and schedule, with A simulated axes.
 //!
 //! A [`World`] is made from a checked scene and a [`Plan`]. Each step computes one instant and shows rows to the observer; the summary is read at the end. No
 //! file, socket or clock of the machine is known here.
@@ -59,7 +59,7 @@ pub(crate) struct World<const A: usize, S, E: Remote<A> = NoRemote> {
     topology: Option<Arc<Topology>>,
     end: Instant,
     now: Instant,
-    /// Position of each copy at its latest tick \[m\], indexed by peer. NaN for a peer in another process that is silent.
+    /// Position of each copy at its latest tick \[m\], indexed by peer. NaN for a silent peer in another process.
     latest: Vec<[f64; A]>,
     /// Attitudes of the copies; `None` if the object does not turn.
     turning: Option<Box<Turning>>,
@@ -156,7 +156,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         }
         self.schedule.take(now, &mut self.ticking);
         self.send(now, observer, watch)?;
-        // Without remote peers nothing else polls the network, so that an instant without events need not be delivered.
+        // Without remote peers nothing else polls the network, so an instant without events need not be delivered.
         if !E::IS_EMPTY || self.network.may_have_events(now) {
             self.deliver(now, observer, watch)?;
         }
@@ -214,7 +214,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
 
     /// Step 1 of an instant: each ticking peer whose sample is due sends this sample to all other peers, to its neighbours, or as a client to its server.
     fn send(&mut self, now: Instant, observer: &mut (impl Observer<Error = Ended> + ?Sized), watch: Watch) -> Result<(), Ended> {
-        // In lockstep all local peers have the tick of the leading peer, so that one comparison skips the loop at ticks without samples.
+        // In lockstep all local peers have the tick of the leading peer, so one comparison skips the loop at ticks without samples.
         if matches!(self.schedule, Schedule::Lockstep { .. }) && self.members[self.remote.lead()].tick < self.earliest_send {
             return Ok(());
         }
@@ -436,13 +436,12 @@ fn network<T: Clone>(scene: &Scene, plan: &Plan) -> Network<T> {
 
 /// Returns the properties that the network needs of each sample's packet.
 fn packet(kind: SampleKind, scene: &Scene) -> PacketInfo {
-    // Packets are ECN-capable, so that a queue that marks has packets to mark. No sender reacts to a mark; a marked packet arrives.
+    // Packets are ECN-capable, so a queue that marks has packets to mark. No sender reacts to a mark, and a marked packet arrives.
     PacketInfo { size: Bytes::new(kind.datagram_len(scene.axes.count()) as u64), ecn_capable: true }
 }
 
 /// Stores a sample with the attitude and the extra numbers of the peer at index `from`: numbers for each receiver if the kind is personal, else one set for
-/// all.
-/// Returns `None` if a number is not finite.
+/// all. Returns `None` if a number is not finite.
 fn store_extended<const A: usize, D: Device<A>, S: Strategy<A>>(
     samples: &mut SamplesInFlight<A>,
     packets: (usize, usize),
@@ -495,7 +494,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> Receivers<'_, A, S, E> {
                 Some(Err(error)) => unreachable!("peers of one scene understand each other: {error}"),
             }
         }
-        // A stored sample counts its packets: a copy adds a packet, every other event takes one away.
+        // The store counts the packets of a sample: a copy adds a packet, every other event removes a packet.
         if event.fate == Fate::Duplicated {
             self.samples.retain(event.payload);
         } else {

@@ -1,4 +1,4 @@
-//! Interface between a running world and its remote peers, and its implementation for virtual time, which has none.
+//! Interface between a running world and remote peers, and the implementation for virtual time, without remote peers.
 
 use cohaptic_peer::wire::{Extra, MAX_LEN, Sample, SampleKind};
 use cohaptic_peer::{Device, Peer, ReceiveError, Reception, RestingDevice, Strategy};
@@ -11,18 +11,18 @@ use crate::observer::{Ended, Observer};
 
 /// Remote peers of a running scene: peers in other processes, and peers whose device is in a person's hand.
 ///
-/// A type parameter of the world, not an optional field: virtual time has no remote peers, and its peers then carry no ages and its loop asks no questions.
+/// A type parameter of the world, not an optional field: in virtual time, peers then carry no ages and the loop over peers asks no questions.
 pub(crate) trait Remote<const A: usize> {
     /// Type of the devices that are not simulated.
     type Device: Device<A> + From<RestingDevice<A>>;
 
-    /// Whether every peer of every scene is local, so that all peers can tick in one loop without calls of `attend`.
+    /// Whether every peer of every scene is local, so all peers can tick in one loop without calls of `attend`.
     const IS_EMPTY: bool;
 
     /// Returns the index of the first local peer. In lockstep its tick count stands for all local peers.
     fn lead(&self) -> usize;
 
-    /// Returns whether the peer is present, so that its copy counts in the discrepancy.
+    /// Returns whether the peer is present, so its copy counts in the discrepancy.
     fn is_there(&self, place: usize) -> bool;
 
     /// Hands a delivered packet to its receiver and returns the outcome; `None` if the receiver is in another process.
@@ -34,7 +34,7 @@ pub(crate) trait Remote<const A: usize> {
         receiver: &mut Peer<A, DeviceModel<A, Self::Device>, S>,
     ) -> Option<Result<Reception, ReceiveError>>;
 
-    /// Prepares a peer for its tick: reads its device if that is in a hand, and tells the peer the ages of the remote peers.
+    /// Prepares a peer for its tick: reads a device in a hand, and tells the peer the ages of the remote peers.
     fn attend<S: Strategy<A>>(
         &mut self,
         now: Instant,
@@ -121,7 +121,7 @@ impl<const A: usize> Arriving<'_, A> {
         self.samples.extra(self.handle, self.to)
     }
 
-    /// Encodes the sample into `buffer` and applies `damage`. Samples travel as numbers, so that bytes are made only here.
+    /// Encodes the sample into `buffer` and applies `damage`. Samples travel as numbers, so bytes are made only here.
     pub(super) fn datagram<'b>(&self, damage: Option<&Damage>, buffer: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
         let len = self.sample().encode_as(self.kind(), &self.extra(), self.axes, buffer);
         if let Some(damage) = damage {

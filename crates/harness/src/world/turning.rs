@@ -1,4 +1,4 @@
-//! State that a running scene keeps for an object that turns.
+//! State of a running scene for a rotating object.
 
 use cohaptic_peer::Gains;
 use cohaptic_peer::rotation::{Attitude, Rotation, Triple};
@@ -47,7 +47,7 @@ impl Turning {
     }
 }
 
-/// Shows a tick of a peer that turns. A function of its own, so that the loop over peers does not build the larger row for peers that do not turn.
+/// Shows a tick of a peer that turns. A function of its own, so the loop over peers does not build the larger row for peers that do not turn.
 #[inline(never)]
 pub(super) fn on_tick(observer: &mut (impl Observer<Error = Ended> + ?Sized), tick: TickRow<'_>, rotation: &Rotation) -> Result<(), Ended> {
     observer.on_tick(&TickRow {

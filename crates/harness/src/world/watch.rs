@@ -2,7 +2,7 @@
 
 use crate::observer::Observer;
 
-/// Kinds of rows that an observer wants, one flag for each `Observer::wants_…`.
+/// Wanted kinds of rows, one flag for each `Observer::wants_…`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Watch {
     pub(crate) ticks: bool,

@@ -1,4 +1,4 @@
-//! Eight devices with their copies along one axis, and their motion in a tick.
+//! Eight devices with copies of the object along one axis, and the motion of a tick.
 
 use cohaptic_peer::coordination::{Law, Observation};
 use cohaptic_peer::tick::{forces, grasp, on_device, on_object};
@@ -24,7 +24,7 @@ pub(in crate::arrays) struct Block {
     /// Contacts of all eight lanes. `None` if no lane has ever had a one-sided contact along this axis.
     pub(super) contacts: Option<Box<[Contact; WIDTH]>>,
     pub(super) axis: usize,
-    /// Whether any of the devices is tied to ground, so that its step map has no free motion.
+    /// Whether any of the devices is tied to ground, so its step map has no free motion.
     pub(super) is_tied: bool,
 }
 
@@ -48,7 +48,7 @@ pub(super) struct Late {
 
 pub(super) const ZERO_MAP: StepMap<Lanes> = StepMap::new([[Lanes::ZERO; 2]; 2], [Lanes::ZERO; 2]);
 
-/// Step map that moves nothing. Without force it keeps even the sign of a zero, which is the reason for the entries of −0.
+/// Step map without motion. Without force the map keeps even the sign of a zero, hence the entries of −0.
 pub(super) const RESTING: StepMap = StepMap::new([[0.0, -0.0], [0.0, 0.0]], [-0.0, 0.0]);
 
 impl Forces {
@@ -66,7 +66,7 @@ pub(super) fn set_map(maps: &mut StepMap<Lanes>, lane: usize, map: &StepMap) {
     });
 }
 
-/// Computes [`Block::tick`]. Each array is a reference of its own, so that the compiler knows that no lane reads what another lane writes.
+/// Computes [`Block::tick`]. Each array is a reference of its own, so the compiler knows that no lane reads what another lane writes.
 #[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "each by a reference of its own")]
 fn tick_of_lanes<const TIED: bool, L: LawOfLanes>(
@@ -222,7 +222,7 @@ impl Block {
 }
 
 impl Late {
-    /// Stores the forces computed now, and returns the forces that act: those of the previous tick in late lanes.
+    /// Stores the forces computed now, and returns the acting forces: in late lanes the forces of the previous tick.
     #[inline(always)]
     pub(super) fn exchange(&mut self, forces: Forces) -> Forces {
         let applied = Forces {

@@ -14,7 +14,7 @@ pub(in crate::arrays) trait LawOfLanes: Coefficients<Coefficient = Lanes, Of<f64
         self.map(|coefficient| coefficient.0[lane])
     }
 
-    /// Returns how many numbers the law remembers along each axis. A constant for most laws, so that the compiler removes the code for memory.
+    /// Returns how many numbers the law remembers along each axis. A constant for most laws, so the compiler removes the code for memory.
     #[inline(always)]
     fn remembered(&self) -> usize {
         self.of_lane(0).memory()
@@ -29,7 +29,7 @@ pub(in crate::arrays) trait LawOfLanes: Coefficients<Coefficient = Lanes, Of<f64
 
 impl<L: Coefficients<Coefficient = Lanes, Of<f64>: Law<f64>>> LawOfLanes for L {}
 
-/// Combines the laws of runs into one law of eight lanes. All laws must be of one kind; lane l gets the coefficients of run l modulo the number of runs.
+/// Combines the laws of runs into one law of eight lanes. All laws must be of the same kind; lane l gets the coefficients of run l modulo the number of runs.
 pub(in crate::arrays) fn law_of_lanes(laws: &[BuiltIn]) -> BuiltIn<Lanes> {
     let coefficients = |law: &BuiltIn| {
         let mut all = Vec::new();
@@ -45,7 +45,7 @@ pub(in crate::arrays) fn law_of_lanes(laws: &[BuiltIn]) -> BuiltIn<Lanes> {
     })
 }
 
-/// Returns the numbers that a law remembers of one lane.
+/// Returns the remembered numbers of one lane.
 #[inline(always)]
 pub(super) fn memory_of_lane(memory: &mut [f64], remembered: usize, lane: usize) -> &mut [f64] {
     if remembered > 0 { &mut memory[lane * remembered..(lane + 1) * remembered] } else { &mut [] }

@@ -1,6 +1,6 @@
 //! Samples that reach all other peers at the same tick: all links have the same constant delay and lose nothing.
 //!
-//! All receivers then hold the same sample of a sender, so that a sample is stored once for all receivers, both in flight and when held.
+//! All receivers then hold the same sample of a sender, so a sample is stored once for all receivers, both in flight and when held.
 
 use std::collections::VecDeque;
 
@@ -167,7 +167,7 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
                 let (x, v) = quads::mean(held, count);
                 blocks.set_target(axis, peer, x, v);
             }
-            // Swap back, so that the places are again those of the first peer.
+            // Swap back to the places of the first peer.
             for peer in (1..self.peers).rev() {
                 quads::swap(held, peer - 1, &mut own);
             }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use cohaptic_units::Instant;
 
-/// Ticks of the wheel, so that a second at 1 kHz fits: delays of satellites with queues. Packets that arrive later are kept in a map, which is slower.
+/// Ticks of the wheel, so a second at 1 kHz fits: delays of satellites with queues. Packets that arrive later are kept in a map, which is slower.
 const HORIZON: u64 = 1024;
 /// Slots of the wheel: two for each tick.
 const SLOTS: usize = 2048;
@@ -70,8 +70,7 @@ impl Ticks {
     /// Returns the number of ticks in `span` \[ns\], rounded up, without a division where possible.
     ///
     /// With r = ⌈2^64/d⌉ = (2^64 + e)/d, 0 ≤ e < d, the product n·r/2^64 is n/d + n·e/(d·2^64), which has the same whole part as n/d while n·e < 2^64. This
-    /// holds for
-    /// n and d below 2^32.
+    /// holds for n and d below 2^32.
     #[inline(always)]
     fn count(self, span: u64) -> u64 {
         match self.reciprocal {
@@ -90,7 +89,7 @@ impl<const A: usize> InFlight<A> {
     /// Stores a packet that becomes known at the given tick and instant. `overtakes`: whether it may arrive before an earlier packet of its link.
     #[inline(always)]
     pub(super) fn push(&mut self, (tick, now): (u64, Instant), packet: Packet<A>, overtakes: bool) {
-        // `now` is a multiple of the tick, so that this sum is the first tick at or after the arrival.
+        // `now` is a multiple of the tick, so this sum is the first tick at or after the arrival.
         let ticks = self.ticks.count(packet.arrival.as_nanos() - now.as_nanos());
         let due = tick.saturating_add(ticks);
         self.packets_at((ticks, due), overtakes).push(packet);
@@ -99,8 +98,7 @@ impl<const A: usize> InFlight<A> {
     /// Returns the packets that are due at the tick `due`, which is `ticks` ahead.
     ///
     /// The caller pushes the packet itself. A packet as an argument would be assembled on the stack and copied in words wider than its fields, for which a
-    /// processor
-    /// stalls.
+    /// processor stalls.
     #[inline(always)]
     fn packets_at(&mut self, (ticks, due): (u64, u64), overtakes: bool) -> &mut Vec<Packet<A>> {
         if ticks >= HORIZON {

@@ -1,7 +1,6 @@
 //! Samples that each arrive at an instant of their own: links that differ, jitter, loss, bursts, outages.
 //!
-//! Peers read arrived samples only at their ticks, and all peers tick together. Samples in flight therefore lie in a timing wheel indexed by the tick at which
-//! they
+//! Peers read arrived samples only at ticks, and all peers tick together. Samples in flight therefore lie in a timing wheel indexed by the tick at which they
 //! arrive. Nothing is sorted but samples that arrive at the same tick over a link on which one sample overtook another.
 
 mod neighbours;
@@ -46,8 +45,7 @@ pub(in crate::arrays) struct PerPacket<const A: usize, const L: usize> {
     /// Samples held, indexed by axis, then ordered by receiver and sender. Each receiver has whole quads, the last of which may be padded.
     held: [Vec<Quad<L>>; A],
     /// Sums of the samples that a receiver holds, indexed by receiver; `None` if the mean of that receiver is not exact. Empty if no mean is exact. Exact means
-    /// are
-    /// computed in single runs only.
+    /// are computed in single runs only.
     sums: Vec<Option<ExactMeans<A>>>,
     /// Least sequence number that is newer than the sample held, indexed by place, then run. 0 as long as no sample has arrived.
     next: Vec<u64>,
@@ -63,8 +61,7 @@ enum Links<const A: usize> {
     /// Links that decide the fate of a packet as it is sent.
     Direct(DirectLinks),
     /// Links that need the instant of the sender's next packet. Only in single runs: scenes that run side by side have direct links, and `const { L > 1 }`
-    /// keeps the
-    /// compiler from generating this case.
+    /// keeps the compiler from generating this case.
     Stepped(SteppedLinks<State<A>>),
 }
 
@@ -84,7 +81,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         for (receiver, to) in receivers.clone().enumerate() {
             for (from, scene) in (0..rows.columns(receiver)).flat_map(|column| scenes.iter().map(move |scene| (column, scene))) {
                 let from = rows.sender(receiver, from);
-                // A receiver's link to itself is never used. It exists so that indices are products; any model does.
+                // A receiver's link to itself is never used and may have any model. The link exists because indices are products.
                 let (from, to) = if from == to { (0, 1) } else { (from, to) };
                 let name = LinkName::between(&scene.peers[from].name, &scene.peers[to].name);
                 let model: &LinkModel = scene.links.between(from, to);
@@ -128,8 +125,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
     }
 
     /// Sends the samples of `senders` to all receivers that hear them. `sent` holds samples indexed by peer of the scene. Each sender sends nothing further
-    /// until its
-    /// `next` instant; before that, only [`PerPacket::pass`] changes the links.
+    /// until its `next` instant; before that, only [`PerPacket::pass`] changes the links.
     ///
     /// A run that has ended goes on sending, because lanes cannot stop one by one; its results are no longer read.
     #[inline(never)]
@@ -195,7 +191,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
     }
 
-    /// Returns the other peers of the scene that a receiver hears.
+    /// Returns the peers of the scene that a receiver hears.
     pub(in crate::arrays) fn senders(&self, receiver: usize) -> impl Iterator<Item = usize> + '_ {
         let senders = (0..self.rows.columns(receiver)).map(move |column| self.rows.sender(receiver, column));
         senders.filter(move |sender| *sender != self.receivers.start + receiver)
@@ -298,7 +294,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
     /// Takes in the samples that have arrived by the end of the scene, which is at or before the tick after `latest`.
     pub(in crate::arrays) fn finish(&mut self, latest: (u64, Instant)) {
         self.pass(latest, &|_| Instant::MAX);
-        // The bucket is that of the tick at or after the end, so that packets which arrive between the end and this tick are removed.
+        // The bucket belongs to the tick at or after the end. Packets with an arrival between the end and this tick are removed.
         if let Some(mut bucket) = self.in_flight.due(latest.0 + 1) {
             for packets in [&mut bucket.in_order, &mut bucket.overtaking] {
                 packets.retain(|packet| packet.arrival <= self.end);
@@ -310,10 +306,8 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
     /// Takes in samples that have arrived.
     ///
     /// The order among links does not matter: of each link the newest sample stays, and sums of samples are exact. Samples are therefore taken in as they lie,
-    /// from
-    /// receiver to receiver, without sorting. Samples of links on which one sample overtakes another come last, sorted, because their order decides which
-    /// samples
-    /// are stale.
+    /// from receiver to receiver, without sorting. Samples of links on which one sample overtakes another come last, sorted, because their order decides which
+    /// samples are stale.
     #[inline(never)]
     fn take_in(&mut self, mut bucket: Bucket<A>) {
         // Mark the links first: their samples in order must wait for the sorted pass too.
@@ -342,9 +336,8 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
     }
 
-    /// Like [`PerPacket::take_in_order`], for exact means. Takes in several samples at once, so that the reads of held samples overlap before the sums need
-    /// them: these
-    /// samples are more than a cache holds.
+    /// Like [`PerPacket::take_in_order`], for exact means. Takes in several samples at once, so the reads of held samples overlap before the sums need them:
+    /// these samples are more than a cache holds.
     #[inline(always)]
     fn take_in_together(&mut self, bucket: &mut Bucket<A>) {
         for packets in bucket.in_order.chunks(TAKEN_TOGETHER) {
@@ -370,7 +363,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
     #[inline(always)]
     fn is_newest(&mut self, packet: &Packet<A>, overtaking: &mut Vec<Packet<A>>) -> bool {
         let next = &mut self.next[packet.place as usize];
-        // A marked entry has its top bit set, so that no sequence number reaches it.
+        // A marked entry has its top bit set, so no sequence number reaches it.
         let is_newest = packet.sequence >= *next;
         if is_newest {
             *next = packet.sequence + 1;
@@ -407,7 +400,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
     }
 
-    /// Replaces the sample `before` by that of `packet` in the sums of its receiver, if the receiver has sums.
+    /// Replaces the sample `before` by the sample of `packet` in the sums of the receiver, if the receiver has sums.
     #[inline(always)]
     fn replace(&mut self, before: &State<A>, packet: &Packet<A>) {
         if let Some(Some(sums)) = self.sums.get_mut(usize::from(packet.receiver)) {
@@ -435,7 +428,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
     /// `sent` returns the instant at which a packet of a sender was sent, by its sequence number.
     pub(in crate::arrays) fn end_early(&mut self, run: usize, at: Instant, sent: impl Fn(usize, u64) -> Instant) {
         if let Links::Stepped(links) = &mut self.links {
-            // Stepped links exist in single runs only, so that stopping all links stops this run only.
+            // Stepped links exist in single runs only, so stopping all links stops this run only.
             links.stop(at);
         }
         for packet in self.in_flight.iter().filter(|packet| packet.place as usize % L == run) {
@@ -515,8 +508,7 @@ impl<const A: usize, const L: usize> NullaryFnOnce for ByLink<'_, A, L> {
 }
 
 impl<const A: usize, const L: usize> DirectSending<'_, A, L> {
-    /// Sends link by link, eight at a time and without a gap between the rows of receivers, so that only the last eight can be incomplete. `CHAINS` says
-    /// whether all
+    /// Sends link by link, eight at a time and without a gap between the rows of receivers, so only the last eight can be incomplete. `CHAINS` says whether all
     /// links have chains.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "the bits of eight links")]
@@ -572,8 +564,7 @@ impl<const A: usize, const L: usize> DirectSending<'_, A, L> {
 }
 
 /// Returns the packet over the link at index `link` of a row, to a receiver that is the peer `peer` of the scene, if all peers hear all other peers. A row is
-/// ordered
-/// by sender, then run.
+/// ordered by sender, then run.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "peers are counted in 16 bits, what they hold in 32")]
 fn packet<const A: usize, const L: usize>(

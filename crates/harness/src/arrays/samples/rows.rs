@@ -14,7 +14,7 @@ use super::in_flight::Packet;
 /// Rows of some receivers, which are counted from 0. Each row has a link from each sender, in the order of the senders.
 #[derive(Clone, Debug)]
 pub(super) enum Rows {
-    /// Every peer hears all other peers. There is also a link from each receiver to itself, over which nothing is sent, so that indices are products.
+    /// Every peer hears all other peers. There is also a link from each receiver to itself, over which nothing is sent, so indices are products.
     All {
         /// Number of peers of the scene.
         peers: usize,
@@ -106,7 +106,7 @@ impl Rows {
     #[inline]
     pub(super) fn place(&self, receiver: usize, column: usize) -> usize {
         match self {
-            // The receiver holds no sample of itself, so that senders after it move down by one.
+            // The receiver holds no sample of itself: the places of later senders are lower by one.
             Self::All { peers, first } => receiver * whole(peers - 1) + column - usize::from(column > first + receiver),
             Self::Some(rows) => rows.places[receiver] + column,
         }
@@ -171,7 +171,7 @@ impl SomeRows {
     }
 
     fn first_link(&self, receiver: usize) -> usize {
-        // The topology counts links from the first peer of the scene, these rows from their first receiver.
+        // The topology counts links from the first peer of the scene, these rows from the first receiver.
         self.topology.places(self.receivers.start + receiver).start - self.topology.places(self.receivers.start).start
     }
 }

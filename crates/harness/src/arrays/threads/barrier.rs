@@ -13,7 +13,7 @@ pub(super) struct Barrier {
     arrived: AtomicUsize,
     /// Number of meetings so far. Its change releases the waiting threads.
     meetings: AtomicUsize,
-    /// Whether a thread panicked, so that waiting threads must not wait for it.
+    /// Whether a thread panicked, so waiting threads must not wait for it.
     is_broken: AtomicBool,
 }
 
@@ -46,7 +46,7 @@ impl Barrier {
         // Read before the arrival is counted: after that, the last thread may end this meeting at any time.
         let meeting = self.meetings.load(Ordering::Acquire);
         if self.arrived.fetch_add(1, Ordering::AcqRel) + 1 == self.threads {
-            // The count is reset before the release, so that a released thread that comes again is counted for the next meeting.
+            // The count is reset before the release, so a released thread that comes again is counted for the next meeting.
             self.arrived.store(0, Ordering::Relaxed);
             self.meetings.store(meeting.wrapping_add(1), Ordering::Release);
             return;

@@ -18,7 +18,7 @@ pub(super) struct Exchange<const A: usize> {
 
 /// Report of a thread at a meeting.
 struct Told<const A: usize> {
-    /// Samples of the thread's peers that send, with their index in the scene.
+    /// Samples of the thread's sending peers, each with the index of the peer in the scene.
     samples: Vec<(usize, Sample<A, 1>)>,
     /// Least and greatest position of the thread's copies \[m\], indexed by tick since the last report, then axis.
     extremes: Vec<(f64, f64)>,
@@ -37,7 +37,7 @@ pub(super) struct Thread<'e, const A: usize> {
     turn: usize,
     /// Extremes of the thread's own copies since its last report, in the order of [`Told::extremes`].
     extremes: Vec<(f64, f64)>,
-    /// Extremes of all threads at a meeting. A field, so that its memory is used again.
+    /// Extremes of all threads at a meeting. A field, to use the same memory at every meeting.
     extremes_of_all: Vec<(f64, f64)>,
     is_finite: bool,
     /// Whether all numbers of all threads were finite at the last meeting.
@@ -52,7 +52,7 @@ impl<const A: usize> Exchange<A> {
         Self { told: [told(), told()], barrier: Barrier::new(threads), goes_on: AtomicBool::new(true) }
     }
 
-    /// Returns a guard that makes all threads panic if the present thread panics while it holds the guard.
+    /// Returns a guard. If the present thread panics before dropping the guard, all threads panic.
     pub(super) const fn guard(&self) -> Guard<'_> {
         self.barrier.guard()
     }
@@ -106,8 +106,7 @@ impl<'e, const A: usize> Thread<'e, A> {
     }
 
     /// Meets the other threads at a tick at which the peers `senders` of the scene send. Fills `sent` with the samples of the other threads' peers; those of
-    /// the
-    /// thread's own peers must be there already.
+    /// the thread's own peers must be there already.
     pub(super) fn exchange(&mut self, senders: &[usize], sent: &mut [Sample<A, 1>]) {
         let told = &self.exchange.told[self.turn];
         self.turn = 1 - self.turn;
@@ -115,7 +114,7 @@ impl<'e, const A: usize> Thread<'e, A> {
             let mut own = told[self.place].lock().unwrap_or_else(PoisonError::into_inner);
             own.samples.clear();
             own.samples.extend(senders.iter().filter(|sender| self.members.contains(sender)).map(|sender| (*sender, sent[*sender])));
-            // The vectors are swapped, so that neither is allocated again.
+            // The vectors are swapped, so neither is allocated again.
             own.extremes.clear();
             std::mem::swap(&mut own.extremes, &mut self.extremes);
             own.is_finite = self.is_finite;
@@ -133,7 +132,7 @@ impl<'e, const A: usize> Thread<'e, A> {
             }
             self.all_are_finite &= told.is_finite;
         }
-        // Extremes are those of one tick of all copies, so that their difference is the discrepancy of that tick.
+        // Extremes are those of one tick of all copies, so their difference is the discrepancy of that tick.
         self.max_discrepancy = self.extremes_of_all.iter().fold(self.max_discrepancy, |largest, (low, high)| largest.max(high - low));
     }
 
@@ -145,7 +144,7 @@ impl<'e, const A: usize> Thread<'e, A> {
         }
         barrier.wait();
         let wanted = goes_on.load(Ordering::Relaxed);
-        // A second meeting, so that no thread stores the next answer before all threads have read this one.
+        // A second meeting: no thread may store the next answer before all threads have read the present answer.
         barrier.wait();
         wanted
     }
@@ -155,7 +154,7 @@ impl<'e, const A: usize> Thread<'e, A> {
 mod tests {
     use super::*;
 
-    /// Two groups note two ticks, and a third tick after a stretch without a meeting: the discrepancy is that of one tick of all groups.
+    /// Two groups note two ticks, and a third tick after a stretch without a meeting: the discrepancy is the largest within a single tick of all groups.
     #[test]
     fn the_discrepancy_is_that_of_one_tick_of_all_groups() {
         let exchange = Exchange::<1>::new(1);
