@@ -238,7 +238,7 @@ pub struct StepRow<'a> {
     pub turn: Option<TurnStepRow>,
 }
 
-/// Turn of one copy over one of its steps, in body axes.
+/// Turn of a copy over a step, in body axes.
 #[derive(Clone, Copy, Debug)]
 pub struct TurnStepRow {
     /// Duration of the step.

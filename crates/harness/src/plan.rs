@@ -86,6 +86,7 @@ fn device(scene: &Scene, peer: usize, ticks_are_observed: bool) -> DeviceChoice 
         || turns.is_some_and(|turns| turns.device.is_some() || turns.attitude.rate.iter().any(|rate| *rate != 0.0));
     let moved_later =
         scene.timeline.iter().any(|change| matches!(&change.what, ChangeKind::Hand { peer: changed, hand: Some(_) } if *changed == peer));
+    // The order matters: a device that touches its copy is needed even if no hand moves the device and no observer sees the device.
     if touches(scene, peer) {
         DeviceChoice::Simulated
     } else if spec.hand.is_none() && !moved_later && !moves {

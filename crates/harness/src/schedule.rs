@@ -72,6 +72,7 @@ impl Schedule {
     pub(crate) fn take(&mut self, at: Instant, peers: &mut Vec<usize>) {
         if let Self::EventDriven(queue) = self {
             peers.clear();
+            // Simultaneous ticks leave the queue in the order of the peers.
             while let Some(tick) = queue.pop_due(at) {
                 peers.push(tick.peer);
             }

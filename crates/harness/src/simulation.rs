@@ -183,6 +183,7 @@ fn run_to_end<const A: usize, S: Strategy<A>>(
                 return Ok(world.summary(ending));
             }
         }
+        // The latest step is complete, so the summary is consistent.
         if !observer.keep_going(world.now()) {
             return Ok(world.summary(Ending::Interrupted(world.now())));
         }

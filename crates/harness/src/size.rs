@@ -54,6 +54,7 @@ fn too_large_for(scene: &Scene, way: Way, free: Option<u64>) -> Option<TooLarge>
     let peers = scene.peers.len();
     let links = scene.link_count();
     let needed = way.bytes(peers, links);
+    // Nodes of a full mesh are limited by the index of a link, nodes of a topology by the index of a node.
     let most = if scene.topology.is_some() { usize::from(u16::MAX) } else { MOST_NODES };
     let (peer, what) = if way == Way::Events && peers > most {
         (most, format!("too many to be simulated with events, which takes at most {most} peers"))

@@ -26,6 +26,7 @@ fn squared_chord(one: &[f64; 4], other: &[f64; 4]) -> f64 {
         let [w, x, y, z] = std::array::from_fn(|part| (one[part] - sign * other[part]) * (one[part] - sign * other[part]));
         w + x + y + z
     };
+    // Both sums are added in the same order, so the result does not depend on the sign of either quaternion.
     let (equal, opposite) = (square(1.0), square(-1.0));
     if equal < opposite { equal } else { opposite }
 }
@@ -63,6 +64,7 @@ impl Spread {
         if near[0] + near[1] <= self.longest.sqrt() {
             return;
         }
+        // The farthest copy gives a second bound for every pair, which excludes further pairs.
         let farthest = (0..self.copies.len()).max_by(|one, other| self.near[*one].total_cmp(&self.near[*other])).unwrap_or(0);
         chords(&self.copies[farthest], &self.copies, &mut self.far);
         let far = two_longest(&self.far);
@@ -79,6 +81,7 @@ impl Spread {
     fn look_at_pairs(&mut self) {
         let Self { longest, copies, near, far, .. } = self;
         let count = |squares: &[f64]| squares.iter().filter(|square| 4.0 * **square > *longest).count();
+        // Start from the bound with fewer candidates: the loops below skip all copies that are near to that copy.
         let few = if count(near) < count(far) { &*near } else { &*far };
         let above = |squares: &[f64], one: usize, other: usize, longest: f64| squares[one].sqrt() + squares[other].sqrt() > longest.sqrt();
         for one in 0..copies.len() {

@@ -69,7 +69,7 @@ pub enum Ending {
     Interrupted(Instant),
 }
 
-/// Results of one peer: its state at its first tick at or after the end, to which its last tick leads.
+/// Results of a peer: the state at the first tick at or after the end, to which the last computed tick leads.
 #[derive(Clone, PartialEq, Debug)]
 pub struct PeerSummary {
     /// Name of the peer.

@@ -256,6 +256,7 @@ impl Blocks {
         if lag == known {
             return;
         }
+        // Ticks before the oldest known tick saturate to that tick.
         let place = |tick: usize| (self.oldest + (tick + known).saturating_sub(lag)) % known * self.blocks.len();
         self.past = match known {
             0 => (0..lag).flat_map(|_| self.blocks.iter().map(|block| block.object)).collect(),

@@ -176,6 +176,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
                 break;
             }
             tick = until;
+            // Changes at the end of the scene are applied in `finish`, at the instant of the end.
             if tick == last {
                 self.finish(tick, &mut watch);
                 break;

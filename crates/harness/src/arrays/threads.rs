@@ -165,6 +165,7 @@ impl<'a, const A: usize> Part<'a, '_, '_, A> {
         }
         // A last exchange without samples: extremes and finiteness of the ticks since the last meeting.
         thread.exchange(&[], &mut []);
+        // The last ticks may have diverged after the last meeting.
         if !thread.all_are_finite() {
             return None;
         }

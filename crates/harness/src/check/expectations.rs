@@ -241,6 +241,7 @@ fn delay(scene: &Scene, expected: &ExpectDelay, summary: &Summary) -> Outcome {
     let stats = selected(expected.link, summary);
     let delivered: u64 = stats.iter().map(|(stats, links)| stats.delivered() * links).sum();
     let what = format!("mean delay on {}", link_name(expected.link, scene));
+    // The mean over all links is weighted by the delivered packets.
     let of_link = |stats: &LinkStats| stats.mean_delay().map_or(0, |mean| mean.as_nanos() * u128::from(stats.delivered()));
     let total: u128 = stats.iter().map(|(stats, links)| of_link(stats) * u128::from(*links)).sum();
     let bounds = Bounds { min: expected.min.map(|min| min.as_secs_f64()), max: expected.max.map(|max| max.as_secs_f64()) };

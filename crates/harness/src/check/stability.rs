@@ -60,7 +60,7 @@ const SIZE: f64 = 1e-6;
 const DIED_OUT: f64 = 1e-3;
 /// Factor of the initial size above which a disturbance has grown, even if walls or a one-sided contact bound its size later.
 const GREW: f64 = 1e3;
-/// Factor between the second and the last quarter that decides all other cases.
+/// Factor of change from the second to the last quarter of the scene from which a disturbance has grown or died out in all other cases.
 const CLEARLY: f64 = 1.1;
 
 /// Returns the fate of a small disturbance of the scene within its duration.
@@ -140,6 +140,7 @@ fn relative_displacement<const A: usize>(nominal: &World<A, BuiltInStrategy<A>>,
     for (one, other) in nominal.bodies().zip(disturbed.bodies()) {
         for axis in 0..A {
             let copy = other.object[axis] - one.object[axis];
+            // The device is compared with the grasped point, which differs from the centre if the copy turns.
             let device = (other.device[axis] - one.device[axis]) - (other.grasp[axis] - one.grasp[axis]);
             low[axis] = low[axis].min(copy);
             high[axis] = high[axis].max(copy);
@@ -164,6 +165,7 @@ fn relative_displacement<const A: usize>(nominal: &World<A, BuiltInStrategy<A>>,
             }
         }
     }
+    // Without turning copies the bounds are still infinite.
     let turned = if least[0].is_finite() { (0..3).map(|axis| greatest[axis] - least[axis]).fold(0.0, f64::max) } else { 0.0 };
     (0..A).map(|axis| high[axis] - low[axis]).fold(stretch.max(turned), f64::max)
 }

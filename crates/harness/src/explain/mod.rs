@@ -85,6 +85,7 @@ const BYTES_A_PACKET: f64 = 40.0;
 /// Explains which parts of a scene the program models, and why.
 #[must_use]
 pub fn explain(scene: &Scene) -> Explanation {
+    // Only measures watch the explained run: records and plots are options of a command, not of the scene.
     let watch = Watch::of(&Measures::of(scene));
     let plan = Plan::new(scene, Model::Least, watch.ticks);
     let mut rows = Rows::default();
@@ -318,6 +319,7 @@ impl Rows {
             }
         }
         let links_change = scene.timeline.iter().any(|change| matches!(change.what, ChangeKind::Link(_) | ChangeKind::AllLinks(_)));
+        // A ring needs arrivals in the order of sending: a broadcast, or equal delays at all times and no access lines.
         let one_delay = scene.topology.is_none() && used.len() == 1 && used.iter().all(|(config, _)| config.is_constant_delay());
         if is_broadcast || one_delay && !links_change && scene.peers.iter().all(|peer| peer.uplink.is_none() && peer.downlink.is_none()) {
             self.model("packets on the way", "a ring", "all delays are equal, so packets arrive in the order in which they were sent");

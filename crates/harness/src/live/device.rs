@@ -70,7 +70,7 @@ impl<const A: usize> HandDevice<A> {
         Self { device, read: state, before: state, share: 1.0, pulled: None }
     }
 
-    /// Returns a simulated device that a pointer pulls. `None` for a pointer that is never there.
+    /// Returns a simulated device pulled by a pointer. `None` for a pointer without readings.
     pub(crate) fn pulling(pointer: Option<Box<dyn LiveDevice>>, pulled: PulledDevice<A>) -> Self {
         let state = pulled.state();
         Self { pulled: Some(pulled), ..Self::new(pointer, state) }

@@ -35,6 +35,7 @@ impl Ramp {
 
     /// Makes the number rise or fall from its value at `at`.
     pub(crate) fn turn(&mut self, at: Instant, rises: bool) {
+        // Turning towards the present direction changes nothing: the ramp keeps its start.
         if self.rises != rises {
             *self = Self { from: self.value(at), since: at, rises, ..*self };
         }

@@ -75,6 +75,7 @@ impl<const A: usize> RemotePeers<A> {
         let seats: Vec<Option<Seat>> = scene.peers.iter().enumerate().map(seat).collect();
         let places = seats.iter().enumerate().filter_map(|(place, seat)| seat.as_ref().map(|_| place)).collect();
         let has_processes = seats.iter().flatten().any(|seat| seat.is_process);
+        // Without any local peer nothing ticks here, and the index is never used.
         let lead = seats.iter().position(|seat| seat.as_ref().is_none_or(|seat| !seat.is_process)).unwrap_or(0);
         let (ages, told) = (vec![Ages::default(); peers], vec![None; peers * peers]);
         Self { seats, places, ages, told, outbox: VecDeque::new(), has_processes, lead, undrained: None }

@@ -43,6 +43,7 @@ impl<const A: usize> PulledDevice<A> {
         let whole: [f64; A] =
             core::array::from_fn(|axis| stiffness * (wanted.position[axis] - position[axis]) + damping * (wanted.velocity[axis] - velocity[axis]));
         let length = whole.iter().map(|force| force * force).sum::<f64>().sqrt();
+        // The limit applies to the whole force, so its direction stays.
         let factor = if length > force_limit { self.weight * (force_limit / length) } else { self.weight };
         whole.map(|force| factor * force)
     }

@@ -138,6 +138,7 @@ impl RecordedScene {
         let files = differing(&self.content.files, &other.content.files);
         let mut differences: Vec<SceneDifference> = keys.map(|(key, recorded, now)| SceneDifference::Key { key, recorded, now }).collect();
         differences.extend(files.map(|(name, recorded, now)| SceneDifference::File { name, recorded, now }));
+        // The fingerprints differ although keys and files are equal.
         if differences.is_empty() {
             differences.push(SceneDifference::Program { recorded: self.program.clone(), now: other.program.clone() });
         }

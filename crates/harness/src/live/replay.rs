@@ -111,7 +111,7 @@ impl Playback {
 
 impl LiveDevice for Playback {
     fn read(&mut self, now: Instant) -> Option<State<3>> {
-        // A reading between ticks belongs to a different scene and is skipped.
+        // Earlier readings were never due at a tick, as in a replay with a different scene, and are skipped.
         while self.readings.front().is_some_and(|(at, _)| *at < now) {
             self.readings.pop_front();
         }

@@ -194,6 +194,7 @@ fn read_row(line: usize, row: &str, scene: &Scene, keys: &LinkKeys, folder: &Pat
         "device" => Recorded::Device { peer: cells.peer(2, scene, &["falcon", "pointer"])?, state: cells.state(scene.axes.count())? },
         "link" => {
             let (from, to) = (cells.peer(2, scene, &[])?, cells.peer(3, scene, &[])?);
+            // A peer has no link to itself.
             if from == to {
                 return Err(cells.refused(3, "another peer than the sender"));
             }
@@ -246,6 +247,7 @@ impl Cells<'_> {
             return Ok(None);
         }
         let numbers: Vec<f64> = self.cells[4].split(' ').filter_map(|number| number.parse().ok()).filter(|number: &f64| number.is_finite()).collect();
+        // Cells without a finite number were dropped above, so both counts must agree.
         if numbers.len() != 2 * axes || self.cells[4].split(' ').count() != numbers.len() {
             return Err(self.refused(4, format!("\"none\", or {} finite numbers, position and velocity on each axis", 2 * axes)));
         }

@@ -275,6 +275,7 @@ impl LiveScene {
             self.let_happen(Instant::from_nanos(before), observer)?;
         }
         self.open = at;
+        // An input at or after the end of the scene is refused even before the end was computed.
         let is_open = self.ended.is_none() && at < each!(&self.world, world => world.end());
         Ok(is_open.then_some(at))
     }

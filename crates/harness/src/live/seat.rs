@@ -101,6 +101,7 @@ impl Seat {
         let silence = kind.silence()?;
         let pointer = if let PeerKind::Pointer(_, pointer) = kind { Some(pointer) } else { None };
         let followed = if pointer.is_some() { place..place + 1 } else { 0..peers };
+        // A held pointer is present from the first instant, before any reading.
         let is_held = pointer.is_some_and(|pointer| pointer.held);
         let fade = |to: usize| if is_held || !followed.contains(&to) { Fade::whole(silence.fade) } else { Fade::unheard(silence.fade) };
         Some(Self {
@@ -147,6 +148,7 @@ impl Seat {
 
     /// Checks the sequence number of a sample and notes it. Any number is admitted after a silence.
     pub(crate) fn admit(&mut self, sequence: u64) -> Result<(), SampleError> {
+        // After a silence the process of the peer may have started again, so any number is admitted.
         if !self.is_silent && sequence <= self.newest {
             self.stats.out_of_order += 1;
             return Err(SampleError::OutOfOrder { found: sequence, newest: self.newest });

@@ -93,6 +93,7 @@ fn of_turn(turn: &TurnStepRow, spin: &Spin) -> f64 {
         let middle: [f64; 3] = std::array::from_fn(|axis| (6.0 * travel[axis] / seconds - before[axis] - after[axis]) / 4.0);
         let gyroscopic = seconds / 6.0 * (product(before) + 4.0 * product(&middle) + product(after));
         for axis in (0..3).filter(|axis| own_damping[*axis] > 0.0) {
+            // The gyroscopic term of an axis contains the moments of inertia about the two axes that follow in cyclic order.
             let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
             let share = own_damping[axis] / (spin.damping[axis] + own_damping[axis]);
             let work = held_torque[axis] * travel[axis] + (spin.inertia[next] - spin.inertia[last]) * gyroscopic;

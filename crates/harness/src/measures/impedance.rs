@@ -127,6 +127,7 @@ impl Fit {
             }
         }
         Some(right.map(|side| {
+            // Back substitution from the last row.
             let last = side[2] / matrix[2][2];
             let middle = (side[1] - matrix[1][2] * last) / matrix[1][1];
             [(side[0] - matrix[0][1] * middle - matrix[0][2] * last) / matrix[0][0], middle, last]

@@ -74,6 +74,7 @@ impl QuantileSketch {
             return None;
         }
         let rank = (u128::from(percent) * u128::from(self.count)).div_ceil(100).max(1);
+        // The rank is compared with the number of values up to each bin, in ascending order of the bins.
         let mut below = u128::from(self.below);
         if below >= rank {
             return Some(0.0);
@@ -85,6 +86,7 @@ impl QuantileSketch {
                 return Some(f64::from_bits(bin << BEHIND | 1 << (BEHIND - 1)));
             }
         }
+        // The rank lies among the values above the last bin.
         Some(f64::INFINITY)
     }
 }
@@ -157,7 +159,7 @@ mod tests {
         assert_eq!(of(LEAST), LEAST * (1.0 + 1.0 / 256.0));
         assert_eq!(of(END.next_down()), END * (1.0 - 1.0 / 512.0));
         assert_eq!((of(END), of(f64::INFINITY), of(f64::NAN)), (f64::INFINITY, f64::INFINITY, f64::INFINITY));
-        // A bin is a 128th of its octave wide, and its lower end is in it.
+        // A bin has the width of a 128th of its octave, and contains its lower end.
         assert_eq!(of(1.0), 1.0 + 1.0 / 256.0);
         assert_eq!(of(1.0 + 1.0 / 128.0), 1.0 + 3.0 / 256.0);
         assert_eq!(of((1.0_f64 + 1.0 / 128.0).next_down()), 1.0 + 1.0 / 256.0);

@@ -30,6 +30,7 @@ impl Accumulator for Settling {
     #[inline]
     fn on_instant(&mut self, row: &InstantRow) {
         if row.discrepancy > self.band {
+            // A later instant within the band begins anew.
             self.since = None;
         } else if self.since.is_none() {
             self.since = Some(row.at);

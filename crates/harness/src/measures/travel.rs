@@ -22,6 +22,7 @@ impl Travelled {
     /// Takes a position at a tick \[m\]. An overflowed position does not count as distant.
     #[inline]
     pub(crate) fn see(&mut self, at: Instant, position: f64, distance: f64) {
+        // The first call is at the first tick of the copy.
         let start = *self.start.get_or_insert(position);
         if self.reached.is_none() && position.is_finite() && (position - start).abs() >= distance {
             self.reached = Some(at);

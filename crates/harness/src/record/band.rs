@@ -178,6 +178,7 @@ impl Bands {
     /// least a tenth of `sane`.
     #[must_use]
     pub fn range(&self, sane: f64) -> (Range<f64>, bool) {
+        // Distances are measured from the lowest value in the first span of the first curve with values.
         let start = (0..self.curves()).find_map(|curve| self.curve(curve).next()).map_or(0.0, |(_, low, _)| low);
         let reach_until = |span: usize| self.all(0..span).map(|(low, high)| (low - start).abs().max((high - start).abs())).fold(0.0, f64::max);
         let (first, whole) = (reach_until(self.spans.div_ceil(10)), reach_until(self.spans));
@@ -185,6 +186,7 @@ impl Bands {
         let shown = |value: &f64| (value - start).abs() <= limit;
         let values = || self.all(0..self.spans).flat_map(|(low, high)| [low, high]);
         let (low, high) = values().filter(shown).fold((start, start), |(low, high), value| (low.min(value), high.max(value)));
+        // A constant curve still needs a range of positive width.
         let margin = if high > low { 0.05 * (high - low) } else { start.abs().max(1e-3) };
         (low - margin..high + margin, values().any(|value| !shown(&value)))
     }

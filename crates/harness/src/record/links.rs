@@ -49,6 +49,7 @@ pub fn links_csv<E>(summary: &Summary, mut write: impl FnMut(&[u8]) -> Result<()
                 _ => push_counters(&mut rows, stats),
             }
             last = Some((stats, counters..rows.len()));
+            // The copied range lies in the piece that is passed on here, so the next row is formatted anew.
             if rows.len() >= PIECE {
                 write(&rows)?;
                 rows.clear();

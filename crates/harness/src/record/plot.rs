@@ -76,6 +76,7 @@ fn visible_runs(panel: &Panel<'_>, curve: usize, range: &std::ops::Range<f64>) -
     for (t, low, high) in panel.bands.curve(curve) {
         let (low, high) = (low * panel.scale, high * panel.scale);
         if !range.contains(&low) || !range.contains(&high) {
+            // A value out of range ends the run, so the line has a gap.
             runs.push(Vec::new());
             continue;
         }

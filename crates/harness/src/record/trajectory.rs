@@ -46,7 +46,7 @@ pub(crate) struct Trajectory {
     turn: Turns,
     /// Instant of the latest row.
     at: Option<Instant>,
-    /// Text of `at` with its comma, which begins all rows of that instant.
+    /// Text of `at` with a comma: the beginning of all rows of this instant.
     beginning: Vec<u8>,
     line: Vec<u8>,
 }
@@ -100,6 +100,7 @@ impl Trajectory {
             }
             match turn.device {
                 Some(device) => push_attitude(line, device),
+                // Seven empty cells keep the columns of a device that does not turn.
                 None if self.turn == Turns::Devices => line.extend_from_slice(b",,,,,,,"),
                 None => {}
             }

@@ -128,6 +128,7 @@ fn closed(mut outline: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
 
 /// Returns the corners of the convex hull of the points, counterclockwise (Andrew 1979).
 fn hull(mut points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+    // From left to right, and upwards among points with the same abscissa.
     points.sort_by(|one, other| one.0.total_cmp(&other.0).then(one.1.total_cmp(&other.1)));
     let chain = |points: &mut dyn Iterator<Item = (f64, f64)>| {
         let mut chain: Vec<(f64, f64)> = Vec::new();
@@ -142,6 +143,7 @@ fn hull(mut points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
         chain.pop();
         chain
     };
+    // The lower chain from left to right, then the upper chain from right to left: each leaves out its last point, with which the other begins.
     let mut lower = chain(&mut points.iter().copied());
     lower.extend(chain(&mut points.iter().rev().copied()));
     lower

@@ -154,6 +154,7 @@ impl LinkSummaries {
         let mut values: Vec<f64> = self.stats.iter().filter_map(value).collect();
         let last = values.len().checked_sub(1)?;
         values.sort_unstable_by(f64::total_cmp);
+        // Ranks count from 1, indices from 0.
         let percent = |percent: usize| values[(values.len() * percent).div_ceil(100).saturating_sub(1)];
         Some(LinkQuantiles { min: values[0], p01: percent(1), p50: percent(50), p99: percent(99), max: values[last] })
     }

@@ -115,7 +115,7 @@ impl<const A: usize, S: Strategy<A>, D: Device<A>> Member<A, S, D> {
         // With a compute delay, the force of the previous tick acts during this step.
         let coordination = if self.peer.compute_delay() { late } else { commanded };
         let before = self.moved_by_coordination(role);
-        // `advance` may replace the applied forces, so they are copied first.
+        // The forces that act during this step, copied before `advance` changes the peer.
         let acting = *self.peer.applied();
         self.peer.advance(now, span);
         let turn = turn.map(|turn| TurnStepRow { after: self.peer.attitude().rate, ..turn });

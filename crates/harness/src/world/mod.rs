@@ -417,6 +417,7 @@ fn network<T: Clone>(scene: &Scene, plan: &Plan) -> Network<T> {
     let config = NetworkConfig { seed: scene.seed, nodes: scene.peers.iter().map(|peer| peer.name.clone()).collect(), general: plan.general_links };
     let link = |from: NodeId, to: NodeId| scene.links.between(from.index(), to.index()).clone();
     let mut network = match &scene.topology {
+        // Every peer has a link to every other peer.
         None => Network::new(config, link),
         Some(topology) => {
             let receivers = |from: NodeId| topology.neighbours(from.index()).iter().map(|to| NodeId::new(*to as usize));

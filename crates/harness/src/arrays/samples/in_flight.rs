@@ -140,6 +140,7 @@ impl<const A: usize> InFlight<A> {
     /// Removes and returns the samples that are due at `tick`; `None` if there are none.
     #[inline(always)]
     pub(super) fn due(&mut self, tick: u64) -> Option<Bucket<A>> {
+        // Checked at every tick: a tick of the map enters the wheel only when due.
         if !self.beyond.is_empty() {
             self.come_near(tick);
         }

@@ -314,6 +314,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         for packet in &bucket.overtaking {
             self.next[packet.place as usize] |= IS_OVERTAKEN;
         }
+        // Samples appended below belong to marked links, but did not mark them.
         let overtaking = bucket.overtaking.len();
         // Without exact means there are no sums to update.
         match self.sums.is_empty() {
