@@ -75,6 +75,7 @@ impl<const A: usize> SamplesInFlight<A> {
     ) -> Option<Handle> {
         let handle = self.store(copies, sample);
         let slot = handle.place();
+        // `extended` grows on demand: samples of the kind `State` never need an entry.
         if self.extended.len() <= slot {
             self.extended.resize(slot + 1, Extended { numbers: Vec::new(), attitude: Attitude::REST });
         }

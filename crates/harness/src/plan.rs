@@ -67,6 +67,7 @@ impl Plan {
 /// Returns the scheduling for some peers of a scene, which need not be all.
 pub(crate) fn ticking<'a>(peers: impl Iterator<Item = &'a PeerSpec> + Clone) -> Ticking {
     let first = peers.clone().next().map(|peer| peer.clock.tick);
+    // Equal ticks without offset and drift: all peers tick at the same instants for ever.
     let together = |peer: &PeerSpec| peer.clock.offset.is_zero() && peer.clock.drift == Drift::default() && Some(peer.clock.tick) == first;
     if first.is_some() && peers.clone().all(together) { Ticking::Lockstep } else { Ticking::EventDriven }
 }

@@ -199,6 +199,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
                 return ControlFlow::Break(());
             }
             let discrepancy = self.step(tick, now, watch);
+            // Counted after the step: the number of ticks computed so far.
             let ticks = tick + 1;
             if !watch.after_motion(now, discrepancy[0]) || self.shape.is_asked_before(ticks) && !watch.keep_going(now) {
                 self.end_all(ticks, |_| Ending::Interrupted(now));

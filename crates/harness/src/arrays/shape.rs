@@ -149,6 +149,7 @@ impl Shape {
             (scene.peers.len() <= usize::from(u16::MAX) || delay.is_some(), "there are more than 65,535 peers, over links that take memory"),
             (scene.duration <= LONGEST && clock.tick <= LONGEST, "it lasts longer than a year"),
         ];
+        // The first reason counts: explanations show a single one.
         if let Some((_, why)) = fits.into_iter().find(|(fits, _)| !fits) {
             return Err(why);
         }

@@ -23,6 +23,7 @@ pub fn run_side_by_side(scenes: &[Scene]) -> Vec<Summary> {
     let mut rest = scenes;
     while let Some(first) = rest.first() {
         let shape = shape(first);
+        // Only neighbours are combined, so the results keep the order of the scenes.
         let alike = rest.iter().take(WIDTH).take_while(|scene| shape.is_some() && self::shape(scene) == shape).count();
         if let Some((shape, _)) = shape.filter(|(shape, _)| pays(shape, alike)) {
             let (now, later) = rest.split_at(alike);

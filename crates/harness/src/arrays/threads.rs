@@ -203,6 +203,7 @@ impl<'a, const A: usize> Part<'a, '_, '_, A> {
     fn meet(&mut self) {
         let Self { groups, thread, .. } = self;
         let Some((first, others)) = groups.split_first_mut() else { return };
+        // The first group collects the samples of all groups of this thread before the exchange.
         for group in &*others {
             first.sent[group.members.clone()].copy_from_slice(&group.sent[group.members.clone()]);
         }
@@ -220,6 +221,7 @@ impl<'a, const A: usize> Part<'a, '_, '_, A> {
                 if sends && tick == ticks.start {
                     group.send(tick, now);
                 }
+                // Before the motion: extremes belong to the present tick.
                 thread.note_extremes(place, group.bodies.blocks().extremes());
                 group.go_on(now, tick, &mut Unwatched(&mut |_| true));
                 thread.note_finite(group.finite[0]);

@@ -111,6 +111,7 @@ pub fn explain(scene: &Scene) -> Explanation {
         }
         Ok((shape, _)) => Some(shape).filter(|_| watch.is_of_ticks()),
     };
+    // In a broadcast every link has a constant delay; over other links of arrays every packet costs as an impaired one.
     let nanos = match &arrays {
         None => WITH_EVENTS,
         Some(shape) if shape.is_broadcast() => Nanos { an_impaired_packet: IN_ARRAYS.a_packet, ..IN_ARRAYS },

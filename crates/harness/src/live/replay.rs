@@ -84,6 +84,7 @@ impl Questions {
             return Ok(false);
         }
         self.left = self.between;
+        // The last instant that has happened.
         let Some(now) = live.open().as_nanos().checked_sub(1).map(Instant::from_nanos) else { return Ok(false) };
         if observer.keep_going(now) {
             return Ok(false);

@@ -271,6 +271,7 @@ impl LiveScene {
     /// Computes everything before `at`, and returns the instant at which an input of `at` takes effect; `None` if the session has ended by then.
     fn come_in(&mut self, at: Instant, observer: &mut AnyObserver<'_>) -> Result<Option<Instant>, Ended> {
         let at = at.max(self.open);
+        // Up to the nanosecond before, because an input comes before everything else at its instant.
         if let Some(before) = at.as_nanos().checked_sub(1) {
             self.let_happen(Instant::from_nanos(before), observer)?;
         }

@@ -117,6 +117,7 @@ impl Accumulator for Ages {
         let held = sampled.len() as u64;
         // Σ (tick − sampled) over all held samples, in one multiplication.
         self.nanos += u128::from(held) * u128::from(row.at.as_nanos()) - nanos;
+        // Every held sample has an age at this tick.
         self.count += held;
         if let Some(sketch) = &mut self.sketch {
             for (sampled, count) in instants {

@@ -246,6 +246,7 @@ impl Measures {
     /// Returns the value of each measure after `elapsed` of the scene, in the order of the names. At the end of a run `elapsed` is [`Summary::duration`].
     #[must_use]
     pub fn values(&self, elapsed: Duration) -> Vec<MeasuredValue> {
+        // Overflowed values have no meaning and are left out.
         let value = |name: MeasureName| self.value(name, elapsed).filter(|value| value.is_finite());
         self.names.iter().map(|name| MeasuredValue { name: *name, value: value(*name) }).collect()
     }

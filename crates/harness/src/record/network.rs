@@ -63,6 +63,7 @@ impl Network {
     }
 
     pub(super) fn on_packet(&mut self, row: &PacketRow) {
+        // Packets of links without a panel are ignored.
         let Some(place) = self.shown.iter().position(|link| (link.from, link.to) == (row.path.from.index(), row.path.to.index())) else { return };
         let link = &mut self.shown[place];
         link.known += 1;

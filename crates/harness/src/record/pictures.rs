@@ -108,6 +108,7 @@ impl Observer for Pictures {
 
     fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Infallible> {
         for axis in 0..row.coupling_force.len() {
+            // Curves are ordered by axis, then peer, as `Bands::split` expects.
             let curve = axis * self.names.len() + row.peer;
             self.positions.add(curve, row.at, row.object.position[axis]);
             self.forces.add(curve, row.at, row.coordination_force[axis]);

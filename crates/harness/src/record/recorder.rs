@@ -66,6 +66,7 @@ impl Recorder {
     /// [`RecordError`] if a file cannot be written.
     pub fn finish_with_pictures(self, summary: &Summary) -> Result<(Vec<PathBuf>, Vec<RecordedPicture>), RecordError> {
         let Self { folder, trajectory, packets, pictures, size } = self;
+        // Records are completed first: an error in writing a picture leaves the records whole.
         let mut files = vec![trajectory.finish()?, packets.finish()?, links::write(&folder, summary)?];
         let pictures = pictures.drawn(size);
         for (file, svg) in &pictures {

@@ -63,6 +63,7 @@ impl Views {
         let (Some(span), Ok(centre)) = (self.spans.span(at), Triple::try_from(centre)) else { return };
         if attitude.is_finite() && centre.iter().all(|x| x.is_finite()) {
             let pose = Pose { centre, orientation: attitude.orientation };
+            // The first pose of a span stays.
             self.poses[peer][span].get_or_insert(pose);
             self.last[peer] = Some(pose);
         }

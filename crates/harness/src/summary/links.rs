@@ -162,6 +162,7 @@ impl LinkSummaries {
 
 impl PartialEq for LinkSummaries {
     fn eq(&self, other: &Self) -> bool {
+        // With the same storage the entries can be compared without expanding them to links.
         let is_kept_alike = self.together == other.together;
         self.peers == other.peers && self.topology == other.topology && if is_kept_alike { self.stats == other.stats } else { self.iter().eq(other) }
     }

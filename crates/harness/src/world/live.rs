@@ -87,6 +87,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
         if at >= self.end {
             return self.finish(observer, watch).map(Step::Ended);
         }
+        // A tick includes the changes and deliveries of its instant.
         if self.schedule.next_instant() == Some(at) {
             return self.step(observer, watch);
         }
@@ -106,6 +107,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
         let kind = self.samples.kind();
         let read = read_sample::<A>(datagram, kind, self.axes, session, (place, peers)).inspect_err(|_| seat.stats.refused += 1);
         let (mut sample, extra) = read?;
+        // Admitted before `hear`, because a silent seat admits any number.
         seat.admit(sample.sequence)?;
         let joins = seat.hear(at);
         // A peer that joins again counts its samples from 0. The receivers see numbers that go on, or they would take the samples for stale.
@@ -118,6 +120,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
                 }
             }
         }
+        // The copy in this process shows the newest sample, so the discrepancy and displays know where the remote copy is.
         self.latest[place] = sample.state.position;
         let peer = &mut self.members[place].peer;
         peer.object_mut().set_state(sample.state);

@@ -162,6 +162,7 @@ impl<const A: usize, S: Strategy<A>, D: Device<A> + From<RestingDevice<A>>> Memb
                 Held::of_some(near, topology.relative_weights(place))
             }
         };
+        // The scene was checked: `update` is a multiple of the tick.
         let send_every = scene.coordination.update.as_nanos() / clock.tick.as_nanos();
         let mut peer = Peer::new(scene.peer_config(place), device, object, strategy, held);
         if let Some(mut rotation) = scene.rotation_of(place) {

@@ -148,6 +148,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             return self.finish(observer, watch).map(Step::Ended);
         };
         if !self.finite {
+            // The tick before this instant led to a number that is not finite.
             return Ok(Step::Ended(Ending::Diverged(now)));
         }
         self.now = now;
@@ -161,6 +162,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             self.deliver(now, observer, watch)?;
         }
         self.compute_and_move(now, observer, watch)?;
+        // `latest` holds the positions before the move, so the discrepancy belongs to `now`.
         let discrepancy = self.measure_discrepancy();
         if watch.instants {
             observer.on_instant(&InstantRow { at: now, discrepancy })?;
@@ -369,6 +371,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                 continue;
             }
             for axis in 0..A {
+                // Comparisons with NaN are false: an unknown position changes neither bound.
                 low[axis] = if position[axis] < low[axis] { position[axis] } else { low[axis] };
                 high[axis] = if position[axis] > high[axis] { position[axis] } else { high[axis] };
             }
@@ -489,6 +492,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> Receivers<'_, A, S, E> {
                 Some(Ok(Reception::Newest)) if watch.holds => {
                     observer.on_hold(&HoldRow { at: now, from: event.path.from.index(), to, sampled: event.offered })?;
                 }
+                // `None`: the datagram waits in the outbox of the remote peers.
                 None | Some(Ok(Reception::Newest)) => {}
                 Some(Ok(Reception::Stale)) => receiver.stale_samples += 1,
                 Some(Err(_)) if event.damage.is_some() => receiver.refused_samples += 1,

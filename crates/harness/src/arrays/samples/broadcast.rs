@@ -82,6 +82,7 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
         while let Some(Sent { sender, sample, .. }) = self.next_due(tick) {
             self.hold(sender, &sample);
             self.arrived[sender] += 1;
+            // After a single new sample, the mean of its sender stays: no peer holds its own sample.
             self.changed = if self.changed == Changed::Nothing { Changed::From(sender) } else { Changed::More };
         }
     }
@@ -105,6 +106,7 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
     #[inline(always)]
     fn hold(&mut self, sender: usize, sample: &Sample<A, L>) {
         if self.sums.is_some() {
+            // Exact sums allow a replacement without adding all samples again.
             let before = self.held_from(sender);
             self.sums.iter_mut().for_each(|sums| sums.replace(&before, &sample.state(0)));
         }

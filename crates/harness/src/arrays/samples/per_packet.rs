@@ -143,6 +143,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         let Self { rows, receivers, links, sends, in_flight, .. } = self;
         match links {
             Links::Direct(links) => {
+                // `sends` has the senders as flags, for the link-by-link ways.
                 sends.fill(false);
                 senders.iter().for_each(|sender| sends[*sender] = true);
                 let (receivers, sends) = (receivers.clone(), &**sends);

@@ -47,6 +47,7 @@ impl Rows {
         let Some(topology) = topology else { return Self::All { peers, first: receivers.start } };
         let mut places = vec![0];
         for peer in receivers.clone() {
+            // Whole quads for each receiver, so a mean never mixes samples of two receivers.
             places.push(places[places.len() - 1] + whole(topology.neighbours(peer).len()));
         }
         let relative: Vec<Option<Vec<f64>>> = receivers.clone().map(|peer| topology.relative_weights(peer)).collect();

@@ -99,6 +99,7 @@ impl<'e, const A: usize> Thread<'e, A> {
         let extremes = extremes.enumerate().map(|(axis, extremes)| (tick * A + axis, extremes));
         for (place, (low, high)) in extremes {
             match self.extremes.get_mut(place) {
+                // Another group of this thread has noted this tick before.
                 Some(all) => *all = (smaller(low, all.0), larger(high, all.1)),
                 None => self.extremes.push((low, high)),
             }
@@ -126,6 +127,7 @@ impl<'e, const A: usize> Thread<'e, A> {
             for (sender, sample) in &told.samples {
                 sent[*sender] = *sample;
             }
+            // All threads note the same ticks, so after the first thread the length stays.
             self.extremes_of_all.resize(told.extremes.len(), (f64::INFINITY, f64::NEG_INFINITY));
             for ((low, high), told) in self.extremes_of_all.iter_mut().zip(&told.extremes) {
                 (*low, *high) = (smaller(told.0, *low), larger(told.1, *high));
