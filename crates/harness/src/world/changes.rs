@@ -45,7 +45,6 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                         None => {
                             let places = 0..self.members.len();
                             places.clone().flat_map(|from| places.clone().map(move |to| (from, to))).filter(|(from, to)| from != to).collect()
-                            // A strategy counts the other peers without its own peer, so peers after `place` move down by one.
                         }
                     };
                     for (from, to) in pairs {
@@ -55,22 +54,23 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                 ChangeKind::Contact { peer, contact } => {
                     self.members[peer].peer.set_contact(contact);
                     for (place, member) in self.members.iter_mut().enumerate().filter(|(place, _)| *place != peer) {
+                        // A strategy counts the other peers without its own peer, so a peer after its own has an index lower by one.
                         member.peer.strategy_mut().set_contact(if peer < place { peer } else { peer - 1 }, contact);
                     }
-                    // A device without simulation has no hand.
                 }
                 ChangeKind::Hand { peer, hand } => match self.members[peer].peer.device_mut() {
                     DeviceModel::Simulated(device) => device.set_hand(hand.as_ref()),
+                    // A device without simulation has no hand.
                     DeviceModel::Unsimulated(_) => {}
                 },
                 ChangeKind::HandTorque { peer, torque } => {
                     if let Some(rotation) = self.members[peer].peer.rotation_mut() {
                         rotation.set_hand(torque);
                     }
-                    // `parameter_changes` made one entry for each of these changes, in the same order.
                 }
                 ChangeKind::SendWhen(when) => self.send_when = Some(when),
                 ChangeKind::Parameters(_) => {
+                    // `parameter_changes` made one entry for each of these changes, in the same order.
                     let ParameterChange { own, damping, turns } = self.parameters.pop().expect("there is one for each of these changes");
                     for (rotation, (law, own_damping, damping)) in self.members.iter_mut().filter_map(|member| member.peer.rotation_mut()).zip(turns)
                     {

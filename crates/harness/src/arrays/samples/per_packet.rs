@@ -510,8 +510,8 @@ impl<const A: usize, const L: usize> NullaryFnOnce for ByLink<'_, A, L> {
 }
 
 impl<const A: usize, const L: usize> DirectSending<'_, A, L> {
-    /// Sends link by link, eight at a time and without a gap between the rows of receivers, so only the last eight can be incomplete. `CHAINS` says whether all
-    /// links have chains.
+    /// Sends link by link, eight at a time and without a gap between the rows of receivers, so only the last eight can be incomplete. `CHAINS`: whether
+    /// the links are of a kind in which a delay depends on earlier delays.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "the bits of eight links")]
     fn by_link<const CHAINS: bool>(self) {
