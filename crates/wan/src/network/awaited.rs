@@ -7,26 +7,33 @@ use core::cmp::Reverse;
 use cohaptic_units::Instant;
 
 use super::id::NodeId;
+use super::paths::Paths;
 use super::pending::LineId;
 
 /// Awaited receivers, and the instants at which packets may reach them.
 #[derive(Clone, Debug)]
 pub(super) struct Awaited {
     /// Whether a node is awaited, indexed by node.
-    /// Instants to come, earliest first. An instant may occur several times.
     is_awaited: Vec<bool>,
+    /// Whether the receiver of a link is awaited, indexed by link. Empty in a network with links between all nodes, whose link numbers give the receiver.
+    is_receiver_awaited: Vec<bool>,
+    /// Instants to come, earliest first. An instant may occur several times.
     instants: BinaryHeap<Reverse<Instant>>,
 }
 
 impl Awaited {
-    pub(super) fn new(nodes: u16, receivers: impl IntoIterator<Item = NodeId>) -> Self {
-        let mut is_awaited = alloc::vec![false; nodes.into()];
+    pub(super) fn new(paths: &Paths, receivers: impl IntoIterator<Item = NodeId>) -> Self {
+        let mut is_awaited = alloc::vec![false; paths.nodes().into()];
         for node in receivers {
             if let Some(is_awaited) = is_awaited.get_mut(node.index()) {
                 *is_awaited = true;
             }
         }
-        Self { is_awaited, instants: BinaryHeap::new() }
+        let is_receiver_awaited = match paths {
+            Paths::All { .. } => Vec::new(),
+            Paths::Some(some) => some.receivers().iter().map(|to| is_awaited[to.index()]).collect(),
+        };
+        Self { is_awaited, is_receiver_awaited, instants: BinaryHeap::new() }
     }
 
     /// Notes that a packet to node `to` leaves a line at `at`.
@@ -41,10 +48,10 @@ impl Awaited {
     pub(super) fn announce(&mut self, at: Instant, line: LineId) {
         let is_awaited = match line {
             // The packets of an uplink go to any node.
-            // In a network with links between all nodes, link numbers are `from * nodes + to`, and the remainder is the receiver. Links of
-            // `Paths::Some` are numbered in another way.
             LineId::Uplink(_) => true,
-            LineId::Link(link) => self.is_awaited[link.index() % self.is_awaited.len()],
+            // In a network with links between all nodes, link numbers are `from * nodes + to`, and the remainder is the receiver.
+            LineId::Link(link) if self.is_receiver_awaited.is_empty() => self.is_awaited[link.index() % self.is_awaited.len()],
+            LineId::Link(link) => self.is_receiver_awaited[link.index()],
             LineId::Downlink(node) => self.is_awaited[node.index()],
         };
         if is_awaited {

@@ -224,7 +224,7 @@ impl<P: Clone> Network<P> {
     /// ignored.
     #[must_use]
     pub fn awaiting(mut self, receivers: impl IntoIterator<Item = NodeId>) -> Self {
-        self.traffic.awaited = Some(Box::new(Awaited::new(self.nodes, receivers)));
+        self.traffic.awaited = Some(Box::new(Awaited::new(&self.places, receivers)));
         self
     }
 

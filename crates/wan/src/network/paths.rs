@@ -84,6 +84,11 @@ impl Paths {
 }
 
 impl SomePaths {
+    /// Returns the receiver of each link, indexed by link.
+    pub(super) fn receivers(&self) -> &[NodeId] {
+        &self.receivers
+    }
+
     fn of(&self, from: NodeId) -> &[NodeId] {
         &self.receivers[self.first[from.index()] as usize..self.first[from.index() + 1] as usize]
     }

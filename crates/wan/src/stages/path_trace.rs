@@ -100,12 +100,13 @@ impl PathTrace {
     ///
     /// # Errors
     ///
-    /// [`PathTraceError::NoLength`] if the recording repeats and has one row.
+    /// [`PathTraceError::NoLength`] if the recording repeats and all rows have the instant of the first row.
     pub fn from_first(self) -> Result<Self, PathTraceError> {
         let first = self.first();
         let rows: Arc<[Row]> =
             self.rows.iter().map(|row| Row { at: Instant::ZERO.saturating_add(row.at.saturating_duration_since(first)), ..*row }).collect();
-        if self.repeats && rows.len() < 2 { Err(PathTraceError::NoLength) } else { Ok(Self { rows, ..self }) }
+        let has_length = rows.last().is_some_and(|last| last.at > Instant::ZERO);
+        if self.repeats && !has_length { Err(PathTraceError::NoLength) } else { Ok(Self { rows, ..self }) }
     }
 
     /// Returns the delay \[ns\] and the probability of loss at `now`.
@@ -264,8 +265,10 @@ mod tests {
             let from_zero = PathTrace::parse("t,delay,loss\n0,0.020,0\n1.5,0.040,0.5\n2,0.010,0\n", Between::Lines, repeats).unwrap();
             assert_eq!(trace.from_first().unwrap(), from_zero);
         }
-        let one_row = |repeats| PathTrace::parse("t,delay\n5,1\n", Between::Steps, repeats).unwrap().from_first();
-        assert_eq!((one_row(true), one_row(false).unwrap().first()), (Err(PathTraceError::NoLength), Instant::ZERO));
+        for one_instant in ["t,delay\n5,1\n", "t,delay\n5,1\n5,2\n"] {
+            let from_first = |repeats| PathTrace::parse(one_instant, Between::Steps, repeats).unwrap().from_first();
+            assert_eq!((from_first(true), from_first(false).unwrap().first()), (Err(PathTraceError::NoLength), Instant::ZERO));
+        }
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! When a network must be called for the sake of some receivers.
 
 use cohaptic_units::Instant;
-use cohaptic_wan::{Fate, NodeId, PacketEvent, Path};
+use cohaptic_wan::{Bottleneck, Fate, LinkConfig, Network, NetworkConfig, NodeId, PacketEvent, Path};
 use proptest::prelude::*;
 
 use crate::random_links::{Payload, Plan, Sending, cases, drain_network, plan, sendings};
@@ -65,10 +65,7 @@ proptest! {
 /// Where nothing but links of a constant delay lies in between, there is no call for anybody else.
 #[test]
 fn nothing_else_wakes_where_links_decide_at_once() {
-    let link = |delay: u64| cohaptic_wan::LinkConfig {
-        delay: cohaptic_wan::Delay::constant(std::time::Duration::from_millis(delay)),
-        ..cohaptic_wan::LinkConfig::default()
-    };
+    let link = |delay: u64| LinkConfig { delay: cohaptic_wan::Delay::constant(std::time::Duration::from_millis(delay)), ..LinkConfig::default() };
     let plan = Plan { nodes: 3, links: (0..9).map(|place| link(3 + place)).collect(), uplinks: vec![None; 3], downlinks: vec![None; 3] };
     let pairs = [(0, 1), (0, 2), (1, 0), (1, 2), (2, 1), (2, 0)];
     let gap = std::time::Duration::from_millis(1);
@@ -80,4 +77,28 @@ fn nothing_else_wakes_where_links_decide_at_once() {
     let (events, wakes) = driven(&plan, false, &script);
     let reached: Vec<Instant> = events.iter().filter(|(_, event)| reaches(event)).map(|(_, event)| event.at).collect();
     assert_eq!((reached.len(), wakes), (20, reached));
+}
+
+/// Links of a network in which not all nodes have links to all are numbered by their place in the lists of receivers.
+#[test]
+fn a_queue_of_some_links_wakes_for_its_own_receiver() {
+    let rate = cohaptic_units::Rate::bits_per_sec(8_000_000).unwrap();
+    let queue = LinkConfig { bottleneck: Some(Bottleneck::at_rate(rate)), ..LinkConfig::default() };
+    let config = NetworkConfig { seed: 1, nodes: ["a", "b", "c"].map(String::from).to_vec(), general: true };
+    let receivers = [vec![1], vec![0], vec![1]];
+    let to = |from: NodeId| receivers[from.index()].iter().copied().map(NodeId::new).collect::<Vec<_>>();
+    let mut network: Network<u8> = Network::of_some(config, to, |_, _| queue.clone()).awaiting([NodeId::new(1)]);
+    for number in 0..3 {
+        network.handle_packet(Instant::ZERO, NodeId::new(2), NodeId::new(1), cohaptic_units::Bytes::new(1000), number).unwrap();
+    }
+    let mut arrived = Vec::new();
+    while let Some(at) = network.poll_awaited() {
+        network.handle_timeout(at).unwrap();
+        while let Some(event) = network.poll_event() {
+            assert_eq!(event.at, at);
+            arrived.push(event.at.as_nanos());
+        }
+    }
+    // A packet of 1000 bytes is on the line for a millisecond.
+    assert_eq!(arrived, [1_000_000, 2_000_000, 3_000_000]);
 }
