@@ -1,15 +1,16 @@
-//! The linear form of a coordination law: the law computed in linear forms of what it sees and remembers.
+//! The linear form of a coordination law. The law is computed once with linear forms in place of numbers, as a function of all that the law sees and
+//! remembers; the coefficients of the resulting forms are the gains of the law.
 
 use std::ops::{Add, Mul, Neg, Sub};
 
 use cohaptic_peer::coordination::{BuiltIn, Law, Observation};
 use cohaptic_peer::{Gains, Motion, Number};
 
-/// Own position and velocity, those of the mean of the samples held, those of the own state of the past, by how much the samples have moved on, and one
-/// number that the law remembers.
+/// The number of unknowns, in this order: position and velocity of the own copy, of the mean of the samples held, and of the own copy in the past; the lead,
+/// by which extrapolation moves the samples; and one number of the memory of the law.
 const UNKNOWNS: usize = 8;
 
-/// A constant plus a multiple of each unknown; or the knowledge that it is no such sum.
+/// A constant plus a multiple of each unknown. `is_linear` is false if a value is no such sum; its coefficients then have no meaning.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Form {
     constant: f64,
@@ -41,7 +42,7 @@ impl Form {
     }
 
     fn times(self, factor: f64) -> Self {
-        // An unknown that does not occur does not come in by a factor that has overflowed.
+        // An unknown with coefficient zero keeps it, also if the factor has overflowed: 0·∞ would be NaN.
         let product = |by: f64| if by == 0.0 { 0.0 } else { by * factor };
         Self { constant: product(self.constant), by: self.by.map(product), ..self }
     }
@@ -81,6 +82,7 @@ impl Mul for Form {
     type Output = Self;
 
     fn mul(self, other: Self) -> Self {
+        // A product is linear if at least one factor is a constant.
         let is_linear = self.is_linear && other.is_linear;
         if self.is_constant() {
             Self { is_linear, ..other.times(self.constant) }
@@ -90,20 +92,20 @@ impl Mul for Form {
     }
 }
 
-/// What comes out of a law in linear form: FT \[N\], or a number that the law remembers from now on.
+/// One result of a law in linear form: FT \[N\], or a number that the law remembers from this tick on.
 ///
-/// own·(x, v) + past·(x, v)(L ticks ago) − heard·(x̄, v̄) − ahead·lead + Σ memory·m, with x̄, v̄ and the lead of an [`Observation`].
+/// The result is own·(x, v) + past·(x, v)(L ticks ago) − heard·(x̄, v̄) − ahead·lead + Σ memory·m, with x̄, v̄ and the lead of an [`Observation`].
 #[derive(Clone, PartialEq, Debug)]
 pub struct LawRow {
-    /// Gains towards the own state of now.
+    /// Gains of the present own state.
     pub own: Gains,
-    /// Gains towards the own state of L ticks ago.
+    /// Gains of the own state of L ticks ago.
     pub past: Gains,
-    /// Gains towards the mean of the samples held.
+    /// Gains of the mean of the samples held.
     pub heard: Gains,
-    /// What the lead is multiplied by: by how much more the velocity of a sample counts for each second of its age \[N/m\].
+    /// Factor of the lead: the gain of a sample's velocity for each second of the sample's age \[N/m\].
     pub ahead: f64,
-    /// What each number that the law remembered is multiplied by.
+    /// Factor of each number that the law remembers, indexed like the memory of the law.
     pub memory: Vec<f64>,
 }
 
@@ -112,16 +114,17 @@ pub struct LawRow {
 pub struct LinearLaw {
     /// The row of FT.
     pub force: LawRow,
-    /// The rows of the numbers that the law remembers, in their order.
+    /// Rows of the numbers that the law remembers, indexed like the memory of the law.
     pub memory: Vec<LawRow>,
-    /// Up to which age \[s\] samples are extrapolated; `None` if they are taken as they are.
+    /// Age up to which samples are extrapolated \[s\]; `None` if samples are used without extrapolation.
     pub horizon: Option<f64>,
-    /// L, how many ticks the law looks back. If any, it remembers nothing else.
+    /// Number of ticks L that the law looks back. A law with L > 0 has no other memory.
     pub lag: usize,
 }
 
 impl LawRow {
-    /// Of the parts of `form` that do not depend on what the law remembers; `None` if it is no such sum, or changes where everything is moved alike.
+    /// Returns the row of the parts of `form` that do not depend on the memory; `None` if `form` is not linear, has a constant, or changes when everything is
+    /// moved alike.
     #[expect(clippy::float_cmp, reason = "what moves with everything has equal gains for both ends to the bit")]
     fn of(form: &Form) -> Option<Self> {
         let Form { constant, by: [stiffness, damping, mean_position, mean_velocity, past_stiffness, past_damping, lead, _], is_linear } = *form;
@@ -136,7 +139,7 @@ impl LawRow {
         })
     }
 
-    /// With everything that is seen multiplied by a factor.
+    /// Returns the row with the gains of everything that the law sees multiplied by a factor. The factors of the memory stay.
     fn scaled(&self, factor: f64) -> Self {
         let Self { own, past, heard, ahead, memory } = self;
         Self { own: own.scaled(factor), past: past.scaled(factor), heard: heard.scaled(factor), ahead: ahead * factor, memory: memory.clone() }
@@ -144,9 +147,9 @@ impl LawRow {
 }
 
 impl LinearLaw {
-    /// The linear form of a law; `None` if it has none, or if its forces change where everything is moved alike.
+    /// Returns the linear form of a law; `None` if the law has none, or if its forces change when everything is moved alike.
     ///
-    /// The coefficients are those that the law multiplies with, to the bit, where every other factor on the way is 1 or 0.
+    /// The coefficients are to the bit the numbers that the law multiplies with, if every other factor in the law is 1 or 0.
     pub(crate) fn of(law: &BuiltIn) -> Option<Self> {
         let remembered = Law::<f64>::memory(law);
         let lag = Law::<f64>::lag(law);
@@ -156,7 +159,8 @@ impl LinearLaw {
         let past = Form::motion(if lag > 0 { 2 } else { 0 });
         let seen = Observation { own: Form::motion(0), past, mean: Form::motion(1), lead: Form::unknown(6) };
         let forms = law.map(|number| Form::of(*number));
-        // FT and the memory after the tick, with one number of the memory before it as an unknown and the others zero.
+        // FT and the memory after the tick. At most one number of the memory before the tick is an unknown, the others are zero: so one unknown is enough for
+        // memories of any length, and the law is computed once for each number.
         let come_out = |unknown: Option<usize>| {
             let mut memory = vec![Form::of(0.0); remembered];
             if let Some(unknown) = unknown {
@@ -175,19 +179,19 @@ impl LinearLaw {
             }
         }
         if law.horizon.is_none() {
-            // Without a horizon the lead is zero.
+            // Without a horizon samples are not extrapolated and the lead is zero.
             law.rows_mut().for_each(|row| row.ahead = 0.0);
         }
         Some(law)
     }
 
-    /// No force at all.
+    /// Returns the law that computes no force and has no memory.
     pub const fn none() -> Self {
         let none = Gains { stiffness: 0.0, damping: 0.0 };
         Self { force: LawRow { own: none, past: none, heard: none, ahead: 0.0, memory: Vec::new() }, memory: Vec::new(), horizon: None, lag: 0 }
     }
 
-    /// FT, and then what the law remembers.
+    /// Iterates over the row of FT and then the rows of the memory.
     pub fn rows(&self) -> impl Iterator<Item = &LawRow> {
         std::iter::once(&self.force).chain(&self.memory)
     }
@@ -196,20 +200,20 @@ impl LinearLaw {
         std::iter::once(&mut self.force).chain(&mut self.memory)
     }
 
-    /// How stiffly and with which damping FT holds the own copy, now or later.
+    /// Returns stiffness and damping with which FT holds the own copy: the gains of the present and of the past own state together.
     pub fn held_by(&self) -> Gains {
         let LawRow { own, past, .. } = &self.force;
         Gains { stiffness: own.stiffness + past.stiffness, damping: own.damping + past.damping }
     }
 
-    /// KT and BT of a law that pulls the copy towards the mean of the samples held and remembers nothing: FT = KT·(x − x̄) + BT·(v − v̄). `None` for any
-    /// other law.
+    /// Returns KT and BT of a law without memory that pulls the copy towards the mean of the samples held: FT = KT·(x − x̄) + BT·(v − v̄). `None` for any other
+    /// law.
     pub(crate) fn pull(&self) -> Option<Gains> {
         let LawRow { own, heard, ahead, .. } = &self.force;
         (self.memory.is_empty() && self.lag == 0 && own == heard && *ahead == 0.0).then_some(*own)
     }
 
-    /// The law with everything that it sees multiplied by a factor.
+    /// Returns the law with everything that the law sees multiplied by a factor.
     pub fn scaled(&self, factor: f64) -> Self {
         let memory = self.memory.iter().map(|row| row.scaled(factor)).collect();
         Self { force: self.force.scaled(factor), memory, ..self.clone() }
@@ -229,7 +233,7 @@ mod tests {
         LawParameters { gains, peers: 3, tick: Duration::from_millis(1), oldest: None, middle: None, own: LawValues::default() }
     }
 
-    /// Equation (10), and equation (2) as the sum of two pulls: KT·(x − x₁) + KT·(x − x₂) with x₁ + x₂ = 2·x̄.
+    /// Checks equation (10), and equation (2) as the sum of two pulls: KT·(x − x₁) + KT·(x − x₂) with x₁ + x₂ = 2·x̄.
     #[test]
     fn the_gains_of_both_laws_come_out_to_the_bit() {
         let gains = Gains { stiffness: 1234.567, damping: 0.1 };

@@ -1,7 +1,7 @@
-//! The frame of a single node on the stack: what a cell of a map costs when all peers are alike.
+//! The frame of a single node, computed in arrays on the stack. When all peers of a scene are alike, each cell of a map costs little more than such frames.
 //!
-//! The same operations in the same order as [`Lifted::frame`](crate::lifted::Lifted::frame), with the bookkeeping done once: which samples of earlier
-//! frames are used, and what happens when. The matrix that comes out is the same to the bit.
+//! The operations and their order are those of [`Lifted::frame`](crate::lifted::Lifted::frame), and the resulting matrix is the same to the bit. Only the
+//! bookkeeping is done once for each timetable: which samples of earlier frames are used, and in which order samples, deliveries and ticks follow.
 
 use std::time::Duration;
 
@@ -12,46 +12,49 @@ use crate::lifted::node::{Scale, coordination_of};
 use crate::lifted::{Lifted, Node, Rounding};
 use crate::timetable::{Event, Timetable};
 
-/// More samples of earlier frames than this, or more sent in one frame, are left to the general path.
+/// The largest number of samples of earlier frames, and the largest number of samples sent in one frame. Frames with more take the general path.
 const MOST_SAMPLES: usize = 4;
-/// Positions and velocities of a device and a copy.
+/// The largest number of states: positions and velocities of a device and a copy.
 const MOST_STATES: usize = 4;
 
-/// What happens in a frame of one node that hears itself.
+/// The steps of a frame of one node that hears its own samples.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct StackFrame {
     steps: Vec<Step>,
-    /// The ages of the samples of earlier frames that are used, ascending.
+    /// Ages of the used samples of earlier frames, ascending; the newest sample of the previous frame has age 1.
     used: Vec<usize>,
-    /// The sample held when the frame begins, by its place among the samples.
+    /// Index of the sample held when the frame begins, among the samples: used ones of earlier frames first, then those sent in the frame.
     held: Option<usize>,
+    /// Number of samples sent in the frame.
     sent: usize,
+    /// Number of samples of earlier frames that are states of the monodromy matrix.
     depth: usize,
 }
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Step {
     Sample,
-    /// From now on that sample is held, by its place: the used ones of earlier frames first, then those sent in this one.
+    /// The node holds this sample from here on. Samples are indexed with the used ones of earlier frames first, then those sent in this frame.
     Deliver(usize),
     Tick(Duration),
 }
 
-/// What a frame is worked out from, besides its steps.
+/// The numbers that a frame is computed from, besides its steps.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StackNode<'a> {
     pub(crate) node: &'a Node,
-    /// How its own samples come back.
+    /// Weight of the node's own samples in its target.
     pub(crate) weight: f64,
-    /// KT and BT of the law; not both zero.
+    /// Gains KT and BT of the law; not both zero.
     pub(crate) coordination: Gains,
-    /// What velocities are multiplied by \[s\].
+    /// Common time that velocities are multiplied by to be lengths \[s\].
     pub(crate) time: f64,
     pub(crate) tied: bool,
 }
 
 impl<'a> StackNode<'a> {
-    /// The only node of a system that this path is for: without a delay of the forces, with a law that is a pull towards the mean, and with something to hear.
+    /// Returns the only node of a system, if the frame can be computed on the stack: forces act without a delay, and the law is a pull towards the mean with
+    /// gains that are not both zero. `None` for any other system.
     pub(crate) fn of(lifted: &Lifted<'a>) -> Option<Self> {
         let [node] = lifted.nodes else { return None };
         let coordination = node.law.pull().filter(|gains| !node.compute_delay && gains.stiffness + gains.damping > 0.0)?;
@@ -60,7 +63,7 @@ impl<'a> StackNode<'a> {
 }
 
 impl StackFrame {
-    /// The steps of a timetable; `None` if it is not of one node, or has more states or samples than fit on the stack.
+    /// Returns the steps of a timetable; `None` if the timetable is not of one node, or has more samples than fit on the stack.
     pub(crate) fn of(timetable: &Timetable) -> Option<Self> {
         let ([sent], [depth]) = (timetable.sent.as_slice(), timetable.depth.as_slice()) else { return None };
         let deliveries = timetable.events.iter().filter_map(|event| match event {
@@ -74,6 +77,7 @@ impl StackFrame {
         if used.len() > MOST_SAMPLES || *sent > MOST_SAMPLES {
             return None;
         }
+        // Samples of this frame have numbers from zero on; a negative number is the age of a sample of an earlier frame.
         let place = |sample: i64| match usize::try_from(sample) {
             Ok(number) => Some(used.len() + number),
             Err(_) => used.iter().position(|age| usize::try_from(-sample) == Ok(*age)),
@@ -88,11 +92,11 @@ impl StackFrame {
         Some(Self { held, sent: *sent, depth: *depth, steps, used })
     }
 
-    /// Writes the monodromy matrix into `matrix` and answers a bound of the error of its entries, in the largest sum of sizes of a row; zero without
-    /// `BOUND`. `closer` is asked for another bound where the quick one says nothing.
+    /// Writes the monodromy matrix into `matrix` and returns a bound of the error of its entries, as the largest sum of absolute values of a row; zero without
+    /// `BOUND`. `closer` computes another bound and is called only where the quick bound is not below 1.
     pub(crate) fn monodromy<const BOUND: bool>(&self, stack: StackNode<'_>, matrix: &mut Matrix, closer: impl FnOnce() -> f64) -> f64 {
         let states = stack.node.states() - usize::from(!stack.tied);
-        // Sizes that the compiler knows are worth a few copies of the loop.
+        // The loop is compiled once for each small number of unknowns, so that the compiler can unroll the loops over columns.
         match states + self.used.len() {
             0..=2 => self.run::<2, BOUND>(stack, matrix, closer),
             3 => self.run::<3, BOUND>(stack, matrix, closer),
@@ -106,12 +110,14 @@ impl StackFrame {
     fn run<const C: usize, const BOUND: bool>(&self, stack: StackNode<'_>, matrix: &mut Matrix, closer: impl FnOnce() -> f64) -> f64 {
         let StackNode { node, weight, coordination, time, tied } = stack;
         let Gains { stiffness, damping } = coordination;
+        // A sample is the one combination of position and velocity that the law uses, scaled to be a length; `unit` [N/m] makes it a force again.
         let unit = stiffness + damping / time;
         let (position_share, velocity_share) = (stiffness / unit, damping / time / unit);
         let count = node.states();
         let object = count - 2;
         let reference = (!tied).then_some(object);
         let states = count - usize::from(!tied);
+        // Every state is an unknown of its own but the reference position, relative to which all others are taken: its row begins as zero.
         let mut z = [[0.0; C]; MOST_STATES];
         for row in (0..count).filter(|row| Some(*row) != reference) {
             z[row][row - usize::from(reference.is_some_and(|reference| row > reference))] = 1.0;
@@ -181,7 +187,8 @@ impl StackFrame {
         if BOUND { rounding.bound(closer) } else { 0.0 }
     }
 
-    /// The matrix of the relative state from the rows of states and samples. `reference`: its row, and how far a translation moves a sample.
+    /// Writes the matrix of the relative state, from the rows of states and samples. `reference` is the row of the reference and the distance by which a
+    /// translation of everything by 1 moves a sample; `None` if the motion is tied to ground. `moved` is the same distance for a row of the states.
     fn assemble<const C: usize>(
         &self,
         z: &[[f64; C]; MOST_STATES],
@@ -219,6 +226,7 @@ impl StackFrame {
                 put(row, &[0.0; C], translation);
             }
         }
+        // A sample of an earlier frame stays a state and becomes older by the number of samples sent.
         for age in self.sent + 1..=self.depth {
             matrix[(states + age - 1, states + age - self.sent - 1)] += 1.0;
         }
