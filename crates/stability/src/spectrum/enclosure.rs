@@ -1,4 +1,4 @@
-//! Where the spectral radius of a matrix can be, if the matrix is only known to within a perturbation.
+//! An interval that contains the spectral radius of a matrix that is known only to within a perturbation.
 //!
 //! A number z is an eigenvalue of T + E only if |E|·|(z − T)⁻¹| ≥ 1 (Stewart & Sun 1990, Section IV.1; Trefethen & Embree 2005, Theorem 2.1). With the
 //! bound B(d) of the resolvent that [`Triangle::resolvent_below`] compares for distances d from the eigenvalues, for every E with |E|₂ ≤ ε
@@ -8,8 +8,8 @@
 //! low:  one is within s of λ_i at least    if ε·B(||λ_k − λ_i| − s|) < 1
 //! ```
 //!
-//! because eigenvalues are continuous in E and cannot cross a circle on which ε·B < 1. To first order R − |λ| and s are ε/|yᴴx|, the classical condition
-//! number (Golub & Van Loan 2013, Section 7.2.2), but nothing here is only true to first order: a defective eigenvalue's ε^(1/m) comes out by itself.
+//! because eigenvalues are continuous in E and cannot cross a circle on which ε·B < 1. To first order R − |λ| and s are ε/|yᴴx|, with the classical condition
+//! number (Golub & Van Loan 2013, Section 7.2.2). But the bounds hold beyond the first order: a defective eigenvalue gets its ε^(1/m) without a special case.
 
 use super::triangle::Triangle;
 
@@ -30,34 +30,35 @@ impl Interval {
     }
 }
 
-/// Growth from one radius that is tried to the next: the result is at most this factor from the best.
+/// Factor between a distance that is tried and the next: the resulting distance is at most this factor above the best one.
 const STEP: f64 = 1.4;
-/// From the smallest distances to the largest.
+/// The largest number of factors [`STEP`] between the smallest distance and the largest.
 const STEPS: u32 = 400;
 
-/// Powers of ten, less 15, within which eigenvalues are taken together, in the order in which they are tried. What most often makes single eigenvalues a
-/// bad description are defective ones at zero, of the samples on their way: a chain of j spreads over ε^(1/j). Beginning there, stopping at the first good
-/// description, and sizes of entries computed once took eight different peers with 127 states from 131 to 26 ms.
+/// Levels of clusters in the order of trial. A level joins eigenvalues that are within 10^(level − 15) times the radius; level 16 joins all eigenvalues.
+/// Single eigenvalues are mostly a bad description because of defective eigenvalues at zero, which come from samples under way: a chain of j spreads over
+/// ε^(1/j). The order begins with levels that suit such chains, because the search stops at the first good description.
 const LEVELS: [i32; 17] = [13, 12, 14, 11, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0, 15, 16];
 
-/// Room to work in.
+/// Buffers of the enclosure, to be used again.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Enclosure {
-    /// The eigenvalues' places by falling modulus.
+    /// Places of the eigenvalues on the diagonal, by falling modulus.
     order: Vec<usize>,
     moduli: Vec<f64>,
     distances: Vec<f64>,
 }
 
 impl Enclosure {
-    /// The interval for |E|₂ ≤ `epsilon`, refined by dividing the spectrum into clusters where single eigenvalues do not tell.
+    /// Returns the interval for |E|₂ ≤ `epsilon`. If single eigenvalues give too wide an interval, the spectrum is divided into clusters. The matrix must have
+    /// at least one row.
     pub(super) fn enclose(&mut self, triangle: &mut Triangle, epsilon: f64) -> Interval {
         triangle.amplify();
         let interval = self.around(triangle, epsilon);
         let top = self.order[0];
         let first = epsilon * triangle.amplification[triangle.block_of(top)];
-        // What a well-conditioned eigenvalue comes to. A bound beyond the radius itself says nothing: eigenvalues that are equal but for rounding have one, which
-        // clusters may better.
+        // `first` is the bound of a well-conditioned eigenvalue. A bound above the radius itself says nothing: eigenvalues that are equal but for rounding have
+        // such a bound, and clusters may improve it.
         let enough = if first <= self.moduli[top] { 6.0 * first } else { 0.0 };
         if interval.width() <= enough {
             return interval;
@@ -65,16 +66,17 @@ impl Enclosure {
         self.clusters(triangle, epsilon, interval, enough)
     }
 
-    /// Single eigenvalues are a bad description: tries clusters. Each gives a bound that holds; the best counts, and one that is good enough is the last.
+    /// Returns the intersection of `interval` with the intervals of clustered spectra. Every clustering gives bounds that hold; the search ends once the
+    /// interval is at most `enough` wide.
     fn clusters(&mut self, triangle: &Triangle, epsilon: f64, mut interval: Interval, enough: f64) -> Interval {
         let size = triangle.size();
         let scale = self.moduli[self.order[0]].max(epsilon);
         let mut tried = vec![size];
         for level in LEVELS {
-            // The last level takes everything.
+            // The last level puts all eigenvalues into one cluster.
             let reach = if level == 16 { f64::INFINITY } else { scale * libm::exp10(f64::from(level - 15)) };
             let mut labels = single_linkage(triangle, reach);
-            // Of nested clusters as many are the same.
+            // The clusters of different levels are nested, so that equal numbers of clusters mean equal clusters.
             let count = labels.iter().enumerate().filter(|(place, label)| place == *label).count();
             if tried.contains(&count) {
                 continue;
@@ -91,7 +93,7 @@ impl Enclosure {
         interval
     }
 
-    /// The interval from one division into blocks.
+    /// Returns the interval that the present division into blocks gives.
     fn around(&mut self, triangle: &mut Triangle, epsilon: f64) -> Interval {
         let size = triangle.size();
         self.moduli.clear();
@@ -112,13 +114,13 @@ impl Enclosure {
         let reach = begin(triangle, order[0]);
         let mut holds = |steps: u32| {
             let reach = reach * libm::pow(STEP, f64::from(steps));
-            // A real matrix's eigenvalues come in conjugate pairs, so that the upper half-plane is enough: there, an eigenvalue below the axis is at
-            // least its imaginary part away.
+            // Eigenvalues of a real matrix come in conjugate pairs, so that z in the upper half-plane is enough: from there, an eigenvalue below the real axis
+            // is at least the size of its imaginary part away.
             distances.clear();
             distances.extend((0..size).map(|place| (top + reach - moduli[place]).max(-triangle.eigenvalue(place).im)));
             triangle.resolvent_below(distances, 1.0 / epsilon).then_some(top + reach)
         };
-        // The farther, the surer: the first step that holds by halving.
+        // The bound falls with the distance: doubling finds a step that holds, bisection then the first such step.
         let mut high = holds(0).unwrap_or(f64::INFINITY);
         if high.is_infinite() {
             let (mut fails, mut last) = (0, 1);
@@ -137,7 +139,7 @@ impl Enclosure {
             }
         }
         let mut low = 0.0;
-        // No circle inside is farther from λ_k than |λ_k| + top: where that is not far enough for all, none is tried.
+        // No point of a circle inside is farther from λ_k than |λ_k| + top. If the bound does not hold even at these distances, no circle is tried.
         distances.clear();
         distances.extend(moduli.iter().map(|modulus| modulus + top));
         if !triangle.resolvent_below(distances, 1.0 / epsilon) {
@@ -160,7 +162,7 @@ impl Enclosure {
     }
 }
 
-/// For each eigenvalue the first one that a chain of steps of at most `reach` leads to.
+/// Returns a label for each eigenvalue: the least place of an eigenvalue that a chain of steps of at most `reach` leads to.
 fn single_linkage(triangle: &Triangle, reach: f64) -> Vec<usize> {
     let size = triangle.size();
     let mut labels: Vec<usize> = (0..size).collect();

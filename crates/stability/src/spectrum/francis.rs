@@ -6,16 +6,16 @@ use super::hessenberg::TINY_SQUARE;
 use super::square::Square;
 use crate::rounding::real;
 
-/// Sweeps for one eigenvalue before the iteration is given up. Two to four are usual; several eigenvalues near zero in a badly scaled matrix took 150.
+/// The largest number of sweeps for one eigenvalue. Two to four are usual; several eigenvalues near zero in a badly scaled matrix took 150.
 const SWEEPS: u32 = 400;
 
-/// Sweeps for one eigenvalue after which an entry counts as zero compared with the whole matrix.
+/// The number of sweeps for one eigenvalue after which a subdiagonal entry counts as zero if it is small compared with the whole matrix.
 const PATIENCE: u32 = 6;
 
-/// Turns a Hessenberg matrix into a quasi-triangular one: blocks of one and two rows on the diagonal, zeros below.
+/// Turns a Hessenberg matrix into a quasi-triangular matrix: blocks of one and two rows on the diagonal, zeros below.
 ///
-/// With `FULL` the whole matrix is transformed (the real Schur form, up to blocks of two with real eigenvalues); without it only the diagonal blocks
-/// are right, which is less work. False if the iteration did not converge.
+/// With `FULL` the whole matrix is transformed (the real Schur form, up to blocks of two with real eigenvalues); without `FULL` only the diagonal blocks
+/// are right, which is less work. Returns false if the iteration did not converge.
 #[inline]
 pub(super) fn iterate<const FULL: bool, S: Square>(matrix: &mut S) -> bool {
     let size = matrix.size();
@@ -33,8 +33,8 @@ pub(super) fn iterate<const FULL: bool, S: Square>(matrix: &mut S) -> bool {
         while first > 0 {
             let below = matrix.at(first, first - 1).abs();
             let beside = matrix.at(first - 1, first - 1).abs() + matrix.at(first, first).abs();
-            // Beside the eigenvalues that it stands between, first. Several eigenvalues at zero never let it sink so far, so later beside the matrix,
-            // which is no larger an error than those of the reduction.
+            // In the first sweeps the entry is compared with the two diagonal entries that it joins. If several eigenvalues are zero it never becomes so small;
+            // so in later sweeps it is compared with the whole matrix. Dropping it then is an error no larger than those of the reduction.
             let beside = if sweeps >= PATIENCE || beside == 0.0 { beside.max(norm / real(size)) } else { beside };
             if below <= f64::EPSILON * 0.5 * beside {
                 matrix.put(first, first - 1, 0.0);
@@ -42,6 +42,7 @@ pub(super) fn iterate<const FULL: bool, S: Square>(matrix: &mut S) -> bool {
             }
             first -= 1;
         }
+        // The last one or two rows have split off: their eigenvalues follow from a block of at most two rows.
         if first + 1 >= last {
             end = first;
             sweeps = 0;
@@ -56,11 +57,12 @@ pub(super) fn iterate<const FULL: bool, S: Square>(matrix: &mut S) -> bool {
     true
 }
 
-/// One sweep over rows `first..=last`, at least three.
+/// Makes one sweep over the rows `first..=last`, which are at least three. `count` is the number of sweeps for this eigenvalue, this one among them.
 #[inline]
 fn sweep<const FULL: bool, S: Square>(matrix: &mut S, first: usize, last: usize, count: u32) {
     let size = matrix.size();
-    // The shifts are the eigenvalues of a block of two: the last one, or, seldom, an arbitrary one, which breaks cycles. Often would undo slow progress.
+    // The shifts are the eigenvalues of the last block of two, given by x, y and the product w. Rarely an arbitrary block takes its place, which breaks
+    // cycles; more often it would undo slow progress.
     let (x, y, w) = if count == 10 || count.is_multiple_of(40) {
         let size = matrix.at(last, last - 1).abs() + matrix.at(last - 1, last - 2).abs();
         let middle = 0.75 * size + matrix.at(last, last);
@@ -68,7 +70,7 @@ fn sweep<const FULL: bool, S: Square>(matrix: &mut S, first: usize, last: usize,
     } else {
         (matrix.at(last, last), matrix.at(last - 1, last - 1), matrix.at(last, last - 1) * matrix.at(last - 1, last))
     };
-    // The first column of (H − s₁)(H − s₂): only its direction matters.
+    // (p, q, r) is the first column of (H − s₁)(H − s₂). Only its direction matters.
     let corner = matrix.at(first, first);
     let below = matrix.at(first + 1, first);
     let mut p = (x - corner) * (y - corner) - w + below * matrix.at(first, first + 1);
@@ -127,7 +129,7 @@ fn sweep<const FULL: bool, S: Square>(matrix: &mut S, first: usize, last: usize,
     }
 }
 
-/// The eigenvalues of [a b; c d].
+/// Returns the eigenvalues of [a b; c d]; of a complex pair the one with the positive imaginary part first.
 #[inline]
 pub(super) fn pair(a: f64, b: f64, c: f64, d: f64) -> [Complex64; 2] {
     let half = 0.5 * (a - d);
@@ -137,13 +139,13 @@ pub(super) fn pair(a: f64, b: f64, c: f64, d: f64) -> [Complex64; 2] {
         let (real, imaginary) = (0.5 * (a + d), (-discriminant).sqrt());
         return [Complex64::new(real, imaginary), Complex64::new(real, -imaginary)];
     }
-    // The root of the larger sum first; the other one from the product, without cancellation.
+    // The sum without cancellation gives the first eigenvalue; the second follows from the product b·c, without cancellation as well.
     let large = half + discriminant.sqrt().copysign(half);
     let other = if large == 0.0 { d } else { d - product / large };
     [Complex64::new(d + large, 0.0), Complex64::new(other, 0.0)]
 }
 
-/// Hands out the eigenvalues of a quasi-triangular matrix, top to bottom.
+/// Passes each eigenvalue of a quasi-triangular matrix to `take`, from top to bottom.
 #[inline]
 pub(super) fn each<S: Square>(matrix: &S, mut take: impl FnMut(Complex64)) {
     let size = matrix.size();

@@ -2,10 +2,10 @@
 
 use super::square::Square;
 
-/// Below this a sum of squares has lost digits to underflow.
+/// A sum of squares below this bound may have lost digits to underflow.
 pub(super) const TINY_SQUARE: f64 = 1e-280;
 
-/// Turns the matrix into one with the same eigenvalues and zeros below the first subdiagonal.
+/// Transforms the matrix so that all entries below the first subdiagonal are zero and the eigenvalues stay the same.
 #[inline]
 pub(super) fn reduce<S: Square>(matrix: &mut S) {
     let size = matrix.size();
@@ -16,17 +16,18 @@ pub(super) fn reduce<S: Square>(matrix: &mut S) {
             below += matrix.at(row, column) * matrix.at(row, column);
         }
         if below < TINY_SQUARE {
-            // Entries below 1e-140 compared with a matrix of about unit size: zero.
+            // The entries are below 1e-140 and the matrix has about unit size: they count as zero.
             for row in pivot + 1..size {
                 matrix.put(row, column, 0.0);
             }
             continue;
         }
         let head = matrix.at(pivot, column);
+        // With the sign of `head`, the sum head + norm has no cancellation.
         let norm = (head * head + below).sqrt().copysign(head);
         let inverse = 1.0 / (head + norm);
         let factor = (head + norm) / norm;
-        // The reflector's vector, 1 first, is kept where the zeros will be.
+        // The vector of the reflection has a first entry of 1, which is not stored. Its other entries stand where the zeros will be.
         for row in pivot + 1..size {
             matrix.put(row, column, matrix.at(row, column) * inverse);
         }

@@ -1,8 +1,8 @@
-//! Eigenvalues of real matrices, and spectral radii that say how sure they are.
+//! Eigenvalues of real matrices, and spectral radii with bounds of their errors.
 //!
-//! Matrices are reduced to Hessenberg form and then iterated, small ones on the stack without an allocation ([`radius_small`]). Both steps are backward
-//! stable: the eigenvalues found are exactly those of a matrix that differs from the given one by a small multiple of n·ε·|A|. What that does to the radius
-//! is computed, not assumed: see [`bounded_radius`].
+//! Matrices are reduced to Hessenberg form and then iterated; small matrices are copied to arrays on the stack, without an allocation ([`radius_small`]).
+//! Reduction and iteration are backward stable: the computed eigenvalues are exactly those of a matrix that differs from the given matrix by a small
+//! multiple of n·ε·|A|. The effect of that difference on the radius is computed, not assumed: see [`bounded_radius`].
 
 mod enclosure;
 mod francis;
@@ -25,11 +25,11 @@ use square::{balance, exponent_of, power_of_two};
 use triangle::Triangle;
 pub use vectors::eigenvector;
 
-/// The backward error of reduction and iteration as a multiple of n·ε·|A|, |A| Frobenius'. The proven constants are larger (Higham 2002, Section 19.3,
-/// gives a multiple of n² for n reflections of length n, all errors pointing the same way); errors that were seen are below 1.
+/// The backward error of reduction and iteration as a multiple of n·ε·|A|, with the Frobenius norm |A|. The proven constants are larger: Higham 2002,
+/// Section 19.3, gives a multiple of n² for n reflections of length n, as if all errors pointed the same way. Measured errors are below 1.
 const BACKWARD_ERROR: f64 = 4.0;
 
-/// Runs an expression with the matrix copied to an array of its size, if it is small; `None` if it is not.
+/// Evaluates an expression with the matrix copied to an array of its size; `None` if the matrix has more than 16 rows, or none.
 macro_rules! on_the_stack {
     ($matrix:expr, $array:ident => $body:expr) => {
         on_the_stack!(@ $matrix, $array => $body; 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16)
@@ -48,9 +48,9 @@ macro_rules! on_the_stack {
     };
 }
 
-/// Room for the computations, to be used again: radii of small matrices never allocate, those of larger ones only when the size changes.
+/// Buffers of the computations, to be used again. The radius of a small matrix, without a bound, needs no allocation.
 ///
-/// A result does not depend on earlier ones.
+/// Results do not depend on earlier computations with the same workspace.
 #[derive(Debug, Default)]
 pub(crate) struct Workspace {
     eigenvalues: Vec<Complex64>,
@@ -59,8 +59,8 @@ pub(crate) struct Workspace {
     enclosure: Enclosure,
 }
 
-/// All eigenvalues, each as often as it is a root of the characteristic polynomial: by falling modulus, then by falling real part, then by falling
-/// imaginary part. Empty if an entry is infinite or NaN.
+/// Returns all eigenvalues, each as often as its multiplicity as a root of the characteristic polynomial: by falling modulus, then by falling real part,
+/// then by falling imaginary part. Empty if an entry is infinite or NaN.
 ///
 /// # Panics
 ///
@@ -72,7 +72,7 @@ pub fn eigenvalues(matrix: &Matrix) -> Vec<Complex64> {
     workspace.eigenvalues
 }
 
-/// The spectral radius, without a bound of its error; 0 for the empty matrix, NaN if an entry is NaN, infinite if one is infinite.
+/// Returns the spectral radius, without a bound of its error; 0 for the empty matrix, NaN if an entry is NaN, infinite if an entry is infinite.
 ///
 /// For many small matrices use [`radius_small`].
 ///
@@ -84,13 +84,13 @@ pub fn radius(matrix: &Matrix) -> f64 {
     Workspace::default().radius(matrix)
 }
 
-/// The spectral radius of every matrix within `perturbation` of this one in the 2-norm, as an interval.
+/// Returns an interval that contains the spectral radius of every matrix within `perturbation` of `matrix` in the 2-norm.
 ///
-/// The interval covers what the computation itself added: the radius of A + E is within value ± error for every real E with
-/// |E|₂ ≤ `perturbation` + 4·n·ε·|A|. To first order the error is the sum of the two times the condition number 1/|yᴴx| of the outermost eigenvalue, but
-/// all eigenvalues count, none is assumed simple, and second-order effects are covered: the bound comes from the norm of the resolvent along circles
+/// The interval also covers the error of the computation: the radius of A + E is within value ± error for every real E with
+/// |E|₂ ≤ `perturbation` + 4·n·ε·|A|. To first order the error is that bound times the condition number 1/|yᴴx| of the outermost eigenvalue. But
+/// all eigenvalues count, no eigenvalue is assumed simple, and second-order effects are covered: the bound comes from the norm of the resolvent along circles
 /// (Stewart & Sun 1990, Section IV.1; Trefethen & Embree 2005, Theorem 2.1), taken from the Schur form by blocks (Golub & Van Loan 2013, Section 7.6.3).
-/// A defective eigenvalue gets the error of size |E|^(1/m) that it has.
+/// A defective eigenvalue of multiplicity m gets its true error, of size |E|^(1/m).
 ///
 /// Matrices whose entries are too large for products of them are scaled by a power of two, which is exact. The error is infinite if an entry is infinite
 /// or NaN, or if `perturbation` is.
@@ -103,7 +103,8 @@ pub fn bounded_radius(matrix: &Matrix, perturbation: f64) -> Radius {
     Workspace::default().bounded_radius(matrix, perturbation)
 }
 
-/// [`radius`] of an array, which is overwritten: the fastest way for sizes up to about 12. NaN if the iteration does not converge, which was never seen.
+/// Returns the [`radius`] of an array, and overwrites the array. Meant for sizes up to about 12. NaN if the iteration does not converge, which no test has
+/// found.
 #[must_use]
 pub fn radius_small<const N: usize>(matrix: &mut [[f64; N]; N]) -> f64 {
     let Some(exponent) = normalise(matrix.as_flattened_mut()) else {
@@ -145,6 +146,7 @@ impl Workspace {
             self.give_up(matrix.rows());
         }
         self.eigenvalues.sort_by(|a, b| {
+            // `total_cmp` has a place for NaN too, so that the order is total.
             let modulus = b.norm().total_cmp(&a.norm());
             modulus.then(b.re.total_cmp(&a.re)).then(b.im.total_cmp(&a.im))
         });
@@ -173,15 +175,15 @@ impl Workspace {
             return Radius { value: 0.0, error: 0.0 };
         }
         let largest = matrix.largest().max(perturbation);
-        // Also not for NaN.
+        // The comparison with a range is false for a perturbation that is NaN, too.
         if !(matrix.is_finite() && (0.0..f64::INFINITY).contains(&perturbation)) {
             return Radius { value: self.radius(matrix), error: f64::INFINITY };
         }
-        // Beyond these sizes products leave the range of numbers.
+        // Products of entries beyond this size could overflow.
         if largest > 1e60 {
             let exponent = exponent_of(largest).min(1000);
             let down = power_of_two(-exponent);
-            // What underflows is lost: less than the least normal number of each entry.
+            // An entry that underflows changes by less than the least normal number.
             let lost = real(size) * f64::MIN_POSITIVE;
             return self.bounded_radius(&matrix.scaled(down), perturbation * down + lost).scaled(power_of_two(exponent));
         }
@@ -191,8 +193,8 @@ impl Workspace {
         }
         let own = BACKWARD_ERROR * real(size) * f64::EPSILON;
         let mut found = self.enclosed(matrix, perturbation + own * norm);
-        // The matrix may be badly scaled: balanced, rounding hurts less, but the perturbation may grow by the ratio of the scales, and no eigenvalue gets
-        // better by more than that ratio. So there is nothing to gain where the perturbation is what counts: radii far above 1 took twice as long.
+        // The matrix may be badly scaled. Balancing lowers the effect of rounding, but the perturbation may grow by the ratio of the scales, and no condition
+        // number falls by more than that ratio. So balancing gains nothing where the perturbation is larger than the rounding.
         let is_rounding = own * norm > perturbation;
         if found.as_ref().is_none_or(|(value, interval)| is_rounding && interval.width() > 1e-9 * value) {
             let mut balanced = matrix.clone();
@@ -212,14 +214,14 @@ impl Workspace {
         let Some((value, interval)) = found else {
             return Radius { value: self.radius(matrix), error: norm + perturbation };
         };
-        // The radius is never above the norm.
+        // The radius is at most the norm.
         let high = interval.high.min((norm + perturbation) * (1.0 + own));
         let value = value.clamp(interval.low.min(high), high);
         // The last term covers the rounding of moduli and of these differences.
         Radius { value, error: (high - value).max(value - interval.low) + 4.0 * f64::EPSILON * value }
     }
 
-    /// The radius as computed, and the interval for perturbations up to `epsilon`; `None` if the iteration does not converge.
+    /// Returns the computed radius and its interval for perturbations up to `epsilon`; `None` if the iteration does not converge.
     fn enclosed(&mut self, matrix: &Matrix, epsilon: f64) -> Option<(f64, Interval)> {
         let triangle = &mut self.triangle;
         let done = on_the_stack!(matrix, array => {
@@ -259,7 +261,7 @@ impl Workspace {
         self.eigenvalues.iter().fold(0.0, larger)
     }
 
-    /// Appends them in any order. False if the iteration did not converge.
+    /// Appends the eigenvalues of a matrix of any size to `self.eigenvalues`, in any order. Returns false if the iteration did not converge.
     fn large_eigenvalues(&mut self, matrix: &Matrix) -> bool {
         self.scratch.clone_from(matrix);
         let scale = power_of_two(normalise(self.scratch.entries_mut()).unwrap_or(0));
@@ -271,21 +273,22 @@ impl Workspace {
         converged
     }
 
-    /// The iteration has not converged, which was never seen. An unknown value is not a number.
+    /// Replaces the eigenvalues by `size` NaNs, because the iteration has not converged and no eigenvalue is known.
     fn give_up(&mut self, size: usize) {
         self.eigenvalues.clear();
         self.eigenvalues.resize(size, Complex64::new(f64::NAN, f64::NAN));
     }
 }
 
-/// Scales the entries of a matrix if they are so large or small that squares would leave the range of numbers, and gives the exponent that undoes it; `None` if
-/// an entry is infinite or NaN.
+/// Scales the entries of a matrix by a power of two, if the entries are so large or small that their squares would overflow or underflow. Returns the
+/// exponent of the power of two that undoes the scaling; `None` if an entry is infinite or NaN.
 #[inline]
 fn normalise(entries: &mut [f64]) -> Option<i32> {
     let mut sum = 0.0;
     for entry in &*entries {
         sum += entry.abs();
     }
+    // The usual case needs one pass only: neither NaN nor an infinite sum is in this range.
     if sum > 1e-60 && sum < 1e60 {
         return Some(0);
     }
@@ -303,7 +306,7 @@ fn normalise(entries: &mut [f64]) -> Option<i32> {
     Some(exponent)
 }
 
-/// The radius of a matrix with an entry that is not a number, or infinite.
+/// Returns the radius of a matrix with an entry that is infinite or NaN.
 #[cold]
 fn unusual<const N: usize>(matrix: &[[f64; N]; N]) -> f64 {
     if matrix.as_flattened().iter().any(|entry| entry.is_nan()) { f64::NAN } else { f64::INFINITY }

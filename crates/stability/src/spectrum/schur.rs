@@ -1,17 +1,18 @@
-//! The complex Schur form of a small matrix together with rows and columns that are carried along.
+//! The complex Schur form of a small matrix, together with rows and columns that are transformed along with the matrix.
 //!
 //! With a unitary Q that makes T = Q*·A·Q upper triangular, Q*·B and C·Q are what an input B and an output C are in the coordinates of T. Q itself is not
 //! formed: the transformations of the rows are made on the columns of B too, those of the columns on the rows of C.
 //!
-//! The single-shift QR iteration (Golub & Van Loan 2013, Sections 7.4 and 7.5) with Wilkinson's shift, in complex numbers throughout: for some ten rows this
-//! costs less than a quasi-triangular form whose blocks of two have to be taken apart afterwards.
+//! The method is the single-shift QR iteration (Golub & Van Loan 2013, Sections 7.4 and 7.5) with Wilkinson's shift, in complex numbers throughout. The
+//! result is triangular at once; a quasi-triangular form would have blocks of two that have to be split afterwards.
 
 use num_complex::Complex64;
 
-/// Sweeps for one eigenvalue before the iteration is given up; two or three are usual.
+/// The largest number of sweeps for one eigenvalue; two or three are usual.
 const SWEEPS: u32 = 60;
 
-/// A square matrix with more columns (inputs) and more rows (outputs), to be worked on in place. To be used again: it only grows.
+/// A square matrix A with further columns (inputs B) and further rows (outputs C), transformed in place. Meant to be loaded again and again: the memory of
+/// earlier matrices is reused.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Schur {
     size: usize,
@@ -21,7 +22,7 @@ pub(crate) struct Schur {
 }
 
 impl Schur {
-    /// Begins with [A B; C 0]; `entry` gives A, B and C by row and column.
+    /// Loads [A B; C 0], where A has `size` rows; `entry` returns A, B and C by row and column.
     pub(crate) fn load(&mut self, size: usize, (outputs, inputs): (usize, usize), entry: impl Fn(usize, usize) -> f64) {
         self.size = size;
         self.rows = size + outputs;
@@ -35,13 +36,13 @@ impl Schur {
         }
     }
 
-    /// An entry of T, of Q*·B (columns beyond those of T) or of C·Q (rows beyond those of T).
+    /// Returns an entry of T, of Q*·B (columns beyond those of T) or of C·Q (rows beyond those of T).
     #[inline]
     pub(crate) fn at(&self, row: usize, column: usize) -> Complex64 {
         self.entries[row * self.columns + column]
     }
 
-    /// Makes the matrix triangular. False if the iteration does not converge, or an entry is not finite.
+    /// Makes the matrix triangular. Returns false if the iteration does not converge, or if an entry is not finite.
     pub(crate) fn triangularise(&mut self) -> bool {
         if !self.entries.iter().all(|entry| entry.re.is_finite()) {
             return false;
@@ -56,7 +57,8 @@ impl Schur {
             while first > 0 {
                 let below = self.at(first, first - 1).l1_norm();
                 let beside = self.at(first - 1, first - 1).l1_norm() + self.at(first, first).l1_norm();
-                // Beside the whole matrix where the neighbours are zero, or the iteration is slow because several eigenvalues are.
+                // The entry is compared with the whole matrix if both diagonal neighbours are zero, or if the iteration is slow because several eigenvalues
+                // are zero.
                 let beside = if beside == 0.0 || sweeps > 10 { beside.max(norm) } else { beside };
                 if below <= 0.5 * f64::EPSILON * beside {
                     self.put(first, first - 1, Complex64::default());
@@ -83,7 +85,7 @@ impl Schur {
         self.entries[row * self.columns + column] = entry;
     }
 
-    /// Zeros below the first subdiagonal, by rotations of neighbouring rows and columns.
+    /// Reduces the matrix to Hessenberg form, with zeros below the first subdiagonal, by rotations of neighbouring rows and columns.
     fn reduce(&mut self) {
         for column in 0..self.size.saturating_sub(2) {
             for row in (column + 2..self.size).rev() {
@@ -96,10 +98,10 @@ impl Schur {
         }
     }
 
-    /// One sweep over the rows from `first` to `last`.
+    /// Makes one sweep over the rows `first..=last`; `count` is the number of sweeps for this eigenvalue, this one among them.
     fn sweep(&mut self, first: usize, last: usize, count: u32) {
         let shift = if count.is_multiple_of(12) {
-            // An arbitrary one now and then breaks cycles.
+            // An arbitrary shift in every twelfth sweep breaks cycles.
             self.at(last, last) + self.at(last, last - 1).l1_norm()
         } else {
             nearer(self.at(last - 1, last - 1), self.at(last - 1, last), self.at(last, last - 1), self.at(last, last))
@@ -118,7 +120,8 @@ impl Schur {
         }
     }
 
-    /// Rotates rows `top` and `top + 1` from column `left` on, and the same columns down to row `bottom`; and all that is carried.
+    /// Rotates the rows `top` and `top + 1` from column `left` on, and the columns of the same numbers in the rows before `bottom`. The inputs of the two rows
+    /// and the outputs of the two columns are rotated along.
     fn rotate(&mut self, top: usize, left: usize, bottom: usize, rotation: Rotation) {
         let Rotation { cosine, sine } = rotation;
         let (upper, lower) = self.entries[top * self.columns..(top + 2) * self.columns].split_at_mut(self.columns);
@@ -136,7 +139,7 @@ impl Schur {
     }
 }
 
-/// The unitary [c s; −s* c] that turns a pair into its length and zero.
+/// The unitary matrix [c s; −s* c] that turns a pair into one whose second entry is zero.
 #[derive(Clone, Copy, Debug)]
 struct Rotation {
     cosine: f64,
@@ -144,7 +147,7 @@ struct Rotation {
 }
 
 impl Rotation {
-    /// `None` where there is nothing to rotate.
+    /// Returns the rotation for a pair; `None` if the second entry is zero already.
     fn of(upper: Complex64, lower: Complex64) -> Option<Self> {
         if lower == Complex64::default() {
             return None;
@@ -159,7 +162,7 @@ impl Rotation {
     }
 }
 
-/// The eigenvalue of [a b; c d] that is nearer to d.
+/// Returns the eigenvalue of [a b; c d] that is nearer to d (Wilkinson's shift).
 fn nearer(a: Complex64, b: Complex64, c: Complex64, d: Complex64) -> Complex64 {
     let half = 0.5 * (a - d);
     let product = b * c;
@@ -173,7 +176,7 @@ mod tests {
     use super::*;
     use crate::{Matrix, eigenvalues};
 
-    /// A matrix without a pattern, from the digits of a linear congruence.
+    /// Returns a matrix without a pattern, from the digits of a linear congruence.
     fn some(size: usize, seed: u32) -> Matrix {
         let mut state = seed;
         Matrix::from_fn(size, size, |_, _| {
@@ -182,7 +185,7 @@ mod tests {
         })
     }
 
-    /// Q is unitary and T = Q*AQ if, for inputs B and outputs C, the impulse response C·A^k·B is that in the coordinates of T.
+    /// Checks that the impulse response C·A^k·B of inputs B and outputs C is the same in the coordinates of T, which it is if Q is unitary and T = Q*AQ.
     #[test]
     fn the_eigenvalues_and_the_impulse_response_stay() {
         for size in 1..=12 {
@@ -201,7 +204,7 @@ mod tests {
                 assert!(schur.triangularise());
                 let mut found: Vec<Complex64> = (0..size).map(|place| schur.at(place, place)).collect();
                 let norm = matrix.frobenius_norm();
-                // Twelve rows: backward errors of some n·ε·|A|, times condition numbers of up to 10⁴ in these matrices.
+                // The tolerance covers backward errors of some n·ε·|A| for up to twelve rows, times condition numbers of up to 10⁴ of these matrices.
                 for value in eigenvalues(&matrix) {
                     let (place, distance) = found.iter().map(|other| (other - value).norm()).enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
                     assert!(distance < 1e-9 * norm, "{size} {seed}: {value} is {distance:e} off");
@@ -213,7 +216,7 @@ mod tests {
                     let seen: f64 = state.iter().enumerate().map(|(place, entry)| carried[(0, place)] * entry).sum();
                     let again: Complex64 = other.iter().enumerate().map(|(place, entry)| schur.at(size, place) * entry).sum();
                     let length = state.iter().map(|entry| entry * entry).sum::<f64>().sqrt();
-                    // Backward stable: errors of n sweeps of n rotations, each 10⁻¹⁶ of the length.
+                    // The method is backward stable: n sweeps of n rotations have an error of 10⁻¹⁶ of the length each.
                     assert!((again - seen).norm() < 1e-13 * (1.0 + norm).powi(4) * (1.0 + length), "{size} {seed}: {again} for {seen}");
                     state = matrix.times_column(&state);
                     other = (0..size).map(|row| (row..size).map(|column| schur.at(row, column) * other[column]).sum()).collect();

@@ -1,17 +1,17 @@
-//! What the small methods need of a square matrix, so that one source serves arrays of a size known to the compiler and matrices of any size.
+//! Access to a square matrix as the eigenvalue methods need it, so that one source serves arrays of a size known to the compiler and matrices of any size.
 
 use std::ops::Range;
 
 use crate::Matrix;
 
-/// A square matrix that is worked on in place.
+/// A square matrix that is transformed in place.
 pub(super) trait Square {
-    /// Rows, and columns.
+    /// Returns the number of rows, which is that of the columns.
     fn size(&self) -> usize;
     fn at(&self, row: usize, column: usize) -> f64;
     fn put(&mut self, row: usize, column: usize, entry: f64);
 
-    /// Reflects three rows from `top` on, in those columns: each less factor·(1, v1, v2) times (1, v1, v2) of them.
+    /// Reflects the three rows from `top` on, in the given columns: subtracts factor·v·(vᵀ·rows) from the rows, with v = (1, v1, v2).
     #[inline]
     fn reflect_rows(&mut self, top: usize, columns: Range<usize>, factor: f64, v1: f64, v2: f64) {
         let (f1, f2) = (factor * v1, factor * v2);
@@ -24,7 +24,7 @@ pub(super) trait Square {
         }
     }
 
-    /// The same of three columns from `left` on, in those rows.
+    /// Reflects the three columns from `left` on, in the given rows: subtracts factor·(columns·v)·vᵀ from the columns, with v = (1, v1, v2).
     #[inline]
     fn reflect_columns(&mut self, left: usize, rows: Range<usize>, factor: f64, v1: f64, v2: f64) {
         let (f1, f2) = (factor * v1, factor * v2);
@@ -37,7 +37,8 @@ pub(super) trait Square {
         }
     }
 
-    /// Reflects the rows, and then the columns, behind `column` by v = (1, what the column holds below that), with that factor: each less factor·v times vᵀ of them.
+    /// Reflects the rows after row `column`, in the columns after `column`, and then the columns after `column`, in all rows: a reflection subtracts factor·v
+    /// times the product of vᵀ with the rows, or of the columns with v. The vector v is 1 followed by the entries of `column` from row `column + 2` on.
     #[inline]
     fn reflect_below(&mut self, column: usize, factor: f64) {
         let (size, pivot) = (self.size(), column + 1);
@@ -99,7 +100,7 @@ impl Square for Matrix {
         self[(row, column)] = entry;
     }
 
-    // The same to the bit, over slices, so that rows are worked on several entries at a time.
+    // The result is that of the default method to the bit. Loops over slices let the compiler work on several entries of a row at a time.
     #[inline]
     fn reflect_rows(&mut self, top: usize, columns: Range<usize>, factor: f64, v1: f64, v2: f64) {
         let (f1, f2) = (factor * v1, factor * v2);
@@ -113,7 +114,7 @@ impl Square for Matrix {
         }
     }
 
-    // The same to the bit, row after row: column after column eigenvalues of 1,024 rows took 10.5 s in place of 3.8 s.
+    // The result is that of the default method to the bit. The loops go row after row, because entries of one column of a large matrix are far apart in memory.
     fn reflect_below(&mut self, column: usize, factor: f64) {
         let (size, pivot) = (self.rows(), column + 1);
         let vector: Vec<f64> = (pivot..size).map(|row| if row == pivot { 1.0 } else { self[(row, column)] }).collect();
@@ -139,14 +140,14 @@ impl Square for Matrix {
     }
 }
 
-/// Makes each row about as large as its column by an exact similarity transform with powers of two (Parlett & Reinsch 1969), and gives the ratio of
-/// the largest to the smallest factor: 1 if nothing was to be done.
+/// Makes each row about as large as the column of the same number, by an exact similarity transform with powers of two (Parlett & Reinsch 1969). Calls
+/// `scaled` with each place whose column was multiplied by a power of two, and the exponent; a place may come several times.
 ///
-/// A row and a column within a factor of eight of each other are left alone, which costs no division.
+/// A row and a column within a factor of eight of each other are left as they are. That test needs no division.
 #[inline]
 pub(super) fn balance<S: Square>(matrix: &mut S, mut scaled: impl FnMut(usize, i32)) {
     let size = matrix.size();
-    // Each pass that changes something lowers the norm by a constant factor; the limit only cuts off a slow tail.
+    // Each pass that changes a row lowers the norm, so that the passes end by themselves. The limit cuts off passes that gain little.
     for _ in 0..16 {
         let mut changed = false;
         for place in 0..size {
@@ -157,11 +158,12 @@ pub(super) fn balance<S: Square>(matrix: &mut S, mut scaled: impl FnMut(usize, i
             }
             let own = matrix.at(place, place).abs();
             (row, column) = (row - own, column - own);
-            // An isolated eigenvalue (or rounding in the difference): no factor would be the right one.
+            // A row or a column without other entries than the diagonal one is that of an isolated eigenvalue: no factor can balance it. (What is left of
+            // the sum may be rounding of the difference.)
             if row <= own * f64::EPSILON || column <= own * f64::EPSILON || (row < 8.0 * column && column < 8.0 * row) {
                 continue;
             }
-            // The power of two next to √(row/column), by which the column is multiplied and the row divided.
+            // The exponent of the power of two near √(row/column), by which the column is multiplied and the row divided.
             let exponent = ((exponent_of(row) - exponent_of(column)) / 2).clamp(-100, 100);
             if exponent == 0 {
                 continue;
@@ -182,12 +184,12 @@ pub(super) fn balance<S: Square>(matrix: &mut S, mut scaled: impl FnMut(usize, i
     }
 }
 
-/// The binary exponent of a positive normal number.
+/// Returns the binary exponent of a positive normal number.
 pub(super) fn exponent_of(number: f64) -> i32 {
     i32::try_from((number.to_bits() >> 52) & 0x7ff).unwrap_or(0) - 1023
 }
 
-/// 2^exponent, for exponents of normal numbers.
+/// Returns 2^exponent; exponents below −1022 and above 1023 are clamped.
 pub(super) fn power_of_two(exponent: i32) -> f64 {
     f64::from_bits(u64::try_from((exponent + 1023).clamp(1, 2046)).unwrap_or(1) << 52)
 }

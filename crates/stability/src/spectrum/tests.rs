@@ -8,7 +8,7 @@ fn matrix(size: usize, entries: &[f64]) -> Matrix {
     Matrix::from_fn(size, size, |row, column| entries[row * size + column])
 }
 
-/// A sequence of numbers in ±1 (xorshift), the same on every run.
+/// A generator of numbers in ±1 (xorshift), the same on every run.
 struct Numbers(u64);
 
 impl Numbers {
@@ -115,7 +115,7 @@ fn nilpotent_chains_are_zero_within_their_bound() {
         let truth = libm::pow(1e-13, 1.0 / real(size));
         assert_contains(bounded_radius(&chain, 1e-13), truth);
         assert_contains(bounded_radius(&bent, 0.0), truth);
-        // A chain beside an eigenvalue near 1 does not blur it.
+        // A defective chain at zero does not widen the interval of an eigenvalue near 1.
         let mut beside = Matrix::from_fn(size + 1, size + 1, |row, column| if column == row + 1 && row > 0 { 1.0 } else { 0.0 });
         beside[(0, 0)] = 1.0 - 1e-10;
         let found = bounded_radius(&beside, 1e-13);
@@ -163,7 +163,7 @@ fn jordan_blocks_stay_inside_their_bound_when_they_split() {
             let truth = 0.75 + libm::pow(epsilon, 1.0 / real(size));
             let found = bounded_radius(&jordan, epsilon);
             assert_contains(found, truth);
-            // Not absurdly wide: within a factor of the root of what this and rounding make.
+            // The interval must not be much wider than needed: within a factor of the m-th root of this perturbation and rounding.
             let scale = libm::pow(epsilon + 1e-14, 1.0 / real(size));
             assert!(found.error < 6.0 * scale, "{found:?} for a block of {size} and {epsilon}");
             assert_contains(bounded_radius(&numbers.similar(&jordan), 0.0), 0.75);
@@ -193,7 +193,7 @@ fn perturbed_matrices_stay_inside_the_bound() {
         assert_contains(found, 1.0);
         for _ in 0..3 {
             let other = bounded_radius(&sum(&known, &numbers.perturbation(size, epsilon)), 0.0);
-            // The other's own interval is far narrower, and both contain its truth.
+            // The interval of the other matrix is far narrower, and both intervals contain its true radius.
             assert!((other.value - found.value).abs() <= found.error + other.error, "{other:?} of {found:?}");
         }
     }
@@ -243,7 +243,7 @@ fn sizes_on_both_sides_of_every_limit_agree_with_each_other() {
     }
 }
 
-/// Pairs each eigenvalue with the nearest one left, and gives the largest distance.
+/// Pairs each eigenvalue with the nearest unpaired one of the other list, and returns the largest distance of a pair.
 fn distance(ours: &[Complex64], mut theirs: Vec<Complex64>) -> f64 {
     ours.iter().fold(0.0, |largest, value| {
         let nearest = (0..theirs.len()).min_by(|a, b| (theirs[*a] - value).norm().total_cmp(&(theirs[*b] - value).norm())).unwrap();
@@ -259,12 +259,12 @@ proptest! {
         let mut numbers = Numbers(seed);
         let any = Matrix::from_fn(size, size, |_, _| if numbers.next() < 0.5 * f64::from(sparse) - 1.0 { 0.0 } else { numbers.next() });
         let ours = eigenvalues(&any);
-        // Another method, which shares no step with the first.
+        // The reference comes from another method, which has no step in common with the first.
         let mut other = Schur::default();
         other.load(size, (0, 0), |row, column| any[(row, column)]);
         prop_assert!(other.triangularise());
         let theirs: Vec<Complex64> = (0..size).map(|place| other.at(place, place)).collect();
-        // Sparse matrices may be defective, which costs digits (up to the root of the multiplicity); the radius's bound covers that.
+        // Sparse matrices may be defective, which costs digits (up to the root of the multiplicity); the bound of the radius covers that loss.
         let bound = bounded_radius(&any, 0.0);
         let radius_of_theirs = theirs.iter().fold(0.0, |largest: f64, value| largest.max(value.norm()));
         prop_assert!((bound.value - radius_of_theirs).abs() <= 2.0 * bound.error, "{bound:?} {radius_of_theirs}");
@@ -283,6 +283,6 @@ fn matrices_whose_squares_overflow_have_their_radius() {
     assert_eq!(found.verdict(), Verdict::Unstable);
     let found = bounded_radius(&matrix(2, &[1e300, 0.0, 0.0, -1e300]), 0.0);
     assert!((found.value / 1e300 - 1.0).abs() < 1e-14 && found.verdict() == Verdict::Unstable, "{found:?}");
-    // The norm is no number, the radius is above 1 all the same.
+    // The norm overflows; the radius is still known to be above 1.
     assert_eq!(bounded_radius(&Matrix::from_fn(100, 100, |_, _| 1e307), 0.0).verdict(), Verdict::Unstable);
 }

@@ -1,4 +1,4 @@
-//! The complex Schur form, and how strongly its parts react to a change.
+//! The complex Schur form, and the sensitivity of its diagonal blocks to a perturbation: bounds of the resolvent for the enclosure of the radius.
 
 use num_complex::Complex64;
 
@@ -6,8 +6,8 @@ use super::francis::pair;
 use super::square::Square;
 use crate::rounding::real;
 
-/// The relative rounding error of one complex product, sum or quotient, generously: √5 half-units for a product (Brent, Percival & Zimmermann 2007),
-/// about twice that for a quotient (Higham 2002, Lemma 3.5).
+/// A generous bound of the relative rounding error of one complex product, sum or quotient: a product has √5 half-units (Brent, Percival & Zimmermann 2007),
+/// a quotient about twice as much (Higham 2002, Lemma 3.5).
 const COMPLEX_ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// An upper triangular matrix T, divided into diagonal blocks T_c.
@@ -24,22 +24,26 @@ const COMPLEX_ROUNDING: f64 = 4.0 * f64::EPSILON;
 pub(super) struct Triangle {
     size: usize,
     entries: Vec<Complex64>,
-    /// First rows of the blocks, and the size at the end.
+    /// First row of each block, and the size of the matrix as the last entry.
     pub(super) starts: Vec<usize>,
-    /// π_c, rounded upward.
+    /// π_c, rounded upward, indexed by block.
     pub(super) amplification: Vec<f64>,
+    /// Solutions of the Sylvester equations of the block at hand: X_c with one row for each column of the block, W_c in the rows and columns of T.
     solution: Vec<Complex64>,
+    /// Bounds of the rounding errors of `solution`.
     doubt: Vec<f64>,
+    /// Bounds of row or column sums within the block at hand.
     column: Vec<f64>,
-    /// Sizes of the entries within blocks of more than one row.
+    /// Moduli of the entries within blocks of more than one row, row by row; entries elsewhere have no meaning.
     moduli: Vec<f64>,
-    /// |Re| + |Im| of every entry, and of what has been solved for.
+    /// |Re| + |Im| of every entry of the matrix, row by row.
     weights: Vec<f64>,
+    /// |Re| + |Im| of every entry of `solution`.
     solved: Vec<f64>,
 }
 
 impl Triangle {
-    /// The triangular form that is unitarily similar to a quasi-triangular one.
+    /// Loads the triangular form that is unitarily similar to the quasi-triangular matrix `quasi`, with a block for each row.
     pub(super) fn load<S: Square>(&mut self, quasi: &S) {
         let size = quasi.size();
         self.size = size;
@@ -56,7 +60,7 @@ impl Triangle {
             if below != 0.0 {
                 let (a, b, d) = (quasi.at(top, top), quasi.at(top, row), quasi.at(row, row));
                 let [first, second] = pair(a, b, below, d);
-                // The eigenvector of `first`, from the row that gives the longer one.
+                // Both rows of the block give an eigenvector of `first`; the longer vector has lost fewer digits.
                 let (from_top, from_below) = ((Complex64::from(b), first - a), (first - d, Complex64::from(below)));
                 let longer =
                     if from_top.0.l1_norm() + from_top.1.l1_norm() > from_below.0.l1_norm() + from_below.1.l1_norm() { from_top } else { from_below };
@@ -70,7 +74,7 @@ impl Triangle {
         self.starts.extend(0..=size);
     }
 
-    /// The unitary similarity transform of rows and columns `top`, `top + 1` whose first column is along (p, q).
+    /// Applies the unitary similarity transform of the rows and columns `top`, `top + 1` whose first column is along (p, q).
     fn rotate(&mut self, top: usize, p: Complex64, q: Complex64) {
         let size = self.size;
         let length = (p.norm_sqr() + q.norm_sqr()).sqrt();
@@ -104,13 +108,13 @@ impl Triangle {
         self.at(place, place)
     }
 
-    /// The block that an eigenvalue belongs to.
+    /// Returns the number of the block that the eigenvalue at `place` on the diagonal belongs to.
     pub(super) fn block_of(&self, place: usize) -> usize {
         self.starts.partition_point(|start| *start <= place) - 1
     }
 
-    /// Reorders the diagonal so that eigenvalues with the same label stand together, and makes each such group a block (Golub & Van Loan 2013,
-    /// Section 7.6.2: exchanges by rotations). `labels` is reordered along.
+    /// Reorders the diagonal so that eigenvalues with the same label stand together, and makes each group of one label a block (Golub & Van Loan 2013,
+    /// Section 7.6.2: exchanges by rotations). `labels` has one label for each place on the diagonal and is reordered along with the eigenvalues.
     pub(super) fn gather(&mut self, labels: &mut [usize]) {
         let size = self.size;
         self.starts.clear();
@@ -134,7 +138,7 @@ impl Triangle {
         self.starts.push(size);
     }
 
-    /// Fills in π_c of every block, infinite where an eigenvalue of one block equals one of another.
+    /// Computes π_c of every block; infinite if an eigenvalue of the block equals an eigenvalue of another block.
     ///
     /// The triangular solves carry a running bound of their rounding error (Higham 2002, Section 8.2), so that π_c is not too small.
     pub(super) fn amplify(&mut self) {
@@ -158,20 +162,20 @@ impl Triangle {
             let (start, end) = (self.starts[block], self.starts[block + 1]);
             let right = self.right(start, end);
             let left = self.left(start, end);
-            // NaN arises from 0·∞ where eigenvalues coincide.
+            // NaN arises from 0·∞ if eigenvalues of different blocks coincide.
             let product = ((1.0 + right) * (1.0 + left)).sqrt() * (1.0 + 1e-12);
             self.amplification.push(if product.is_nan() { f64::INFINITY } else { product });
         }
     }
 
-    /// |X_c|²: (T₁₁ − t_qq)·X_q = Σ_{p<q} X_p·t_pq − T_1q, column by column, from the bottom row up.
+    /// Returns |X_c|² of the block `start..end`. Solves (T₁₁ − t_qq)·X_q = Σ_{p<q} X_p·t_pq − T_1q, column by column, from the bottom row up.
     fn right(&mut self, start: usize, end: usize) -> f64 {
         let size = self.size;
         let mut sum = 0.0;
         for q in start..end {
             for row in (0..start).rev() {
                 let (mut value, mut carried, mut magnitude) = (-self.at(row, q), 0.0, self.weights[row * size + q]);
-                // Rows of T₁₁ to the right of this one with a minus; the solution in this column is kept in a row of its own.
+                // Terms of T₁₁ right of the diagonal are subtracted. Column q of the solution is stored as row q, so that both slices are contiguous.
                 let (beyond, column) = (row * size + row + 1..row * size + start, q * size + row + 1..q * size + start);
                 let known = self.solution[column.clone()].iter().zip(&self.doubt[column.clone()]).zip(&self.solved[column]);
                 for ((entry, weight), ((known, doubt), size)) in self.entries[beyond.clone()].iter().zip(&self.weights[beyond]).zip(known) {
@@ -179,7 +183,7 @@ impl Triangle {
                     carried += doubt * weight;
                     magnitude += size * weight;
                 }
-                // Earlier columns of the block with a plus.
+                // Terms of earlier columns of the block are added.
                 for p in start..q {
                     let weight = self.weights[p * size + q];
                     value += self.solution[p * size + row] * self.at(p, q);
@@ -192,14 +196,15 @@ impl Triangle {
         sum
     }
 
-    /// |W_c|²: W_pj·(t_jj − t_pp) = T_pj + Σ_{r>p} t_pr·W_rj − Σ_{i<j} W_pi·t_ij, from the last row of the block up, from left to right.
+    /// Returns |W_c|² of the block `start..end`. Solves W_pj·(t_jj − t_pp) = T_pj + Σ_{r>p} t_pr·W_rj − Σ_{i<j} W_pi·t_ij, from the last row of the block up
+    /// and from left to right.
     fn left(&mut self, start: usize, end: usize) -> f64 {
         let size = self.size;
         let mut sum = 0.0;
         for p in (start..end).rev() {
             for column in end..size {
                 let (mut value, mut carried, mut magnitude) = (self.at(p, column), 0.0, self.weights[p * size + column]);
-                // Of the block itself with a plus, beyond it with a minus.
+                // Terms within the block are added, terms after the block are subtracted.
                 for i in p + 1..end {
                     let (entry, weight) = (self.at(p, i), self.weights[p * size + i]);
                     value += self.solution[i * size + column] * entry;
@@ -218,7 +223,8 @@ impl Triangle {
         sum
     }
 
-    /// Stores value/difference at `place` with the bound of its error, and gives the square of the largest size it may have.
+    /// Stores the quotient value/difference at `place` with the bound of its error, and returns the square of the largest modulus that the exact quotient can
+    /// have. `carried` is the error of earlier solutions in `value`, `magnitude` the sum of the sizes of its terms.
     #[inline]
     fn divide(&mut self, place: usize, value: Complex64, carried: f64, magnitude: f64, difference: Complex64) -> f64 {
         let scale = 1.0 / difference.norm_sqr();
@@ -232,10 +238,11 @@ impl Triangle {
         size * size
     }
 
-    /// Whether |(z − T)⁻¹| is below `limit` for every z whose distance to each eigenvalue is at least the given one, as far as a bound of it can tell.
+    /// Returns whether a bound of |(z − T)⁻¹| is below `limit` for every z whose distance to each eigenvalue is at least the entry of `distances` at its place.
+    /// False also means that the bound cannot tell.
     ///
     /// Within a block, the inverse of a triangular matrix is at most, entry by entry, that of its comparison matrix (Higham 2002, Theorem 8.12), and
-    /// |·|₂² ≤ |·|₁·|·|∞. It is a refinement of Henrici's bound Σ ν^j/d^(j+1) (1962), which uses only the norm ν of the strict triangle.
+    /// |·|₂² ≤ |·|₁·|·|∞. This refines Henrici's bound Σ ν^j/d^(j+1) (1962), which uses only the norm ν of the strict triangle.
     pub(super) fn resolvent_below(&mut self, distances: &[f64], limit: f64) -> bool {
         if distances.iter().any(|distance| *distance <= 0.0) {
             return false;
@@ -243,7 +250,7 @@ impl Triangle {
         let limit = limit * (1.0 - 1e-12);
         let blocks = 0..self.amplification.len();
         let single = |starts: &[usize], block: usize| starts[block + 1] - starts[block] == 1;
-        // The cheap part first: it often is too much alone.
+        // Blocks of one row are cheap and come first: often their sum alone reaches the limit.
         let mut total = 0.0;
         for block in blocks.clone().filter(|block| single(&self.starts, *block)) {
             total += self.amplification[block] / distances[self.starts[block]];
@@ -267,7 +274,7 @@ impl Triangle {
             self.column[row] = (1.0 + beyond.map(|(entry, bound)| entry * bound).sum::<f64>()) / distances[row];
             rows = rows.max(self.column[row]);
         }
-        // The same of the columns; a row's share is added to all columns beyond it at once.
+        // Sums of the columns: the share of each row is added to all later columns at once, along the row.
         self.column[start..end].fill(1.0);
         for (column, distance) in distances.iter().enumerate().take(end).skip(start) {
             let bound = self.column[column] / distance;

@@ -7,21 +7,22 @@ use crate::factorisation::Lu;
 use crate::matrix::ComplexMatrix;
 use crate::rounding::real;
 
-/// Solves for one vector: the first leads into the space of the eigenvalue, the second makes up for a start that was nearly orthogonal to it.
+/// The number of solves for one vector. The first leads into the space of the eigenvalue; the second corrects for a start that was nearly orthogonal to that
+/// space.
 const STEPS: usize = 2;
 
-/// An eigenvector of length 1 of a matrix for one of its eigenvalues as computed, or nearly one: of an eigenvalue that is not simple some vector of its space, another for each `place`.
-/// `None` where numbers overflow.
+/// Returns an eigenvector of length 1, to rounding, of a matrix for one of its computed eigenvalues. For an eigenvalue that is not simple the result is some
+/// vector of its space, a different vector for each `place`. `None` if numbers overflow.
 pub fn eigenvector(matrix: &Matrix, value: Complex64, place: usize) -> Option<Vec<Complex64>> {
     let size = matrix.rows();
     let shifted = ComplexMatrix::from_fn(size, size, |row, column| matrix[(row, column)] - if row == column { value } else { Complex64::ZERO });
-    // With a pivot of zero the value is an eigenvalue to the last digit: a division by the size of a rounding error leads to its vector all the same.
+    // If a pivot is zero, `value` is an eigenvalue to the last digit. A division by a number of the size of a rounding error still leads to its vector.
     let least = Complex64::from(f64::EPSILON * matrix.largest().max(f64::MIN_POSITIVE));
     let factors = Lu::with_least_pivot(&shifted, least);
     let mut vector = start(size, place);
     for _ in 0..STEPS {
         vector = factors.solve(&vector);
-        // Divided twice, so that squares do not overflow.
+        // The vector is divided by its largest entry first, so that the squares of the length do not overflow.
         let largest = vector.iter().map(|entry| entry.l1_norm()).fold(0.0, f64::max);
         vector.iter_mut().for_each(|entry| *entry /= largest);
         let length = vector.iter().map(Complex64::norm_sqr).sum::<f64>().sqrt();
@@ -30,7 +31,7 @@ pub fn eigenvector(matrix: &Matrix, value: Complex64, place: usize) -> Option<Ve
     vector.iter().all(|entry| entry.is_finite()).then_some(vector)
 }
 
-/// A vector without a pattern, another for each place: the fractions of multiples of the golden ratio.
+/// Returns a start vector without a pattern, a different vector for each `place`: the fractional parts of multiples of the golden ratio, plus one half.
 fn start(size: usize, place: usize) -> Vec<Complex64> {
     const GOLDEN: f64 = 0.618_033_988_749_895;
     let entry = |row: usize| real((row + 1) * (place + 1)) * GOLDEN;
@@ -55,7 +56,7 @@ mod tests {
             for (place, value) in eigenvalues(&matrix).into_iter().enumerate() {
                 let vector = eigenvector(&matrix, value, place).unwrap();
                 let left = residual(&matrix, value, &vector);
-                // The eigenvalue is that of a matrix within n·ε·|A|, and so is the solution.
+                // The eigenvalue and the solution are both exact for matrices within n·ε·|A|.
                 assert!(left < 1e-14 * real(size) * matrix.frobenius_norm(), "{size}: {left} for {value}");
             }
         }
