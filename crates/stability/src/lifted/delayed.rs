@@ -1,27 +1,29 @@
-//! A frame whose samples are long on their way, as a loop with delays instead of a large matrix.
+//! A frame whose samples are long under way, as a loop with delays instead of a large matrix.
 
 use super::frame::FrameMap;
 use crate::Matrix;
 use crate::determinant::{DelayedLoop, DelayedLoopError, Kernel};
 
 impl FrameMap {
-    /// The loop whose characteristic roots are the eigenvalues of [`FrameMap::monodromy`], but for some that are zero.
+    /// Returns the loop whose characteristic roots are the eigenvalues of [`FrameMap::monodromy`], but for some that are zero. Fails if a delay has too many
+    /// steps or an entry is not finite.
     ///
-    /// Its signals are the relative states x; for each sample that is sent in a frame, its value V when the next frame begins, relative to where the
-    /// reference is then; and by how much d the reference moved in the frame before. A sample that was sent L frames ago is
+    /// The signals of the loop are the relative states x; for each sample that is sent in a frame, the value V of the sample when the next frame begins,
+    /// relative to the reference at that instant; and the distance d by which the reference moved in the previous frame. A sample that was sent L frames ago is
     ///
     /// ```text
     /// y(f) = V(f − L + 1) − t·(d(f) + d(f−1) + … + d(f − L + 2))
     /// ```
     ///
-    /// with t the displacement of a sample under a displacement of everything by 1: a delay, and the sum that remains of one in relative coordinates.
+    /// where t is the displacement of a sample under a displacement of everything by 1. The first term is a delay; the sum is what a delay adds in relative
+    /// coordinates.
     pub(crate) fn delayed_loop(&self) -> Result<DelayedLoop, DelayedLoopError> {
         let states = self.state_unknowns();
         let kept: Vec<usize> = (0..self.states.rows()).filter(|row| Some(*row) != self.reference()).collect();
         let sent = self.sent.rows();
         let size = states + sent + usize::from(self.reference().is_some());
         let moved = size - 1;
-        // One row of the frame for each signal, in units of which `displaced` by the reference's motion is taken off.
+        // One row of the frame for each signal, and the factor by which the motion of the reference is subtracted from the row.
         let mut rows: Vec<(&[f64], f64)> = kept.iter().map(|row| (self.states.row(*row), self.displacement(*row))).collect();
         rows.extend((0..sent).map(|row| (self.sent.row(row), self.translation(sent - row))));
         let reference = self.reference().map(|row| self.states.row(row));
@@ -36,6 +38,8 @@ impl FrameMap {
         let mut terms: Vec<(Kernel, Matrix)> = Vec::new();
         for (number, (node, age)) in self.used.iter().enumerate() {
             let of_node = self.sent_by(*node);
+            // A sample of age `age` was sent `frames` frames ago, because every frame sends `of_node.len()` numbers of the node; `column` is the signal of
+            // the sample with the same place in its frame.
             let frames = age.div_ceil(of_node.len().max(1));
             let column = states + of_node.start + of_node.len() * frames - age;
             let mut add = |kernel: Kernel, column: usize, factor: f64| {
@@ -68,12 +72,12 @@ impl FrameMap {
         DelayedLoop::new(now, terms)
     }
 
-    /// How many rows the monodromy matrix has.
+    /// Returns the number of rows of the monodromy matrix.
     pub(crate) fn size(&self) -> usize {
         self.state_unknowns() + self.history()
     }
 
-    /// How many signals [`FrameMap::delayed_loop`] has.
+    /// Returns the number of signals of [`FrameMap::delayed_loop`].
     pub(crate) fn signals(&self) -> usize {
         self.state_unknowns() + self.sent.rows() + usize::from(self.reference().is_some())
     }

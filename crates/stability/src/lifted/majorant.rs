@@ -1,15 +1,16 @@
-//! A bound of a frame's rounding that stays close however fast disturbances grow.
+//! A bound of the rounding errors of a frame that stays close however fast disturbances grow.
 //!
-//! With T the matrix of a tick, a computed row set ẑ obeys ẑ⁺ = T·ẑ + r, and each operation rounds what it adds up, so that r is at most u·|T|·s row by row,
-//! s the sums of the sizes of the computed rows and |T| the sizes of the terms that a tick adds up. Hence two recursions over the same events,
+//! With T the matrix of a tick, the computed rows ẑ obey ẑ⁺ = T·ẑ + r. Each operation rounds the terms that it adds up, so that r is at most u·|T|·s row by
+//! row, where s holds the sums of absolute values of the computed rows and |T| the absolute values of the terms of a tick. Hence two recursions over the same
+//! events,
 //!
 //! ```text
 //! s⁺ = |T|·s        e⁺ = |T|·e + u·|T|·s
 //! ```
 //!
-//! bound the sums and their errors. No entry of the frame is looked at, only the numbers of the nodes. Of stiff gains each |T| grows by a factor that is
-//! near that of T: with a = KT·h²/(2m) the copy alone goes by about a − 3 a tick, its majorant by a + 4. So e stays about u times the ticks times s,
-//! where the square of the growth ([`Rounding`](super::Rounding)) says nothing any more.
+//! bound the sums and their errors. The recursions use only the parameters of the nodes, no entry of the frame's matrix. For stiff gains |T| grows by a factor
+//! near that of T: with a = KT·h²/(2m), the copy alone grows by about a − 3 per tick and its majorant by a + 4. So e stays about u times the number of ticks
+//! times s, also if the square of the growth ([`Rounding`](super::Rounding)) says nothing.
 
 use std::collections::VecDeque;
 
@@ -18,13 +19,13 @@ use super::system::Lifted;
 use crate::rounding::real;
 use crate::timetable::Event;
 
-/// What the operations of a tick round, relative to the terms that they add up: at most fifteen in a row, the rounding of the step maps' coefficients and of
-/// the units among them.
+/// Rounding error of the operations of a tick, relative to the terms that they add up: at most fifteen operations in a row, among them the rounding of the
+/// coefficients of step maps and of the units.
 const TICK: f64 = 16.0 * f64::EPSILON;
-/// Rounding of a sample, and of the mean of samples in addition to one rounding for each node.
+/// Rounding error of a sample, and of the mean of samples; the mean has one rounding more for each number of each node.
 const MEAN: f64 = 6.0 * f64::EPSILON;
 
-/// A bound of the sum of the sizes of a row, and one of its error.
+/// A bound of the sum of absolute values of a row, and a bound of the row's error.
 #[derive(Clone, Copy, Debug)]
 struct Size {
     sum: f64,
@@ -39,35 +40,35 @@ impl Size {
         Self { sum: self.sum + factor.abs() * other.sum, error: self.error + factor.abs() * other.error }
     }
 
-    /// Rounded by a share of itself.
+    /// Returns the size with the error of one more rounding, of the share `by` of the sum.
     fn rounded(self, by: f64) -> Self {
         Self { error: self.error + by * self.sum, ..self }
     }
 }
 
-/// The rows of a node.
+/// Sizes of the rows of a node.
 #[derive(Clone, Debug)]
 struct NodeSizes {
     device: [Size; 2],
     copy: [Size; 2],
-    /// The forces that act next, on the copy and on the device \[N\].
+    /// Sizes of the forces that act at the next tick, on the copy and on the device \[N\].
     pending: [Size; 2],
-    /// What the law remembers, in its own units.
+    /// Sizes of the numbers that the law remembers, in the law's own units.
     memory: Vec<Size>,
-    /// What it takes of the own states of the latest ticks, the newest first.
+    /// Sizes of the combinations of the own states of the latest ticks that the law uses, the newest first.
     past: VecDeque<Size>,
 }
 
 impl Lifted<'_> {
-    /// A bound of the rounding errors of a frame.
+    /// Returns a bound of the rounding errors of a frame: see [`error_of`].
     pub(crate) fn error(&self) -> f64 {
         let compliance = self.nodes[0].compliance(self.time);
         error_of(self, |_| compliance)
     }
 }
 
-/// A bound of the errors of all rows of a frame as one matrix, in the 2-norm: of the states at the end and of the samples sent, positions and velocities,
-/// each relative to the reference or not. `compliance` is what the waiting forces of a node are multiplied by to be lengths [m/N].
+/// Returns a bound of the errors of all rows of a frame as one matrix, in the 2-norm: of the states at the end and of the samples sent, as positions and
+/// velocities, relative to the reference or not. `compliance` returns the factor [m/N] that makes the waiting forces of a node lengths.
 pub(crate) fn error_of(lifted: &Lifted<'_>, compliance: impl Fn(usize) -> f64) -> f64 {
     let nodes = lifted.nodes.len();
     let unit = |node: usize, place: usize| lifted.nodes[node].memory_unit(place, Scale { time: lifted.time, compliance: compliance(node) });
@@ -96,7 +97,8 @@ pub(crate) fn error_of(lifted: &Lifted<'_>, compliance: impl Fn(usize) -> f64) -
     let mut sent: Vec<Vec<Vec<Size>>> = vec![Vec::new(); nodes];
     let mut squares = 0.0;
     let reference = |sizes: &[NodeSizes]| if lifted.tied { Size::ZERO } else { sizes[0].copy[0] };
-    // Samples are taken relative to where the reference is at the end, which is not known yet: their own errors now, that of the reference then.
+    // Samples are taken relative to the reference at the end of the frame, which is not known yet. Their own errors are noted now, and the error of the
+    // reference is added at the end.
     let mut positions: Vec<Size> = Vec::new();
     let of_sample = |sent: &[Vec<Vec<Size>>], node: usize, sample: i64| {
         usize::try_from(sample).ok().map_or_else(|| before.clone(), |number| sent[node][number].clone())
@@ -111,6 +113,7 @@ pub(crate) fn error_of(lifted: &Lifted<'_>, compliance: impl Fn(usize) -> f64) -
             Event::Sample { node } => {
                 let copy = sizes[node].copy;
                 positions.push(copy[0]);
+                // The velocity of a sample does not depend on the reference, so that its error is final.
                 squares += copy[1].error * copy[1].error;
                 sent[node].push(signal(copy).into_iter().map(|size| size.rounded(MEAN)).collect());
             }
@@ -145,7 +148,7 @@ pub(crate) fn error_of(lifted: &Lifted<'_>, compliance: impl Fn(usize) -> f64) -
         if lifted.nodes[node].compute_delay {
             size.pending.iter().for_each(|force| add(Size::ZERO.plus(compliance(node), *force).rounded(f64::EPSILON), Size::ZERO));
         }
-        // Each is displaced by the share of the position in it, at most 1.
+        // The reference counts in each number by the share of the position, which is at most 1.
         size.past.iter().for_each(|number| add(*number, origin));
         let memory = size.memory.iter().enumerate();
         memory.for_each(|(place, number)| add(Size::ZERO.plus(unit(node, place), *number).rounded(2.0 * f64::EPSILON), Size::ZERO));
@@ -153,7 +156,7 @@ pub(crate) fn error_of(lifted: &Lifted<'_>, compliance: impl Fn(usize) -> f64) -
     squares.sqrt()
 }
 
-/// One tick of a node: see [`Node::tick`].
+/// Makes one tick of a node in sizes: see [`Node::tick`].
 fn tick(node: &Node, sizes: &mut NodeSizes, heard: &[Size], lifted: &Lifted<'_>, span: std::time::Duration) {
     let time = lifted.time;
     let (wall, gains) = (node.wall.unwrap_or(cohaptic_peer::Gains { stiffness: 0.0, damping: 0.0 }), node.law.force.own);
@@ -171,6 +174,7 @@ fn tick(node: &Node, sizes: &mut NodeSizes, heard: &[Size], lifted: &Lifted<'_>,
         on_copy = on_copy.plus(unit, oldest);
         sizes.past.push_front(Size::ZERO.plus(past.stiffness / unit, x).plus(past.damping / time / unit, v).rounded(MEAN));
     }
+    // Every term of a force counts with its absolute value: signs must not cancel in a bound.
     let mut on_device = Size::ZERO;
     if node.device.is_some() {
         let [xh, vh] = sizes.device;

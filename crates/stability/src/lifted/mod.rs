@@ -1,7 +1,7 @@
-//! The lifted system: nodes of one axis, coupled by weights over the samples they send, and one frame of it as a matrix.
+//! The lifted system: nodes of one axis, coupled by weights over the samples that the nodes send, and one frame of the system as a matrix.
 //!
-//! Lifting turns a system with two rates into one with the slow rate, without approximation (Araki & Yamamoto 1986). A node is a peer, or what a class of
-//! equal peers has in common or apart; the weights are the averaging matrix, or one of its eigenvalues.
+//! Lifting turns a system with two rates into a system with the slow rate, without approximation (Araki & Yamamoto 1986). A node is a peer, or the common
+//! or relative motion of a class of equal peers; the weights are the averaging matrix, or one of its eigenvalues. The module does not know scenes.
 
 mod delayed;
 pub(crate) mod frame;

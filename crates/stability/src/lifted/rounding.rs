@@ -1,41 +1,45 @@
-//! How far the rounding of a frame's ticks may take its rows from the exact ones.
+//! A quick bound of the rounding errors of a frame.
 //!
-//! Each tick of a node rounds some ten operations on numbers of at most step·growth: *step* is the largest sum of the sizes of a row of one tick's matrix,
-//! *growth* the largest sum of a row of what the frame has made so far of its unknowns. The rest of the frame magnifies that by about the growth of the
-//! whole frame. Where disturbances grow so fast that the square of the growth says nothing any more, [`majorant`](super::majorant) does.
+//! Each tick of a node rounds some ten operations on numbers of at most step·growth. *Step* is the largest sum of absolute values of a row of one tick's
+//! matrix; *growth* is the largest such sum of a row of the states so far, as functions of the frame's unknowns. The rest of the frame magnifies a rounding
+//! error by about the growth of the whole frame. If disturbances grow so fast that the square of the growth says nothing, [`majorant`](super::majorant) has
+//! a closer bound.
 
-/// The bound, carried along with the ticks of a frame.
+/// The numbers of the bound, updated after each tick of a frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rounding {
-    /// The largest sum of the sizes of a row so far; 1 at the beginning.
+    /// Largest sum of absolute values of a row so far; 1 at the beginning.
     growth: f64,
+    /// Number of ticks of all nodes so far.
     ticks: u32,
+    /// Largest sum of absolute values of a row of one tick's matrix, over all nodes.
     step: f64,
 }
 
-/// What the operations of a tick round, relative to the numbers in it.
+/// Rounding error of the operations of one tick, relative to the numbers in the tick.
 const TICK: f64 = 10.0 * f64::EPSILON;
 
 impl Rounding {
-    /// Before the first tick; `step` is that of the worst node.
+    /// Returns the state before the first tick. `step` is the largest sum of absolute values of a row of one tick's matrix, over all nodes.
     pub(crate) const fn new(step: f64) -> Self {
         Self { growth: 1.0, ticks: 0, step }
     }
 
-    /// A tick of a node after which its rows have at most that sum.
+    /// Counts a tick of a node, after which the sums of absolute values of the node's rows are at most `sum`.
     #[inline]
     pub(crate) fn tick(&mut self, sum: f64) {
         self.ticks += 1;
         self.growth = self.growth.max(sum);
     }
 
-    /// A bound of the errors, in the largest sum of sizes of a row; where it says nothing, the smaller of it and what `closer` answers.
+    /// Returns a bound of the errors, as the largest sum of absolute values of a row. If the bound is not below 1, `closer` is called and the smaller of both
+    /// bounds is returned.
     pub(crate) fn bound(&self, closer: impl FnOnce() -> f64) -> f64 {
         closer_of(TICK * f64::from(self.ticks) * self.step * self.growth * self.growth, closer)
     }
 }
 
-/// A bound of errors where it says something: below 1. Elsewhere the smaller of it and another, which takes longer.
+/// Returns `bound` if it is below 1, and otherwise the smaller of `bound` and the bound of `closer`, which takes longer to compute. NaN counts as infinite.
 pub(crate) fn closer_of(bound: f64, closer: impl FnOnce() -> f64) -> f64 {
     if bound < 1.0 { bound } else { [bound, closer()].into_iter().filter(|bound| !bound.is_nan()).fold(f64::INFINITY, f64::min) }
 }

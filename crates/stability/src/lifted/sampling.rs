@@ -1,20 +1,20 @@
-//! What of a sample takes part: one number, where all that hears it uses the same combination of position and velocity, or both.
+//! The numbers of a sample that are unknowns of a frame: one number if all laws use the same combination of position and velocity, otherwise both.
 
 use cohaptic_peer::Gains;
 
 use crate::linear_form::LawRow;
 
-/// Which numbers of a sample are unknowns of their own.
+/// The numbers of a sample that are unknowns of their own.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Sampling {
-    /// (K·x + B·v)/(K + B/time), a length, of these gains K and B.
+    /// The combination (K·x + B·v)/(K + B/time), a length, for these gains K and B.
     Combined(Gains),
     /// Position, and velocity multiplied by the common time.
     Whole,
 }
 
 impl Sampling {
-    /// How many numbers of a sample there are.
+    /// Returns the count of numbers in a sample.
     pub const fn channels(self) -> usize {
         match self {
             Self::Combined(_) => 1,
@@ -22,12 +22,12 @@ impl Sampling {
         }
     }
 
-    /// Whether samples have no part in the motion.
+    /// Returns whether samples have no effect on the motion.
     pub fn is_silent(self, time: f64) -> bool {
         self.unit(time) <= 0.0
     }
 
-    /// What position and velocity of a copy are multiplied by in that number of a sample, where velocities are multiplied by `time`.
+    /// Returns the factors of the copy's position and velocity in number `channel` of a sample; velocities are multiplied by `time` \[s\].
     pub fn shares(self, channel: usize, time: f64) -> (f64, f64) {
         match (self, channel) {
             (Self::Combined(_), _) if self.is_silent(time) => (0.0, 0.0),
@@ -40,7 +40,7 @@ impl Sampling {
         }
     }
 
-    /// As [`Sampling::shares`], of a combined number before it is divided to be a length \[N\].
+    /// Returns the factors of position and velocity as [`Sampling::shares`], but those of a combined number before its division by K + B/time [N/m].
     pub fn gains(self, channel: usize, time: f64) -> (f64, f64) {
         match self {
             Self::Combined(Gains { stiffness, damping }) => (stiffness, damping / time),
@@ -48,18 +48,18 @@ impl Sampling {
         }
     }
 
-    /// The coefficient of a number in the scale of [`Sampling::gains`], from its coefficient in the scale of [`Sampling::shares`].
+    /// Converts the coefficient of a number from the scale of [`Sampling::shares`] to the scale of [`Sampling::gains`].
     pub(crate) fn of_gains(self, heard: f64, time: f64) -> f64 {
         let unit = self.unit(time);
         if unit > 0.0 && unit.is_finite() { heard / unit } else { 1.0 }
     }
 
-    /// How far a translation of everything by 1 moves that number of a sample.
+    /// Returns the distance by which a translation of everything by 1 moves number `channel` of a sample.
     pub fn translation(self, channel: usize, time: f64) -> f64 {
         self.shares(channel, time).0
     }
 
-    /// What that number of a sample of that age \[s\] is multiplied by in what a row of a law hears \[N\].
+    /// Returns the factor of number `channel` of a sample of age `age` \[s\] in the force that a row of a law hears [N/m].
     pub fn heard(self, row: &LawRow, channel: usize, age: f64, time: f64) -> f64 {
         match (self, channel) {
             (Self::Combined(gains), _) if row.heard == gains => self.unit(time),
@@ -71,7 +71,7 @@ impl Sampling {
         }
     }
 
-    /// What a sample is divided by [N/m].
+    /// Returns the divisor that makes a combined number a length [N/m]; 1 for whole samples.
     fn unit(self, time: f64) -> f64 {
         match self {
             Self::Combined(Gains { stiffness, damping }) => stiffness + damping / time,

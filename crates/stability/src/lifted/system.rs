@@ -1,41 +1,41 @@
-//! The lifted system: nodes that are coupled through samples.
+//! The description of a lifted system: nodes, weights and timetable, and the sizes that follow.
 
 use super::Sampling;
 use super::node::{Node, Rows};
 use crate::Matrix;
 use crate::timetable::{Event, Timetable};
 
-/// Nodes that are coupled through samples.
+/// A system of nodes that are coupled through samples.
 #[derive(Clone, Copy, Debug)]
 pub struct Lifted<'a> {
-    /// The nodes.
+    /// The nodes; the first node's copy is the reference of a system that nothing ties to ground. Not empty.
     pub nodes: &'a [Node],
-    /// The weight of each node's samples (column) in each node's target (row).
+    /// Weight of each node's samples (column) in each node's target (row).
     pub weights: &'a Matrix,
-    /// What happens in a frame of them.
+    /// Samples, deliveries and ticks of the nodes in one frame.
     pub timetable: &'a Timetable,
-    /// Which numbers of a sample the laws of the nodes use.
+    /// The numbers of a sample that the laws of the nodes use.
     pub sampling: Sampling,
-    /// What velocities are multiplied by \[s\].
+    /// Common time that velocities are multiplied by to be lengths \[s\].
     pub time: f64,
-    /// Whether something ties the motion to ground. If not, the whole may be moved without a force, and positions are taken relative to the first
+    /// Whether something ties the motion to ground. If not, everything can be moved together without a force, and positions are taken relative to the first
     /// node's copy.
     pub tied: bool,
 }
 
-/// How large the matrix of a frame is.
+/// Sizes of the matrix of a frame and of its delayed loop.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Sizes {
-    /// Its rows: see [`FrameMap::size`](super::FrameMap::size).
+    /// Number of rows of the matrix: see [`FrameMap::size`](super::FrameMap::size).
     pub(crate) states: usize,
-    /// How many of these are numbers of samples of earlier frames: see [`FrameMap::history`](super::FrameMap::history).
+    /// Number of these rows that are numbers of samples of earlier frames: see [`FrameMap::history`](super::FrameMap::history).
     pub(crate) history: usize,
-    /// The rows of its delayed loop: see [`FrameMap::signals`](super::FrameMap::signals).
+    /// Number of rows of the delayed loop: see [`FrameMap::signals`](super::FrameMap::signals).
     pub(crate) signals: usize,
 }
 
 impl Lifted<'_> {
-    /// How large its matrix is, told without making one.
+    /// Returns the sizes of the system's matrix without computing the matrix.
     pub(crate) fn sizes(&self) -> Sizes {
         let channels = self.sampling.channels();
         let silent = self.sampling.is_silent(self.time);
@@ -46,7 +46,7 @@ impl Lifted<'_> {
         Sizes { states: own + history, history, signals: own + sent + reference }
     }
 
-    /// The rows of each node.
+    /// Returns the places of the rows of each node.
     pub fn rows(&self) -> Vec<Rows> {
         let mut count = 0;
         let rows = self.nodes.iter().map(|node| {
@@ -57,7 +57,7 @@ impl Lifted<'_> {
         rows.collect()
     }
 
-    /// How often each node ticks in a frame.
+    /// Returns the number of ticks of each node in a frame.
     pub fn ticks(&self) -> Vec<usize> {
         let mut ticks = vec![0; self.nodes.len()];
         for event in &self.timetable.events {
