@@ -1,4 +1,4 @@
-//! One frame of the lifted system: where it leads, as a linear function of where it began.
+//! One frame of the lifted system: the states at its end and the samples sent, as linear functions of the states at its beginning.
 
 use super::node::{External, Node, Rows, Scale, Scratch};
 use super::rounding::Rounding;
@@ -6,69 +6,72 @@ use super::system::Lifted;
 use crate::timetable::{Event, Instants};
 use crate::{Matrix, Unwatched, Watch};
 
-/// The inputs and outputs within a frame.
+/// Inputs and outputs within a frame. Every method has a default without input or output.
 pub trait Instrument {
-    /// How many inputs there are, each a column more.
+    /// Returns the number of inputs. Each input is one more column of the unknowns.
     fn inputs(&self) -> usize {
         0
     }
 
-    /// Sets the hand's force on the device of a node at a tick, `at` ns into the frame, as a function of the inputs \[N\]; answers whether there is one.
+    /// Sets the hand's force on the device of a node at a tick, `at` ns into the frame, as a function of the inputs \[N\]. Returns whether a force acts.
     fn push(&mut self, _node: usize, _at: u64, _inputs: &mut [f64]) -> bool {
         false
     }
 
-    /// Sees the velocity of the device of a node at a tick, before it moves; multiplied by the common time.
+    /// Sees the velocity of the device of a node at a tick, multiplied by the common time, before the device moves.
     fn see(&mut self, _node: usize, _at: u64, _velocity: &[f64]) {}
 
-    /// Sees all rows at a tick of a node, whose own are `rows`, before it moves. Sets what replaces the force of its coupling (first) and of its wall on the
-    /// copy, as functions of the inputs \[N\]; answers which of them are replaced.
+    /// Sees all rows at a tick of a node, whose own rows are `rows`, before the node moves. Sets the forces that replace that of the node's coupling (first)
+    /// and that of the wall on the copy, as functions of the inputs \[N\]. Returns which of the two are replaced.
     fn touch(&mut self, _node: usize, _z: &Matrix, _rows: Rows, _inputs: [&mut [f64]; 2]) -> [bool; 2] {
         [false; 2]
     }
 }
 
-/// Nothing is pushed or looked at.
+/// The instrument without inputs and outputs.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Autonomous;
 
 impl Instrument for Autonomous {}
 
-/// Where a frame leads.
+/// The linear map of one frame, from the unknowns to the states at the end and the samples sent.
 ///
-/// The unknowns, one column each: the states at the beginning, but for the reference; then the samples of earlier frames that are used; then inputs.
-/// A sample is one number or two, as [`Sampling`](super::Sampling) says, each with a place of its own: with c numbers a sample, number i of sample s has the place c·s + i.
+/// The unknowns, one column each, are the states at the beginning without the reference, then the used samples of earlier frames, then the inputs. A sample
+/// has one number or two, as [`Sampling`](super::Sampling) says, each with a place of its own: with c numbers per sample, number i of sample s has the
+/// place c·s + i.
 #[derive(Clone, PartialEq, Debug)]
 pub struct FrameMap {
-    /// The states at the end, one row each, the reference among them, in positions as they are.
+    /// States at the end, one row each, the reference among them. Positions are absolute here, not relative to the reference.
     pub states: Matrix,
-    /// How far a translation by 1 moves each of the rows: 1 for positions.
+    /// Distance by which a translation of everything by 1 moves each row of `states`: 1 for positions, 0 for velocities.
     displacements: Vec<f64>,
-    /// The row of the position that all others are relative to.
+    /// Row of the position that all positions are relative to; `None` if the motion is tied to ground.
     reference: Option<usize>,
-    /// The samples sent in the frame: for each node, its rows in `sent`.
+    /// Samples sent in the frame, one row for each number, ordered by node, then by time.
     pub sent: Matrix,
+    /// First row of `sent` of each node.
     first_sent: Vec<usize>,
-    /// The samples of earlier frames that are used: of which node, how many samples before this frame's first.
+    /// Numbers of samples of earlier frames that are used: the sending node, and the distance to the first number of this frame, at least 1.
     pub used: Vec<(usize, usize)>,
+    /// Number of sample numbers of earlier frames that are states, for each node.
     depth: Vec<usize>,
-    /// How far a translation by 1 moves each number of a sample.
+    /// Distance by which a translation of everything by 1 moves each number of a sample.
     translations: Vec<f64>,
-    /// A bound of the rounding errors of all rows, in the largest sum of sizes of a row.
+    /// Bound of the rounding errors of all rows, as the largest sum of absolute values of a row.
     pub error: f64,
 }
 
-/// After how many entries that are worked on it is asked whether to go on: some ten milliseconds.
+/// The number of computed entries after which the watch is asked whether to stop; some ten milliseconds of work.
 const LOOK: usize = 1_000_000;
 
 impl Lifted<'_> {
-    /// Steps through the frame with all unknowns at once.
+    /// Computes the map of a frame, by all steps of the frame with all unknowns at once.
     #[expect(clippy::missing_panics_doc, reason = "nothing ends what nobody watches")]
     pub fn frame(&self, instrument: &mut impl Instrument) -> FrameMap {
         self.frame_watched(instrument, &Unwatched).expect("without a watch nothing ends it")
     }
 
-    /// [`Lifted::frame`]; `None` if the watch ends it.
+    /// Computes [`Lifted::frame`]; `None` if the watch stops the computation.
     pub(crate) fn frame_watched(&self, instrument: &mut impl Instrument, watch: &dyn Watch) -> Option<FrameMap> {
         let (channels, silent) = (self.sampling.channels(), self.sampling.is_silent(self.time));
         let rows = self.rows();
@@ -88,7 +91,7 @@ impl Lifted<'_> {
                 _ => z[(row, row)] = 1.0,
             }
         }
-        // Samples: those used of earlier frames, then those sent in this one.
+        // Rows of `store`: the used samples of earlier frames, then the samples sent in this frame.
         let mut first_sent = Vec::with_capacity(self.nodes.len());
         let mut samples = used.len();
         for sent in &self.timetable.sent {
@@ -101,7 +104,7 @@ impl Lifted<'_> {
         }
         let mut next_sent = first_sent.clone();
         let nodes = self.nodes.len();
-        // The row of the first number of a sample; those of its others follow.
+        // The row of the first number of a sample in `store`; the row of the second number follows. Samples of earlier frames have negative numbers.
         let row_of = |node: usize, sample: i64| -> Option<usize> {
             match usize::try_from(sample) {
                 Ok(number) => Some(first_sent[node] + number * channels),
@@ -112,7 +115,7 @@ impl Lifted<'_> {
         for (to, from, sample) in &self.timetable.held {
             held[to * nodes + from] = row_of(*from, *sample).map(|row| (row, *sample));
         }
-        // What each row of a node's law hears.
+        // The force that each row of each node's law hears [N].
         let law_rows = 1 + self.nodes.iter().map(|node| node.law.memory.len()).max().unwrap_or(0);
         let mut heard = Matrix::zeros(nodes * law_rows, columns);
         let instants = self.ages_matter().then(|| Instants::of(self.timetable));
@@ -125,7 +128,7 @@ impl Lifted<'_> {
         let mut rounding = Rounding::new(step);
         let mut since = 0;
         for event in &self.timetable.events {
-            // An event takes some operations in each column.
+            // An event takes some operations per column.
             since += columns;
             if since > LOOK {
                 since = 0;
@@ -152,6 +155,7 @@ impl Lifted<'_> {
                     stale[to] = true;
                 }
                 Event::Tick { node, at, span } => {
+                    // The sums change only after a delivery, unless the laws use the ages of samples, which change from tick to tick.
                     if std::mem::take(&mut stale[node]) || instants.is_some() {
                         (0..law_rows).for_each(|row| heard.row_mut(node * law_rows + row).fill(0.0));
                         for from in 0..nodes {
@@ -203,25 +207,25 @@ impl Lifted<'_> {
             error: if instrument.inputs() == 0 {
                 rounding.bound(|| self.error())
             } else {
-                // Nothing that is pushed is among the rows of the closer bound.
+                // The closer bound does not cover the columns of inputs.
                 rounding.bound(|| f64::INFINITY)
             },
         })
     }
 
-    /// Whether the law of a node uses the ages of samples, so that the same sample is heard differently from tick to tick.
+    /// Returns whether the law of a node uses the ages of samples. If so, the same sample is heard differently from tick to tick.
     fn ages_matter(&self) -> bool {
         self.nodes.iter().any(|node| node.law.horizon.is_some())
     }
 
-    /// The numbers of samples of earlier frames that are used in this one, by node and then by age.
+    /// Returns the numbers of samples of earlier frames that are used in this frame, ordered by node and then by age: see [`FrameMap::used`].
     fn used(&self) -> Vec<(usize, usize)> {
         let deliveries = self.timetable.events.iter().filter_map(|event| match event {
             Event::Deliver { from, to, sample } => Some((*to, *from, *sample)),
             Event::Sample { .. } | Event::Tick { .. } => None,
         });
         let all = self.timetable.held.iter().copied().chain(deliveries);
-        // Only samples that weigh something are unknowns; a mean over nobody holds none.
+        // Only samples with a weight other than zero are unknowns; the mean of a node without senders holds no sample.
         let mut used: Vec<(usize, usize)> = all
             .filter(|(to, from, _)| self.weights[(*to, *from)] != 0.0)
             .filter_map(|(_, from, sample)| usize::try_from(-sample).ok().filter(|age| *age > 0).map(|age| (from, age)))
@@ -237,13 +241,13 @@ impl Lifted<'_> {
 }
 
 impl FrameMap {
-    /// The matrix that one frame multiplies the relative state by: states but for the reference, then for each node the samples of earlier frames, the
-    /// newest first.
+    /// Returns the matrix by which one frame multiplies the relative state: the states without the reference, then for each node the samples of earlier frames,
+    /// the newest first.
     pub fn monodromy(&self) -> Matrix {
         self.driven(0)
     }
 
-    /// The same with a column for each of the first `inputs` inputs behind.
+    /// Returns [`FrameMap::monodromy`] with further columns for the first `inputs` inputs.
     pub fn driven(&self, inputs: usize) -> Matrix {
         let count = self.states.rows();
         let kept: Vec<usize> = (0..count).filter(|row| Some(*row) != self.reference).collect();
@@ -277,50 +281,52 @@ impl FrameMap {
                 }
             }
         }
+        // A sample that is older than all samples of the frame stays a state, and becomes older by the number of samples sent.
         for (row, column) in shifted {
             matrix[(row, column)] += 1.0;
         }
         matrix
     }
 
-    /// How far a translation by 1 moves a number of a sample that has that place before the first of the frame.
+    /// Returns the distance by which a translation of everything by 1 moves the number of a sample that is `age` numbers before the first of the frame.
     pub fn translation(&self, age: usize) -> f64 {
         let channels = self.translations.len();
         self.translations[(channels - age % channels) % channels]
     }
 
-    /// How many numbers of samples of earlier frames are states.
+    /// Returns the count of numbers of samples of earlier frames that are states.
     pub(crate) fn history(&self) -> usize {
         self.depth.iter().sum()
     }
 
-    /// The rows of `sent` that a node sent, in order of time and then of the numbers of a sample.
+    /// Returns the rows of `sent` that a node sent, ordered by time and then by the numbers of a sample.
     pub fn sent_by(&self, node: usize) -> std::ops::Range<usize> {
         let end = self.first_sent.get(node + 1).copied().unwrap_or_else(|| self.sent.rows());
         self.first_sent[node]..end
     }
 
-    /// How many unknowns are states.
+    /// Returns the number of unknowns that are states.
     pub fn state_unknowns(&self) -> usize {
         self.states.rows() - usize::from(self.reference.is_some())
     }
 
-    /// The row of the position that all others are relative to.
+    /// Returns the row of the position that all positions are relative to; `None` if the motion is tied to ground.
     pub const fn reference(&self) -> Option<usize> {
         self.reference
     }
 
-    /// A translation leaves a row as it is: that of a body which something ties to ground and nothing to the others.
+    /// Marks a row as one that a translation does not move: the row of a body that is tied to ground and not to the other bodies.
     pub fn tie(&mut self, row: usize) {
         self.displacements[row] = 0.0;
     }
 
-    /// How far a translation by 1 moves a row.
+    /// Returns the distance by which a translation of everything by 1 moves a row of `states`.
     pub fn displacement(&self, row: usize) -> f64 {
         self.displacements[row]
     }
 
-    /// Where the unknowns of the frame, and of this number of inputs, stand among the columns of [`FrameMap::driven`]; and where the samples of each node do.
+    /// Returns the column of [`FrameMap::driven`] for each unknown of the frame and each of the first `inputs` inputs; and the first column of each node's
+    /// samples.
     pub fn places(&self, inputs: usize) -> (Vec<usize>, Vec<usize>) {
         let states = self.state_unknowns();
         let mut first = Vec::with_capacity(self.depth.len());
@@ -335,13 +341,13 @@ impl FrameMap {
     }
 }
 
-/// The largest sum of the sizes of a row, over the rows of one node.
+/// Returns the largest sum of absolute values of a row, over the `count` rows of one node.
 fn norm(z: &Matrix, rows: Rows, count: usize) -> f64 {
     let first = rows.device.unwrap_or(rows.object);
     (first..first + count).map(|row| z.row(row).iter().map(|entry| entry.abs()).sum::<f64>()).fold(0.0, f64::max)
 }
 
-/// The rows from `first` on.
+/// Returns the rows from `first` on.
 fn tail(matrix: &Matrix, first: usize) -> Matrix {
     Matrix::from_fn(matrix.rows() - first, matrix.columns(), |row, column| matrix[(first + row, column)])
 }

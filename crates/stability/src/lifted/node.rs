@@ -1,7 +1,7 @@
-//! A node of the lifted system: a peer, or what a class of equal peers has in common, on one axis.
+//! A node of the lifted system on one axis, its rows and its tick: a peer, or the common or relative motion of a class of equal peers.
 //!
-//! Positions are in metres. Velocities are multiplied by a common time and forces by a compliance, so that every state is a length: norms, and errors
-//! bounded by them, then mean something.
+//! Positions are in metres. Velocities are multiplied by a common time and forces by a compliance, so that every state is a length. Without a common unit,
+//! norms of states and the error bounds that use norms would have no meaning.
 
 use std::time::Duration;
 
@@ -16,7 +16,7 @@ use crate::linear_form::{LawRow, LinearLaw};
 pub struct Body {
     short: (Duration, StepMap),
     long: StepMap,
-    /// Rounding of the coefficients, where it is more than a tick's own operations round.
+    /// Rounding of the coefficients of the exact maps; `None` if the operations of a tick round more.
     coarse: Option<Coarse>,
 }
 
@@ -47,19 +47,19 @@ impl Body {
         Self { coarse, ..Self::from_steps(clock, |span| plant.step(span, integrator)) }
     }
 
-    /// From the step over each span.
+    /// Returns a body whose step map over a span between ticks is `step(span)`.
     pub(crate) fn from_steps(clock: &Clock, step: impl Fn(Duration) -> StepMap) -> Self {
         let (short, long) = clock.spans();
         let first = step(short);
         Self { short: (short, first), long: if long == short { first } else { step(long) }, coarse: None }
     }
 
-    /// The step map, if all spans between ticks are equal.
+    /// Returns the step map, if all spans between ticks have the same map.
     pub fn only_map(&self) -> Option<StepMap> {
         (self.long == self.short.1).then_some(self.long)
     }
 
-    /// With another step map over every span.
+    /// Returns the body with `map` as the step map over every span.
     pub fn with_map(&self, map: StepMap) -> Self {
         Self { short: (self.short.0, map), long: map, ..*self }
     }
@@ -74,81 +74,81 @@ impl Body {
         let map = self.map(span).map(|coefficient| coefficient.abs());
         let (e, g) = map.coefficients();
         let Some(Coarse { factor, least }) = self.coarse else { return (e, g, 1.0) };
-        // NaN stays: f64::max would drop it.
+        // `f64::max` would drop a NaN; this comparison keeps a NaN of the coefficients.
         let larger = |one: f64, other: f64| if one < other { other } else { one };
         let rows = std::array::from_fn(|row| std::array::from_fn(|column| larger(e[row][column], least.0[row][column])));
         (rows, std::array::from_fn(|row| larger(g[row], least.1[row])), factor)
     }
 
-    /// The step map for velocities multiplied by `time` \[s\]; its forces stay in newtons.
+    /// Returns the step map over a span for velocities multiplied by `time` \[s\]; forces stay in newtons.
     pub fn scaled_map(&self, span: Duration, time: f64) -> StepMap {
         let (e, g) = self.map(span).coefficients();
         StepMap::new([[e[0][0], e[0][1] / time], [e[1][0] * time, e[1][1]]], [g[0], g[1] * time])
     }
 }
 
-/// A node: what of a peer takes part in the linear motion of one axis.
+/// A node: the parts of a peer that move linearly along one axis.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Node {
-    /// The device and the arm that holds it; `None` where it touches nothing.
+    /// The device and the arm that holds it; `None` if the device does not touch the copy.
     pub device: Option<Body>,
     /// The copy of the object.
     pub object: Body,
-    /// KC and BC.
+    /// Gains KC and BC of the coupling between device and copy.
     pub coupling: Gains,
     /// The coordination law.
     pub law: LinearLaw,
-    /// A spring and a damper that tie the copy to ground.
+    /// Spring and damper that tie the copy to ground, if any.
     pub wall: Option<Gains>,
-    /// Whether forces are applied one tick after they were computed.
+    /// Whether forces act one tick after their computation.
     pub compute_delay: bool,
-    /// Whether position and velocity of the own states of the past are states each, and not only the combination that the law takes of them.
+    /// Whether position and velocity of the own past are both states. If not, only the combination that the law uses is a state.
     pub keeps_whole_past: bool,
 }
 
-/// Where a node's states stand among the rows.
+/// Rows of the states of a node.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Rows {
-    /// Position and velocity of the device, if it takes part.
+    /// Row of the position of the device, if the node has a device; the row of the velocity follows.
     pub device: Option<usize>,
-    /// Position and velocity of the copy.
+    /// Row of the position of the copy; the row of the velocity follows.
     pub object: usize,
-    /// The forces that were computed and act next: on the copy and, in the row after it, on the device.
+    /// Row of the force on the copy that acts at the next tick, if forces act one tick late; the row of the force of the device's coupling follows.
     pub pending: Option<usize>,
-    /// The first of the numbers that the law remembers.
+    /// Row of the first number that the law remembers; the others follow.
     pub memory: usize,
-    /// Where the law looks back: what it takes of the own states of the latest ticks, or position and velocity of each, the newest first.
+    /// First row of the own states of the latest ticks, the newest first, if the law looks back: one combination per tick, or position and velocity.
     pub past: usize,
 }
 
 /// The units of the states.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Scale {
-    /// What velocities are multiplied by \[s\].
+    /// Factor of velocities \[s\].
     pub time: f64,
-    /// What forces are multiplied by [m/N].
+    /// Factor of forces [m/N].
     pub compliance: f64,
 }
 
 impl Scale {
-    /// Gains towards a velocity that is multiplied by the common time.
+    /// Converts gains to gains of a velocity that is multiplied by the common time.
     pub fn gains(self, gains: Gains) -> Gains {
         Gains { stiffness: gains.stiffness, damping: gains.damping / self.time }
     }
 }
 
-/// Forces of a tick that do not follow from the states, each a function of the unknowns \[N\].
+/// Forces of a tick that do not follow from the states, each a function of the unknowns: one entry per column \[N\].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct External<'a> {
     /// The force of the hand on the device.
     pub hand: Option<&'a [f64]>,
-    /// In place of the coupling's.
+    /// The force that replaces that of the coupling.
     pub coupling: Option<&'a [f64]>,
-    /// On the copy, in place of the wall's.
+    /// The force on the copy that replaces that of the wall.
     pub wall: Option<&'a [f64]>,
 }
 
-/// Rows that a tick works with, kept from tick to tick.
+/// Buffers of a tick, kept from tick to tick.
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
     coupling: Vec<f64>,
@@ -157,7 +157,7 @@ pub struct Scratch {
 }
 
 impl Scratch {
-    /// Makes room for rows of this number of columns.
+    /// Gives the buffers this number of columns.
     pub fn resize(&mut self, columns: usize) {
         self.coupling.resize(columns, 0.0);
         self.on_object.resize(columns, 0.0);
@@ -165,30 +165,30 @@ impl Scratch {
 }
 
 impl Node {
-    /// How many rows its states take.
+    /// Returns the number of rows of the node's states.
     pub fn states(&self) -> usize {
         let bodies = if self.device.is_some() { 2 } else { 1 };
         2 * bodies + if self.compute_delay { bodies } else { 0 } + self.law.memory.len() + self.past_rows()
     }
 
-    /// How many rows the own states of the past take.
+    /// Returns the number of rows of the own states of the past.
     fn past_rows(&self) -> usize {
         self.looks_back() * if self.keeps_whole_past { 2 } else { 1 }
     }
 
-    /// How many ticks the law looks back, where it does anything with what it sees there.
+    /// Returns the number of ticks that the law looks back; 0 if the gains of the past state are zero.
     pub fn looks_back(&self) -> usize {
         let Gains { stiffness, damping } = self.law.force.past;
         if stiffness + damping > 0.0 { self.law.lag } else { 0 }
     }
 
-    /// What a combination (K·x + B·v)/(K + B/time) of an own state is divided by to be a length, of the gains K and B by which the law takes the past [N/m].
+    /// Returns the divisor K + B/time of the combination (K·x + B·v)/(K + B/time) of a past own state, with the law's gains K and B of the past [N/m].
     pub fn past_unit(&self, time: f64) -> f64 {
         let Gains { stiffness, damping } = self.law.force.past;
         stiffness + damping / time
     }
 
-    /// How far a translation of everything by 1 moves each of its rows, where it stands at `rows`.
+    /// Returns the distance by which a translation of everything by 1 moves the row `row` of the node, whose rows are `rows`.
     pub fn displacement(&self, rows: Rows, row: usize, time: f64) -> f64 {
         if row == rows.object || Some(row) == rows.device {
             1.0
@@ -201,7 +201,7 @@ impl Node {
         }
     }
 
-    /// Its rows, from `first` on.
+    /// Returns the places of the node's rows, which stand from `first` on.
     pub fn rows(&self, first: usize) -> Rows {
         let device = self.device.map(|_| first);
         let object = first + if self.device.is_some() { 2 } else { 0 };
@@ -209,22 +209,22 @@ impl Node {
         Rows { device, object, pending: self.compute_delay.then_some(object + 2), memory: past - self.law.memory.len(), past }
     }
 
-    /// The compliance that makes the node's forces lengths: how far a force moves the copy within the common time.
+    /// Returns the compliance that makes the node's forces lengths: the distance that a force moves the copy within the common time [m/N].
     pub fn compliance(&self, time: f64) -> f64 {
         self.object.short.1.coefficients().1[1] * time
     }
 
-    /// The largest sum of the sizes of a row of one tick's matrix, in the units of `scale`: how much rounding errors grow in a tick at most.
+    /// Returns the largest sum of absolute values of a row of one tick's matrix, in the units of `scale`. Rounding errors grow by at most that factor per tick.
     pub(crate) fn step_norm(&self, scale: Scale) -> f64 {
-        // One that is extrapolated without end counts by the gains alone, as its own row does.
+        // A sample that is extrapolated without end counts by the gains alone.
         self.step_norm_up_to(scale, 0.0)
     }
 
-    /// The same where samples are extrapolated without end, and none is older than `oldest` \[s\].
+    /// Returns [`Node::step_norm`] with `oldest` \[s\] as the age of the oldest sample, for laws that extrapolate samples without end.
     pub fn step_norm_up_to(&self, scale: Scale, oldest: f64) -> f64 {
         let gain = |gains: Gains| gains.stiffness.abs() + gains.damping.abs() / scale.time;
         let wall = self.wall.map_or(0.0, gain);
-        // Samples are used up to the horizon at most.
+        // Samples are extrapolated up to the horizon at most.
         let oldest = self.law.horizon.map_or(0.0, |horizon| if horizon.is_finite() { horizon } else { oldest });
         let seen = |row: &LawRow| gain(row.own) + gain(row.past) + gain(row.heard) + row.ahead.abs() * oldest / scale.time;
         let remembered = |row: &LawRow| row.memory.iter().enumerate().map(|(place, by)| by.abs() / self.memory_unit(place, scale)).sum::<f64>();
@@ -245,16 +245,18 @@ impl Node {
         row(&self.object, on_object).max(device).max(memory)
     }
 
-    /// What a number that the law remembers is multiplied by to be a length: by how far its part of the force moves the copy within the common time.
+    /// Returns the factor that makes number `place` of the law's memory a length: the distance that the force of one unit of the number moves the copy within
+    /// the common time.
     pub fn memory_unit(&self, place: usize, scale: Scale) -> f64 {
         let by = self.law.force.memory[place].abs();
-        // A force that is remembered acts for that long, where one that waits acts for a tick.
+        // A remembered force acts for the whole common time, whereas a waiting force acts for a tick.
         let ticks = scale.time / self.object.short.0.as_secs_f64();
         scale.compliance * ticks * if by > 0.0 { by } else { 1.0 }
     }
 
-    /// One tick: forces from the rows as they are, `heard` what each row of the law hears of the samples held \[N\], FT's first, which pulls the copy there;
-    /// `external` what else acts. Every row is a linear function of the same unknowns, one column each.
+    /// Makes one tick: computes the forces from the rows `z` and moves device and copy by `span`. `heard` returns the force that each row of the law hears of
+    /// the samples held \[N\], the row of FT first. `external` has the forces that do not follow from the states. Every row is a linear function of the same
+    /// unknowns, one column each.
     #[expect(clippy::too_many_arguments, reason = "what a tick needs, each of its own kind")]
     pub fn tick<'a>(
         &self,
@@ -291,12 +293,14 @@ impl Node {
                 *force += wall;
             }
         }
+        // Past states and memory change here, before the copy moves, because both take in the state that the forces of this tick have seen.
         if self.looks_back() > 0 {
             self.look_back(z, rows, scale, on_object);
         }
         if !self.law.memory.is_empty() {
             self.remember(z, rows, heard, scale, (on_object, memory));
         }
+        // With a delay of the computation the forces of the previous tick act now, and the new forces wait.
         if let Some(pending) = rows.pending {
             exchange(z.row_mut(pending), on_object, scale.compliance);
             if rows.device.is_some() {
@@ -314,7 +318,7 @@ impl Node {
 }
 
 impl Node {
-    /// The oldest of the own states takes part in the force, and the present one is remembered.
+    /// Adds the force of the oldest own state to `on_object`, and stores the present own state in place of the oldest.
     fn look_back(&self, z: &mut Matrix, rows: Rows, scale: Scale, on_object: &mut [f64]) {
         let (count, unit, gains) = (self.looks_back(), self.past_unit(scale.time), scale.gains(self.law.force.past));
         if self.keeps_whole_past {
@@ -340,7 +344,7 @@ impl Node {
         }
     }
 
-    /// The memory of the law takes part in the force and takes its next values.
+    /// Adds the force of the law's memory to `on_object`, and gives the memory its next values.
     fn remember<'a>(
         &self,
         z: &mut Matrix,
@@ -356,6 +360,7 @@ impl Node {
                 *force -= share * remembered;
             }
         }
+        // The next values are collected first, because every row may depend on all present values.
         next.reset(self.law.memory.len(), columns);
         for (row, law) in self.law.memory.iter().enumerate() {
             let unit = self.memory_unit(row, scale);
@@ -376,7 +381,7 @@ impl Node {
         }
     }
 
-    /// What the rows of the law hear of a unit of that number of a sample of that age \[s\], FT's first \[N\].
+    /// Iterates over the forces that the rows of the law hear of a unit of number `channel` of a sample of age `age` \[s\], the row of FT first [N/m].
     pub fn heard(&self, sampling: Sampling, channel: usize, age: f64, time: f64) -> impl Iterator<Item = f64> {
         let age = self.law.horizon.map_or(0.0, |horizon| age.min(horizon));
         self.law.rows().map(move |row| sampling.heard(row, channel, age, time))
@@ -384,7 +389,7 @@ impl Node {
 }
 
 impl Sampling {
-    /// One number if that is all that the laws of the nodes use; of laws that hear nothing too.
+    /// Returns the numbers of a sample that the laws of the nodes use: one number if all rows use multiples of the same combination, or hear nothing.
     pub fn of(nodes: &[Node]) -> Self {
         let heard = |row: &LawRow| (row.heard.stiffness != 0.0 || row.heard.damping != 0.0).then_some(row.heard);
         let rows = || nodes.iter().flat_map(|node| node.law.rows());
@@ -399,12 +404,12 @@ impl Sampling {
     }
 }
 
-/// Coordination and wall pull on the copy's own state alike.
+/// Returns the sum of both gains, because coordination and wall pull on the copy's own state alike.
 pub(crate) fn coordination_of(coordination: Gains, wall: Option<Gains>) -> Gains {
     wall.map_or(coordination, |wall| Gains { stiffness: coordination.stiffness + wall.stiffness, damping: coordination.damping + wall.damping })
 }
 
-/// Stores the forces just computed and gives those computed a tick before.
+/// Exchanges forces: stores the new ones as lengths, and puts those stored a tick before into `force` \[N\].
 fn exchange(stored: &mut [f64], force: &mut [f64], compliance: f64) {
     for (stored, force) in stored.iter_mut().zip(force) {
         let before = *stored / compliance;
