@@ -1,9 +1,9 @@
-//! Roots counted by the argument principle, with steps whose phase change is bounded beforehand.
+//! Counts of roots by the argument principle, with steps along a circle whose change of phase is bounded beforehand.
 //!
 //! Between two points of the contour A changes by Δ, and det A by the factor det(1 + A⁻¹Δ) = Π (1 + μ). The sum of the |μ| is at most the nuclear norm of
-//! A⁻¹Δ (Weyl; Horn & Johnson 1991, Theorem 3.3.13), and while that is at most q < 1 the phase has changed by at most asin q < π/2: each factor by at most
-//! asin |μ|, and asin is convex. So a step that is covered by such discs from both ends has a phase change below π, which the determinants at its ends
-//! tell. Rounding and a perturbation of the entries are counted in Δ; a count then holds for every system that near.
+//! A⁻¹Δ (Weyl; Horn & Johnson 1991, Theorem 3.3.13). While that norm is at most q < 1, the phase changes by at most asin q < π/2, because each factor changes
+//! the phase by at most asin |μ| and asin is convex. So a step that such discs cover from both ends has a change of phase below π, which follows from the
+//! determinants at its ends. Δ includes rounding and the perturbation of the entries, so that a count holds for every system within the perturbation.
 
 use core::f64::consts::PI;
 
@@ -14,7 +14,7 @@ use super::kernel::Kernel;
 use super::point::Point;
 use crate::Watch;
 
-/// The most points that one count may cost, and as many more for each step of delay. A root that asks for more counts as too near.
+/// The largest number of points of one count is `POINTS`, and `POINTS_PER_STEP` more for each step of delay. A root that needs more points is too near.
 const POINTS: u64 = 10_000;
 const POINTS_PER_STEP: u64 = 60;
 
@@ -25,27 +25,28 @@ pub(super) struct Circle {
     pub(super) radius: f64,
 }
 
-/// The outcome of one trip around.
+/// The result of one trip around a circle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Trip {
-    /// Turns of det A; `None` if a root is so near that it cannot be told.
+    /// Turns of det A around zero; `None` if a root is too near to the circle.
     pub(super) turns: Option<i64>,
-    /// The point where a root seemed to be nearest.
+    /// Point of the circle where a root seemed to be nearest: the norm of A⁻¹ is largest there, or the trip ended there.
     pub(super) nearest: Complex64,
 }
 
-/// The numbers that all points of a circle have in common.
+/// Numbers that all points of a circle have in common.
 struct Limits {
+    /// Smallest modulus of a point of the circle, rounded down.
     inner: f64,
-    /// Of each kernel: its limits, and inner^−j.
+    /// Limits of each kernel and inner^−j, indexed like the terms of the loop.
     kernels: Vec<((f64, f64), f64)>,
-    /// The perturbation of A at most, and the kernels' rounding.
+    /// Bound of the perturbation of A and of the rounding of the kernels, in the 2-norm.
     blur: f64,
 }
 
 impl DelayedLoop {
-    /// How often det A turns around zero on the circle, which must not have the origin inside unless it is its centre, for all systems whose
-    /// matrices are within `perturbation` of these in the 2-norm; not told if the watch ends it.
+    /// Counts the turns of det A around zero along the circle, for all systems whose matrices are within `perturbation` of these in the 2-norm. The origin must
+    /// be the centre of the circle or outside. No turns are returned if the watch stops the trip.
     pub(super) fn trip(&self, circle: Circle, perturbation: f64, watch: &dyn Watch) -> Trip {
         let centred = circle.centre.norm() == 0.0;
         let inner = (if centred { circle.radius } else { circle.centre.norm() - circle.radius }) * (1.0 - 1e-15);
@@ -79,7 +80,7 @@ impl DelayedLoop {
                     return trip;
                 };
                 let back = self.reach(&there, &limits, circle.radius);
-                // Arcs are longer than chords: what covers the arc covers all its points.
+                // Two discs whose radii sum to the length of the arc cover all its points, because a chord is shorter than its arc.
                 if let Some(back) = back
                     && covered + back >= (next - angle) * circle.radius
                 {
@@ -93,12 +94,13 @@ impl DelayedLoop {
                 }
                 step *= 0.5;
                 if step * circle.radius <= 0.9 * covered {
-                    // Already inside the disc of this point, and the next one has no room: rounding.
+                    // The next point lies within the disc of this one, and its own disc is empty or too small: rounding hides the phase.
                     trip.nearest = there.z;
                     return trip;
                 }
             }
             if angle >= end {
+                // A half circle has half the turns of the circle, because det A is conjugate in the lower half.
                 let turns = phase / end;
                 trip.turns = Some(rounded(turns));
                 return trip;
@@ -116,7 +118,8 @@ impl DelayedLoop {
         Limits { inner, kernels, blur }
     }
 
-    /// How far from a point the phase is known to change by less than a quarter turn; `None` if not even at the point itself.
+    /// Returns the distance from a point within which the phase changes by less than a quarter turn, at most `longest`; `None` if the bound fails even at the
+    /// point itself.
     fn reach(&self, point: &Point, limits: &Limits, longest: f64) -> Option<f64> {
         let nuclear = point.nuclear(self.now.rows());
         let fixed = (limits.blur + point.rounding) * nuclear;
@@ -132,7 +135,7 @@ impl DelayedLoop {
             }
             sum
         };
-        // The change is monotone in the length: bisection in its logarithm, to a tenth.
+        // The change grows with the length: bisection finds the largest length to within a tenth.
         let mut low = 1e-18 * point.z.norm();
         let mut high = longest;
         let least = change(low);

@@ -1,12 +1,12 @@
-//! A loop with delays, in the form of its characteristic function.
+//! A loop with delays, given by the matrices of its characteristic function.
 
 use super::kernel::Kernel;
 use crate::Matrix;
 
-/// x(t+1) = now·x(t) + Σ matrix·(what a kernel makes of x at t and before): the characteristic function is
-/// F(z) = det(z − now − Σ kernel(z)·matrix), and an eigenvalue of the loop is a root of it.
+/// A loop x(t+1) = now·x(t) + Σ matrix·(kernel applied to x). Its characteristic function is F(z) = det(z − now − Σ kernel(z)·matrix), and the eigenvalues of
+/// the loop are the roots of F.
 ///
-/// `Kernel::Delay(j)` in it stands for x(t−j), and `Kernel::Sum(j)` for x(t−1) + … + x(t−j).
+/// `Kernel::Delay(j)` stands for x(t−j), and `Kernel::Sum(j)` for x(t−1) + … + x(t−j).
 #[derive(Clone, PartialEq, Debug)]
 pub struct DelayedLoop {
     pub(super) now: Matrix,
@@ -21,24 +21,24 @@ pub(super) struct Term {
     pub(super) norm: f64,
 }
 
-/// Why matrices make no loop.
+/// Why matrices do not make a loop.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DelayedLoopError {
-    /// Not all matrices are square and of one size.
+    /// The matrices are empty, not square, or of different sizes.
     #[error("a matrix of a delayed loop has {rows} rows and {columns} columns, expected {size} of each, at least 1")]
     Shape {
         /// Rows of that matrix.
         rows: usize,
         /// Columns of that matrix.
         columns: usize,
-        /// The rows of the first matrix.
+        /// Rows of the matrix `now`.
         size: usize,
     },
-    /// A delay has more steps than are counted.
+    /// A delay has 2³² steps or more.
     #[error("a delay of {steps} steps: expected fewer than 2^32")]
     TooLong {
-        /// The steps.
+        /// Steps of the delay.
         steps: usize,
     },
     /// An entry is infinite or NaN.
@@ -47,7 +47,7 @@ pub enum DelayedLoopError {
 }
 
 impl DelayedLoop {
-    /// The loop. Terms that are zero are left out.
+    /// Returns the loop of these matrices. Terms that are zero are left out.
     ///
     /// # Errors
     ///

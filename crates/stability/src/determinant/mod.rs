@@ -1,8 +1,7 @@
-//! Stability of loops with long delays from a small determinant instead of a large matrix.
+//! Stability of loops with long delays, from a small determinant instead of a large matrix.
 //!
-//! A delay of j steps adds j times as many states to a matrix as signals are delayed, but to the characteristic equation only a factor z^−j. The
-//! roots of that equation outside a circle are counted by the argument principle, and the outermost is found by Newton's method and then certified by
-//! two counts.
+//! In a matrix, a delay of j steps adds j states for each delayed signal. In the characteristic equation the same delay is only a factor z^−j. The roots of
+//! that equation outside a circle are counted by the argument principle. The outermost root is found by Newton's method and then certified by two counts.
 
 mod contour;
 mod delayed_loop;
@@ -21,22 +20,22 @@ use contour::Circle;
 pub use delayed_loop::{DelayedLoop, DelayedLoopError};
 pub use kernel::Kernel;
 
-/// About how many points are looked at for each step of delay, on all circles together: measured, of delays of 250 to 4000 frames.
+/// The approximate number of points per step of delay, on all circles together, measured for delays of 250 to 4000 frames.
 const POINTS_A_STEP: f64 = 60.0;
-/// Operations for an entry of the matrix of a point besides products: kernels, lengths and allocations.
+/// Operations for an entry of the matrix at a point besides products: kernels, lengths and allocations.
 const OF_AN_ENTRY: f64 = 20.0;
 
 impl DelayedLoop {
-    /// The number of roots with |z| > `radius`, each as often as its multiplicity; `None` if one is so near to the circle that rounding hides on
-    /// which side it is, or if |z|^−j leaves the range of numbers on it.
+    /// Returns the number of roots with |z| > `radius`, each as often as its multiplicity; `None` if a root is so near to the circle that rounding hides its
+    /// side, if |z|^−j overflows on the circle, or if `radius` is not positive and finite.
     ///
-    /// F has no poles but z = 0 and is z^n far away, so that the roots outside are n less the turns of F along the circle.
+    /// F has no poles but z = 0 and is close to z^n far away, so that the number of roots outside is n minus the turns of F along the circle.
     #[must_use]
     pub fn roots_outside(&self, radius: f64) -> Option<usize> {
         self.count(radius, 0.0, &Unwatched)
     }
 
-    /// [`DelayedLoop::roots_outside`] for all loops whose matrices are each within `perturbation` of these in the 2-norm.
+    /// Returns [`DelayedLoop::roots_outside`] if it is the same for all loops whose matrices are each within `perturbation` of these in the 2-norm.
     fn count(&self, radius: f64, perturbation: f64, watch: &dyn Watch) -> Option<usize> {
         if !(radius > 0.0 && radius.is_finite()) {
             return None;
@@ -44,7 +43,7 @@ impl DelayedLoop {
         self.roots_beyond(self.trip(Circle { centre: Complex64::default(), radius }, perturbation, watch).turns?)
     }
 
-    /// How many operations [`DelayedLoop::bounded_radius`] takes, about: the points of a circle are as many as the steps of delay.
+    /// Returns the approximate number of operations of [`DelayedLoop::bounded_radius`]: the number of points grows like the steps of delay.
     #[must_use]
     pub fn operations(&self) -> f64 {
         POINTS_A_STEP * real(usize::try_from(self.steps()).unwrap_or(usize::MAX)) * self.operations_of_a_point()
@@ -53,11 +52,11 @@ impl DelayedLoop {
     /// Returns the operations for the characteristic matrix at one point, its inverse and the distances that follow from the inverse.
     fn operations_of_a_point(&self) -> f64 {
         let size = real(self.now.rows());
-        // A multiplication of complex numbers is four; a product with each term beside the inverse.
+        // A complex multiplication counts as four operations. The inverse is one product, and each term is another.
         4.0 * size * size * (size + size * real(self.terms.len()) + OF_AN_ENTRY)
     }
 
-    /// The steps of all kernels.
+    /// Returns the sum of the steps of all kernels.
     fn steps(&self) -> u64 {
         self.terms.iter().map(|term| u64::from(term.kernel.steps())).sum()
     }

@@ -1,24 +1,25 @@
-//! The characteristic matrix at one point.
+//! The characteristic matrix at one point z, and its inverse.
 
 use num_complex::Complex64;
 
 use super::delayed_loop::DelayedLoop;
 
-/// A(z) = z − now − Σ kernel(z)·matrix, inverted.
+/// The inverse of A(z) = z − now − Σ kernel(z)·matrix, and numbers of its evaluation.
 #[derive(Clone, Debug)]
 pub(super) struct Point {
     pub(super) z: Complex64,
-    /// The direction of det A, of length 1.
+    /// det A divided by its modulus.
     pub(super) direction: Complex64,
+    /// A⁻¹, row by row.
     pub(super) inverse: Vec<Complex64>,
-    /// The kernels' sizes.
+    /// Moduli of the kernels at z, indexed like the terms of the loop.
     pub(super) sizes: Vec<f64>,
-    /// The 2-norm of the rounding error of the entries of A and of the elimination, at most.
+    /// Bound of the 2-norm of the rounding error of the entries of A and of the elimination.
     pub(super) rounding: f64,
 }
 
 impl DelayedLoop {
-    /// `None` if the matrix is singular to the last digit, or its entries are too large for numbers.
+    /// Evaluates and inverts A at z; `None` if A is singular to the last digit, or if its entries are too large.
     pub(super) fn point(&self, z: Complex64) -> Option<Point> {
         let size = self.now.rows();
         let mut matrix: Vec<Complex64> = self.now.entries().iter().map(|entry| Complex64::from(-entry)).collect();
@@ -35,14 +36,14 @@ impl DelayedLoop {
             sizes.push(value.norm());
             error += value.norm() * term.norm;
         }
-        // Sums of that number of terms, and Gauss–Jordan elimination with pivots of a matrix of that size (growth is taken as the size: Higham 2002, 9.3).
+        // The bound covers sums of one term per kernel, and Gauss–Jordan elimination with pivots, whose growth is taken as the size (Higham 2002, 9.3).
         let dimension = f64::from(u32::try_from(size).unwrap_or(u32::MAX));
         let rounding = 8.0 * f64::EPSILON * (dimension + f64::from(u32::try_from(sizes.len()).unwrap_or(u32::MAX))) * error;
         let direction = invert(&mut matrix, size)?;
         Some(Point { z, direction, inverse: matrix, sizes, rounding })
     }
 
-    /// F/F' = 1/tr(A⁻¹·A'), with A' = 1 − Σ kernel'·matrix (Jacobi's formula).
+    /// Returns the step F/F' = 1/tr(A⁻¹·A') of Newton's method, with A' = 1 − Σ kernel'·matrix (Jacobi's formula).
     pub(super) fn newton_step(&self, point: &Point) -> Complex64 {
         let size = self.now.rows();
         let mut trace: Complex64 = (0..size).map(|place| point.inverse[place * size + place]).sum();
@@ -59,12 +60,12 @@ impl DelayedLoop {
 }
 
 impl Point {
-    /// A bound of the nuclear norm (the sum of the singular values) of A⁻¹: the sum of its columns' lengths.
+    /// Returns a bound of the nuclear norm (the sum of the singular values) of A⁻¹: the sum of the lengths of the columns.
     pub(super) fn nuclear(&self, size: usize) -> f64 {
         (0..size).map(|column| (0..size).map(|row| self.inverse[row * size + column].norm_sqr()).sum::<f64>().sqrt()).sum()
     }
 
-    /// The same of A⁻¹·matrix.
+    /// Returns a bound of the nuclear norm of A⁻¹·matrix: the sum of the lengths of the columns.
     pub(super) fn nuclear_with(&self, matrix: &crate::Matrix) -> f64 {
         let size = matrix.rows();
         let mut total = 0.0;
@@ -80,7 +81,8 @@ impl Point {
     }
 }
 
-/// Inverts in place by Gauss–Jordan elimination with row exchanges, and gives the direction of the determinant.
+/// Inverts a matrix in place by Gauss–Jordan elimination with row exchanges, and returns the determinant divided by its modulus; `None` if a pivot is too
+/// small or too large.
 fn invert(matrix: &mut [Complex64], size: usize) -> Option<Complex64> {
     let mut direction = Complex64::new(1.0, 0.0);
     let mut exchanges = Vec::with_capacity(size);
@@ -118,6 +120,7 @@ fn invert(matrix: &mut [Complex64], size: usize) -> Option<Complex64> {
             }
         }
     }
+    // Exchanges of rows of A are exchanges of columns of the inverse, undone from the last to the first.
     for (step, pivot_row) in exchanges.into_iter().enumerate().rev() {
         if step != pivot_row {
             for row in 0..size {

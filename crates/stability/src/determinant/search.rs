@@ -1,4 +1,4 @@
-//! The outermost root.
+//! The search for the outermost root of a loop with delays, and its certification by counts.
 
 use num_complex::Complex64;
 
@@ -6,33 +6,33 @@ use super::contour::Circle;
 use super::{DelayedLoop, Kernel};
 use crate::{Matrix, Radius, Unwatched, Watch};
 
-/// Up to this many rows the explicit matrix is as cheap, and its bound is better at multiple roots.
+/// The largest number of rows for which the explicit matrix is used: it is as cheap, and its bound is better at multiple roots.
 const EXPLICIT: usize = 40;
-/// Halvings of the bracket, in its logarithm.
+/// The largest number of halvings of the bracket, in the logarithm of the radius.
 const HALVINGS: u32 = 60;
-/// Growth of the distances at which a root is certified.
+/// Factor between a distance at which a root could not be certified and the next distance.
 const GROWTH: f64 = 3.0;
 
 impl DelayedLoop {
-    /// The modulus of the outermost root: for every loop whose matrices are each within `perturbation` of these in the 2-norm, it is within value ±
-    /// error.
+    /// Returns the modulus of the outermost root. For every loop whose matrices are each within `perturbation` of these in the 2-norm, the modulus is within
+    /// value ± error.
     ///
-    /// The upper end is certified by a count of no root outside, the lower end by a count of one root at least within a small circle (or outside the
-    /// lower end), both for all those loops and with the rounding of the evaluation included; see [`DelayedLoop::roots_outside`]. The circles
-    /// start as near as the first-order sensitivity |A⁻¹|·|F/F'| of the root allows and grow threefold until they hold.
+    /// The upper end is certified by a count of no root outside, the lower end by a count of at least one root within a small circle (or outside the
+    /// lower end). Both counts hold for all those loops and include the rounding of the evaluation; see [`DelayedLoop::roots_outside`]. The distances of the
+    /// circles begin with the first-order sensitivity |A⁻¹|·|F/F'| of the root and grow threefold until the counts succeed.
     ///
-    /// If all roots are so far inside that |z|^−j leaves the range of numbers, the interval reaches from 0 to the smallest radius at which they were
-    /// counted. The error is infinite if nothing could be counted.
+    /// If all roots are so far inside that |z|^−j overflows, the interval reaches from 0 to the smallest radius at which the roots were counted. The error is
+    /// infinite if no count succeeded.
     #[must_use]
     pub fn bounded_radius(&self, perturbation: f64) -> Radius {
         self.bounded_radius_watched(perturbation, &Unwatched).unwrap_or(Radius::UNKNOWN)
     }
 
-    /// [`DelayedLoop::bounded_radius`], watched: it is asked at each point of each circle; `None` if the watch ends it.
+    /// Computes [`DelayedLoop::bounded_radius`] with a watch, which is asked at each point of each circle; `None` if the watch stops the computation.
     #[must_use]
     pub(crate) fn bounded_radius_watched(&self, perturbation: f64, watch: &dyn Watch) -> Option<Radius> {
         let radius = self.searched(perturbation, watch);
-        // A count that was ended tells nothing, like one that is too near to a root: what came of it is no answer.
+        // A stopped count looks like a count too near to a root, so that the radius of a stopped search may be wrong and is no answer.
         (!watch.stops()).then_some(radius)
     }
 
@@ -45,7 +45,7 @@ impl DelayedLoop {
             return Radius::UNKNOWN;
         };
         let longest = longest.max(1);
-        // z^−j stays below 1e60; and below a radius at which nothing could be told, nothing is tried again.
+        // At the floor |z|^−j is 1e60. The floor rises to each radius at which a count failed, so that no smaller radius is tried.
         let mut floor = libm::pow(10.0, -60.0 / f64::from(longest));
         let mut low: f64 = 0.0;
         let mut trial = high;
@@ -59,7 +59,7 @@ impl DelayedLoop {
                 Some(_) => low = low.max(trial),
                 None => floor = floor.max(trial),
             }
-            // From outside, the root that seems nearest is usually the outermost; if it is not, at least none within it is.
+            // From outside, the root that seems nearest to the circle is usually the outermost one. If it is not, its modulus is still a lower bound.
             if low < trial
                 && let Some(root) = self.polished(trip.nearest)
             {
@@ -80,11 +80,11 @@ impl DelayedLoop {
         interval(low, high, 0.5 * (low + high))
     }
 
-    /// The radius of the explicit matrix of a short delay: the newest state, and as many older ones as the kernels reach.
+    /// Returns the radius of the explicit matrix of a loop with short delays. The states are the newest x and the `depth` older ones that the kernels reach.
     fn explicit_radius(&self, depth: usize, perturbation: f64) -> Radius {
         let size = self.now.rows();
         let mut whole = Matrix::zeros(size * (depth + 1), size * (depth + 1));
-        // A row of k blocks, each changed by the same matrix, changes by √k of it in the 2-norm.
+        // A row of k blocks that are all perturbed by the same matrix is perturbed by √k times the norm of that matrix, in the 2-norm.
         let mut copies = 1.0;
         for row in 0..size {
             whole.row_mut(row)[..size].copy_from_slice(self.now.row(row));
@@ -110,7 +110,7 @@ impl DelayedLoop {
         crate::bounded_radius(&whole, perturbation * copies)
     }
 
-    /// A radius beyond which there is no root: |z| > |now| + Σ |kernel|·|matrix| makes A diagonally dominant in norm.
+    /// Returns a radius beyond which there is no root, because |z| > |now| + Σ |kernel|·|matrix| makes A regular; `None` if no radius below 10¹² suffices.
     fn outer(&self, perturbation: f64) -> Option<f64> {
         let mut radius = 0.25;
         while radius < 1e12 {
@@ -126,13 +126,13 @@ impl DelayedLoop {
         None
     }
 
-    /// Newton's method from `start`, with the last digits of a multiple root left open; `None` if it does not converge.
+    /// Returns the root that Newton's method finds from `start`; the last digits of a multiple root may be wrong. `None` if the method does not converge.
     fn polished(&self, start: Complex64) -> Option<Complex64> {
         let mut z = start;
         let mut last = f64::INFINITY;
         for _ in 0..80 {
             let Some(point) = self.point(z) else {
-                // Singular to the last digit next to a root; or too far inside for numbers.
+                // The matrix is singular to the last digit next to a root, or z is so far inside that entries overflow: only a small last step means a root.
                 return (last < 1e-6 * z.norm()).then_some(z);
             };
             let step = self.newton_step(&point);
@@ -140,9 +140,9 @@ impl DelayedLoop {
             if !length.is_finite() {
                 return None;
             }
-            // Steps that no longer shrink near the rounding of the root: done.
+            // The step is within rounding, or small and no longer shrinking: the iteration has converged.
             if length <= 4.0 * f64::EPSILON * z.norm() || (length < 1e-6 * z.norm() && length > 0.9 * last) {
-                // A root next to the real axis is one on it, as far as can be told: half circles are cheaper.
+                // A root this close to the real axis is taken to be real, because half circles are cheaper. The counts that follow decide.
                 return Some(if z.im.abs() < 1e-14 * z.norm() { Complex64::from(z.re) } else { z });
             }
             last = length;
@@ -151,7 +151,8 @@ impl DelayedLoop {
         None
     }
 
-    /// The first-order error of a root: |A⁻¹| grows like |root's sensitivity|/distance next to it.
+    /// Returns the first-order error of a root, as the distance of the first circle. Next to the root |A⁻¹| is its sensitivity divided by the distance, so that
+    /// the sensitivity follows from a point nearby.
     fn first_distance(&self, root: Complex64, perturbation: f64) -> f64 {
         let longest = f64::from(self.terms.iter().map(|term| term.kernel.steps()).max().unwrap_or(0).max(1));
         let offset = 1e-6 / longest * root.norm();
@@ -165,11 +166,11 @@ impl DelayedLoop {
         if first.is_finite() { first.max(smallest) } else { smallest }
     }
 
-    /// A radius that at least one root reaches, from a circle around the computed one; 0 if there is none.
+    /// Returns a radius that at least one root reaches, by counts on circles around the computed root; 0 if no count succeeds.
     fn certified_low(&self, root: Complex64, perturbation: f64, watch: &dyn Watch) -> f64 {
         let mut distance = self.first_distance(root, perturbation);
         while distance < 0.9 * root.norm() && !watch.stops() {
-            // A circle that comes near the real axis but is not centred there would meet the conjugate root too; that is no harm.
+            // A circle that reaches across the real axis may contain the conjugate root too. The count is then larger, and the bound still holds.
             if self.trip(Circle { centre: root, radius: distance }, perturbation, watch).turns.is_some_and(|turns| turns > 0) {
                 return (root.norm() - distance) * (1.0 - 4.0 * f64::EPSILON);
             }
@@ -178,7 +179,8 @@ impl DelayedLoop {
         0.0
     }
 
-    /// A radius that no root reaches, as little above that of `root` as can be told; `None` if there is a root outside, or nothing can be told.
+    /// Returns a radius below `high` that no root reaches, as little above the modulus of `root` as counts allow; `None` if there is a root outside, or if no
+    /// count succeeds.
     fn certified_high(&self, root: Complex64, high: f64, perturbation: f64, watch: &dyn Watch) -> Option<f64> {
         let modulus = root.norm();
         let mut distance = self.first_distance(root, perturbation);

@@ -9,7 +9,7 @@ fn scalar(now: f64, terms: &[(Kernel, f64)]) -> DelayedLoop {
     DelayedLoop::new(one(now), terms.iter().map(|(kernel, entry)| (*kernel, one(*entry))).collect()).unwrap()
 }
 
-/// The explicit matrix: the newest state, and as many older ones as the kernels reach.
+/// Returns the explicit matrix of a loop, whose states are the newest x and the older ones that the kernels reach.
 fn companion(looped: &DelayedLoop) -> Matrix {
     let size = looped.now.rows();
     let depth = looped.terms.iter().map(|term| term.kernel.steps()).max().unwrap_or(0) as usize;
@@ -102,7 +102,7 @@ fn double_roots_get_the_error_that_they_have() {
         let found = looped.bounded_radius(0.0);
         assert!((found.value - 0.5).abs() <= found.error && found.error < 1e-6, "{found:?}");
         assert_eq!(looped.roots_outside(0.4999), Some(2));
-        // A perturbation of ε moves it by √ε.
+        // A perturbation of ε moves a double root by √ε.
         let wider = looped.bounded_radius(1e-8);
         assert!(wider.error > 0.9e-4 && wider.error < 2e-3, "{wider:?}");
     }
@@ -165,7 +165,7 @@ proptest! {
         let explicit = bounded_radius(&whole, 0.0);
         prop_assert!((found.value - explicit.value).abs() <= found.error + explicit.error, "{found:?} {explicit:?}");
         prop_assert!(found.error < 1e-6 || found.value < 0.5, "{found:?} {explicit:?}");
-        // What the bound of a perturbation says holds for the perturbed.
+        // The interval for a perturbation contains the radius of a perturbed loop.
         let moved = DelayedLoop::new(looped.now.scaled(1.0 + 1e-5), looped.terms.iter().map(|term| (term.kernel, term.matrix.scaled(1.0 - 1e-5))).collect());
         let other = moved.unwrap().bounded_radius(0.0);
         let wide = looped.bounded_radius(1e-5 * 3.0);
