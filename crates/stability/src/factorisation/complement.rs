@@ -2,13 +2,13 @@
 
 use crate::Matrix;
 
-/// An orthonormal basis, as columns, of the vectors of `size` entries that are orthogonal to all given ones. Given vectors may depend on each other: a part of one that the
-/// others do not span counts as nothing if its length is at most `least`.
+/// Returns an orthonormal basis, as columns, of the vectors of `size` entries that are orthogonal to all given vectors. The given vectors may depend on each
+/// other: the part of a vector that the others do not span counts as zero if its length is at most `least`.
 pub fn orthogonal_complement(mut vectors: Vec<Vec<f64>>, size: usize, least: f64) -> Matrix {
     let mut reflectors: Vec<Vec<f64>> = Vec::new();
     while reflectors.len() < size {
         let done = reflectors.len();
-        // Earlier reflections have left each vector with entries beyond the first ones.
+        // Only entries from `done` on are orthogonal to the vectors already taken: earlier reflections have turned those onto the first axes.
         let length = |vector: &Vec<f64>| vector[done..].iter().map(|entry| entry * entry).sum::<f64>().sqrt();
         let lengths: Vec<f64> = vectors.iter().map(length).collect();
         let Some(longest) = (0..vectors.len()).max_by(|one, other| lengths[*one].total_cmp(&lengths[*other])) else { break };
@@ -25,6 +25,7 @@ pub fn orthogonal_complement(mut vectors: Vec<Vec<f64>>, size: usize, least: f64
     for column in 0..basis.columns() {
         let mut vector = vec![0.0; size];
         vector[reflectors.len() + column] = 1.0;
+        // The reflections in reverse order turn the remaining axes into the complement.
         reflectors.iter().rev().for_each(|reflector| reflect(&mut vector, reflector));
         for (row, entry) in vector.into_iter().enumerate() {
             basis[(row, column)] = entry;
@@ -33,7 +34,7 @@ pub fn orthogonal_complement(mut vectors: Vec<Vec<f64>>, size: usize, least: f64
     basis
 }
 
-/// Reflects a vector x at the plane that is orthogonal to the reflector v: x − 2·v·(vᵀx)/(vᵀv).
+/// Reflects a vector x at the plane orthogonal to the reflector v: x − 2·v·(vᵀx)/(vᵀv).
 fn reflect(vector: &mut [f64], reflector: &[f64]) {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let factor = 2.0 * dot(vector, reflector) / dot(reflector, reflector);
@@ -48,7 +49,7 @@ mod tests {
 
     #[test]
     fn a_complement_is_orthonormal_and_orthogonal_to_all() {
-        // The third is the sum of the first two.
+        // The third vector is the sum of the first two.
         let vectors = vec![vec![1.0, 2.0, 0.0, -1.0, 3.0], vec![0.0, 1e-3, 1e-3, 0.0, 0.0], vec![1.0, 2.001, 1e-3, -1.0, 3.0]];
         let basis = orthogonal_complement(vectors.clone(), 5, 1e-9);
         assert_eq!((basis.rows(), basis.columns()), (5, 3));

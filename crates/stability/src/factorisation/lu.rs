@@ -6,9 +6,9 @@ use num_complex::Complex64;
 
 use crate::matrix::Dense;
 
-/// A number in a matrix that is factorised.
+/// An entry of a matrix that is factorised, real or complex.
 pub trait Entry: Copy + Default + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + From<f64> {
-    /// How large it is: the sum of the sizes of its parts, within √2 of its modulus.
+    /// Returns the sum of the absolute values of real and imaginary part, which is between the modulus and √2 times the modulus.
     fn size(self) -> f64;
 }
 
@@ -26,12 +26,13 @@ impl Entry for Complex64 {
 
 /// P·A = L·U of a square matrix A: L is lower triangular with ones on the diagonal, U is upper triangular, P exchanges rows.
 ///
-/// Solutions are those of a matrix that differs from A by a small multiple of n·ε·|L|·|U| (Higham 2002, Theorem 9.4). Of a singular matrix they are not finite, or very large.
+/// Computed solutions are exact for a matrix that differs from A by a small multiple of n·ε·|L|·|U| (Higham 2002, Theorem 9.4). If A is singular, solutions
+/// are not finite or very large.
 #[derive(Clone, Debug)]
 pub struct Lu<T> {
     /// L below the diagonal, U on and above it.
     factors: Dense<T>,
-    /// For each row of the factors, that of A.
+    /// Row of A for each row of the factors.
     rows: Vec<usize>,
 }
 
@@ -42,7 +43,7 @@ impl<T: Entry> Lu<T> {
         Self::with_least_pivot(matrix, T::default())
     }
 
-    /// [`Lu::of`] with `least` in the place of pivots that are zero: of a singular matrix the factors are those of a regular one nearby.
+    /// Factorises as [`Lu::of`], with `least` in place of pivots that are zero: the factors of a singular matrix are those of a regular matrix nearby.
     pub(crate) fn with_least_pivot(matrix: &Dense<T>, least: T) -> Self {
         let size = matrix.rows();
         let (mut factors, mut rows) = (matrix.clone(), (0..size).collect::<Vec<_>>());
@@ -71,7 +72,7 @@ impl<T: Entry> Lu<T> {
         Self { factors, rows }
     }
 
-    /// x with A·x = b.
+    /// Returns x with A·x = b.
     pub(crate) fn solve(&self, right: &[T]) -> Vec<T> {
         let size = self.rows.len();
         let mut x: Vec<T> = self.rows.iter().map(|row| right[*row]).collect();
@@ -84,7 +85,7 @@ impl<T: Entry> Lu<T> {
         x
     }
 
-    /// x with Aᵀ·x = b.
+    /// Returns x with Aᵀ·x = b.
     pub(crate) fn solve_transposed(&self, right: &[T]) -> Vec<T> {
         let size = self.rows.len();
         let mut y = right.to_vec();
@@ -104,7 +105,7 @@ impl<T: Entry> Lu<T> {
         x
     }
 
-    /// X with A·X = B.
+    /// Returns X with A·X = B.
     pub fn solve_all(&self, right: &Dense<T>) -> Dense<T> {
         let mut solutions = Dense::zeros(right.rows(), right.columns());
         for column in 0..right.columns() {
@@ -116,19 +117,19 @@ impl<T: Entry> Lu<T> {
         solutions
     }
 
-    /// A⁻¹.
+    /// Returns A⁻¹.
     pub fn inverse(&self) -> Dense<T> {
         let size = self.rows.len();
         self.solve_all(&Dense::from_fn(size, size, |row, column| T::from(if row == column { 1.0 } else { 0.0 })))
     }
 }
 
-/// Σ a·b.
+/// Returns Σ a·b.
 fn sum<T: Entry>(a: &[T], b: &[T]) -> T {
     a.iter().zip(b).fold(T::default(), |sum, (a, b)| sum + *a * *b)
 }
 
-/// Takes a multiple of some numbers away from others.
+/// Subtracts `factor` times each number of `numbers` from the entry of `from` at the same place.
 fn subtract<T: Entry>(from: &mut [T], factor: T, numbers: &[T]) {
     for (entry, number) in from.iter_mut().zip(numbers) {
         *entry = *entry - factor * *number;
@@ -141,7 +142,7 @@ mod tests {
     use crate::Matrix;
     use crate::matrix::ComplexMatrix;
 
-    /// Hilbert's matrix of three rows times 60, and its inverse times 60 (both of whole numbers).
+    /// Hilbert's matrix of three rows times 60; the constant after it is 60 times the inverse of this matrix. All entries are whole numbers.
     const HILBERT: [[f64; 3]; 3] = [[60.0, 30.0, 20.0], [30.0, 20.0, 15.0], [20.0, 15.0, 12.0]];
     const INVERSE: [[f64; 3]; 3] = [[9.0, -36.0, 30.0], [-36.0, 192.0, -180.0], [30.0, -180.0, 180.0]];
 
@@ -150,7 +151,7 @@ mod tests {
         let found = Lu::of(&Matrix::from_fn(3, 3, |row, column| HILBERT[row][column])).inverse();
         for (place, found) in found.entries().iter().enumerate() {
             let expected = INVERSE[place / 3][place % 3] / 60.0;
-            // The condition number is 524: some roundings of a thousandth of 10⁻¹² each.
+            // The condition number is 524, so that errors are some roundings of a thousandth of 10⁻¹².
             assert!((found - expected).abs() < 1e-12, "{place}: {found} for {expected}");
         }
     }

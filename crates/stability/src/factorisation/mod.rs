@@ -1,4 +1,4 @@
-//! Factorisations of matrices that are the same to the bit everywhere: no library that chooses its instructions by the processor takes part.
+//! Factorisations of matrices with results that are the same to the bit on every machine: they use no library that chooses instructions by the processor.
 
 mod complement;
 mod lu;

@@ -1,14 +1,14 @@
-//! Symmetric matrices: Cholesky's factors and Jacobi's eigenvectors.
+//! Factorisations of symmetric matrices: Cholesky's factor, and eigenvectors by Jacobi's rotations.
 
 use crate::Matrix;
 
-/// The upper triangle R with RᵀR = A (Cholesky), from the upper triangle of A; `None` if a pivot is not above zero.
+/// Returns the upper triangle R with RᵀR = A (Cholesky). Reads only the upper triangle of A. `None` if a pivot is not above zero or not finite.
 pub fn cholesky(symmetric: &Matrix) -> Option<Matrix> {
     let size = symmetric.rows();
     let mut factor = Matrix::from_fn(size, size, |i, j| if i <= j { symmetric[(i, j)] } else { 0.0 });
     for pivot in 0..size {
         let square = factor[(pivot, pivot)];
-        // Written so that NaN fails.
+        // The negated condition refuses a pivot that is NaN.
         if !(square > 0.0 && square.is_finite()) {
             return None;
         }
@@ -16,7 +16,7 @@ pub fn cholesky(symmetric: &Matrix) -> Option<Matrix> {
         for entry in &mut factor.row_mut(pivot)[pivot..] {
             *entry /= root;
         }
-        // Whole rows at a time: the inner loop has no sum that must be added up in order.
+        // The loop subtracts whole rows. So the innermost loop has no sum whose terms must be added in order.
         let row = factor.row(pivot)[pivot..].to_vec();
         for below in pivot + 1..size {
             let share = row[below - pivot];
@@ -68,7 +68,7 @@ pub fn solve(upper: &Matrix, right: &[f64]) -> Vec<f64> {
     x
 }
 
-/// Eigenvalues and, as rows, eigenvectors of a symmetric matrix by Jacobi's rotations, in no order.
+/// Returns the eigenvalues of a symmetric matrix, in no order, and the eigenvectors of length 1 as rows in the same order, by Jacobi's rotations.
 pub fn eigen(symmetric: &Matrix) -> (Vec<f64>, Matrix) {
     const SWEEPS: u32 = 30;
     let size = symmetric.rows();
@@ -79,7 +79,7 @@ pub fn eigen(symmetric: &Matrix) -> (Vec<f64>, Matrix) {
         for p in 0..size {
             for q in p + 1..size {
                 let off = a[(p, q)];
-                // An entry this small against both its diagonal entries is rounding.
+                // An entry this small compared with its two diagonal entries is rounding.
                 if off.abs() <= f64::EPSILON * (a[(p, p)] * a[(q, q)]).abs().sqrt() || off.abs() < f64::MIN_POSITIVE {
                     continue;
                 }
@@ -118,7 +118,7 @@ fn rotate_rows(a: &mut Matrix, p: usize, q: usize, cosine: f64, sine: f64) {
 mod tests {
     use super::*;
 
-    /// Some matrix without structure.
+    /// Returns a matrix without structure.
     fn some(size: usize) -> Matrix {
         Matrix::from_fn(size, size, |i, j| libm::sin(f64::from(u32::try_from(7 * i * i + 3 * j + i * j + 1).unwrap())))
     }

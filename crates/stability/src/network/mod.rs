@@ -1,7 +1,7 @@
-//! When samples arrive if nothing is left to chance.
+//! The arrival times of samples over the links of a scene, with nothing left to chance.
 //!
-//! A link that only delays gives its delay at once. In any other a random part is replaced by a stated one; if it still does more than delay, the
-//! scene's own samples are sent through the emulator until what becomes of them repeats. Links that share no access line are looked at once for each
+//! The timing of a link that only delays is its delay. In every other link each random part is replaced by a stated one. If the link still does more than
+//! delay, samples of the scene are sent through the emulator until their fates repeat. Links without shared access lines are probed once for each
 //! configuration and each way of sampling, so that very many equal peers cost as much as two.
 
 mod nominal;
@@ -27,29 +27,29 @@ use self::sampling::Sampling;
 use crate::AnalysisError;
 use crate::pieces::refuse_topology;
 
-/// More peers than this are not probed together.
+/// The largest number of peers whose shared lines are probed together.
 const MOST_SHARING: usize = 256;
 
-/// What the links of a scene do with nothing left to chance.
+/// The timings of the links of a scene with nothing left to chance.
 #[derive(Clone, Debug)]
 pub struct NominalNetwork {
-    /// The different timings, each used.
+    /// The different timings, each used by at least one link.
     timings: Vec<LinkTiming>,
     places: Places,
-    /// The nominal parts, in words.
+    /// A sentence for each replaced part of the network.
     pub notes: Vec<String>,
 }
 
-/// Which timing a link has.
+/// The place of each link's timing in [`NominalNetwork::timings`].
 #[derive(Clone, Debug)]
 enum Places {
-    /// By its configuration, the class of its sender and that of its receiver.
+    /// Indexed by the configuration of the link, the class of its sender and the class of its receiver.
     Classes { links: cohaptic_scene::LinkTable, senders: Vec<usize>, receivers: Vec<usize>, places: BTreeMap<(usize, usize, usize), usize> },
-    /// By sender and receiver, row by row.
+    /// Indexed by sender and receiver, row by row; the diagonal has no meaning.
     Each { peers: usize, places: Vec<usize> },
 }
 
-/// The parts of a scene's network without chance.
+/// The nominal links and access lines of a scene; `size` is the size of a sample's datagram.
 struct Lines {
     size: Bytes,
     links: Vec<Nominal>,
@@ -58,11 +58,12 @@ struct Lines {
 }
 
 impl NominalNetwork {
-    /// When samples arrive in this scene as it begins.
+    /// Returns the timings of all links of a scene as it is configured at its beginning.
     ///
     /// # Errors
     ///
-    /// [`AnalysisError`] if what becomes of samples never repeats: a queue that is offered more than it carries, periods that do not meet.
+    /// [`AnalysisError`] if the fates of samples never repeat, because a queue is offered more than it carries or because periods do not meet; if too many
+    /// peers share lines; if the scene has a topology; or if peers send only on changes (dead bands).
     pub fn of(scene: &Scene) -> Result<Self, AnalysisError> {
         refuse_topology(scene, "this analysis")?;
         if scene.coordination.send_when.is_some() {
@@ -88,13 +89,13 @@ impl NominalNetwork {
         Ok(Self { timings: known.timings, places, notes: notes::notes(scene, links, uplinks, downlinks) })
     }
 
-    /// Every link takes that long and does nothing else.
+    /// Returns the network in which every link takes `delay` and does nothing else.
     pub fn uniform(delay: Duration) -> Self {
         let places = Places::Each { peers: 0, places: Vec::new() };
         Self { timings: vec![LinkTiming::Constant(delay)], places, notes: Vec::new() }
     }
 
-    /// The timing of a link, by the places of its ends; for a peer with itself the answer has no meaning.
+    /// Returns the timing of the link from peer `from` to peer `to`. The timing from a peer to itself has no meaning.
     pub fn timing(&self, from: usize, to: usize) -> &LinkTiming {
         if self.is_uniform() {
             return &self.timings[0];
@@ -108,7 +109,7 @@ impl NominalNetwork {
         &self.timings[place]
     }
 
-    /// Whether all links have one timing.
+    /// Returns whether all links have the same timing.
     pub const fn is_uniform(&self) -> bool {
         self.timings.len() == 1
     }
@@ -128,7 +129,7 @@ pub(crate) fn chance_of(scene: &Scene) -> Vec<&'static str> {
     names
 }
 
-/// Timings as they are met, each with a link that has it.
+/// The different timings found so far, each with a link that has the timing.
 #[derive(Default)]
 struct Known {
     timings: Vec<LinkTiming>,
@@ -145,7 +146,7 @@ impl Known {
         })
     }
 
-    /// All patterns together must repeat soon.
+    /// Fails if all patterns together repeat only after more than [`MOST_SAMPLES`] samples.
     fn check_period(&self, scene: &Scene) -> Result<(), AnalysisError> {
         let mut all = 1;
         for (timing, link) in self.timings.iter().zip(&self.links) {
@@ -162,7 +163,7 @@ const fn gcd(a: usize, b: usize) -> usize {
     if b == 0 { a } else { gcd(b, a % b) }
 }
 
-/// Where access lines only delay, each link is by itself.
+/// Finds the timings of a scene whose access lines only delay, so that links do not affect each other.
 fn by_class(scene: &Scene, lines: &Lines, uplinks: &[Duration], downlinks: &[Duration], known: &mut Known) -> Result<Places, AnalysisError> {
     let links = &scene.links;
     let matters = lines.links.iter().any(|link| link.constant().is_none());
@@ -170,7 +171,7 @@ fn by_class(scene: &Scene, lines: &Lines, uplinks: &[Duration], downlinks: &[Dur
     let sampling = |peer: usize| matters.then(|| Sampling::of(scene, peer, uplinks[peer]));
     let senders: Vec<usize> = (0..uplinks.len()).map(|peer| class(&mut ways, (uplinks[peer], sampling(peer)))).collect();
     let receivers: Vec<usize> = downlinks.iter().map(|delay| class(&mut spans, *delay)).collect();
-    // A link for each combination that there is.
+    // Finds one link for each combination of configuration and classes that occurs.
     let mut members = (vec![Vec::new(); ways.len()], vec![Vec::new(); spans.len()]);
     for peer in 0..senders.len() {
         members.0[senders[peer]].push(peer);
@@ -193,6 +194,7 @@ fn by_class(scene: &Scene, lines: &Lines, uplinks: &[Duration], downlinks: &[Dur
     for ((config, sender, receiver), (from, to)) in used {
         let link = &lines.links[config];
         let way = Sampling::of(scene, from, uplinks[from]);
+        // A link that does not depend on the time treats senders alike that differ only by a shift in time.
         let way = if link.is_timeless() { way.timeless() } else { way };
         let key = (config, link.constant().is_none().then_some(way));
         let timing = match (alone.get(&key), link.constant()) {
@@ -212,7 +214,7 @@ fn class<K: Ord>(classes: &mut BTreeMap<K, usize>, key: K) -> usize {
     *classes.entry(key).or_insert(next)
 }
 
-/// What one link does by itself.
+/// Returns the timing of one link, by a probe of a network of its two ends.
 fn probed(scene: &Scene, lines: &Lines, link: &Nominal, way: Sampling, (from, to): (usize, usize)) -> Result<LinkTiming, AnalysisError> {
     let config = NetworkConfig { seed: scene.seed, nodes: [from, to].map(|peer| scene.peers[peer].name.clone()).to_vec(), general: false };
     let network = Network::new(config, |_, _| link.config.clone());
@@ -223,7 +225,7 @@ fn probed(scene: &Scene, lines: &Lines, link: &Nominal, way: Sampling, (from, to
     Ok(found[1].clone())
 }
 
-/// Where lines are shared, all links together.
+/// Finds the timings of a scene with access lines that do more than delay, by a probe of all links together.
 fn shared(scene: &Scene, lines: &Lines, known: &mut Known) -> Result<Places, AnalysisError> {
     let peers = scene.peers.len();
     if peers > MOST_SHARING {
@@ -239,7 +241,7 @@ fn shared(scene: &Scene, lines: &Lines, known: &mut Known) -> Result<Places, Ana
         for (line, nominal) in [(AccessLine::Uplink(node), &lines.uplinks[place]), (AccessLine::Downlink(node), &lines.downlinks[place])] {
             let Some(nominal) = nominal else { continue };
             let (name, paths) = match line {
-                // Before a relay a sample is one packet.
+                // A peer sends a sample to a relay as one packet, and without a relay as one packet per receiver.
                 AccessLine::Uplink(_) => {
                     let receivers = if scene.relay { 1 } else { peers };
                     (format!("the uplink of {}", peer.name), others().take(receivers).map(|other| (place, other)).collect())
@@ -262,12 +264,12 @@ fn shared(scene: &Scene, lines: &Lines, known: &mut Known) -> Result<Places, Ana
     let all = lines.links.iter().chain(lines.uplinks.iter().flatten()).chain(lines.downlinks.iter().flatten());
     let found = probe.patterns(cycle(all, scene, peers), &rates).map_err(|error| explained(scene, error, |from, to| (from, to)))?;
     let timings = found.into_iter().enumerate();
-    // The diagonal has no meaning and must not count as another timing.
+    // The diagonal has no meaning and must not count as a timing of its own.
     let places = timings.map(|(place, timing)| if place / peers == place % peers { 0 } else { known.place(timing, (place / peers, place % peers)) });
     Ok(Places::Each { peers, places: places.collect() })
 }
 
-/// Samples are capable of ECN, as in a simulation.
+/// Returns the packet of a sample. Samples are capable of ECN, as in a simulation.
 const fn info(size: Bytes) -> PacketInfo {
     PacketInfo { size, ecn_capable: true }
 }
@@ -276,10 +278,10 @@ fn rated(line: Option<&Nominal>, size: Bytes, name: String, paths: Vec<(usize, u
     line?.rate(size).map(|(rate, bits)| RatedLine { name, rate, bits, paths })
 }
 
-/// How many samples it takes at most until what depends on the time or on the number of packets begins anew.
+/// Returns the largest number of samples until every part that depends on the time or on the number of packets begins anew.
 fn cycle<'a>(lines: impl IntoIterator<Item = &'a Nominal>, scene: &Scene, senders: usize) -> u64 {
     let update = scene.coordination.update.as_nanos();
-    // A clock may be a tenth fast.
+    // A clock may be a tenth fast, so that it sends more samples in the same time.
     let in_time =
         |line: &Nominal| line.cycle().map_or(0, |cycle| u64::try_from(cycle.as_nanos() * 10 / 9 / update).unwrap_or(u64::MAX).saturating_add(1));
     lines.into_iter().map(|line| in_time(line).max(line.packet_cycle())).max().unwrap_or(0).max(senders as u64)

@@ -1,4 +1,4 @@
-//! A link with nothing left to chance: each random part is replaced by a stated one.
+//! A link with nothing left to chance: each random part is replaced by a stated part.
 
 use std::time::Duration;
 
@@ -9,16 +9,16 @@ use cohaptic_wan::{
     Slots, Sojourn,
 };
 
-/// A link without chance, and in words what was replaced by what.
+/// A link without chance, and sentences that say what was replaced.
 #[derive(Clone, Debug)]
 pub(crate) struct Nominal {
     pub(crate) config: LinkConfig,
     pub(crate) replaced: Vec<String>,
-    /// Names of the random parts among the replaced ones.
+    /// Names of the replaced parts that are random.
     pub(crate) chance: Vec<&'static str>,
 }
 
-/// The replaced parts of a link, as they are met.
+/// The replaced parts of a link, in the order of replacement.
 #[derive(Default)]
 struct Replaced {
     words: Vec<String>,
@@ -26,7 +26,7 @@ struct Replaced {
 }
 
 impl Replaced {
-    /// Notes a part that is certain and does not repeat.
+    /// Notes a part that is not random but ends.
     fn end(&mut self, words: &str) {
         self.words.push(words.to_owned());
     }
@@ -39,7 +39,7 @@ impl Replaced {
 }
 
 impl Nominal {
-    /// The nominal link for samples of that size, which understand congestion marks.
+    /// Returns the nominal link for samples of that size, which understand congestion marks.
     pub(crate) fn of(model: &LinkModel, size: Bytes) -> Self {
         let only = |delay, words: String, chance: &[&'static str]| Self {
             config: LinkConfig { delay: Delay::constant(delay), ..LinkConfig::default() },
@@ -68,19 +68,19 @@ impl Nominal {
         }
     }
 
-    /// The delay, if the link does nothing else.
+    /// Returns the delay of the link, if the link does nothing but delay.
     pub(crate) fn constant(&self) -> Option<Duration> {
-        // Of equal delays none overtakes another, and with one stage there is one order of stages.
+        // With equal delays no sample overtakes another, and with one stage there is one order of stages: order and layout have no effect.
         let plain = LinkConfig { order: Order::default(), layout: Layout::default(), ..self.config.clone() };
         plain.is_constant_delay().then(|| self.config.delay.mean())
     }
 
-    /// Whether what it does to samples does not depend on when the first of them is sent.
+    /// Returns whether the fates of samples do not depend on the instant of the first sample.
     pub(crate) fn is_timeless(&self) -> bool {
         self.cycle().is_none() && self.config.outages.is_empty()
     }
 
-    /// The longest span after which something in it repeats that depends on the time.
+    /// Returns the longest period of the parts of the link that depend on the time; `None` if no part does.
     pub(crate) fn cycle(&self) -> Option<Duration> {
         let LinkConfig { outages, loss, bottleneck, trace, .. } = &self.config;
         let outage = outages.random().map(|random| random.up.mean() + random.down.mean());
@@ -91,12 +91,12 @@ impl Nominal {
         [outage, loss, service, trace.as_ref().and_then(cohaptic_wan::PathTrace::period)].into_iter().flatten().max()
     }
 
-    /// After how many packets a pattern of losses begins anew.
+    /// Returns the number of packets after which a pattern of losses begins anew; 1 without such a pattern.
     pub(crate) fn packet_cycle(&self) -> u64 {
         pattern(&self.config.loss, Counts::Packets).and_then(Pattern::period).unwrap_or(1)
     }
 
-    /// The least rate of its queues [bit/s] and what a sample of that size takes \[bit\] there.
+    /// Returns the rate of the queue that carries the fewest samples per second [bit/s], and the size of a sample in that queue \[bit\]; `None` without a queue.
     #[expect(clippy::cast_precision_loss, reason = "a rate, compared with a tolerance")]
     pub(crate) fn rate(&self, size: Bytes) -> Option<(f64, f64)> {
         let bits = |bytes: Bytes| bytes.get() as f64 * 8.0;
@@ -128,7 +128,7 @@ fn stripped(config: &LinkConfig, size: Bytes) -> Nominal {
     }
     config.outages = outages(&config.outages, &mut replaced);
     if config.marks_instead_of_loss {
-        // Samples understand marks, so that none of them is lost.
+        // Samples understand marks, so that a mark in place of a loss loses no sample.
         config.loss = Loss::None;
         config.marks_instead_of_loss = false;
     }
@@ -169,7 +169,8 @@ fn stripped(config: &LinkConfig, size: Bytes) -> Nominal {
     Nominal { config, replaced: replaced.words, chance: replaced.chance }
 }
 
-/// Outages that come and go with spans of fixed length stay; those that are drawn are left out, and those of a list end.
+/// Returns the outages that repeat with spans of fixed length, and the idle outages. Outages with drawn spans are left out, and so are outages at given
+/// times, because they end.
 fn outages(given: &Outages, replaced: &mut Replaced) -> Outages {
     let mut kept = Outages::default();
     if !given.scheduled().is_empty() {
@@ -201,7 +202,7 @@ fn loss(given: Loss, replaced: &mut Replaced) -> Loss {
     }
     let mean = given.mean();
     if mean == Some(1.0) {
-        // A loss of everything is not random.
+        // The loss of every sample is not random.
         return everything();
     }
     if mean != Some(0.0) {
@@ -210,7 +211,7 @@ fn loss(given: Loss, replaced: &mut Replaced) -> Loss {
     Loss::None
 }
 
-/// The pattern of losses, if that is what they are, that counts in those units.
+/// Returns the pattern of losses, if the losses are a pattern that counts in these units.
 fn pattern(loss: &Loss, counts: Counts) -> Option<&Pattern> {
     if let Loss::Pattern(pattern) = loss { Some(pattern).filter(|pattern| pattern.counts() == counts) } else { None }
 }

@@ -1,4 +1,4 @@
-//! The nominal parts of a link, in words.
+//! Sentences about the replaced parts of links, for users.
 
 use std::collections::BTreeMap;
 
@@ -6,7 +6,7 @@ use cohaptic_scene::Scene;
 
 use super::nominal::Nominal;
 
-/// A line for each thing that was replaced, with the links where it was.
+/// Returns a line for each replaced part, with the links that have the part.
 pub(crate) fn notes(scene: &Scene, links: &[Nominal], uplinks: &[Option<Nominal>], downlinks: &[Option<Nominal>]) -> Vec<String> {
     let mut firsts: Vec<Option<(usize, usize)>> = vec![None; links.len()];
     for (pair, config) in scene.links.exceptions() {
@@ -29,10 +29,12 @@ pub(crate) fn notes(scene: &Scene, links: &[Nominal], uplinks: &[Option<Nominal>
     notes.lines(scene.links.is_uniform())
 }
 
-/// The same words are said once.
+/// Lines to be printed: equal words become one line, which counts the links.
 #[derive(Default)]
 struct Notes<'a> {
+    /// Words in the order in which they were added.
     order: Vec<&'a str>,
+    /// The first place of each line of words, and the number of links.
     places: BTreeMap<&'a str, (String, u64)>,
 }
 

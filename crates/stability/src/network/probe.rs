@@ -1,4 +1,4 @@
-//! Samples are sent through the emulated network itself until what becomes of them repeats.
+//! A probe of an emulated network: samples are sent through the network until their fates repeat.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -9,37 +9,40 @@ use cohaptic_wan::{Fate, Network, NodeId, PacketInfo};
 use super::sampling::Sampling;
 use super::timing::LinkTiming;
 
-/// The longest pattern, of all links together \[samples\].
+/// The longest pattern of all links together \[samples\].
 pub(crate) const MOST_SAMPLES: usize = 64;
 
-/// A probe gives up after that number of samples of a peer, or of packets in all.
+/// The largest number of samples of a peer in a probe. [`MOST_PACKETS`] is that of packets of all peers.
 const MOST_SENT: u64 = 16_384;
 const MOST_PACKETS: u64 = 1 << 24;
 
-/// The number of samples before the first look at what came out. Twice as many for every further look.
+/// The number of samples of each peer before the first search for patterns. The number doubles before each further search.
 const FIRST_LOOK: u64 = 256;
 
 const PENDING: u64 = u64::MAX;
 const LOST: u64 = u64::MAX - 1;
 
-/// A network and its senders.
+/// A network and the peers that send samples into it.
 pub(crate) struct Probe {
     network: Network<()>,
     nodes: usize,
     senders: Vec<Sampling>,
     info: PacketInfo,
+    /// Number of samples that each sender has sent.
     sent: Vec<u64>,
+    /// Instants of the next sample of each sender; equal instants in the order of the senders.
     next: BTreeSet<(Instant, usize)>,
-    /// For each path, how long each sample took \[ns\].
+    /// Time that each sample took \[ns\], or `LOST` or `PENDING`; indexed by sender · nodes + receiver, then by sample.
     taken: Vec<Vec<u64>>,
 }
 
+/// A line with a limited rate, and the paths whose samples pass the line.
 #[derive(Clone, Debug)]
 pub(crate) struct RatedLine {
     pub(crate) name: String,
-    /// What it carries [bit/s].
+    /// Rate that the line carries [bit/s].
     pub(crate) rate: f64,
-    /// What a sample takes \[bit\].
+    /// Size of a sample on the line \[bit\].
     pub(crate) bits: f64,
     pub(crate) paths: Vec<(usize, usize)>,
 }
@@ -52,14 +55,14 @@ pub(crate) enum NoPattern {
 }
 
 impl Probe {
-    /// The first nodes of the network send to all others.
+    /// Returns a probe in which the first nodes of the network, one for each entry of `senders`, send to all other nodes.
     pub(crate) fn new(network: Network<()>, nodes: usize, senders: Vec<Sampling>, info: PacketInfo) -> Self {
         let next = senders.iter().enumerate().filter_map(|(place, sampling)| Some((sampling.instant(0)?, place))).collect();
         Self { network, nodes, sent: vec![0; senders.len()], senders, info, next, taken: vec![Vec::new(); nodes * nodes] }
     }
 
-    /// What becomes of the samples on each path, by sender and receiver. `cycle`: how many samples it takes at most until what depends on the time or is
-    /// counted by links begins anew; patterns are believed if they outlast it.
+    /// Returns the timing of each path, indexed by sender · nodes + receiver. `cycle` is the largest number of samples until every part of the links that
+    /// depends on time or counts packets begins anew. A pattern must repeat for longer than that to be accepted.
     pub(crate) fn patterns(mut self, cycle: u64, lines: &[RatedLine]) -> Result<Vec<LinkTiming>, NoPattern> {
         let paths: Vec<(usize, usize)> =
             (0..self.senders.len()).flat_map(|from| (0..self.nodes).map(move |to| (from, to))).filter(|(from, to)| from != to).collect();
@@ -76,7 +79,7 @@ impl Probe {
                     None => missing = missing.or(Some((*from, *to))),
                 }
             }
-            // A pattern that carries more than a line can is the calm before its queue has filled.
+            // A pattern that carries more than the rate of a line is only seen until the queue of the line has filled.
             let carried = |line: &RatedLine| self.load(line, |from, to| found[from * self.nodes + to].arriving());
             if missing.is_none() && lines.iter().all(|line| carried(line) <= line.rate * (1.0 + 1e-9)) {
                 return Ok(found);
@@ -94,12 +97,12 @@ impl Probe {
         })
     }
 
-    /// What passes a line [bit/s], if that fraction of the samples of each path does.
+    /// Returns the load of a line [bit/s], if the fraction `fraction(from, to)` of the samples of each path passes the line.
     fn load(&self, line: &RatedLine, fraction: impl Fn(usize, usize) -> f64) -> f64 {
         line.paths.iter().map(|(from, to)| fraction(*from, *to) * self.senders[*from].per_second() * line.bits).sum()
     }
 
-    /// Goes on until every peer has sent that number of samples.
+    /// Sends samples until every peer has sent `samples` of them since the beginning.
     fn send(&mut self, samples: u64) {
         let mut waiting = Vec::new();
         while let Some((now, place)) = self.next.pop_first() {
@@ -107,10 +110,11 @@ impl Probe {
                 waiting.push((now, place));
                 continue;
             }
-            // Instants come in order, and every sender is a node.
+            // No error is possible: instants come in order, and every sender is a node.
             let _ = self.network.handle_broadcast(now, NodeId::new(place), self.info, ());
             self.sent[place] += 1;
             self.next.extend(self.senders[place].instant(self.sent[place]).map(|at| (at, place)));
+            // All samples of one instant enter the network before the network handles the instant.
             if self.next.first().is_none_or(|(at, _)| *at > now) {
                 self.receive(now);
             }
@@ -119,7 +123,7 @@ impl Probe {
     }
 
     fn receive(&mut self, now: Instant) {
-        // Instants come in order.
+        // No error is possible: instants come in order.
         let _ = self.network.handle_timeout(now);
         while let Some(event) = self.network.poll_event() {
             if !event.fate.is_end() {
@@ -137,7 +141,8 @@ impl Probe {
     }
 }
 
-/// The shortest pattern that repeats from `start` until nothing more is known, for long enough.
+/// Returns the shortest pattern that repeats from sample `start` to the last sample before a pending one; `None` if there is none, or if these samples are
+/// too few.
 fn repeated(taken: &[u64], start: u64, cycle: u64) -> Option<LinkTiming> {
     let known = taken.iter().position(|taken| *taken == PENDING).unwrap_or(taken.len());
     let start = usize::try_from(start).ok()?;
@@ -148,7 +153,7 @@ fn repeated(taken: &[u64], start: u64, cycle: u64) -> Option<LinkTiming> {
     }
     let period = (1..=MOST_SAMPLES).find(|period| tail.iter().zip(&tail[*period..]).all(|(one, next)| one == next))?;
     let entry = |place: usize| {
-        // The first sample from `start` on that has this place in the pattern.
+        // Index in `tail` of the first sample from `start` on that has this place in the pattern.
         let sample = (place + period - start % period) % period;
         (tail[sample] != LOST).then(|| Duration::from_nanos(tail[sample]))
     };

@@ -1,4 +1,4 @@
-//! Cases computed by hand, and random networks against the emulator driven by itself.
+//! Cases computed by hand, and random networks compared with the emulator itself.
 
 use std::time::Duration;
 
@@ -64,7 +64,7 @@ fn slots_take_every_other_sample_along() {
     assert_eq!(*slots.timing(0, 1), pattern(&[Some(10_000), Some(2_000)]));
 }
 
-/// Two senders at one downlink of 128 kbit/s, 4 ms a sample: the second of those that come together waits for the first.
+/// Two senders share a downlink of 128 kbit/s, 4 ms per sample: of two samples that arrive together the second waits for the first.
 #[test]
 fn samples_that_share_a_line_wait_for_each_other() {
     let shared = network(
@@ -98,7 +98,7 @@ fn what_no_line_carries_is_refused_unless_its_queue_is_short() {
     let over = scene("link = { rate = \"63kbit\", queue = { limit = \"unlimited\" } }", &[]);
     let error = NominalNetwork::of(&over).unwrap_err();
     assert_eq!(error, AnalysisError::Overloaded { line: "the link from peer1 to peer2".to_owned(), load: 64_000.0, rate: 63_000.0 });
-    // At 32 kbit/s a sample takes 16 ms, so that every other one finds the line busy.
+    // At 32 kbit/s a sample takes 16 ms, so that every other sample finds the line busy.
     let half = network("link = { rate = \"32kbit\", queue = { limit = \"0 packets\" } }", &[]);
     assert_eq!(*half.timing(0, 1), pattern(&[Some(16_000), None]));
 }

@@ -1,19 +1,19 @@
-//! How long samples take on a link.
+//! The time that samples take on a link.
 
 use std::sync::Arc;
 use std::time::Duration;
 
-/// How long the n-th sample of a sender takes on a link.
+/// The time that the n-th sample of a sender takes on a link.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum LinkTiming {
-    /// All the same.
+    /// Every sample takes the same time.
     Constant(Duration),
-    /// The n-th sample takes the entry n modulo the length; `None`: it never arrives.
+    /// The n-th sample takes the time at index n modulo the length; `None` if the sample never arrives. Not empty.
     Pattern(Arc<[Option<Duration>]>),
 }
 
 impl LinkTiming {
-    /// What a repeating pattern comes to: one delay that repeats is a constant.
+    /// Returns the timing of a repeating pattern. A pattern of a single delay is a constant, so that equal timings compare equal.
     pub(crate) fn repeating(pattern: Vec<Option<Duration>>) -> Self {
         match pattern.as_slice() {
             [Some(delay)] => Self::Constant(*delay),
@@ -21,7 +21,7 @@ impl LinkTiming {
         }
     }
 
-    /// After how many samples it repeats.
+    /// Returns the number of samples after which the timing repeats.
     pub(crate) fn period(&self) -> usize {
         match self {
             Self::Constant(_) => 1,
@@ -29,7 +29,7 @@ impl LinkTiming {
         }
     }
 
-    /// The fraction of samples that arrive.
+    /// Returns the fraction of samples that arrive.
     #[expect(clippy::cast_precision_loss, reason = "a pattern is short")]
     pub(crate) fn arriving(&self) -> f64 {
         match self {
@@ -38,7 +38,7 @@ impl LinkTiming {
         }
     }
 
-    /// The timing with every sample later by that.
+    /// Returns the timing with every sample later by `by`.
     pub(crate) fn later(&self, by: Duration) -> Self {
         match self {
             Self::Constant(delay) => Self::Constant(delay.saturating_add(by)),
