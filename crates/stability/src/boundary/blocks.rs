@@ -1,5 +1,5 @@
-//! Blocks of a search that several processes share. A block has some of the first samples, and is searched as if there were no others; what they say of each other
-//! across its ends is left to the search of the whole, which finds almost all that it looks at known.
+//! Blocks of a search that several processes share. A block has some of the first samples and is searched as if there were no other samples. The search of
+//! the whole range comes afterwards: it finds almost all of its values known, and computes those that depend on samples of two blocks.
 
 use rayon::prelude::*;
 
@@ -7,21 +7,21 @@ use super::{Boundary, BoundaryOptions, End, by_value, go_on};
 use crate::map::{Scratches, nodes};
 use crate::{AnalysisError, Cell, Family, FamilyError, KeyRange, Watch};
 
-/// The number of intervals between first samples in a block.
+/// The largest number of intervals between first samples in a block.
 const INTERVALS: usize = 8;
 
-/// A part of the range of a search.
+/// A part of the range of a search, given by its first values.
 #[derive(Clone, PartialEq, Debug)]
 pub struct BoundaryBlock(Vec<f64>);
 
 impl BoundaryBlock {
-    /// The values that are looked at first, ascending, both ends of the block among them.
+    /// Returns the values of the first pass, ascending, both ends of the block among them.
     #[must_use]
     pub fn first_values(&self) -> &[f64] {
         &self.0
     }
 
-    /// Whether its search finds all that it looks at known.
+    /// Returns whether `known` has all values that a search of the block computes.
     #[must_use]
     pub fn is_known(&self, range: &KeyRange, options: BoundaryOptions, known: &[(f64, Cell)]) -> bool {
         let known = by_value(known);
@@ -32,7 +32,7 @@ impl BoundaryBlock {
 }
 
 impl Boundary {
-    /// The range of a search in blocks, which meet at their ends.
+    /// Returns the blocks of the range of a search, ascending. The last value of a block is the first value of the next block.
     #[must_use]
     pub fn blocks(range: &KeyRange, options: BoundaryOptions) -> Vec<BoundaryBlock> {
         let values = nodes(range, options.samples);
@@ -40,12 +40,12 @@ impl Boundary {
         (0..values.len().saturating_sub(1)).step_by(INTERVALS).map(block).collect()
     }
 
-    /// Searches some blocks, on all threads of the pool that it is called in. `found` gets each value that was not known and its radius, and `done` the place of
-    /// each block that is whole; the others were ended by the watch.
+    /// Searches blocks on all threads of the pool that calls this function. `found` is called with each value that was not known and its radius, and `done`
+    /// with the index of each block whose search ended by itself; the watch has stopped the other searches.
     ///
     /// # Errors
     ///
-    /// [`FamilyError`] of a radius that cannot be computed, and if the family has not one open key.
+    /// [`FamilyError`] if a radius cannot be computed, or if the family has not exactly one open key.
     pub fn search_blocks(
         family: &Family,
         options: BoundaryOptions,

@@ -1,13 +1,14 @@
-//! Which intervals between samples need another look.
+//! The choice of intervals between samples that need to be halved.
 
 use std::collections::BTreeMap;
 
 use crate::{Cell, Verdict};
 
-/// The radius within an interval is taken to leave the chord by at most this many times what the second differences around it say.
+/// The factor of the estimated distance between the radius and its chord within an interval. The estimate comes from the second differences around the
+/// interval.
 const SAFETY: f64 = 4.0;
 
-/// The values looked at so far, in order.
+/// The cells computed so far, ordered by value.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub(super) struct Samples(BTreeMap<Ordered, Cell>);
 
@@ -43,20 +44,21 @@ impl Samples {
     }
 }
 
-/// A sample as it is judged.
+/// The numbers of a sample by which intervals are judged.
 #[derive(Clone, Copy, Debug)]
 struct Sample {
+    /// Value of the key.
     at: f64,
-    /// The logarithm of the radius.
+    /// Logarithm of the radius, clamped to ±50.
     level: f64,
-    /// How far it may be off.
+    /// Bound of the error of `level`, to first order.
     error: f64,
     verdict: Verdict,
 }
 
 impl Sample {
     fn of((at, Cell { radius, .. }): (f64, Cell)) -> Self {
-        // Beyond e^±50 nothing is gained by going on, and infinities have no second difference.
+        // The exact size of radii beyond e^±50 does not matter, and infinite levels would have no second difference.
         const LARGEST: f64 = 50.0;
         let log = |value: f64| if value.is_nan() { 0.0 } else { libm::log(value.max(0.0)).clamp(-LARGEST, LARGEST) };
         let level = log(radius.value);
@@ -65,19 +67,19 @@ impl Sample {
     }
 }
 
-/// The middles of all intervals that need another look, ascending. `spacing`: that of the first samples.
+/// Returns the middles of all intervals that need to be halved, ascending. `spacing` is the distance between values of the first pass.
 pub(super) fn wanted(samples: &Samples, tolerance: f64, spacing: f64) -> Vec<f64> {
     let samples: Vec<Sample> = samples.iter().map(Sample::of).collect();
     let middle = |place: usize| {
         let (low, high) = (samples[place], samples[place + 1]);
         let middle = low.at + 0.5 * (high.at - low.at);
-        // Between two neighbouring doubles there is nothing.
+        // Two neighbouring doubles have no double between them.
         (middle > low.at && middle < high.at && needs_a_look(&samples, place, tolerance, spacing)).then_some(middle)
     };
     (0..samples.len().saturating_sub(1)).filter_map(middle).collect()
 }
 
-/// Whether something may be hidden between a sample and the next.
+/// Returns whether the verdict may change between the sample `place` and the next.
 fn needs_a_look(samples: &[Sample], place: usize, tolerance: f64, spacing: f64) -> bool {
     let (low, high) = (samples[place], samples[place + 1]);
     let width = high.at - low.at;
@@ -86,21 +88,22 @@ fn needs_a_look(samples: &[Sample], place: usize, tolerance: f64, spacing: f64) 
     }
     match (low.verdict, high.verdict) {
         (one, other) if one != other => true,
-        // A marginal stretch, or one in which nothing is known of the radius, is looked at twice as closely as the rest, and then believed: what the radius does
-        // within its error, or without a number, has no bend.
+        // Marginal intervals, and intervals where the radius is not known, are halved once. Further halving tells nothing: second differences of a radius
+        // within its error, or without a number, mean nothing.
         (Verdict::Marginal | Verdict::Overflow, _) => width > 0.75 * spacing,
         _ => {
+            // The second differences over this interval and its neighbours below and above; the first and the last interval have one only.
             let before = place.checked_sub(1).map(|place| bend(samples, place));
             let after = (place + 2 < samples.len()).then(|| bend(samples, place));
             let bend = before.into_iter().chain(after).fold(0.0, f64::max);
             let distance = (low.level.abs() - low.error).min(high.level.abs() - high.error);
-            // The parabola with the second difference D leaves its chord by D·(width/2)².
+            // A parabola with the second divided difference D is D·(width/2)² away from its chord in the middle.
             distance <= SAFETY * bend * 0.25 * width * width
         }
     }
 }
 
-/// The size of the second divided difference of a sample and the next two.
+/// Returns the absolute value of the second divided difference of the level at sample `place` and the next two.
 fn bend(samples: &[Sample], place: usize) -> f64 {
     let [a, b, c] = [samples[place], samples[place + 1], samples[place + 2]];
     let slope = |a: Sample, b: Sample| (b.level - a.level) / (b.at - a.at);

@@ -1,10 +1,10 @@
-//! Boundaries: every value of one key at which a scene turns stable or unstable.
+//! Boundaries: the values of one key at which a scene turns stable or unstable.
 //!
-//! Stability regions are not convex and have islands, so the line is looked at in many places first. Then, pass after pass, the intervals between
-//! neighbouring samples are gone through: where the verdict changes they are halved down to the tolerance; where it does not, and the radius bends
-//! enough to reach 1 and come back in between, they are halved until it certainly does not. What the radius does within an interval is judged
-//! by the second differences around it, so an island that is smooth on the scale of the samples, or a tangency, is found however narrow it is; one that
-//! shows nothing of itself at the samples around it is not, and the result says how fine it looked.
+//! Stability regions are not convex and have islands, so the radius is first computed at many values. Then, pass after pass, intervals between neighbouring
+//! values are halved. An interval whose ends have different verdicts is halved down to the tolerance. An interval whose ends have the same verdict is halved
+//! as long as the radius may bend enough to reach 1 and come back in between. The bend of the radius within an interval is estimated from the second
+//! differences around the interval. So an island that is smooth on the scale of the samples, or a tangency, is found however narrow it is. An island that
+//! does not show in the samples around it is not found; the result tells the distances between neighbouring values.
 
 pub(crate) mod blocks;
 mod intervals;
@@ -21,84 +21,85 @@ use crate::watch::Asks;
 use crate::{AnalysisError, Cell, Family, FamilyError, KeyRange, Verdict, Watch};
 use intervals::{Samples, wanted};
 
-/// How closely a boundary is looked for.
+/// Options of a search for a boundary.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct BoundaryOptions {
-    /// How many values are looked at first, both ends among them; at least 2. Default: 400.
+    /// Number of values of the first pass, both ends of the range among them; at least 2. Default: 400.
     pub samples: usize,
-    /// How closely each crossing is found, in the unit of the key; above zero.
+    /// Largest width of the interval that contains a crossing, in the unit of the key; above zero.
     pub tolerance: f64,
-    /// The search ends when it has looked at this number of values; see [`Boundary::is_settled`]. Default: 100,000.
+    /// Largest number of values that a search computes; see [`Boundary::is_settled`]. Default: 100,000.
     pub most: usize,
 }
 
 impl BoundaryOptions {
-    /// 400 samples, and 10⁻⁹ of the range.
+    /// Returns the default options: 400 samples, and a tolerance of 10⁻⁹ of the range.
     #[must_use]
     pub fn of(range: &KeyRange) -> Self {
         Self { samples: 400, tolerance: 1e-9 * (range.high - range.low), most: 100_000 }
     }
 
-    /// The same for mean-square radii, whose bounds are wider: 10⁻⁷ of the range.
+    /// Returns the default options for mean-square radii, whose bounds are wider: 400 samples, and a tolerance of 10⁻⁷ of the range.
     #[must_use]
     pub fn of_mean_square(range: &KeyRange) -> Self {
         Self { tolerance: 1e-7 * (range.high - range.low), ..Self::of(range) }
     }
 }
 
-/// A value at which the verdict changes.
+/// A value of the key at which the verdict changes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Crossing {
-    /// The value, to half the tolerance.
+    /// Value of the key, to within half the tolerance.
     pub value: f64,
-    /// Below it.
+    /// Verdict below the value.
     pub from: Verdict,
-    /// Above it.
+    /// Verdict above the value.
     pub to: Verdict,
 }
 
-/// Neighbouring values at which the radius cannot be told from 1.
+/// A stretch of neighbouring values at which the radius cannot be told from 1.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Stretch {
-    /// The first one that was seen.
+    /// Lowest computed value of the stretch.
     pub low: f64,
-    /// The last one that was seen; the same if there is one only: the radius touches 1 and turns back.
+    /// Highest computed value of the stretch; equal to `low` if the stretch has a single value, at which the radius touches 1 and turns back.
     pub high: f64,
 }
 
-/// All crossings along a key.
+/// All crossings along a key, and the values at which they were looked for.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Boundary {
-    /// In ascending order. One between stable and unstable on whose two sides is a marginal stretch no wider than the tolerance counts once.
+    /// Crossings in ascending order. A marginal stretch no wider than the tolerance between different verdicts counts as one crossing.
     pub crossings: Vec<Crossing>,
-    /// Where the radius stays, or touches, 1 as closely as can be told; in ascending order. Those that are part of a crossing are left out.
+    /// Stretches where the radius is 1 as closely as can be told, in ascending order. Stretches that are part of a crossing are left out.
     pub marginal: Vec<Stretch>,
-    /// The verdict at the lower end of the range.
+    /// Verdict at the lower end of the range.
     pub first: Verdict,
-    /// How many values were looked at.
+    /// Number of computed values.
     pub samples: usize,
-    /// The shortest distance between two neighbouring ones.
+    /// Shortest distance between two neighbouring values; infinite if there are fewer than two.
     pub finest: f64,
-    /// The longest distance between two neighbouring ones.
+    /// Longest distance between two neighbouring values.
     pub coarsest: f64,
-    /// Every value that was looked at and its radius, by the criterion of the family, ascending: given to [`Boundary::find`] again, none of them is computed
-    /// again.
+    /// Every computed value and its radius by the criterion of the family, ascending by value. A later [`Boundary::find`] that gets these values computes none
+    /// of them again.
     pub known: Vec<(f64, Cell)>,
     settled: bool,
 }
 
-/// How a search ended.
+/// The reason why a search ended.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum End {
-    /// Every interval was looked at as closely as it needs.
+    /// Every interval is divided as finely as needed.
     Settled,
-    /// It had looked at as many values as it may.
+    /// The search would need more values than it may compute.
     Most,
-    /// It was stopped.
+    /// The search was stopped.
     Stopped,
 }
 
-/// Looks at values, and then at those between them that they call for, pass after pass.
+/// Computes the cells of the values `first`, and then, pass after pass, those of the middles of intervals that need to be halved. `look` returns `None` if
+/// the search is to stop.
 fn go_on<E: Send>(
     first: Vec<f64>,
     range: &KeyRange,
@@ -112,6 +113,7 @@ fn go_on<E: Send>(
             return Ok((seen, End::Most));
         }
         let found: Vec<Option<(f64, Cell)>> = next.par_iter().map(|value| look(*value)).collect::<Result<_, E>>()?;
+        // Cells that were computed before a stop are kept, so that a later search can begin with them.
         let is_whole = found.iter().all(Option::is_some);
         seen.extend(found.into_iter().flatten());
         if !is_whole {
@@ -122,7 +124,7 @@ fn go_on<E: Send>(
     Ok((seen, End::Settled))
 }
 
-/// Known radii, by the bits of the value.
+/// Returns the known cells, indexed by the bits of their values.
 fn by_value(known: &[(f64, Cell)]) -> BTreeMap<u64, Cell> {
     known.iter().map(|(value, cell)| (value.to_bits(), *cell)).collect()
 }
@@ -133,17 +135,17 @@ pub enum BoundaryError<E> {
     /// The options make no sense.
     #[error("{samples} samples and a tolerance of {tolerance}: expected at least 2 samples, not more than {most}, and a finite tolerance above zero")]
     Options {
-        /// How many values are looked at first.
+        /// Number of values of the first pass.
         samples: usize,
         /// The tolerance.
         tolerance: f64,
-        /// How many are looked at at most.
+        /// Largest number of values of the search.
         most: usize,
     },
     /// The family has not one open key.
     #[error("{keys} open keys: expected one for a boundary")]
     Keys {
-        /// How many.
+        /// Number of open keys.
         keys: usize,
     },
     /// A radius cannot be computed.
@@ -167,7 +169,7 @@ impl Boundary {
         Self::find_watched(family, options, known, progress, &Asks(stop))
     }
 
-    /// [`Boundary::find`] with a watch, which sees how far values are that take long, and ends the search within them.
+    /// Runs [`Boundary::find`] with a watch, which sees the progress of values that take long and can stop the search within a value.
     ///
     /// # Errors
     ///
@@ -190,15 +192,16 @@ impl Boundary {
         Self::searched(range, options, known, radius, progress, || watch.stops())
     }
 
-    /// Finds every crossing of a radius over a range, which may be that of anything. Values are looked at on all threads of the pool it is called in;
-    /// what comes out does not depend on how many there are.
+    /// Finds every crossing of any function `radius` over a range. Values are computed on all threads of the pool that calls this function; the result does not
+    /// depend on the number of threads.
     ///
-    /// `known` are values looked at before, such as [`Boundary::known`] of a search that was stopped; values that are not needed are left out. `progress`
-    /// is told after each value how many have been looked at; `stop` is asked before each: if it answers `true` the search ends as it is.
+    /// `known` are values computed before, such as [`Boundary::known`] of a search that was stopped; values that this search does not need are left out of the
+    /// result. `progress` is called after each value with the number of values so far. `stop` is called before each value; if it returns `true` the search ends
+    /// with the values so far.
     ///
     /// # Errors
     ///
-    /// [`BoundaryError::Options`], and what `radius` answers.
+    /// [`BoundaryError::Options`] for options out of range, and [`BoundaryError::Radius`] with an error of `radius`.
     pub fn search<E: Send>(
         range: &KeyRange,
         options: BoundaryOptions,
@@ -210,7 +213,7 @@ impl Boundary {
         Self::searched(range, options, known, |value| radius(value).map(Some), progress, stop)
     }
 
-    /// [`Boundary::search`]; of a value that was ended before it was known, `radius` answers `None`.
+    /// Runs [`Boundary::search`] with a `radius` that returns `None` if the computation of a value was stopped.
     fn searched<E: Send>(
         range: &KeyRange,
         options: BoundaryOptions,
@@ -241,13 +244,14 @@ impl Boundary {
         Ok(Self::of(&seen, tolerance, end == End::Settled))
     }
 
-    /// How many of the values are nominal: see [`Cell::is_nominal`].
+    /// Returns the number of values whose cells are nominal: see [`Cell::is_nominal`].
     #[must_use]
     pub fn nominal(&self) -> usize {
         self.known.iter().filter(|(_, cell)| cell.is_nominal).count()
     }
 
-    /// Whether every interval was looked at as closely as it needs: not if the search was stopped, or had looked at as many values as it may.
+    /// Returns whether every interval is divided as finely as needed. False if the search was stopped, or would have needed more than the largest number of
+    /// values.
     #[must_use]
     pub const fn is_settled(&self) -> bool {
         self.settled
@@ -258,7 +262,8 @@ impl Boundary {
         let gaps = || known.windows(2).map(|pair| pair[1].0 - pair[0].0);
         let mut marginal: Vec<Stretch> = Vec::new();
         let mut crossings: Vec<Crossing> = Vec::new();
-        // The verdict on this side of the line, and where it was seen last; a marginal span waits until its width is known.
+        // `before` is the verdict below the present run of equal verdicts, and the last value with that verdict. A run is taken as a whole, because a marginal
+        // run is a crossing only if it is narrow.
         let first = known.first().map_or(Verdict::Marginal, |(_, cell)| cell.radius.verdict());
         let mut place = 0;
         let mut before: Option<(f64, Verdict)> = None;
@@ -276,7 +281,7 @@ impl Boundary {
                     } else {
                         crossings.push(Crossing { value: 0.5 * (low + high), from: side, to: other });
                     }
-                    // What follows is past the crossing already.
+                    // The next run lies above this crossing, so that its own verdict is already the one below it.
                     before = Some((high, other));
                 }
                 _ => {

@@ -7,13 +7,13 @@ fn range() -> KeyRange {
     KeyRange { key: "key".to_owned(), low: 0.0, high: 10.0, unit: String::new() }
 }
 
-/// A line with that logarithm of the radius, as sure of it as rounding allows.
+/// Returns the boundary of a line with that logarithm of the radius, whose error is that of rounding.
 #[track_caller]
 fn along(level: impl Fn(f64) -> f64 + Sync) -> Boundary {
     let radius = |value: f64| Ok::<_, ()>(Cell::certain(Radius { value: libm::exp(level(value)), error: 1e-14 }));
     let boundary = Boundary::search(&range(), BoundaryOptions::of(&range()), &[], radius, |_| (), || false).unwrap();
     assert!(boundary.is_settled());
-    // A search that goes through every double would never end; these end after a few hundred values more than the first.
+    // A search that goes through every double would not end; these searches end after a few hundred values more than the first pass.
     assert!(boundary.samples < 1500, "{} values", boundary.samples);
     boundary
 }

@@ -96,7 +96,7 @@ impl Nominal {
         pattern(&self.config.loss, Counts::Packets).and_then(Pattern::period).unwrap_or(1)
     }
 
-    /// Returns the rate of the queue that carries the fewest samples per second [bit/s], and the size of a sample in that queue \[bit\]; `None` without a queue.
+    /// Returns the rate of the queue that carries the fewest samples per second [bit/s], and the size of a sample in that queue \[bit\]; `None` without queues.
     #[expect(clippy::cast_precision_loss, reason = "a rate, compared with a tolerance")]
     pub(crate) fn rate(&self, size: Bytes) -> Option<(f64, f64)> {
         let bits = |bytes: Bytes| bytes.get() as f64 * 8.0;
