@@ -10,29 +10,29 @@ use super::Map;
 /// A line through the plane of a map.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Polyline {
-    /// Its points (x, y). Those of a closed line do not repeat the first one at the end.
+    /// Points (x, y) of the line. A closed line does not repeat its first point at the end.
     pub points: Vec<(f64, f64)>,
-    /// Whether the last point leads to the first one.
+    /// Whether the line goes on from the last point to the first.
     pub closed: bool,
 }
 
 impl Map {
-    /// Where the radius is 1: polylines with the stable side on their left, x to the right and y up. One that does not end at the edge of the map is
+    /// Returns the lines where the radius is 1, with the stable side on their left, x to the right and y up. A line that does not end at the edge of the map is
     /// closed. Between two nodes the logarithm of the radius is taken to be linear; rows that were not computed count as unstable.
     #[must_use]
     pub fn contour(&self) -> Vec<Polyline> {
         contour(self, false)
     }
 
-    /// The stable region: closed polylines along its edge and the edge of the map, anticlockwise around stable cells and clockwise around the
-    /// others, to be filled by either rule.
+    /// Returns the stable region as closed polylines along its edge and the edge of the map, anticlockwise around stable cells and clockwise around holes. Both
+    /// fill rules (even-odd and nonzero) give the region.
     #[must_use]
     pub fn regions(&self) -> Vec<Polyline> {
         contour(self, true)
     }
 }
 
-/// A side of a square: from the node at that row and column to the right, or up.
+/// A side of a square, from the node at `row` and `column` to the next node to the right, or to the next node up.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 struct Side {
     row: usize,
@@ -40,7 +40,7 @@ struct Side {
     up: bool,
 }
 
-/// The map with a margin around it, if lines are to be closed along its edge.
+/// A map with a margin of nodes around it, 1 wide if lines are to be closed along the edge of the map, otherwise 0.
 struct Field<'a> {
     map: &'a Map,
     margin: usize,
@@ -55,9 +55,9 @@ impl Field<'_> {
         self.map.y.len() + 2 * self.margin
     }
 
-    /// The logarithm of the radius, which is below zero where it is stable; the margin is not.
+    /// Returns the logarithm of the radius at a node, below zero at stable nodes; the margin has the largest level.
     fn level(&self, row: usize, column: usize) -> f64 {
-        // Beyond e^±50 nothing is gained by going on, and infinities have no line between them.
+        // The exact size of radii beyond e^±50 does not matter, and infinite levels would have no point between them.
         const LARGEST: f64 = 50.0;
         match self.radius(row, column) {
             Some(radius) if radius.is_nan() => LARGEST,
@@ -75,7 +75,7 @@ impl Field<'_> {
         row.get(column.checked_sub(self.margin)?).copied()
     }
 
-    /// Where the level is crossed on a side. The margin lies on the edge of the map itself.
+    /// Returns the point of a side at which the level is zero. The margin lies on the edge of the map itself.
     fn point(&self, side: Side) -> (f64, f64) {
         let (row, column) = if side.up { (side.row + 1, side.column) } else { (side.row, side.column + 1) };
         let (from, to) = (self.level(side.row, side.column), self.level(row, column));
@@ -88,7 +88,7 @@ impl Field<'_> {
         (between(&self.map.x, side.column, column), between(&self.map.y, side.row, row))
     }
 
-    /// The directed pieces within the square above and to the right of a node: from one side to another.
+    /// Returns the directed pieces of line, from one side to another, within the square above and to the right of a node.
     fn pieces(&self, row: usize, column: usize) -> [Option<(Side, Side)>; 2] {
         let corners = [(row, column), (row, column + 1), (row + 1, column + 1), (row + 1, column)];
         let [a, b, c, d] = corners.map(|(row, column)| self.stable(row, column));
@@ -110,7 +110,7 @@ impl Field<'_> {
             (true, false, true, true) => [Some((bottom, right)), None],
             (true, true, false, true) => [Some((right, top)), None],
             (true, true, true, false) => [Some((top, left)), None],
-            // A saddle: the middle decides whether the stable corners hang together.
+            // At a saddle the level in the middle decides whether the two stable corners are connected.
             (true, false, true, false) | (false, true, false, true) => {
                 let middle = corners.map(|(row, column)| self.level(row, column)).iter().sum::<f64>();
                 match (a, middle < 0.0) {
@@ -124,7 +124,7 @@ impl Field<'_> {
     }
 }
 
-/// Every line, in the order of where it begins: first those that end at the edge of the map, then those that are closed.
+/// Returns every line in the order of first sides: first the lines that end at the edge of the map, then the closed lines.
 pub(super) fn contour(map: &Map, to_the_edge: bool) -> Vec<Polyline> {
     let field = Field { map, margin: usize::from(to_the_edge) };
     let mut next: BTreeMap<Side, Side> = BTreeMap::new();
@@ -141,7 +141,7 @@ pub(super) fn contour(map: &Map, to_the_edge: bool) -> Vec<Polyline> {
     }
     while let Some(first) = next.keys().next().copied() {
         let mut points = follow(&field, &mut next, first);
-        // The way back to where it began has come to its first point again.
+        // A closed line has reached its first point again, which is not repeated.
         points.pop();
         lines.push(Polyline { points, closed: true });
     }

@@ -13,10 +13,10 @@ use rayon::prelude::*;
 use crate::watch::Asks;
 use crate::{AnalysisError, Cell, Criterion, Family, FamilyError, FamilyScratch, KeyRange, Watch};
 
-/// More cells than this are refused.
+/// The largest number of cells of a map.
 const MOST_CELLS: usize = 100_000_000;
 
-/// How many nodes a map has along each key, the ends of the ranges among them.
+/// The numbers of nodes of a map along each key, the ends of the ranges among them.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Grid {
     columns: usize,
@@ -29,25 +29,25 @@ pub enum MapError {
     /// The grid has no cells, or too many.
     #[error("a grid of {columns} x {rows} cells: expected at least 1 and at most {MOST_CELLS} in all")]
     Grid {
-        /// How many columns.
+        /// Number of columns.
         columns: usize,
-        /// How many rows.
+        /// Number of rows.
         rows: usize,
     },
     /// The family has not two open keys.
     #[error("{keys} open keys: expected two for a map")]
     Keys {
-        /// How many.
+        /// Number of open keys.
         keys: usize,
     },
-    /// The rows that are given are not those of such a grid.
+    /// The rows known in advance do not fit the grid.
     #[error("row {row} of the rows known in advance has {cells} cells: expected {columns}, or none where the row is not known")]
     Known {
-        /// The first such row.
+        /// Index of the first row that does not fit.
         row: usize,
-        /// How many cells it has.
+        /// Number of cells of that row.
         cells: usize,
-        /// How many it should have.
+        /// Number of cells that the grid has in that row; 0 beyond the last row of the grid.
         columns: usize,
     },
     /// A cell cannot be computed.
@@ -56,11 +56,11 @@ pub enum MapError {
 }
 
 impl Grid {
-    /// A grid with these numbers of nodes along the first key, and along the second.
+    /// Returns a grid with `columns` nodes along the first key and `rows` nodes along the second.
     ///
     /// # Errors
     ///
-    /// [`MapError::Grid`] for none, and for more than 10⁸ in all.
+    /// [`MapError::Grid`] for a grid without cells, and for more than 10⁸ cells.
     pub const fn new(columns: usize, rows: usize) -> Result<Self, MapError> {
         match columns.checked_mul(rows) {
             Some(1..=MOST_CELLS) => Ok(Self { columns, rows }),
@@ -68,13 +68,13 @@ impl Grid {
         }
     }
 
-    /// How many nodes along the first key.
+    /// Returns the number of nodes along the first key.
     #[must_use]
     pub const fn columns(&self) -> usize {
         self.columns
     }
 
-    /// How many nodes along the second key.
+    /// Returns the number of nodes along the second key.
     #[must_use]
     pub const fn rows(&self) -> usize {
         self.rows
@@ -84,30 +84,30 @@ impl Grid {
 /// The radius over a grid, by the criterion of the family.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Map {
-    /// The values of the first key, ascending.
+    /// Values of the first key, ascending.
     pub x: Vec<f64>,
-    /// The values of the second key, ascending.
+    /// Values of the second key, ascending.
     pub y: Vec<f64>,
-    /// The radius at each value of y, for each value of x; a row is empty if the filling was stopped before it was reached.
+    /// Radius of each cell, indexed by y, then by x. A row is empty if the filling was stopped before the row was finished.
     pub radius: Vec<Vec<f64>>,
-    /// For each of them whether the cell is nominal: see [`Cell::is_nominal`](crate::Cell::is_nominal).
+    /// Whether each cell is nominal, indexed as `radius`: see [`Cell::is_nominal`](crate::Cell::is_nominal).
     pub nominal: Vec<Vec<bool>>,
 }
 
-/// The cells of one value of y, for each value of x; empty if they are not known.
+/// The cells of one value of y, one for each value of x; empty if the row is not known.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct MapRow {
-    /// The radii.
+    /// Radius of each cell.
     pub radius: Vec<f64>,
-    /// For each of them whether the cell is nominal.
+    /// Whether each cell is nominal.
     pub nominal: Vec<bool>,
 }
 
 impl Map {
-    /// Fills a map of a family with two open keys, the first along x, on all threads of the pool it is called in. What comes out does not depend on
-    /// how many there are.
+    /// Fills a map of a family with two open keys, the first along x, on all threads of the pool that calls this function. The result does not depend on the
+    /// number of threads.
     ///
-    /// `done` is called after each row, in no particular order, with its number; `stop` is asked before each row and within long ones: if it answers
+    /// `done` is called after each row with the index of the row, in no particular order. `stop` is called before each row and within long rows: if it returns
     /// `true`, the rest is not computed and the rows that are not finished stay empty.
     ///
     /// # Errors
@@ -117,12 +117,12 @@ impl Map {
         Self::resume(family, grid, Vec::new(), |row, _| done(row), stop)
     }
 
-    /// As [`Map::fill`], with rows that are known: `known[row]` is such a row, or empty; rows beyond its end are not known. Known rows are not computed
-    /// again, and `done` is not called for them; for the others it gets the row too, to be put away.
+    /// Fills a map as [`Map::fill`], with rows that are known: `known[row]` is a known row, or empty; rows beyond the end of `known` are not known. Known rows
+    /// are not computed again, and `done` is not called for known rows. For every other row `done` also gets the cells, so that they can be stored.
     ///
     /// # Errors
     ///
-    /// As [`Map::fill`], and if a known row has not as many cells as the grid has columns.
+    /// As [`Map::fill`], and [`MapError::Known`] if a known row does not have as many cells as the grid has columns.
     pub fn resume(
         family: &Family,
         grid: Grid,
@@ -133,7 +133,7 @@ impl Map {
         Self::resume_watched(family, grid, known, done, &Asks(stop))
     }
 
-    /// [`Map::resume`] with a watch, which sees how far cells are that take long, and ends the filling within them.
+    /// Runs [`Map::resume`] with a watch, which sees the progress of cells that take long and can stop the filling within a cell.
     ///
     /// # Errors
     ///
@@ -183,14 +183,14 @@ impl Map {
         Ok(Self { x, y, radius, nominal })
     }
 
-    /// Whether every row has been computed.
+    /// Returns whether every row has been computed.
     #[must_use]
     pub fn is_complete(&self) -> bool {
         self.radius.iter().all(|row| !row.is_empty())
     }
 }
 
-/// One row; `None` if it was stopped.
+/// Computes one row; `None` if the computation was stopped.
 fn cells(
     family: &Family,
     x: &[f64],
@@ -199,7 +199,7 @@ fn cells(
     stop: &impl Fn() -> bool,
     watch: &dyn Watch,
 ) -> Result<Option<MapRow>, FamilyError> {
-    // Cells whose second moment is followed one by one take long.
+    // A cell with a second moment takes long, so that `stop` is called after each. Other cells are quick.
     let often = if family.criterion() == Criterion::MeanSquare { 1 } else { 256 };
     let mut row = MapRow { radius: Vec::with_capacity(x.len()), nominal: Vec::with_capacity(x.len()) };
     for (column, x) in x.iter().enumerate() {
@@ -216,7 +216,7 @@ fn cells(
     Ok(Some(row))
 }
 
-/// As many values from the low end of the range to the high one, both included, at equal distances; of one the low end.
+/// Returns `count` values at equal distances from the low end of the range to the high end, both included; the low end alone if `count` is 1.
 pub(crate) fn nodes(range: &KeyRange, count: usize) -> Vec<f64> {
     let last = crate::rounding::real(count.saturating_sub(1));
     let node = |number: usize| {
@@ -229,7 +229,7 @@ pub(crate) fn nodes(range: &KeyRange, count: usize) -> Vec<f64> {
     (0..count).map(node).collect()
 }
 
-/// Scratches that are lent to threads.
+/// Scratches that threads borrow for a computation.
 #[derive(Debug, Default)]
 pub(crate) struct Scratches(Mutex<Vec<FamilyScratch>>);
 

@@ -1,11 +1,11 @@
-//! The verdict on every cell of a map.
+//! The verdicts on the cells of a map.
 
 use rayon::prelude::*;
 
 use super::Map;
 use crate::{Criterion, Family, FamilyError, FamilyScratch, Radius, Verdict};
 
-/// A spectral radius this close to 1 is computed again: far more than any radius of a scene that can be run is off.
+/// The distance from 1 below which a spectral radius is computed again, with a bound: far more than the error of any radius of a scene that can be run.
 const NEAR: f64 = 1e-3;
 /// A mean-square radius this close to 1 is computed again, which takes a thousand times as long: a hundred times as far as those were seen off that are
 /// computed without a bound (`crates/stability/src/mean_square/tests.rs`).
