@@ -220,7 +220,7 @@ impl Node {
         self.step_norm_up_to(scale, 0.0)
     }
 
-    /// Returns [`Node::step_norm`] with `oldest` \[s\] as the age of the oldest sample, for laws that extrapolate samples without end.
+    /// Returns the norm of `step_norm` with `oldest` \[s\] as the age of the oldest sample, for laws that extrapolate samples without end.
     pub fn step_norm_up_to(&self, scale: Scale, oldest: f64) -> f64 {
         let gain = |gains: Gains| gains.stiffness.abs() + gains.damping.abs() / scale.time;
         let wall = self.wall.map_or(0.0, gain);

@@ -64,7 +64,7 @@ fn known_rows_are_not_computed_again() {
     assert!(matches!(odd, Err(MapError::Known { row: 9, .. })));
 }
 
-/// A map with that logarithm of the radius.
+/// Returns a map with that logarithm of the radius.
 fn made_up(columns: usize, rows: usize, level: impl Fn(f64, f64) -> f64) -> Map {
     let range = |text| KeyRange::parse(text).unwrap();
     let (x, y) = (nodes(&range("x=-2..2"), columns), nodes(&range("y=-1..1"), rows));
@@ -73,7 +73,7 @@ fn made_up(columns: usize, rows: usize, level: impl Fn(f64, f64) -> f64) -> Map 
     Map { x, y, radius, nominal }
 }
 
-/// Twice the area to the left of a closed line, by the shoelace formula.
+/// Returns twice the area to the left of a closed line, by the shoelace formula.
 fn area(line: &Polyline) -> f64 {
     let ends = line.points.iter().zip(line.points.iter().cycle().skip(1));
     0.5 * ends.map(|((x0, y0), (x1, y1))| x0 * y1 - x1 * y0).sum::<f64>()

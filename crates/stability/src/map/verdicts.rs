@@ -7,13 +7,13 @@ use crate::{Criterion, Family, FamilyError, FamilyScratch, Radius, Verdict};
 
 /// The distance from 1 below which a spectral radius is computed again, with a bound: far more than the error of any radius of a scene that can be run.
 const NEAR: f64 = 1e-3;
-/// A mean-square radius this close to 1 is computed again, which takes a thousand times as long: a hundred times as far as those were seen off that are
-/// computed without a bound (`crates/stability/src/mean_square/tests.rs`).
+/// The distance from 1 below which a mean-square radius is computed again, which takes a thousand times as long. It is a hundred times the largest error
+/// that was measured of radii without a bound (`crates/stability/src/mean_square/tests.rs`).
 const NEAR_OF_SQUARES: f64 = 1e-7;
 
 impl Map {
-    /// The verdict on every cell, row after row, on all threads of the pool it is called in. A map has radii without bounds of their errors, which is enough far
-    /// from 1; near it they are computed again, with one. `family`: that of the map.
+    /// Returns the verdict on every cell, indexed as the radii, on all threads of the pool that calls this function. The radii of a map have no bounds of their
+    /// errors, which is enough far from 1. Radii near 1 are computed again, with a bound. `family` must be the family of the map.
     ///
     /// # Errors
     ///
