@@ -1,4 +1,6 @@
-//! One curve: the scene as it stands, or with what `--curve` changes.
+//! One curve of `cohaptic admittance`: from the scene file and the overrides of one `--curve` to the response of one peer.
+//!
+//! [`subjects`] reads and linearises every scene before any curve is computed, so that a wrong argument ends the command early.
 
 use cohaptic_answers::admittance::Curve;
 use cohaptic_scene::Scene;
@@ -9,15 +11,16 @@ use crate::failure::{self, Failure, not_analysed};
 use crate::input;
 use crate::variants::Variant;
 
-/// A scene of which the admittance is asked for.
+/// A scene whose admittance the user asks for, ready to be computed at any frequency.
 pub(super) struct Subject {
     variant: Variant,
     scene: Scene,
     pub(super) admittance: Admittance,
+    /// Mean-square analysis of the scene; `None` if nothing in the scene's network is random.
     chance: Option<Result<MeanSquare, AnalysisError>>,
 }
 
-/// The scene as it stands, then that of every `--curve`.
+/// Returns one subject for the scene without changes, then one subject per `--curve`, in the order of the command line.
 pub(super) fn subjects(arguments: &AdmittanceArguments, watch: &dyn Watch) -> Result<Vec<Subject>, Failure> {
     Variant::all(&arguments.curve, &[])?.into_iter().map(|variant| Subject::new(arguments, variant, watch)).collect()
 }
@@ -31,6 +34,7 @@ impl Subject {
         let peer = place_of(&arguments.peer, &scene, &variant)?;
         let ended = || Failure::Interrupted("the analysis was ended before its first point".to_owned());
         let [axis, seen] = [arguments.axis, arguments.seen].map(|axis| axis.map(Into::into));
+        // Only a stopped analysis is an interruption. Every other error is a property of the scene, and the message names the scene's file.
         let admittance = Admittance::between_watched(&scene, peer, axis, seen, watch).map_err(|error| match error {
             AdmittanceError::Analysis(AnalysisError::Stopped) => ended(),
             error @ (AdmittanceError::NoSuchPeer { .. }
@@ -41,6 +45,7 @@ impl Subject {
             | AdmittanceError::Analysis(_)) => not_analysed(file, &error),
         })?;
         let chance = has_chance(&scene).then(|| mean_square_watched(&scene, &Limits { watch, ..Limits::of_unknowns(QUICK_UNKNOWNS) }));
+        // Other errors of the mean-square analysis stay in `chance`: the answer reports them beside the curve, which is valid without the analysis.
         if chance == Some(Err(AnalysisError::Stopped)) {
             return Err(ended());
         }
@@ -48,9 +53,10 @@ impl Subject {
     }
 }
 
-/// A message names this many peers at most.
+/// Largest number of peers that an error message names.
 const MOST_NAMED: usize = 20;
 
+/// Returns the index of the peer that `--peer` names. The error lists the peers of the scene.
 fn place_of(wanted: &str, scene: &Scene, variant: &Variant) -> Result<usize, Failure> {
     scene.peers.iter().position(|peer| peer.name == wanted).ok_or_else(|| {
         let names: Vec<&str> = scene.peers.iter().take(MOST_NAMED).map(|peer| peer.name.as_str()).collect();
@@ -62,7 +68,7 @@ fn place_of(wanted: &str, scene: &Scene, variant: &Variant) -> Result<usize, Fai
 }
 
 impl Subject {
-    /// The curve at as many of the frequencies as there is time for.
+    /// Computes the response at `frequencies` \[Hz\], in their order. If `watch` stops the analysis, the curve has the points finished so far.
     pub(super) fn curve(self, frequencies: &[f64], watch: &dyn Watch) -> Result<Curve, Failure> {
         let Self { variant, scene, admittance, chance } = self;
         let response = admittance.response_watched(frequencies, watch).map_err(|error| Failure::Input(error.to_string()))?;

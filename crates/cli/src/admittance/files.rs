@@ -1,4 +1,4 @@
-//! The files of `--out`: one table of all curves, and one picture, a Bode plot.
+//! The files that `cohaptic admittance --out` writes: one table of all curves, and one Bode plot of all curves.
 
 use std::path::Path;
 
@@ -9,9 +9,9 @@ use cohaptic_picture::Size;
 use crate::failure::Failure;
 use crate::file::write_into;
 
-/// Writes `admittance.csv` and `admittance.svg` into a folder, and gives their paths.
+/// Writes `admittance.csv` and, if `is_whole`, `admittance.svg` into `folder`, and returns the paths of the written files.
 ///
-/// An incomplete list of points has only the table: a picture takes longer than users wait after Ctrl-C.
+/// An interrupted analysis gets only the table: drawing the picture takes longer than users wait after Ctrl-C.
 pub(super) fn write(folder: &Path, peer: &str, curves: &[Curve], is_whole: bool, size: Size) -> Result<Vec<String>, Failure> {
     let mut written = vec![write_into(folder, "admittance.csv", csv(curves))?];
     if is_whole {

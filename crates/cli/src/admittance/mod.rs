@@ -1,4 +1,6 @@
-//! `cohaptic admittance`.
+//! `cohaptic admittance`: computes how one peer's hand feels the coupled system, frequency by frequency.
+//!
+//! This module reads the arguments, chooses the frequencies and writes the answer; `curve` computes, `files` writes the files of `--out`.
 
 mod curve;
 mod files;
@@ -15,7 +17,9 @@ use crate::failure::Failure;
 use crate::file::own_folder;
 use crate::output;
 
-/// Says what the hand of one peer feels.
+/// Computes the admittance of one peer for the scene and for each `--curve`, and writes the answer.
+///
+/// An interrupted analysis still answers with the points finished so far; the returned failure then gives their number.
 pub(crate) fn admittance(arguments: &AdmittanceArguments) -> Result<ExitCode, Failure> {
     let watch = AnalysisWatch::new(arguments.memory);
     let subjects = curve::subjects(arguments, &watch);
@@ -23,20 +27,23 @@ pub(crate) fn admittance(arguments: &AdmittanceArguments) -> Result<ExitCode, Fa
         watch.clear();
     }
     let subjects = subjects?;
+    // One list of frequencies serves all curves, so that no frequency may exceed the limit of the peer with the slowest ticks.
     let highest = subjects.iter().map(|subject| subject.admittance.highest_frequency()).fold(f64::INFINITY, f64::min);
     let frequencies = frequencies(arguments, highest)?;
+    // The folder is locked until the command ends, so that no second command writes into the same folder.
     let _own = arguments.out.as_deref().map(own_folder).transpose()?;
     let curves = subjects.into_iter().map(|subject| subject.curve(&frequencies, &watch));
     let curves = curves.collect::<Result<Vec<Curve>, Failure>>();
     watch.clear();
     let curves: Vec<Curve> = curves?.into_iter().filter(|curve| !curve.response.points.is_empty()).collect();
     let finished = curves.iter().map(|curve| curve.response.points.len()).sum::<usize>();
+    // The curve of the scene without changes comes in addition to the curves of `--curve`.
     let wanted = frequencies.len() * (1 + arguments.curve.len());
     let is_interrupted = finished < wanted;
     if curves.is_empty() {
         return Err(Failure::Interrupted(format!("none of {wanted} points was finished")));
     }
-    // Nothing is written before everything is known to be right.
+    // Files are written only after every curve has been computed without an error.
     let files = match &arguments.out {
         Some(folder) => files::write(folder, &arguments.peer, &curves, !is_interrupted, arguments.pictures.size())?,
         None => Vec::new(),
@@ -54,13 +61,18 @@ pub(crate) fn admittance(arguments: &AdmittanceArguments) -> Result<ExitCode, Fa
     Ok(ExitCode::SUCCESS)
 }
 
+/// Lowest frequency without `--from` \[Hz\].
 const LOWEST: f64 = 0.01;
+/// Highest frequency without `--to` \[Hz\], if the peer's ticks are fast enough.
 const HIGHEST: f64 = 100.0;
+/// Number of frequencies without `--points`.
 const POINTS: usize = 60;
-/// More points than this are refused: a table of them fills a small machine.
+/// Largest accepted number of points: the table of a larger number could fill the memory of a small machine.
 const MOST: usize = 1_000_000;
 
-/// The frequencies that were asked for \[Hz\], none above `highest`.
+/// Returns the frequencies of `--at`, or frequencies evenly spaced on a logarithmic scale from `--from` to `--to` \[Hz\].
+///
+/// A frequency that is not above zero, or above `highest` \[Hz\], is an input failure.
 fn frequencies(arguments: &AdmittanceArguments, highest: f64) -> Result<Vec<f64>, Failure> {
     if !arguments.at.is_empty() {
         return arguments.at.iter().map(|hz| checked("--at", *hz, highest)).collect();
@@ -79,12 +91,15 @@ fn frequencies(arguments: &AdmittanceArguments, highest: f64) -> Result<Vec<f64>
     if points > MOST {
         return Err(Failure::Input(format!("--points {points}: expected at most {MOST}")));
     }
+    // `points` is at least 2 here, so that the divisor is at least 1.
     #[expect(clippy::cast_precision_loss, reason = "at most a million points")]
     let share = |place: usize| place as f64 / (points - 1) as f64;
+    // The last frequency is `to` itself: rounding in the power could put the frequency above `highest`.
     let between = |place: usize| if place + 1 == points { to } else { from * (to / from).powf(share(place)) };
     Ok((0..points).map(between).collect())
 }
 
+/// Returns `hz` if the frequency is above zero and at most `highest` \[Hz\].
 fn checked(option: &str, hz: f64, highest: f64) -> Result<f64, Failure> {
     if hz > 0.0 && hz <= highest {
         return Ok(hz);

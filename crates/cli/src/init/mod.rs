@@ -1,4 +1,6 @@
-//! `cohaptic init`: a scene to begin with.
+//! `cohaptic init`: writes a shipped scene as a commented file, from which a user begins a scene of his own.
+//!
+//! `shipped` holds the texts of the scenes, this module changes the number of peers, and `write` writes the text with its comments.
 
 mod shipped;
 #[cfg(test)]
@@ -16,7 +18,7 @@ use crate::failure::Failure;
 use crate::file::write_file;
 use crate::{input, output};
 
-/// Writes a scene in which every key is explained.
+/// Writes the scene of `--from` with a comment for every key, or lists the names of the shipped scenes.
 pub(crate) fn init(arguments: &InitArguments) -> Result<ExitCode, Failure> {
     if arguments.list {
         output::text(&list()?)?;
@@ -39,7 +41,7 @@ pub(crate) fn init(arguments: &InitArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// A shipped scene for a number of peers, with every key explained.
+/// Returns the text of a shipped scene for `peers` peers, or for the scene's own number if `peers` is `None`, with a comment for every key.
 fn commented(name: &str, text: &str, peers: Option<u32>) -> Result<String, Failure> {
     let mut scene = parsed(text)?;
     let own = peer_count(&scene);
@@ -47,10 +49,11 @@ fn commented(name: &str, text: &str, peers: Option<u32>) -> Result<String, Failu
     if wanted != own {
         change_peers(&mut scene, wanted);
     }
+    // The text says so if the number of peers was changed, because the expectations of the scene are then left out.
     Ok(write::scene(&scene, name, (wanted != own).then_some(own)))
 }
 
-/// Every name with the title of its scene.
+/// Returns one line per name of a shipped scene: the name and the scene's title.
 fn list() -> Result<String, Failure> {
     let width = shipped::names().map(str::len).max().unwrap_or(0);
     let mut list = String::new();
@@ -64,7 +67,7 @@ fn list() -> Result<String, Failure> {
     Ok(list)
 }
 
-/// A scene that ships is TOML, which tests prove.
+/// Parses the text of a shipped scene. Tests parse every shipped scene, so that the failure does not occur in a released program.
 fn parsed(text: &str) -> Result<Table, Failure> {
     text.parse().map_err(|error: toml::de::Error| Failure::System(format!("a scene within the program cannot be read: {error}")))
 }
@@ -72,20 +75,24 @@ fn parsed(text: &str) -> Result<Table, Failure> {
 fn refuse_to_overwrite(file: &Path, force: bool) -> Result<(), Failure> {
     match file.symlink_metadata() {
         Ok(_) if !force => Err(Failure::Input(format!("{} is there already: expected another name, or --force to write over it", file.display()))),
+        // An error mostly means that no file has this name. Writing the file reports every other obstacle.
         Ok(_) | Err(_) => Ok(()),
     }
 }
 
+/// Returns the number of peers: the scene's `count`, or the number of `[[peers]]` entries if the scene has no `count`.
 fn peer_count(scene: &Table) -> usize {
     let by_number = scene.get("scene").and_then(|header| header.get("count")).and_then(Value::as_integer);
     by_number.and_then(|count| usize::try_from(count).ok()).unwrap_or_else(|| entries(scene, "peers").len())
 }
 
-/// Changes the number of peers: the last ones are left out, with all that names them, or others like the last one are added. Expectations of the
-/// scene is left out, since it holds for the number that it was computed for.
+/// Changes the number of peers to `wanted`. Removes the last peers with every entry that names a removed peer, or adds copies of the last peer.
+///
+/// The expectations of the scene are removed, because they hold only for the number of peers for which they were computed.
 fn change_peers(scene: &mut Table, wanted: usize) {
     scene.remove("expect");
     let header = scene.get_mut("scene").and_then(Value::as_table_mut);
+    // Peers of a scene with `count` are called peer1, peer2, … and need no entry: an entry only overrides keys of the peer that the entry names.
     let left_out = match header.filter(|header| header.contains_key("count")) {
         Some(header) => {
             header.insert("count".to_owned(), Value::Integer(i64::try_from(wanted).unwrap_or(i64::MAX)));
@@ -105,6 +112,7 @@ fn change_peers(scene: &mut Table, wanted: usize) {
             names.into_iter().skip(wanted).collect()
         }
     };
+    // An entry that names a peer which no longer exists would make the scene invalid.
     for list in ["links", "timeline"] {
         if let Some(Value::Array(entries)) = scene.get_mut(list) {
             entries.retain(|entry| !mentions(entry, &left_out));
@@ -113,8 +121,11 @@ fn change_peers(scene: &mut Table, wanted: usize) {
     fit_ring(scene, wanted);
 }
 
-/// A ring has an even number of neighbours, fewer than there are peers: as many of those it had as there are places for. Two peers hear each other on any topology, and need none.
+/// Reduces the number of neighbours on a ring to the largest even number below `peers`, if the scene has more.
+///
+/// For two peers the ring is removed: two peers hear each other on every topology.
 fn fit_ring(scene: &mut Table, peers: usize) {
+    // A ring needs an even number of neighbours (the same number on both sides), fewer than the number of peers.
     let most = i64::try_from(peers.saturating_sub(1) / 2 * 2).unwrap_or(i64::MAX);
     let ring =
         scene.get_mut("topology").and_then(Value::as_table_mut).filter(|topology| topology.get("kind").and_then(Value::as_str) == Some("ring"));
@@ -129,6 +140,7 @@ fn fit_ring(scene: &mut Table, peers: usize) {
     }
 }
 
+/// Appends copies of the last peer, named after their place in the list, until the list has `wanted` entries.
 fn add_like_the_last(peers: &mut Vec<Value>, wanted: usize) {
     let Some(last) = peers.last().cloned() else { return };
     for number in peers.len() + 1..=wanted {
@@ -140,7 +152,7 @@ fn add_like_the_last(peers: &mut Vec<Value>, wanted: usize) {
     }
 }
 
-/// Whether an entry is about one of these peers: names stand under `from`, `to` and `peer`.
+/// Returns whether an entry of `links` or `timeline` names one of the peers `names`: under `from`, `to` or `peer`, or under `from` or `to` of its `link`.
 fn mentions(entry: &Value, names: &[String]) -> bool {
     let is_one = |value: Option<&Value>| value.and_then(Value::as_str).is_some_and(|name| names.iter().any(|out| out == name));
     let ends = |value: &Value| is_one(value.get("from")) || is_one(value.get("to"));

@@ -1,22 +1,22 @@
-//! The scenes that ship with the program, within it: those that need no file beside them.
+//! The texts of the shipped scenes, compiled into the program. Scenes that read a data file beside them are left out.
 
-/// Other names of some of them.
+/// Alias names of shipped scenes, each with the scene's own name.
 const OTHER_NAMES: [(&str, &str); 2] = [("paper/5-1", "paper/5-1-ap-2100"), ("paper/5-2", "paper/5-2-ap")];
 
-/// A scene by its name, or by another name of it: its own name and its text.
+/// Returns the own name and the text of the scene that has `name` as its own name or as its alias; `None` if no shipped scene has the name.
 pub(super) fn find(name: &str) -> Option<(&'static str, &'static str)> {
     let name = OTHER_NAMES.iter().find(|(other, _)| *other == name).map_or(name, |(_, own)| own);
     SCENES.iter().copied().find(|(own, _)| *own == name)
 }
 
-/// All names, the other ones first.
+/// Returns the names of all shipped scenes, aliases first.
 pub(super) fn names() -> impl Iterator<Item = &'static str> {
     OTHER_NAMES.iter().map(|(other, _)| *other).chain(SCENES.iter().map(|(own, _)| *own))
 }
 
 macro_rules! shipped {
     ($($name:literal),* $(,)?) => {
-        /// Each with its name: its path within `scenarios/`, without the ending.
+        /// Name and text of each shipped scene. The name is the path of the file within `scenarios/`, without the extension.
         const SCENES: &[(&str, &str)] = &[$(($name, include_str!(concat!("../../scenarios/", $name, ".toml")))),*];
     };
 }
@@ -140,7 +140,7 @@ mod tests {
 
     use super::*;
 
-    /// Whatever ships is here, unless it names a file of `scenarios/network/data`.
+    /// Compares [`SCENES`] with the files in `scenarios/`. Scenes that read a file of `scenarios/network/data` are not expected.
     #[test]
     fn every_scene_that_stands_alone_is_here() {
         let mut expected = Vec::new();

@@ -1,4 +1,4 @@
-//! A written scene is accepted, and equals the scene it was made from.
+//! Tests of `cohaptic init`: a written scene is accepted, and equals the shipped scene from which the text was written.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ fn scene(text: &str, said: &str) -> Scene {
     Scene::parse(text, Path::new("scene.toml"), &[]).unwrap_or_else(|error| panic!("{said}: {error}\n{text}"))
 }
 
-/// Without `--peers` the text is the scene itself: comments and defaults change nothing.
+/// Without `--peers` the written text parses to the shipped scene: the added comments and the written defaults change no value.
 #[test]
 fn what_is_written_is_the_scene_it_was_made_from() {
     for name in shipped::names() {
@@ -33,7 +33,7 @@ fn every_scene_can_be_had_for_other_numbers_of_peers() {
     }
 }
 
-/// Each key that is written behind a `#` can be taken into the scene as it stands there; most are defaults, which change nothing.
+/// Each key that the text proposes after a `#` is accepted when the user removes the `#`.
 #[test]
 fn every_key_that_is_proposed_is_accepted() {
     let (name, text) = shipped::find("paper/5-1").unwrap();
@@ -43,13 +43,14 @@ fn every_key_that_is_proposed_is_accepted() {
     assert!(proposed.len() > 30, "{proposed:?}");
     for at in proposed {
         let lines: Vec<&str> = written.lines().enumerate().map(|(number, line)| if number == at { &line[2..] } else { line }).collect();
+        // A key that needs a rate is rightly refused, since this scene's links have no rate.
         if !lines[at].contains("Needs rate") {
             scene(&lines.join("\n"), lines[at]);
         }
     }
 }
 
-/// A key that people change has its meaning beside or above it, and its unit if it has one.
+/// Keys that users often change have their meaning and their unit in a comment on the same line or above the line.
 #[test]
 fn keys_are_explained_with_their_units() {
     let (name, text) = shipped::find("paper/5-1").unwrap();

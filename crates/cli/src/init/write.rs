@@ -1,4 +1,6 @@
-//! A scene as text, in which every key is explained: the keys that it has, and behind a `#` those that it could have.
+//! Writes a scene as TOML text with a comment for every key. Keys that the scene does not set follow a `#`, as proposals.
+//!
+//! Meanings, units and defaults come from the schema of scene files, so that no text about a key stands twice in the program.
 
 use std::fmt::Write as _;
 
@@ -6,10 +8,10 @@ use cohaptic_linkfile::schema::{Form, Key, Need, Table};
 use cohaptic_scene::schema::FileSchema;
 use toml::Value;
 
-/// Where comments begin, if the line before them is not longer.
+/// Column in which the comment of a line begins, unless the key and its value need more columns.
 const COLUMN: usize = 30;
 
-/// Values of keys that have no default, as proposals.
+/// Proposed values of keys for which the schema's default, or the lack of a default, would be no useful proposal.
 const EXAMPLES: [(&str, &str); 6] = [
     ("enclosure", "{ min = -0.1, max = 0.1, stiffness = 1000.0, damping = 5.0 }"),
     ("clock", "{ offset = \"300us\", drift = \"20ppm\" }"),
@@ -19,10 +21,10 @@ const EXAMPLES: [(&str, &str); 6] = [
     ("queue", "{ limit = \"100 packets\" }"),
 ];
 
-/// Keys that are not proposed: they mean something only together with others, some of them with an inertia of the object.
+/// Keys that are never proposed: each has a meaning only together with other keys, some of them only with an inertia of the object.
 const NOT_PROPOSED: [&str; 8] = ["count", "substeps", "netem-profile", "name", "orientation", "angular-velocity", "grasp", "rotation-steps"];
 
-/// A scene as text. `other_number`: how many peers the shipped scene has, if this one has another number.
+/// Returns `scene` as commented text. `other_number` is the number of peers of the shipped scene `name`, if `scene` has a different number.
 pub(super) fn scene(scene: &toml::Table, name: &str, other_number: Option<usize>) -> String {
     let mut text = format!(
         "# A scene to begin with, written by cohaptic init --from {name}.\n\
@@ -41,7 +43,7 @@ pub(super) fn scene(scene: &toml::Table, name: &str, other_number: Option<usize>
     text
 }
 
-/// A table at the top, or the entries of a list.
+/// Appends one top-level key of the scene: a table, or every entry of a list of tables. A key of another form appends nothing.
 fn part(text: &mut String, key: &Key, value: Option<&Value>) {
     // Tables whose keys people change are written even if the scene has none.
     let is_proposed = matches!(key.name, "simulation" | "peer" | "link");
@@ -50,10 +52,12 @@ fn part(text: &mut String, key: &Key, value: Option<&Value>) {
     {
         let _ = writeln!(text, "\n# {}.\n[{}]", key.about, key.name);
         let nothing = toml::Table::new();
+        // Expectations follow from the other keys, so that none is proposed.
         fields(text, table, value.and_then(Value::as_table).unwrap_or(&nothing), key.name != "expect");
     }
     if let (Form::List(Form::Table(table)), Some(entries)) = (&key.form, value.and_then(Value::as_array)) {
         for (number, entry) in entries.iter().enumerate() {
+            // The meaning of the list stands above its first entry only.
             let about = if number == 0 { format!("# {}.\n", key.about) } else { String::new() };
             let _ = writeln!(text, "\n{about}[[{}]]", key.name);
             if let Some(entry) = entry.as_table() {
@@ -63,7 +67,7 @@ fn part(text: &mut String, key: &Key, value: Option<&Value>) {
     }
 }
 
-/// The keys of a table, those that it has and, if it is to propose some, the others.
+/// Appends the keys of `table` that `values` sets and, if `propose`, the remaining keys as proposals. The order is the order of the schema.
 fn fields(text: &mut String, table: &Table, values: &toml::Table, propose: bool) {
     for key in table.keys() {
         match values.get(key.name) {
@@ -74,6 +78,7 @@ fn fields(text: &mut String, table: &Table, values: &toml::Table, propose: bool)
     }
 }
 
+/// Appends a key that the scene sets. Comments on an inline table or on a list of tables stand above the key, because the line itself is long.
 fn field(text: &mut String, key: &Key, value: &Value) {
     if let Some(within) = value.as_table() {
         let _ = writeln!(text, "# {}: {}", key.name, about(key));
@@ -91,6 +96,7 @@ fn field(text: &mut String, key: &Key, value: &Value) {
     }
 }
 
+/// Appends a key as a proposal after a `#`. A key with neither an example nor a default is left out.
 fn proposal(text: &mut String, key: &Key) {
     let example = EXAMPLES.iter().find(|(name, _)| *name == key.name).map(|(_, example)| *example);
     let value = match (example, key.need) {
@@ -103,11 +109,12 @@ fn proposal(text: &mut String, key: &Key) {
     }
 }
 
+/// Appends `said` with `about` as the comment on the same line.
 fn line(text: &mut String, said: &str, about: &str) {
     let _ = writeln!(text, "{said:<COLUMN$}  # {about}");
 }
 
-/// What the keys of a table within a line mean, each on a line of its own.
+/// Appends one comment line per key of an inline table, nested tables included. `path` names the table, with a dot between keys.
 fn explain(text: &mut String, path: &str, form: &Form, values: &toml::Table) {
     let Some(table) = form.table() else { return };
     for key in table.keys() {
@@ -120,7 +127,7 @@ fn explain(text: &mut String, path: &str, form: &Form, values: &toml::Table) {
     }
 }
 
-/// The meaning of a key with its unit.
+/// Returns the meaning of a key, with the unit in brackets if the key has a unit.
 fn about(key: &Key) -> String {
     let unit = key.form.unit();
     if unit.is_empty() { key.about.to_owned() } else { format!("{} [{unit}]", key.about) }
