@@ -1,4 +1,4 @@
-//! What the commands answer: the parts that their JSON documents share, and the same in words.
+//! Parts of the answers of `cohaptic falcon`: the structures that the JSON documents of several commands share, and the same values as lines of text.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -13,7 +13,7 @@ use super::bench::{Bench, End};
 use super::reach::{FirmwareState, Target};
 use crate::documents::micros;
 
-/// Which device it was.
+/// Identity of the device in an answer. The optional fields are absent for a simulated device, and where the system does not give the string.
 #[derive(Serialize)]
 pub(super) struct Identity {
     pub(super) simulated: bool,
@@ -32,7 +32,7 @@ impl Identity {
     }
 }
 
-/// What was said between host and device.
+/// Statistics of the exchanges between host and device: counts since the driver was opened, except for the fields with a unit in their names.
 #[derive(Clone, Serialize)]
 pub(super) struct Traffic {
     pub(super) seconds: f64,
@@ -51,7 +51,7 @@ pub(super) struct Traffic {
 }
 
 impl Traffic {
-    /// `spent`: how long packets were exchanged.
+    /// Reads the statistics of `bench`. `spent` is the time from the first exchange to the last, over which the rate of reports is averaged.
     pub(super) fn of(bench: &Bench, spent: Duration) -> Self {
         let statistics = bench.statistics();
         let (late_turns, worst) = bench.lateness();
@@ -76,7 +76,7 @@ impl Traffic {
     }
 }
 
-/// What became of the forces that were asked for.
+/// Statistics of the forces that were asked for: the limit, the largest force, and the number of changes per kind of change.
 #[derive(Serialize)]
 pub(super) struct Forces {
     pub(super) limit_n: f64,
@@ -88,6 +88,7 @@ pub(super) struct Forces {
 }
 
 impl Forces {
+    /// Reads the statistics of `bench`. Causes for which no force became zero are left out.
     pub(super) fn of(bench: &Bench, limit_n: f64, largest_n: f64) -> Self {
         let statistics = bench.statistics();
         let zeroed = ZeroCause::ALL.into_iter().map(|cause| (cause.name(), statistics.zeroed_by(cause))).filter(|(_, count)| *count > 0).collect();
@@ -95,7 +96,7 @@ impl Forces {
     }
 }
 
-/// A device as its driver sees it.
+/// State of a device as its driver sees it. Triples of encoders are in the order top, right, left; position and velocity are `None` until homed.
 #[derive(Clone, Serialize)]
 pub(super) struct Seen {
     pub(super) phase: &'static str,
@@ -123,7 +124,7 @@ impl Seen {
     }
 }
 
-/// The colour of a phase.
+/// Returns the colour of the device's light in a phase.
 pub(super) fn light(phase: Phase) -> &'static str {
     match phase.leds() {
         Leds::RED => "red",
@@ -133,12 +134,14 @@ pub(super) fn light(phase: Phase) -> &'static str {
     }
 }
 
+/// Returns the names of the pressed buttons.
 pub(super) fn buttons(pressed: Buttons) -> Vec<&'static str> {
     let names = [(Buttons::PLUS, "plus"), (Buttons::FORWARD, "forward"), (Buttons::CENTRE, "centre"), (Buttons::MINUS, "minus")];
     names.into_iter().filter(|(button, _)| pressed.contains(*button)).map(|(_, name)| name).collect()
 }
 
 impl FirmwareState {
+    /// Returns the name of the state in JSON documents.
     pub(super) const fn name(self) -> &'static str {
         match self {
             Self::Running => "running",
@@ -148,6 +151,7 @@ impl FirmwareState {
 }
 
 impl End {
+    /// Returns the name of the end in JSON documents. A task that has seen enough and a time that is over are both `complete`.
     pub(super) const fn name(self) -> &'static str {
         match self {
             Self::Enough | Self::Over => "complete",
@@ -157,6 +161,7 @@ impl End {
     }
 }
 
+/// Returns the statistics of exchanges as two lines of text.
 pub(super) fn traffic(traffic: &Traffic) -> [String; 2] {
     let Traffic { seconds, exchanges, reports_per_s, timeouts, garbage_bytes, faults, implausible, late_turns, worst_late_us, .. } = traffic;
     [
@@ -167,6 +172,7 @@ pub(super) fn traffic(traffic: &Traffic) -> [String; 2] {
     ]
 }
 
+/// Returns encoders and buttons as two lines of text.
 pub(super) fn seen(seen: &Seen) -> [String; 2] {
     let homed = seen.homed.map(|homed| if homed { "homed" } else { "not homed" });
     let encoder = |place: usize| format!("{} ({})", seen.encoders[place], homed[place]);
@@ -177,6 +183,7 @@ pub(super) fn seen(seen: &Seen) -> [String; 2] {
     ]
 }
 
+/// Returns the statistics of forces as one line of text.
 pub(super) fn forces(forces: &Forces) -> String {
     let Forces { limit_n, largest_n, limited, slewed, saturated, zeroed } = forces;
     let zeroed: Vec<String> = zeroed.iter().map(|(cause, count)| format!("{count} {cause}")).collect();
@@ -184,13 +191,13 @@ pub(super) fn forces(forces: &Forces) -> String {
     format!("force up to {largest_n:.3} N, limit {limit_n} N; {limited} limited, {slewed} slewed, {saturated} saturated; became zero: {zeroed}")
 }
 
-/// `x 1.2 mm, y -3.0 mm, z 45.6 mm`.
+/// Formats a position \[m\] in millimetres, such as `x 1.2 mm, y -3.0 mm, z 45.6 mm`.
 pub(super) fn place(position: Triple) -> String {
     let [x, y, z] = position.map(|part| 1e3 * part);
     format!("x {x:.1} mm, y {y:.1} mm, z {z:.1} mm")
 }
 
-/// Lines below a title.
+/// Returns a text of `title` and, indented below the title, `lines`.
 pub(super) fn block(title: &str, lines: &[String]) -> String {
     let mut text = format!("{title}\n");
     for line in lines {
@@ -201,6 +208,7 @@ pub(super) fn block(title: &str, lines: &[String]) -> String {
     text
 }
 
+/// Returns the Euclidean length of a vector, in the unit of the vector.
 pub(super) fn length(vector: Triple) -> f64 {
     let [x, y, z] = vector;
     x.hypot(y).hypot(z)

@@ -1,4 +1,6 @@
-//! One exchange a millisecond, until somebody has seen enough.
+//! The loop of all `cohaptic falcon` commands: one exchange with the device per millisecond, until the command's task ends the loop.
+//!
+//! The module takes an opened transport and a [`Task`], and knows nothing of arguments and answers.
 
 use std::time::Duration;
 
@@ -10,47 +12,54 @@ use super::reach::AnyTransport;
 use crate::failure::Failure;
 use crate::interrupt;
 
-/// From one exchange to the next: USB gives no more than one in a millisecond.
+/// Time between the beginnings of two exchanges. USB allows at most one exchange per millisecond.
 const PERIOD: Duration = Duration::from_millis(1);
 
-/// A turn that is later than this is counted. The serial chip hands over what has come once a millisecond, by its own clock: somewhat less is no fault.
+/// Lateness from which a turn counts as late. The serial chip delivers received bytes once per millisecond by its own clock, so that less is no fault.
 const LATE: Duration = Duration::from_micros(100);
 
-/// The work on a device.
+/// The work of a command on a device, called once per exchange.
 pub(super) trait Task {
-    /// The force on the grip \[N\] that is wanted at `at`, counted from the first exchange; `None` wants none.
+    /// Returns the force to put on the grip \[N\], or `None` to ask for no force. `at` is the time since the first exchange began.
     fn wants(&mut self, at: Duration, status: &Status) -> Option<Triple>;
 
-    /// Looks at what came of the exchange that ended at `at`, and says whether to go on.
+    /// Reads the status after an exchange, and returns whether the loop goes on. `at` is the time since the first exchange began.
     fn look(&mut self, at: Duration, status: &Status) -> Result<Go, Failure>;
 }
 
+/// Answer of a task after an exchange.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Go {
+    /// The loop continues.
     On,
+    /// The task is complete, and the loop ends.
     Enough,
 }
 
-/// Why exchanges ended.
+/// Reason for the end of the loop.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum End {
-    /// The task has seen enough.
+    /// The task is complete.
     Enough,
-    /// The time is over.
+    /// The time limit has passed.
     Over,
-    /// The user asked for it.
+    /// The user interrupted the command.
     Interrupted,
-    /// The driver could not go on.
+    /// An exchange failed, and the driver cannot continue.
     Failed(DriverError),
 }
 
-/// A driver and how well its loop keeps its time.
+/// A driver, with the schedule of its exchanges and the statistics of late turns.
 #[derive(Debug)]
 pub(super) struct Bench {
     driver: Driver<AnyTransport>,
+    /// Instant at which the driver was opened, from which all times are counted.
     begun: Instant,
+    /// Instant at which the present turn was due.
     next: Instant,
+    /// Number of turns that were late by more than [`LATE`].
     late: u64,
+    /// Largest lateness of a turn.
     worst: Duration,
 }
 
@@ -61,7 +70,8 @@ impl Bench {
         Ok(Self { driver, begun: now, next: now, late: 0, worst: Duration::ZERO })
     }
 
-    /// Exchanges packets; `most` is how long at most. Force is off for good afterwards, whatever happened.
+    /// Exchanges packets until the task, the user, an error or the time limit `most` ends the loop. The driver is stopped afterwards in every case,
+    /// an error of the task included, so that no force stays on the device.
     pub(super) fn run(&mut self, most: Option<Duration>, task: &mut impl Task) -> Result<End, Failure> {
         // Readings of the device are a result, and the loop looks for a signal before each exchange.
         interrupt::has_results();
@@ -90,7 +100,7 @@ impl Bench {
         }
     }
 
-    /// Waits for the next turn; a turn that took too long moves all that follow.
+    /// Waits until the next turn is due. A turn that took longer than the period postpones all later turns.
     fn pace(&mut self) {
         self.next = self.next.saturating_add(PERIOD);
         let now = self.driver.now();
@@ -100,11 +110,12 @@ impl Bench {
         } else {
             self.late += u64::from(late > LATE);
             self.worst = self.worst.max(late);
+            // Turns are not made up for: exchanges in quick succession would not be faster, since USB limits their rate.
             self.next = now;
         }
     }
 
-    /// Since the first exchange.
+    /// Returns the time since the driver was opened, which is also the time since the first exchange began.
     pub(super) fn passed(&self) -> Duration {
         self.driver.now().saturating_duration_since(self.begun)
     }
@@ -117,7 +128,7 @@ impl Bench {
         self.driver.statistics()
     }
 
-    /// Turns that ended a tenth of a millisecond or more after the next should have begun, and the longest that one was late.
+    /// Returns the number of turns that were late by more than 0.1 ms, and the largest lateness of any turn.
     pub(super) const fn lateness(&self) -> (u64, Duration) {
         (self.late, self.worst)
     }

@@ -1,4 +1,4 @@
-//! `cohaptic falcon home`.
+//! `cohaptic falcon home`: waits until a user has homed the device, without any force on the grip.
 
 use std::process::ExitCode;
 use std::time::Duration;
@@ -18,7 +18,7 @@ use crate::failure::{Failure, INTERRUPTED};
 use crate::output;
 use crate::progress::Progress;
 
-/// Waits until a user has homed a device and pulled its grip out.
+/// Waits until a user has homed the device and pulled the grip out, for at most the time of `--for`. A device that is not active by then is a failure.
 pub(super) fn home(arguments: &HomeArguments) -> Result<ExitCode, Failure> {
     let which = &arguments.which;
     let firmware = reach::read_firmware(which.firmware.as_deref())?;
@@ -35,7 +35,7 @@ pub(super) fn home(arguments: &HomeArguments) -> Result<ExitCode, Failure> {
         #[serde(flatten)]
         identity: Identity::of(&target),
         firmware: state.name(),
-        // Whether it was homed at the end, beyond doubt.
+        // A reading exists only if all three axes are homed.
         is_homed: is_homed,
         is_active: is_active,
         ending: end.name(),
@@ -75,15 +75,18 @@ fn describe(name: &str, firmware: FirmwareState, homed_and_active: (bool, bool),
     answer::block(name, &lines)
 }
 
+/// The task of `home`: guides the user, and keeps the last status.
 struct Homing {
     guide: Guide,
     line: Progress,
+    /// Status after the last exchange.
     last: Status,
+    /// Time from the first exchange to the end of the last.
     until: Duration,
 }
 
 impl Task for Homing {
-    /// No force, but one that is asked for: so the light turns green when forces would go out.
+    /// Asks for a force of zero. A device becomes active, and the light turns green, only while somebody asks for force.
     fn wants(&mut self, _at: Duration, _status: &Status) -> Option<Triple> {
         Some([0.0; 3])
     }

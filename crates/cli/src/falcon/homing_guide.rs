@@ -1,15 +1,16 @@
-//! What a user is told on the way to an active device.
+//! Messages that lead a user through homing, from a silent device to an active device.
 
 use cohaptic_falcon::driver::{Phase, Status};
 
 use super::reach::say;
 use crate::progress::Progress;
 
-/// Says what to do whenever something else is to be done.
+/// Prints the next step of homing whenever the driver's phase changes.
 #[derive(Debug)]
 pub(super) struct Guide {
+    /// Phase seen last, whose message has been printed if the phase has a message.
     said: Option<Phase>,
-    /// Whether somebody is going to ask for force.
+    /// Whether the command asks the device for force. Without force the device never becomes active, and the last step of homing is left out.
     pushes: bool,
 }
 
@@ -18,7 +19,7 @@ impl Guide {
         Self { said: None, pushes }
     }
 
-    /// Says what to do in this phase, unless it is what was said last.
+    /// Prints the message of the present phase to standard error, unless the phase is the same as at the last call.
     pub(super) fn look(&mut self, status: &Status, line: &Progress) {
         if self.said == Some(status.phase) {
             return;
@@ -30,6 +31,7 @@ impl Guide {
     }
 }
 
+/// Returns the message of a phase; `None` for phases in which the user has nothing to do.
 const fn what_to_do(phase: Phase, pushes: bool) -> Option<&'static str> {
     match phase {
         Phase::Silent | Phase::Stopped => None,

@@ -1,13 +1,13 @@
-//! `cohaptic falcon`: looks at a Novint Falcon, homes it, watches it, or simulates one.
+//! `cohaptic falcon`: probes, homes, watches or simulates a Novint Falcon.
 //!
 //! ```text
 //!   probe  home  watch  simulate
 //!     └─────┴──┬───┴───────┘
-//!            bench               exchanges, one a millisecond
+//!            bench               exchanges, one per millisecond
 //!              │
-//!            reach               a device over USB or a simulated one, with firmware in it
+//!            reach               opens a USB device or a simulated device, and loads its firmware
 //!              │
-//!             way                bytes and a clock, whichever it is
+//!        AnyTransport            bytes and a clock, for both kinds of device
 //! ```
 
 mod answer;
@@ -24,7 +24,7 @@ use std::process::ExitCode;
 use crate::arguments::{FalconArguments, FalconCommand};
 use crate::failure::Failure;
 
-/// Runs the command that was asked for.
+/// Runs the subcommand of the arguments.
 pub(crate) fn falcon(arguments: &FalconArguments) -> Result<ExitCode, Failure> {
     match &arguments.command {
         FalconCommand::Probe(arguments) => probe::probe(arguments),

@@ -1,4 +1,4 @@
-//! `cohaptic falcon probe`.
+//! `cohaptic falcon probe`: opens every Falcon in turn, exchanges packets without force, and reports the state of each device.
 
 use std::process::ExitCode;
 use std::time::Duration;
@@ -18,7 +18,7 @@ use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INPUT_OUTPUT, INTERRUPTED};
 use crate::{interrupt, output};
 
-/// A device that nobody gets a force from.
+/// Configuration of a driver that limits every force to 0 N.
 pub(super) const WITHOUT_FORCE: DriverConfig = DriverConfig { limits: Limits { force: 0.0, ..Limits::DEFAULT }, ..DriverConfig::DEFAULT };
 
 #[derive(Serialize)]
@@ -26,7 +26,7 @@ struct ProbeDocument {
     falcons: Vec<Entry>,
 }
 
-/// What was found out about one Falcon, as far as it went.
+/// Result of the probe of one Falcon. An obstacle ends the probe of the device; the fields of later steps are then empty.
 #[derive(Serialize)]
 struct Entry {
     #[serde(flatten)]
@@ -35,12 +35,14 @@ struct Entry {
     firmware: Option<&'static str>,
     #[serde(flatten)]
     answered: Option<Answered>,
-    /// What was in the way.
+    /// The obstacle, in words; `None` if the probe is complete.
     error: Option<String>,
+    /// Name of the device in texts for people.
     #[serde(skip)]
     name: String,
 }
 
+/// Statistics and last state of a device that answered.
 #[derive(Serialize)]
 struct Answered {
     #[serde(flatten)]
@@ -49,7 +51,7 @@ struct Answered {
     seen: Seen,
 }
 
-/// Looks at every Falcon that is meant.
+/// Probes every Falcon that the arguments select, one after the other, and answers with the results of all.
 pub(super) fn probe(arguments: &ProbeArguments) -> Result<ExitCode, Failure> {
     let firmware = reach::read_firmware(arguments.which.firmware.as_deref())?;
     let targets = reach::targets(&arguments.which)?;
@@ -59,6 +61,7 @@ pub(super) fn probe(arguments: &ProbeArguments) -> Result<ExitCode, Failure> {
             falcons.push(Entry::of(target, firmware.as_ref(), arguments.length)?);
         }
     }
+    // An interruption leaves out the remaining devices; the answer still has the results of the devices before the interruption.
     let document = ProbeDocument { falcons };
     output::answer(
         arguments.which.json,
@@ -117,9 +120,11 @@ impl Entry {
     }
 }
 
-/// Keeps what was seen last.
+/// The task of `probe`: asks for no force, and keeps the state after the last exchange.
 struct Looking {
+    /// State after the last exchange; `None` before the first.
     seen: Option<Seen>,
+    /// Time from the first exchange to the end of the last.
     until: Duration,
 }
 

@@ -1,4 +1,6 @@
-//! From a name on the command line to a device whose firmware runs.
+//! Selects a device by the arguments, opens the device, and loads its firmware.
+//!
+//! The result is an [`AnyTransport`] with running firmware, which [`Bench`](super::bench::Bench) takes.
 
 use std::fmt;
 use std::io::{self, Write as _};
@@ -16,28 +18,28 @@ use crate::failure::Failure;
 use crate::progress::Progress as Bar;
 use crate::realtime::loading;
 
-/// How far the simulated hand sways \[m\], and how fast \[Hz\].
+/// Amplitudes \[m\] and frequency \[Hz\] of the swaying simulated hand.
 pub(super) const SWAY: ([f64; 3], f64) = ([0.020, 0.015, 0.010], 0.5);
 
-/// A device that is there.
+/// A device that the arguments select.
 #[derive(Clone, Debug)]
 pub(super) enum Target {
     Usb(Listed),
     Simulated {
         in_virtual_time: bool,
-        /// Whether its firmware is to be loaded: a real one is switched on without, too.
+        /// Whether the device begins without firmware, as a real device does after it is switched on.
         switched_on: bool,
     },
 }
 
-/// How a device came by its firmware.
+/// Origin of the firmware that runs in a device: running before the command, or loaded by the command.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum FirmwareState {
     Running,
     Loaded,
 }
 
-/// Every device that is meant; at least one.
+/// Returns every device that the arguments select, at least one. No device, or none with the serial number, is a failure.
 pub(super) fn targets(which: &WhichFalcon) -> Result<Vec<Target>, Failure> {
     if which.simulated {
         return Ok(vec![Target::Simulated { in_virtual_time: which.virtual_time, switched_on: which.firmware.is_some() }]);
@@ -46,14 +48,14 @@ pub(super) fn targets(which: &WhichFalcon) -> Result<Vec<Target>, Failure> {
     Ok(meant(all, which.serial.as_deref()).map_err(|error| of_usb(&error))?.into_iter().map(Target::Usb).collect())
 }
 
-/// Those with that serial number, or all; at least one.
+/// Returns the devices with the serial number `serial`, or all devices without `serial`. An empty result is an error.
 fn meant(all: Vec<Listed>, serial: Option<&str>) -> Result<Vec<Listed>, UsbError> {
     let Some(serial) = serial else { return if all.is_empty() { Err(UsbError::NoDevice) } else { Ok(all) } };
     let meant: Vec<Listed> = all.iter().filter(|listed| listed.serial.as_deref() == Some(serial)).cloned().collect();
     if meant.is_empty() { Err(UsbError::NoSuchSerial { serial: serial.to_owned(), others: all }) } else { Ok(meant) }
 }
 
-/// The one device that is meant.
+/// Returns the only device that the arguments select. Several devices are a failure, which lists the devices.
 pub(super) fn target(which: &WhichFalcon) -> Result<Target, Failure> {
     let mut all = targets(which)?;
     if all.len() > 1 {
@@ -63,6 +65,7 @@ pub(super) fn target(which: &WhichFalcon) -> Result<Target, Failure> {
     all.pop().ok_or_else(|| of_usb(&UsbError::NoDevice))
 }
 
+/// Converts an error of USB to a failure, with a hint about where to look next.
 fn of_usb(error: &UsbError) -> Failure {
     let where_to_look = match error {
         UsbError::NoDevice => ". `lsusb -d 0403:cb48` shows whether the system sees it; docs/falcon.md says what else to look at",
@@ -84,12 +87,12 @@ impl Target {
         }
     }
 
-    /// In words, for people.
+    /// Returns the name of the device in texts for people.
     pub(super) fn name(&self) -> String {
         self.listed().map_or_else(|| "simulated Falcon".to_owned(), Listed::to_string)
     }
 
-    /// Opens the way there.
+    /// Opens the transport to the device: the USB device itself, or a new simulated device whose hand homes and then sways.
     pub(super) fn open(&self) -> Result<AnyTransport, UsbError> {
         match self {
             Self::Usb(listed) => UsbTransport::open(listed.serial.as_deref()).map(AnyTransport::new),
@@ -105,7 +108,7 @@ impl Target {
     }
 }
 
-/// Reads the firmware of `--firmware`, before any device is touched.
+/// Reads the firmware file of `--firmware`. Called before any device is opened, so that a wrong file leaves every device unchanged.
 pub(super) fn read_firmware(path: Option<&Path>) -> Result<Option<Firmware>, Failure> {
     let Some(path) = path else { return Ok(None) };
     Firmware::read(path).map(Some).map_err(|error| match error {
@@ -114,7 +117,9 @@ pub(super) fn read_firmware(path: Option<&Path>) -> Result<Option<Firmware>, Fai
     })
 }
 
-/// Sees to it that firmware runs; the obstacle, in words.
+/// Makes sure that the device runs firmware: checks a device without `firmware`, and loads `firmware` into a device that runs none.
+///
+/// The error is the obstacle in words, for the user.
 pub(super) fn make_ready(way: &mut AnyTransport, firmware: Option<&Firmware>) -> Result<FirmwareState, String> {
     let options = BootOptions::DEFAULT;
     let Some(firmware) = firmware else {
@@ -135,13 +140,13 @@ pub(super) fn make_ready(way: &mut AnyTransport, firmware: Option<&Firmware>) ->
     outcome.map(|loaded| if loaded { FirmwareState::Loaded } else { FirmwareState::Running }).map_err(|error| error.to_string())
 }
 
-/// A line for people, beside the results.
+/// Prints a line for people to standard error, apart from the results on standard output.
 pub(super) fn say(line: &str) {
-    // What cannot be said does not keep anything from being done.
+    // A closed standard error must not end the work on the device.
     let _ = writeln!(io::stderr(), "{line}");
 }
 
-/// USB or simulated: the device behind it does not know which.
+/// A transport over USB or to a simulated device, boxed, so that the code after this module has one type for both.
 pub(super) struct AnyTransport(Box<dyn Transport>);
 
 impl AnyTransport {

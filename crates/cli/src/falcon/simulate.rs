@@ -1,4 +1,4 @@
-//! `cohaptic falcon simulate`: the driver on a device that is not there.
+//! `cohaptic falcon simulate`: runs the driver on a simulated device in virtual time, and compares the driver's view with the device's true state.
 
 use std::process::ExitCode;
 use std::time::Duration;
@@ -21,7 +21,7 @@ use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::output;
 
-/// Changes of phase that are kept. With many faults there may be one every few milliseconds.
+/// Largest number of phase changes in the answer. With many faults the phase may change every few milliseconds.
 const CHANGES: usize = 100;
 
 #[derive(Serialize)]
@@ -30,7 +30,7 @@ struct SimulateDocument {
     seed: u64,
     asked_n: Option<[f64; 3]>,
     ending: &'static str,
-    /// Why the driver gave up, if it did.
+    /// Error with which the driver gave up; `None` if the driver ran to the end.
     driver_error: Option<String>,
     changes: Vec<Change>,
     more_changes: u64,
@@ -46,7 +46,7 @@ struct SimulateDocument {
     largest_motor_force_n: f64,
 }
 
-/// A phase that began.
+/// A change of the driver's phase: instant of the change \[s\], name of the new phase, colour of its light.
 #[derive(Clone, Serialize)]
 struct Change {
     t_s: f64,
@@ -54,7 +54,7 @@ struct Change {
     light: &'static str,
 }
 
-/// Runs driver and device in virtual time.
+/// Runs driver and simulated device in virtual time, with the faults that the arguments ask for, and writes the answer.
 pub(super) fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failure> {
     let probability = |given: Option<Probability>| given.map_or(0.0, Probability::get);
     let (garbage, drop) = (probability(arguments.garbage), probability(arguments.drop));
@@ -80,7 +80,7 @@ pub(super) fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failur
     let end = bench.run(Some(arguments.length), &mut simulating)?;
     let document = simulating.document(&bench, arguments, end);
     output::answer(arguments.json, DocumentSchema::FALCON_SIMULATE, &document, || document.describe(), output::NO_FILES)?;
-    // A driver that gives up has done what was to be seen.
+    // A driver that gives up is a success: users of this command inject faults to see how the driver reacts.
     Ok(if end == End::Interrupted { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }
 
@@ -114,7 +114,7 @@ impl SimulateDocument {
     }
 }
 
-/// The hand that was chosen.
+/// Simulated hand that `--hand` selects.
 enum HeldBy {
     Nobody(StillHand),
     User(Waypoints),
@@ -140,21 +140,30 @@ impl Hand for HeldBy {
     }
 }
 
+/// The task of `simulate`: asks for the configured force, and collects the driver's view and the device's true state.
 struct Simulating {
     simulator: SharedSimulator,
     force: Option<Triple>,
     unplug_after: Option<Duration>,
+    /// Origin of the driver's positions in the frame of the device \[m\].
     origin: Triple,
     truth: Truth,
+    /// Status after the last exchange.
     last: Status,
+    /// Time from the first exchange to the end of the last.
     until: Duration,
+    /// Length of the largest force that the driver sent \[N\].
     largest_force: f64,
+    /// Phase noted last.
     phase: Phase,
+    /// First [`CHANGES`] changes of phase, in the order of time.
     changes: Vec<Change>,
+    /// Number of changes of phase after the first [`CHANGES`].
     more_changes: u64,
 }
 
 impl Simulating {
+    /// Notes the phase at `at`, if the phase differs from the one noted last.
     fn change(&mut self, at: Duration, phase: Phase) {
         if self.phase == phase {
             return;
@@ -168,7 +177,7 @@ impl Simulating {
     }
 
     fn document(mut self, bench: &Bench, arguments: &SimulateArguments, end: End) -> SimulateDocument {
-        // How it was left: the driver has said farewell, or cannot.
+        // The final state is read after the bench has stopped the driver: the phase and the motors show whether the force was switched off.
         self.change(bench.passed(), bench.status().phase);
         let motors = self.simulator.with(|device| (device.motor_force(), *device.observed()));
         (self.truth.motor_force, self.truth.observed) = motors;
@@ -210,33 +219,35 @@ impl Task for Simulating {
     }
 }
 
-/// The largest of what was seen of a device behind its driver's back.
+/// True state of the simulated device after the last exchange, and the largest values over all exchanges. The driver does not see these values.
 #[derive(Clone, Copy, Debug, Default)]
 struct Truth {
-    /// In the frame of the device \[m\].
+    /// Position of the grip in the frame of the device \[m\].
     position: Triple,
-    /// \[N\]
+    /// Force of the motors on the grip \[N\].
     motor_force: Triple,
+    /// Largest length of `motor_force` \[N\].
     largest_motor_force: f64,
-    /// How far the driver's position was from the true one at most \[m\]; `None` if it never had one.
+    /// Largest distance between the driver's position and the true position \[m\]; `None` if the driver never had a position.
     largest_error: Option<f64>,
     observed: Observed,
 }
 
 impl Truth {
-    /// Looks; `origin`: where the driver's positions count from.
+    /// Reads the device's state after an exchange. `origin` is the origin of the driver's positions in the frame of the device \[m\].
     fn look(&mut self, simulator: &SharedSimulator, status: &Status, origin: Triple) {
         let look = |device: &mut Simulator| (device.position(), device.motor_force(), *device.observed());
         (self.position, self.motor_force, self.observed) = simulator.with(look);
         self.largest_motor_force = self.largest_motor_force.max(answer::length(self.motor_force));
         if let Some(reading) = status.reading {
+            // The driver's position counts from `origin`, the device's from the base.
             let off = answer::length(std::array::from_fn(|axis| reading.position[axis] + origin[axis] - self.position[axis]));
             self.largest_error = Some(self.largest_error.unwrap_or(0.0).max(off));
         }
     }
 }
 
-/// What the device has seen of its host.
+/// Counts that the simulated device keeps of the packets and bytes from its host.
 #[derive(Serialize)]
 struct DeviceDocument {
     commands: u64,
@@ -254,7 +265,7 @@ impl DeviceDocument {
         Self { commands, garbage_bytes: garbage, misheard_bytes: misheard, largest_count, largest_count_unhomed, saturated, torque_timeouts }
     }
 
-    /// In words.
+    /// Returns the counts as one line of text.
     fn describe(&self) -> String {
         let Self { commands, garbage_bytes, misheard_bytes, largest_count, largest_count_unhomed, saturated, torque_timeouts } = self;
         format!(

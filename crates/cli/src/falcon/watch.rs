@@ -1,4 +1,4 @@
-//! `cohaptic falcon watch`: reads a device, and pushes it gently.
+//! `cohaptic falcon watch`: reads a device continuously, and optionally applies a constant force or a spring to the grip.
 
 use std::io::{self, IsTerminal as _, Write as _};
 use std::path::Path;
@@ -22,7 +22,7 @@ use crate::file::unwritten;
 use crate::output;
 use crate::progress::Progress;
 
-/// From one row on standard output to the next, or one look of a person to the next.
+/// Time between two rows on standard output, or between two updates of the line on a terminal.
 const READABLE: Duration = Duration::from_millis(100);
 
 #[derive(Serialize)]
@@ -31,7 +31,7 @@ struct WatchDocument {
     identity: Identity,
     firmware: &'static str,
     ending: &'static str,
-    /// When forces first could go out, if they could.
+    /// Time at which the device first was active \[s\]; `None` if the device never was active.
     active_after_s: Option<f64>,
     #[serde(flatten)]
     traffic: Traffic,
@@ -44,7 +44,7 @@ struct WatchDocument {
     files: Vec<String>,
 }
 
-/// Watches a device until the time is over or the user has seen enough.
+/// Watches a device until the time limit passes or the user interrupts the command, and writes the answer.
 pub(super) fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
     let which = &arguments.which;
     let push = Push::of(arguments)?;
@@ -57,7 +57,7 @@ pub(super) fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
     let mut watching = Watching::new(push, arguments, *bench.status())?;
     let end = bench.run(arguments.length, &mut watching);
     watching.line.clear();
-    // Whole rows up to the end, whatever that was.
+    // The file is finished before an error of the loop is returned, so that the rows written up to the error are kept.
     let files = watching.file.take().map(SamplesFile::finish).transpose()?.into_iter().collect();
     let end = end?;
     let document = WatchDocument {
@@ -102,7 +102,7 @@ impl WatchDocument {
     }
 }
 
-/// What the grip is pushed with.
+/// Force on the grip: none, a constant force \[N\], or a spring to the origin (stiffness \[N/m\], damping \[N·s/m\]).
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Push {
     Nothing,
@@ -128,11 +128,13 @@ impl Push {
         }
     }
 
+    /// Returns the force for the grip's present reading \[N\]; `None` asks for no force.
     fn wants(&self, status: &Status) -> Option<Triple> {
         match *self {
             Self::Nothing => None,
             Self::Force(force) => Some(force),
             Self::Spring { stiffness, damping } => {
+                // Without a reading the position is unknown, so that the spring asks for no force.
                 let reading = status.reading?;
                 Some(std::array::from_fn(|axis| -stiffness * reading.position[axis] - damping * reading.velocity[axis]))
             }
@@ -140,19 +142,27 @@ impl Push {
     }
 }
 
+/// The task of `watch`: applies the push, writes the rows, and collects the values of the answer.
 struct Watching {
     push: Push,
     guide: Guide,
     line: Progress,
     file: Option<SamplesFile>,
-    /// Rows go to standard output: it is no terminal, and nobody wants a document.
+    /// Whether rows go to standard output: standard output is no terminal, and no JSON document is asked for.
     prints_rows: bool,
+    /// Time of the next row on standard output, or of the next update of the terminal's line.
     next_look: Duration,
+    /// Status after the last exchange.
     last: Status,
+    /// Time from the first exchange to the end of the last.
     until: Duration,
+    /// Time at which the device first was active.
     active_after: Option<Duration>,
+    /// Lowest and highest position on each axis \[m\]; `None` before the first reading.
     range: Option<(Triple, Triple)>,
+    /// Largest speed of the grip \[m/s\].
     fastest: f64,
+    /// Length of the largest force that the driver sent \[N\].
     largest_force: f64,
 }
 
@@ -178,6 +188,7 @@ impl Watching {
         })
     }
 
+    /// Takes the status at `at` into the values of the answer.
     fn note(&mut self, at: Duration, status: &Status) {
         (self.last, self.until) = (*status, at);
         if status.phase == Phase::Active {
@@ -206,7 +217,7 @@ impl Task for Watching {
             file.write(&row(at, status))?;
         }
         if at >= self.next_look {
-            // The device's clock: rows do not pile up after a pause.
+            // Counted from the present exchange, not from the last due time: no burst of rows follows a pause.
             self.next_look = at + READABLE;
             if self.prints_rows {
                 print_row(&row(at, status))?;
@@ -218,7 +229,7 @@ impl Task for Watching {
     }
 }
 
-/// The device in one line.
+/// Returns the state of the device as one line for a terminal. Encoders stand in for a position that is unknown.
 fn shown(at: Duration, status: &Status) -> String {
     let seen = Seen::of(status);
     let place = match (seen.position_m, seen.velocity_m_s) {
@@ -229,10 +240,10 @@ fn shown(at: Duration, status: &Status) -> String {
     format!("{:.1} s {} ({}): {place}; force {x:.2}, {y:.2}, {z:.2} N; buttons {}", at.as_secs_f64(), seen.phase, seen.light, seen.buttons.join(" "))
 }
 
-/// The columns. Unknown values are left empty.
+/// Header of the CSV rows. Times are in s, positions in m, velocities in m/s, forces in N. Unknown values are empty.
 pub(super) const HEADER: &str = "t,phase,homed,encoder1,encoder2,encoder3,x,y,z,vx,vy,vz,fx,fy,fz,buttons";
 
-/// A row, without its line break.
+/// Returns the CSV row of the status at `at`, without a line break.
 pub(super) fn row(at: Duration, status: &Status) -> String {
     let Status { phase, homed, encoders: [top, right, left], reading, force, .. } = status;
     let homed: String = homed.map(|homed| if homed { '1' } else { '0' }).iter().collect();
@@ -248,7 +259,7 @@ pub(super) fn row(at: Duration, status: &Status) -> String {
     format!("{:.6},{},{homed},{top},{right},{left},{place},{fx},{fy},{fz},{pressed}", at.as_secs_f64(), phase.name())
 }
 
-/// A file of them.
+/// A CSV file of rows, which appears under its name only when [`finish`](Self::finish) is called.
 pub(super) struct SamplesFile {
     file: WholeFile,
 }
@@ -268,7 +279,7 @@ impl SamplesFile {
         written.map_err(unwritten(self.file.path()))
     }
 
-    /// Gives the file its name; says it.
+    /// Completes the file under its name, and returns the path for messages.
     pub(super) fn finish(self) -> Result<String, Failure> {
         let path = self.file.path().to_path_buf();
         self.file.finish().map_err(unwritten(&path))?;
@@ -276,7 +287,7 @@ impl SamplesFile {
     }
 }
 
-/// Rows on standard output, each as soon as it is there.
+/// Prints a row to standard output at once, without waiting for more rows.
 pub(super) fn print_row(row: &str) -> Result<(), Failure> {
     output::raw(format!("{row}\n").as_bytes())
 }
