@@ -1,4 +1,5 @@
-//! The same hand again, in virtual time: as it was, under the other strategy, and without a network.
+//! Compares a finished part with two variants: replays the recorded hand in virtual time with the part's own strategy and links, with the other strategy,
+//! and without a network. The answer has the curves of all three runs, for the page.
 
 use std::convert::Infallible;
 use std::thread;
@@ -13,20 +14,22 @@ use serde_json::{Value, json};
 use super::scene::PlayedScene;
 use super::stage::{Finished, said};
 
-/// As many values of each curve are drawn.
+/// Number of steps into which a record is divided, unless a step would then be shorter than 1 ms. Each curve has one value per step.
 const VALUES: u64 = 600;
 
 const AP: &str = "average-position";
 const PD: &str = "proportional-derivative";
 
-/// A way to run it again.
+/// A variant of the part to replay.
 struct Variant {
     name: &'static str,
     scene: PlayedScene,
     has_network: bool,
 }
 
-/// Runs the part again in three ways, and gives the curves of each.
+/// Replays the part in three variants, in parallel, and returns the curves of each as JSON.
+///
+/// The error is a text for the page: the record cannot be read, nothing was recorded, or a scene is refused.
 pub(super) fn compare(finished: &Finished) -> Result<Value, String> {
     let began = Clock::now();
     let text = std::fs::read_to_string(&finished.inputs).map_err(|error| format!("{}: {error}", finished.inputs.display()))?;
@@ -45,7 +48,7 @@ pub(super) fn compare(finished: &Finished) -> Result<Value, String> {
     ];
     let keys = link_keys_of_text(&finished.scene.text(), finished.scene.file(), &[]).map_err(|error| said(&error))?;
     let inputs = Inputs::read(&text, &scene, &keys.into_values().next().unwrap_or_default());
-    // The error may quote files that the record names, which the page is not shown.
+    // The error may quote the content of files that the record names, and people at the page must not see the content.
     let inputs = inputs.map_err(|_| "the record of the part cannot be read again: `cohaptic run --inputs` says why".to_owned())?;
     let lasted = inputs.last_instant().unwrap_or(Instant::ZERO);
     if inputs.is_empty() || lasted == Instant::ZERO {
@@ -53,6 +56,7 @@ pub(super) fn compare(finished: &Finished) -> Result<Value, String> {
     }
     let hand = scene.peers.iter().position(|peer| matches!(peer.kind, PeerKind::Pointer(..))).unwrap_or(0);
     let hand = inputs.busiest_device().unwrap_or(hand);
+    // A step of at least one millisecond also keeps the divisor in `on_tick` above zero.
     let step = Duration::from_nanos((lasted.as_nanos() / VALUES).max(1_000_000));
     let run = |variant: &Variant| curve(variant, &inputs, hand, step, lasted);
     let runs: Vec<Result<Value, String>> = thread::scope(|scope| {
@@ -70,6 +74,7 @@ pub(super) fn compare(finished: &Finished) -> Result<Value, String> {
     }))
 }
 
+/// Replays one variant, and returns its curves and their largest values as JSON. `lasted` is the length of the record.
 fn curve(variant: &Variant, inputs: &Inputs, hand: usize, step: Duration, lasted: Instant) -> Result<Value, String> {
     let scene = variant.scene.scene().map_err(|error| said(&error))?;
     let mut curves = Curves { hand, step, at: vec![[f64::NAN; 3]; scene.peers.len()], discrepancy: Vec::new(), force: Vec::new() };
@@ -92,20 +97,24 @@ fn curve(variant: &Variant, inputs: &Inputs, hand: usize, step: Duration, lasted
         "force_n": curves.force,
         "largest_discrepancy_m": largest(&curves.discrepancy),
         "largest_force_n": largest(&curves.force),
+        // A divergence after the end of the record is left out, because the part itself did not last so long.
         "diverged_s": diverged.filter(|at| *at < lasted.as_secs_f64()),
     }))
 }
 
-/// The largest distance between two copies, and the force that the hand feels: the largest of each step.
+/// Observer that keeps, per step, the largest distance between two copies \[m\] and the largest coupling force on the hand \[N\].
 struct Curves {
+    /// Index of the peer whose force is kept.
     hand: usize,
     step: Duration,
+    /// Last position of each copy \[m\], indexed by peer. NaN before the first tick of the peer.
     at: Vec<[f64; 3]>,
     discrepancy: Vec<f64>,
     force: Vec<f64>,
 }
 
 impl Curves {
+    /// Raises the value of step `place` to at least `value`. Steps that do not exist yet begin at zero.
     fn raise(values: &mut Vec<f64>, place: usize, value: f64) {
         if values.len() <= place {
             values.resize(place + 1, 0.0);
@@ -130,6 +139,7 @@ impl Observer for Curves {
         }
         let here = self.at[row.peer];
         let apart = |there: &[f64; 3]| length(&[here[0] - there[0], here[1] - there[1], here[2] - there[2]]);
+        // Distances to copies without a tick so far are NaN, and are left out.
         let most = self.at.iter().map(apart).filter(|apart| apart.is_finite()).fold(0.0, f64::max);
         Self::raise(&mut self.discrepancy, place, most);
         Ok(())

@@ -1,4 +1,5 @@
-//! Parts follow one another without a jerk: what a moving hand feels across their border changes no faster than while a part goes on.
+//! Test that parts follow one another without a jerk: across the border of two parts, force and position of a moving hand change no faster than within a
+//! part.
 
 use std::convert::Infallible;
 use std::path::Path;
@@ -13,12 +14,12 @@ use super::scene::PlayedScene;
 
 const TEXT: &str = include_str!("../../scenarios/live/play.toml");
 const TICK: u64 = 1_000_000;
-/// A display of 62.5 pictures per second: the hand is told every 16 ticks.
+/// Ticks between two positions of the hand, as from a display with 62.5 pictures per second.
 const PICTURE: u64 = 16;
-/// How long a part takes to end and the next to begin, in ticks: the hand moves on meanwhile.
+/// Ticks from the end of a part to the beginning of the next part. The hand moves on during the pause.
 const PAUSE: u64 = 24;
 
-/// What the peers feel and where they are, tick by tick.
+/// Coupling force \[N\], position of the copy \[m\] and position of the device \[m\], each along x and y, indexed by peer and tick.
 #[derive(Default)]
 struct Felt(Vec<Vec<[f64; 6]>>);
 
@@ -39,14 +40,14 @@ impl Observer for Felt {
     }
 }
 
-/// A hand that goes round at 0.2 m/s.
+/// Returns the position of the hand at a tick: the hand moves along a circle at 0.2 m/s.
 fn place(tick: u64) -> [f64; 3] {
     #[expect(clippy::cast_precision_loss, reason = "some thousand ticks")]
     let angle = 5.0 * tick as f64 * 1e-3;
     [0.04 * angle.sin(), 0.04 * (1.0 - angle.cos()), 0.0]
 }
 
-/// Runs a part over a number of ticks, with the hand that began before it. Gives the forces and places, and how it stands at the end.
+/// Runs a part for `ticks` ticks, with the hand's motion from tick `begin` on. Returns the observed values, and the state of each peer at the end.
 fn run(played: &PlayedScene, pointer: &Pointer, begin: u64, ticks: u64) -> (Felt, Vec<PeerStatus>) {
     let scene = played.scene().unwrap();
     let mut live = LiveScene::new(&scene, |peer| (peer == 0).then(|| pointer.device()));
@@ -67,15 +68,16 @@ fn largest(felt: &[[f64; 6]]) -> [f64; 2] {
     felt.windows(2).fold([0.0, 0.0], |[force, way], pair| [change(pair, 0).max(force), change(pair, 2).max(change(pair, 4)).max(way)])
 }
 
-/// At the border itself force and places change no more than from tick to tick before. Then the hand catches up with what it moved while no part ran, and the
-/// copies hear nothing for 100 ms and then another strategy. No force changes by more than 0.3 N in a millisecond, and nothing moves at more than 0.3 m/s. A
-/// pointer that was at once at its new place would pull with 20 N·s/m at more than 0.2 m/s: by 4 N and more.
+/// At the border itself, forces and positions change at most as much as from tick to tick before the border. After the border the device catches up with the
+/// hand, which moved while no part ran; the copies receive nothing for 100 ms, and then samples of another strategy. In that time no force changes by more
+/// than 0.3 N per millisecond, and nothing moves faster than 0.3 m/s. A pointer that jumped to the hand's new position would pull with 20 N·s/m at more than
+/// 0.2 m/s, and so change the force by 4 N or more.
 #[test]
 fn nobody_is_jerked_when_a_part_begins() {
     let delay = ["link.delay=100ms".to_owned()];
     let played = PlayedScene::read(TEXT, Path::new("play.toml"), &delay).unwrap();
     let scene = played.scene().unwrap();
-    // The border falls anywhere between two places of the hand.
+    // The five ends put the border at different ticks between two positions of the hand.
     for ends in [2000, 2003, 2007, 2011, 2015] {
         for (strategy, peers) in [("average-position", 3), ("average-position", 4), ("proportional-derivative", 3), ("proportional-derivative", 5)] {
             let pointer = Pointer::default();
@@ -86,7 +88,7 @@ fn nobody_is_jerked_when_a_part_begins() {
             let next = played.clone().standing(&stands, &scene).with_strategy(strategy).with_peers(peers);
             let (after, _) = run(&next, &pointer, ends + PAUSE, 300);
             for (peer, (before, after)) in before.0.iter().zip(&after.0).enumerate() {
-                // The hand took hold in the first second.
+                // The first second is left out: in that second the hand takes hold of the object.
                 let [usual_force, usual_way] = largest(&before[1000..]);
                 let [border_force, border_way] = largest(&[before[before.len() - 1], after[0]]);
                 let said = format!("{ends} {strategy} {peers}, peer {peer}");

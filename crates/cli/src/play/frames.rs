@@ -1,4 +1,4 @@
-//! The picture of everything that moves, from the thread that has to be on time to the pages.
+//! Passes the motion of a part from the session's real-time thread to the pages, as JSON text.
 
 use std::fmt::Write as _;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -6,39 +6,42 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use cohaptic_harness::live::Presence;
 use cohaptic_live::session::{EndedPacket, Motion, PeerStatus};
 
-/// The newest motion. It is written as text when somebody looks, not on the thread that has to be on time.
+/// The newest motion. The motion is written as text when a page asks, on the page's thread, so that the real-time thread does not spend the time.
 #[derive(Default)]
 pub(super) struct Frames(Mutex<Newest>);
 
 #[derive(Default)]
 struct Newest {
+    /// Number of motions published so far, over all parts.
     number: u64,
+    /// Number of the present part, counted from 1.
     part: usize,
     axes: usize,
     motion: Option<Arc<Motion>>,
-    /// The text of that number.
+    /// Last text that was written, with the number of its motion. Several pages share the text.
     text: Option<(u64, Arc<str>)>,
 }
 
 impl Frames {
-    /// Another part begins, of a scene with that number of axes.
+    /// Begins a part whose scene has `axes` axes. The motion of the part before is dropped.
     pub(super) fn begin(&self, part: usize, axes: usize) {
         let mut newest = self.newest();
         (newest.part, newest.axes, newest.motion) = (part, axes, None);
     }
 
-    /// Takes a motion. A reader holds the lock for as long as it takes to count a reference, so that nobody waits.
+    /// Stores a motion as the newest. Readers hold the lock only while they clone a reference, so that the real-time thread does not wait long.
     pub(super) fn publish(&self, motion: Motion) {
         let mut newest = self.newest();
         newest.number += 1;
         newest.motion = Some(Arc::new(motion));
     }
 
-    /// The last motion of the part; `None` before the first.
+    /// Returns the last motion of the present part, or `None` before the first.
     pub(super) fn last(&self) -> Option<Arc<Motion>> {
         self.newest().motion.clone()
     }
 
+    /// Returns the number and the JSON text of the newest motion. The text is `{}` before the first motion of a part.
     pub(super) fn text(&self) -> (u64, Arc<str>) {
         let (number, part, axes, motion) = {
             let newest = self.newest();
@@ -49,8 +52,10 @@ impl Frames {
             }
             (newest.number, newest.part, newest.axes, newest.motion.clone())
         };
+        // The lock is not held while the text is written, so that `publish` does not wait for the formatting.
         let text: Arc<str> = motion.map_or_else(|| "{}".to_owned(), |motion| written(part, axes, &motion)).into();
         let mut newest = self.newest();
+        // A text of an older motion is not stored.
         if newest.number == number {
             newest.text = Some((number, Arc::clone(&text)));
         }
@@ -62,7 +67,7 @@ impl Frames {
     }
 }
 
-/// `{"part":1,"t":0.5,"peers":[…],"packets":[[from,to,ms,lost],…]}`: metres with micrometres, newtons with millinewtons.
+/// Returns the motion as `{"part":1,"t":0.5,"peers":[…],"packets":[[from,to,ms,lost],…]}`. Positions are in m with six decimals, forces in N with three.
 fn written(part: usize, axes: usize, motion: &Motion) -> String {
     let mut text = format!("{{\"part\":{part},\"t\":{:.4},\"peers\":[", motion.elapsed.as_secs_f64());
     for (place, peer) in motion.peers.iter().enumerate() {
@@ -78,6 +83,7 @@ fn written(part: usize, axes: usize, motion: &Motion) -> String {
     text
 }
 
+/// Appends the state of one peer, with vectors cut to the scene's axes.
 fn write_peer(text: &mut String, axes: usize, peer: &PeerStatus) {
     let state = &peer.state;
     let hand = match state.presence {
@@ -101,7 +107,7 @@ fn write_peer(text: &mut String, axes: usize, peer: &PeerStatus) {
     text.push('}');
 }
 
-/// Numbers that are not finite are `null`: a scene may diverge.
+/// Appends an array of numbers. A number that is not finite becomes `null`, because JSON has no such number and a scene may diverge.
 fn write_numbers(text: &mut String, numbers: &[f64], digits: usize) {
     for (place, number) in numbers.iter().enumerate() {
         text.push(if place == 0 { '[' } else { ',' });

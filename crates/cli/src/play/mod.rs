@@ -1,4 +1,7 @@
-//! `cohaptic play`: a session in which people take part from a page.
+//! `cohaptic play`: a session in which people move the hands of a scene from a web page.
+//!
+//! The session runs in parts. A part ends when a page asks for another strategy, another number of peers or a reset; the next part begins where the copies
+//! stand. This module opens the server and runs one part after the other, `stage` answers the pages, and `scene` makes the scene of each part.
 
 mod compare;
 #[cfg(test)]
@@ -32,11 +35,11 @@ use crate::live::onlookers;
 use crate::realtime::{ControlFiles, Edit, KeyedLinks, Look, refused_server, say, token_of};
 use crate::{input, interrupt};
 
-/// The scene if none is given: three users, average-position, 24 ms.
+/// Text of the default scene: three users, average-position, a delay of 24 ms.
 const USUAL: &str = include_str!("../../scenarios/live/play.toml");
 const USUAL_NAME: &str = "play.toml";
 
-/// Runs the session until Ctrl-C, and says where its page is.
+/// Runs the session until Ctrl-C or the end of `--for`, part by part, and prints the addresses of the page.
 pub(crate) fn play(arguments: &PlayArguments) -> Result<ExitCode, Failure> {
     let overrides = &arguments.overrides.set;
     let beginning = match &arguments.scene {
@@ -70,12 +73,14 @@ pub(crate) fn play(arguments: &PlayArguments) -> Result<ExitCode, Failure> {
     let mut next = beginning;
     for number in 1.. {
         let (part, session, conductor) = prepare(arguments, &stage, &board, number, next, &records, begun)?;
+        // The addresses are printed once the first part is ready, so that a page that opens at once finds a scene.
         if number == 1 {
             announce();
         }
         let report = run_part(session, conductor)?;
         let is_over = interrupt::requested() || arguments.length.is_some_and(|length| begun.elapsed() >= length);
         let fell_apart = matches!(report.summary.ending, Ending::Diverged(_));
+        // A diverged part has no state from which another part could begin, so that the next part begins anew.
         next = stage.finish(&part, records.inputs(number), fell_apart);
         say(&format!("part {number}: {}, the run is {}", part.scene.coordination.strategy.name(), report.validity));
         if is_over {
@@ -85,7 +90,7 @@ pub(crate) fn play(arguments: &PlayArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// What cannot be played.
+/// Refuses scenes that cannot be played: with a topology, with a timeline, with too few or too many peers, or with peers on other devices.
 fn check(played: &PlayedScene) -> Result<(), Failure> {
     let scene = played.scene()?;
     let refuse = |message: String| Err(Failure::Input(format!("{}: {message}", played.file().display())));
@@ -108,7 +113,7 @@ fn check(played: &PlayedScene) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Gives the visitor a hand, and says whose it was if the scene simulates it.
+/// Makes sure that the scene has a pointer for the visitor. Returns the name of the peer that became a pointer if the scene itself has none.
 fn lend_hand(played: PlayedScene) -> Result<(PlayedScene, Option<String>), Failure> {
     let file = played.file().display().to_string();
     played.with_hand()?.ok_or_else(|| {
@@ -116,7 +121,7 @@ fn lend_hand(played: PlayedScene) -> Result<(PlayedScene, Option<String>), Failu
     })
 }
 
-/// Makes a part ready, and shows it to the pages.
+/// Opens the session of part `number`, and publishes the part to the pages. `begun` is the beginning of the first part.
 fn prepare(
     arguments: &PlayArguments,
     stage: &Arc<PlayStage>,
@@ -150,7 +155,7 @@ fn prepare(
     Ok((part, session, PartConductor { stage: Arc::clone(stage), look: Look::on(board), wanted, pairs, axes, end }))
 }
 
-/// Runs a part until somebody wants another one.
+/// Runs a part until its conductor ends the part, and returns the session's report.
 fn run_part(session: Session, mut conductor: PartConductor) -> Result<Report, Failure> {
     // The part is recorded from its first sample on, and the session asks the conductor 50 times a second.
     interrupt::has_results();
@@ -159,13 +164,16 @@ fn run_part(session: Session, mut conductor: PartConductor) -> Result<Report, Fa
     running.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)).map_err(crate::live::refused)
 }
 
-/// Publishes a part and hands in what the pages change.
+/// Conductor of one part: publishes status and motion to the pages, and passes the pages' changes of links to the session.
 struct PartConductor {
     stage: Arc<PlayStage>,
     look: Look,
+    /// Changes of links that the pages asked for.
     wanted: Receiver<Edit>,
+    /// Sender and receiver of each link, in the order of the board.
     pairs: Vec<(usize, usize)>,
     axes: usize,
+    /// End of the session by `--for`.
     end: Option<Clock>,
 }
 
@@ -191,10 +199,10 @@ impl Conductor for PartConductor {
     }
 }
 
-/// The folders of the parts: those that were asked for, or some that go with the program.
+/// Folder of the records, with one folder per part: the folder of `--out`, or a temporary folder that is removed at the end.
 struct Records {
     folder: PathBuf,
-    /// `None` for a folder that is not kept.
+    /// Ownership of the folder of `--out`; `None` for a temporary folder.
     own: Option<OwnFolder>,
 }
 
@@ -206,12 +214,12 @@ impl Records {
             return Ok(Self { folder: folder.to_path_buf(), own: Some(own) });
         }
         let folder = std::env::temp_dir().join(format!("cohaptic-play-{}", std::process::id()));
-        // Its own, not one that somebody else has laid there.
+        // Creating fails if the folder exists: in the shared temporary folder another user could have prepared a folder of this name.
         std::fs::create_dir(&folder).map_err(|error| refused(&folder, &error))?;
         Ok(Self { folder, own: None })
     }
 
-    /// The folder of a part, with its scene.
+    /// Creates the folder of a part, writes the part's scene as `scene.toml`, and returns the path of the folder.
     fn begin(&self, number: usize, scene: &str) -> Result<PathBuf, Failure> {
         let folder = self.part(number);
         let file = folder.join("scene.toml");
@@ -232,20 +240,20 @@ impl Records {
 impl Drop for Records {
     fn drop(&mut self) {
         if self.own.is_none() {
-            // What cannot be removed now, the system removes with its temporary files.
+            // Files that cannot be removed now remain until the system cleans its temporary folder.
             let _ = std::fs::remove_dir_all(&self.folder);
         }
     }
 }
 
-/// A link with an address that other machines can ask for, where the server listens on all of them.
+/// Returns `url` with this machine's own address in place of the loopback address, if the server listens on all addresses; otherwise `url` itself.
 fn reached_from_elsewhere(listening: SocketAddr, url: String) -> String {
     let loopback = match listening.ip() {
         IpAddr::V4(ip) if ip.is_unspecified() => "127.0.0.1",
         IpAddr::V6(ip) if ip.is_unspecified() => "[::1]",
         IpAddr::V4(_) | IpAddr::V6(_) => return url,
     };
-    // The address of the network card through which others would be answered. Nothing is sent.
+    // Connecting a UDP socket sends nothing, but makes the system choose the network card and so the address that other machines can reach.
     let own = UdpSocket::bind(("0.0.0.0", 0)).and_then(|socket| {
         socket.connect(("192.0.2.1", 9))?;
         socket.local_addr()
@@ -261,7 +269,7 @@ mod tests {
 
     use super::*;
 
-    /// The scenes of the program, by the end of their path, with what keeps them from being played.
+    /// Shipped scenes by their path in `scenarios`, each with the reason for which the scene is refused, if so.
     fn shipped() -> BTreeMap<String, Result<PlayedScene, String>> {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
         let folders = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_dir());
@@ -300,7 +308,7 @@ mod tests {
                     let scene = played.scene().unwrap();
                     let held = scene.peers.iter().filter(|peer| matches!(peer.kind, PeerKind::Pointer(..)) && peer.contact != Contact::None);
                     assert!(held.count() >= 1, "{name}");
-                    // Where it stands, the next part begins: with every peer in the text.
+                    // Every peer stands in the scene's text, since the next part sets the peers' positions there.
                     assert_eq!(played.clone().with_peers(scene.peers.len()).scene().unwrap(), scene, "{name}");
                 }
                 (Err(message), Some(word)) => assert!(message.contains(word), "{name}: {message}"),

@@ -1,5 +1,5 @@
-//! The scene of `cohaptic play`, part by part: the same text with another strategy, another number of peers, the links as they were changed, and everything
-//! where it stands.
+//! The scene of a part of `cohaptic play`: the scene file's document with another strategy, another number of peers, changed links, and the states in which
+//! the part before ended.
 
 use std::path::{Path, PathBuf};
 
@@ -8,30 +8,31 @@ use cohaptic_peer::{Contact, Gains};
 use cohaptic_scene::{LinkKeys, PeerKind, Scene, SceneError, scene_text};
 use toml::{Table, Value};
 
-/// As many peers can be played with.
+/// Accepted numbers of peers.
 pub(super) const PEERS: std::ops::RangeInclusive<usize> = 2..=10;
 
-/// A part lasts no longer than this; recordings of longer ones would not be compared in a moment.
+/// Longest duration of a part. The comparison replays the whole recording, and people wait for the result.
 const DURATION: &str = "1h";
 
-/// How a visitor holds an object that nobody touches in its scene: as in the scene that is usual here.
+/// Gains of the visitor's grasp if no simulated peer of the scene touches the object. The default scene of the command has the same gains.
 const GRASP: Gains = Gains { stiffness: 1000.0, damping: 5.0 };
 
-/// A scene as a document that can be changed.
+/// A scene as a TOML document, on which changes are made before the scene is parsed.
 #[derive(Clone, Debug)]
 pub(super) struct PlayedScene {
-    /// All but the peers.
+    /// The document without `[[peers]]`.
     table: Table,
+    /// The entries of `[[peers]]`, one per peer, in the order of the scene.
     peers: Vec<Table>,
-    /// Beside which files are looked for that it names.
+    /// Path of the scene file. Files that the scene names are looked up relative to its folder.
     file: PathBuf,
 }
 
-/// Keys of the links, by sender and receiver.
+/// Keys of each link, with the indices of sender and receiver.
 pub(super) type Links = Vec<((usize, usize), LinkKeys)>;
 
 impl PlayedScene {
-    /// Takes the scene for play: it lasts long and expects nothing.
+    /// Reads a scene for play: applies the overrides, sets the duration to [`DURATION`], and removes the expectations, which hold for the file's own duration.
     pub(super) fn read(text: &str, file: &Path, overrides: &[String]) -> Result<Self, SceneError> {
         let scene = Scene::parse_live(text, file, overrides)?;
         let text = scene_text(text, file, overrides)?;
@@ -40,7 +41,7 @@ impl PlayedScene {
         let about = section(&mut table, "scene");
         about.insert("duration".to_owned(), DURATION.into());
         about.insert("title".to_owned(), scene.title.clone().into());
-        // Peers that a number makes are written out: each stands somewhere else when the next part begins.
+        // Peers that `count` generates get entries of their own, because each peer has its own position when the next part begins.
         about.remove("count");
         let written: Vec<Table> = table.remove("peers").and_then(|peers| peers.try_into().ok()).unwrap_or_default();
         let peer = |name: &str| {
@@ -51,7 +52,7 @@ impl PlayedScene {
         Ok(Self { table, peers, file: file.to_path_buf() })
     }
 
-    /// Its text, which is a scene file.
+    /// Returns the text of the scene, which is a valid scene file.
     pub(super) fn text(&self) -> String {
         let mut table = self.table.clone();
         table.insert("peers".to_owned(), Value::Array(self.peers.iter().cloned().map(Value::Table).collect()));
@@ -62,13 +63,15 @@ impl PlayedScene {
         &self.file
     }
 
-    /// The scene itself.
+    /// Parses the scene.
     pub(super) fn scene(&self) -> Result<Scene, SceneError> {
         Scene::parse_live(&self.text(), &self.file, &[])
     }
 
-    /// With a hand for the visitor, and the name of its peer if the scene has no pointer of its own: the first simulated peer that touches the object, or else
-    /// the first one, then with a grasp. A pointer turns nothing, so a device that turns is passed over. `None` if no peer is left.
+    /// Makes a peer a pointer if the scene has no pointer of its own, and then returns the name of the peer too.
+    ///
+    /// The peer is the first simulated peer that touches the object, or else the first simulated peer, which then gets a grasp. Peers whose device turns are
+    /// left out, because a pointer cannot turn a device. `None` if no peer can become a pointer.
     pub(super) fn with_hand(mut self) -> Result<Option<(Self, Option<String>)>, SceneError> {
         let scene = self.scene()?;
         if scene.peers.iter().any(|peer| matches!(peer.kind, PeerKind::Pointer(..))) {
@@ -99,7 +102,7 @@ impl PlayedScene {
         self
     }
 
-    /// With links that do nothing to a packet.
+    /// Replaces all links and access lines by ideal links, which neither delay nor lose packets.
     pub(super) fn without_network(mut self) -> Self {
         self.table.remove("links");
         self.table.insert("link".to_owned(), Value::Table(Table::new()));
@@ -110,7 +113,7 @@ impl PlayedScene {
         self
     }
 
-    /// With the links as they are now. All that is written anew is complete: pairs that are new have the keys of the first.
+    /// Sets the keys of the links. A pair of peers that `links` lacks gets the keys of the first link of `links`. No links change nothing.
     pub(super) fn with_links(mut self, links: &Links) -> Self {
         let Some((_, first)) = links.first() else { return self };
         let names = self.names();
@@ -130,13 +133,14 @@ impl PlayedScene {
             let ends = [("from", pair.0), ("to", pair.1)].map(|(end, place)| (end.to_owned(), Value::from(names[place].as_str())));
             Value::Table(ends.into_iter().chain(keys(known)).collect())
         };
+        // The common `link` table is emptied below, so that every pair needs an entry with all its keys.
         let entries: Vec<Value> = pairs.map(entry).collect();
         self.table.insert("link".to_owned(), Value::Table(Table::new()));
         self.table.insert("links".to_owned(), Value::Array(entries));
         self
     }
 
-    /// With everything where it stands, and hands on the devices that they hold.
+    /// Sets the initial states to the states `peers` of the part before, whose scene was `scene`. A pointer that was held is held from the beginning.
     pub(super) fn standing(mut self, peers: &[PeerStatus], scene: &Scene) -> Self {
         let axes = scene.axes.count();
         let numbers = |values: &[f64]| Value::Array(values.iter().copied().map(Value::Float).collect());
@@ -161,7 +165,7 @@ impl PlayedScene {
         self
     }
 
-    /// With that number of peers: the last ones go, or others like the last one come, in the middle of the copies and at rest.
+    /// Changes the number of peers: removes the last peers and their links, or adds copies of the last peer, at rest at the mean position of all copies.
     pub(super) fn with_peers(mut self, number: usize) -> Self {
         let names = self.names();
         let places: Vec<Vec<f64>> = self.peers.iter().map(|peer| floats(peer.get("position"))).collect();
@@ -173,6 +177,7 @@ impl PlayedScene {
         while self.peers.len() < number {
             let mut other = self.peers.last().cloned().unwrap_or_default();
             let free = (self.peers.len() + 1..).map(|place| format!("peer-{place}")).find(|name| !names.contains(name));
+            // The state of the copied peer is not that of the new peer, which begins without a hand and at rest.
             for key in ["hand", "velocity", "device-position", "device-velocity", "angular-velocity"] {
                 other.remove(key);
             }
@@ -198,7 +203,7 @@ impl PlayedScene {
     }
 }
 
-/// The table below a key, which is made if it is not there.
+/// Returns the table at `key`. A missing value, or a value that is no table, is replaced by an empty table.
 fn section<'a>(table: &'a mut Table, key: &str) -> &'a mut Table {
     let entry = table.entry(key.to_owned()).or_insert_with(|| Value::Table(Table::new()));
     if !entry.is_table() {

@@ -1,4 +1,7 @@
-//! What the pages of `cohaptic play` ask of the session, part by part.
+//! The stage of `cohaptic play`: answers the requests of the pages for hands, for another part, for a comparison, and for files of the last part.
+//!
+//! Threads of the control server call [`Stage`], and the thread of the session calls the inherent methods. Each field that changes is
+//! atomic or has a lock of its own.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -20,19 +23,20 @@ use super::scene::{Links, PEERS, PlayedScene};
 use crate::live::onlookers::pairs;
 use crate::realtime::{ControlFiles, KeyedLinks};
 
-/// How long a part may take to end and be written before it is compared.
+/// Longest time that a comparison waits for the present part to end and to be written.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// The differences of the next part.
+/// Changes that a page asks for in the next part. `None` keeps the value of the present part.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Wish {
     strategy: Option<String>,
     peers: Option<usize>,
-    /// Everything where the scene begins, in place of where it stands.
+    /// Whether the next part begins from the initial states of the scene, not from the states in which the present part ends.
     reset: bool,
 }
 
 impl Wish {
+    /// Reads a wish from JSON. An unknown key, or a number of peers outside [`PEERS`], is an error for the page.
     fn read(value: &Value) -> Result<Self, String> {
         let keys = value.as_object().ok_or("expected a JSON object such as {\"strategy\": \"average-position\"} or {\"peers\": 4}")?;
         let mut wish = Self::default();
@@ -51,14 +55,14 @@ impl Wish {
     }
 }
 
-/// What runs now.
+/// The part that runs now: its number, counted from 1, and its scene as document and as parsed.
 pub(super) struct Part {
     pub(super) number: usize,
     pub(super) played: PlayedScene,
     pub(super) scene: Scene,
 }
 
-/// A part that has ended, with what was recorded.
+/// A part that has ended, with the file of its recorded inputs.
 pub(super) struct Finished {
     pub(super) number: usize,
     pub(super) scene: PlayedScene,
@@ -68,28 +72,34 @@ pub(super) struct Finished {
 /// The stage of `cohaptic play`.
 pub(super) struct PlayStage {
     pub(super) frames: Frames,
-    /// Where it begins, and where it is put back to.
+    /// Scene of the first part, to which a reset returns.
     beginning: PlayedScene,
-    /// Whether the three steps of the page say what happens in this scene.
+    /// Whether the page shows its three guided steps, which describe the default scene only.
     is_guided: bool,
-    /// Which files changes of links may name.
+    /// Files that changes of links may name.
     pub(super) files: ControlFiles,
+    /// One pointer per possible peer, indexed by peer. The pointers outlive the parts, so that a hand keeps its position across a border.
     pointers: Vec<Pointer>,
+    /// Whether a page has taken the hand, indexed by peer.
     taken: Mutex<Vec<bool>>,
     part: Mutex<Option<Arc<Part>>>,
     links: Mutex<Option<KeyedLinks>>,
     wish: Mutex<Option<Wish>>,
+    /// Whether `wish` holds a wish. An atomic, so that the real-time thread asks without a lock.
     is_wished: AtomicBool,
     finished: Mutex<Option<Arc<Finished>>>,
+    /// Address for other people, known once the server listens.
     pub(super) join: OnceLock<String>,
 }
 
+/// Locks the mutex, also if another thread panicked while it held the lock.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// Returns the message of an error for a page: the key and what is wrong, without lines of a file.
 pub(super) fn said(error: &SceneError) -> String {
-    // A person at the page may name a file and not see its content.
+    // People at a page may name a file in a change of links, but must not see the file's content in an error.
     let message = error.bare_message();
     error.diagnostic().map_or_else(|| message.clone(), |diagnostic| format!("{}: {message}", diagnostic.key()))
 }
@@ -112,7 +122,7 @@ impl PlayStage {
         }
     }
 
-    /// A part begins.
+    /// Makes `part` the running part, with `links` as its links.
     pub(super) fn begin(&self, part: Part, links: KeyedLinks) -> Arc<Part> {
         self.frames.begin(part.number, part.scene.axes.count());
         let part = Arc::new(part);
@@ -121,17 +131,19 @@ impl PlayStage {
         part
     }
 
-    /// The pointer of the peer in that place.
+    /// Returns the device of the pointer of peer `place`; `None` if `place` is not below the largest number of peers.
     pub(super) fn device(&self, place: usize) -> Option<Box<dyn LiveDevice>> {
         self.pointers.get(place).map(Pointer::device)
     }
 
-    /// Whether somebody wants another part; asked on the thread that has to be on time.
+    /// Returns whether a page wants another part. Called on the real-time thread.
     pub(super) fn is_wished(&self) -> bool {
         self.is_wished.load(Ordering::Relaxed)
     }
 
-    /// A part has ended: gives the scene of the next. `fell_apart`: no state of it can be gone on from.
+    /// Ends `part`, whose inputs were recorded in the file `inputs`, and returns the scene of the next part.
+    ///
+    /// `fell_apart` says that the part diverged. The next part then begins from the initial states, as after a reset.
     pub(super) fn finish(&self, part: &Part, inputs: PathBuf, fell_apart: bool) -> PlayedScene {
         let wish = lock(&self.wish).take().unwrap_or_default();
         self.is_wished.store(false, Ordering::Relaxed);
@@ -140,6 +152,7 @@ impl PlayStage {
         next
     }
 
+    /// Returns the scene of the part that would follow `part` by `wish`. Links of peers that go are left out.
     fn next(&self, part: &Part, wish: &Wish) -> PlayedScene {
         let peers: Vec<PeerStatus> = self.frames.last().map(|motion| motion.peers.clone()).unwrap_or_default();
         let number = wish.peers.unwrap_or(part.scene.peers.len());
@@ -154,7 +167,7 @@ impl PlayStage {
         lock(&self.part).clone().ok_or_else(|| "the session has not begun".to_owned())
     }
 
-    /// The last part that ended, if one did.
+    /// Returns the last part that has ended, or `None` during the first part.
     fn last_finished(&self) -> Option<Arc<Finished>> {
         lock(&self.finished).clone()
     }
@@ -212,7 +225,7 @@ impl Stage for PlayStage {
 
     fn leave_hand(&self, hand: usize) {
         if let Some(pointer) = self.pointers.get(hand) {
-            // To let go is always possible.
+            // Letting go has no position that could be refused, so that the result is always `Ok`.
             let _ = pointer.tell(None);
             lock(&self.taken)[hand] = false;
         }
@@ -221,7 +234,7 @@ impl Stage for PlayStage {
     fn begin_anew(&self, wish: &Value) -> Result<(), String> {
         let wish = Wish::read(wish)?;
         let part = self.running()?;
-        // What cannot begin is refused now, while the present part goes on.
+        // A scene that is refused must be refused here: after the present part has ended, the session could not go on.
         self.next(&part, &wish).scene().map_err(|error| said(&error))?;
         *lock(&self.wish) = Some(wish);
         self.is_wished.store(true, Ordering::Relaxed);
@@ -231,6 +244,7 @@ impl Stage for PlayStage {
     fn compare(&self) -> Result<Value, String> {
         let part = self.running()?;
         let began = Clock::now();
+        // An empty wish ends the part, and so completes the record, but changes nothing.
         self.begin_anew(&json!({}))?;
         let finished = loop {
             if let Some(finished) = self.last_finished().filter(|finished| finished.number >= part.number) {
@@ -258,7 +272,7 @@ fn read(path: &Path) -> Option<Vec<u8>> {
     std::fs::read(path).ok()
 }
 
-/// The links of whichever part runs.
+/// Editor of the links of the running part. The server keeps one editor for all parts.
 pub(super) struct PartLinks(pub(super) Arc<PlayStage>);
 
 impl LinkEditor for PartLinks {
