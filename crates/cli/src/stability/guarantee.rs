@@ -1,4 +1,4 @@
-//! Parts that the commands which prove have in common: their bar, and why a proof is refused.
+//! Parts shared by all commands that prove: the progress bar, the failures of a proof, and the note about pieces without a certificate.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use crate::failure::{Failure, not_analysed};
 use crate::interrupt;
 use crate::progress::Progress;
 
-/// Shows how many pieces of a set were looked at, and ends the proof when the user asks for it.
+/// Watcher of a proof: shows the number of checked pieces, and stops the proof when the user interrupts the command. Dropping the watcher clears the bar.
 pub(super) struct PieceWatch(Progress);
 
 impl PieceWatch {
@@ -42,7 +42,7 @@ impl Watch for PieceWatch {
     }
 }
 
-/// Why nothing is proven, for the option that asked for it; `family` has the words about scenes that are refused.
+/// Converts an error of a proof to a failure. `option` is the option that asked for the proof, and `family` converts errors about the scene.
 pub(super) fn failure(error: ProofError, option: &str, scene: &Path, family: impl FnOnce(FamilyError) -> Failure) -> Failure {
     if let ProofError::Analysis(error) = &error {
         return if *error == AnalysisError::Stopped { ended() } else { not_analysed(scene, error) };
@@ -50,12 +50,12 @@ pub(super) fn failure(error: ProofError, option: &str, scene: &Path, family: imp
     if let ProofError::Family(error) = error { family(error) } else { Failure::Input(format!("{option}: {error}")) }
 }
 
-/// The words about a proof that was ended: its verdicts hold, but they are not all.
+/// Returns the failure of an interrupted proof. The verdicts found before the interruption hold.
 pub(super) fn ended() -> Failure {
     Failure::Interrupted("the proof was ended; pieces that it had not looked at are undecided, all others hold".to_owned())
 }
 
-/// The note on pieces that have a verdict and no certificate, if there are any.
+/// Returns the note about `pieces` pieces that have a verdict but no certificate; empty for no such piece.
 pub(super) fn left_open(pieces: usize) -> String {
     if pieces == 0 {
         String::new()

@@ -1,4 +1,6 @@
-//! `cohaptic stability`: what can be said about a scene without simulating it.
+//! `cohaptic stability`: analyses and proves the stability of scenes without simulating the scenes.
+//!
+//! `point` judges one scene, `map` a plane of two keys, and `boundary` a range of one key. The remaining modules are shared by these three.
 
 mod boundary;
 mod certificate;
@@ -14,7 +16,7 @@ use std::process::ExitCode;
 use crate::arguments::{StabilityArguments, StabilityCommand};
 use crate::failure::Failure;
 
-/// Runs the command that was asked for.
+/// Runs the subcommand of the arguments.
 pub(crate) fn stability(arguments: &StabilityArguments) -> Result<ExitCode, Failure> {
     match &arguments.command {
         StabilityCommand::Point(arguments) => point::point(arguments),

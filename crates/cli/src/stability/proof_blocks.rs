@@ -1,4 +1,4 @@
-//! Shards of proofs: the blocks of each proof, and their pieces as rows in a folder.
+//! Divides proofs among shards: each proof is a number of blocks, and the decided pieces of all blocks are kept as rows in a shared folder.
 
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
@@ -18,10 +18,10 @@ use crate::{interrupt, output};
 
 pub(super) const NAMES: Names = Names { piece: "block", unit: "range" };
 
-/// What the header of its file says of rows.
+/// Header line that explains the rows.
 pub(super) const ROW: &str = "each row: the number of the proof, from and to of each key, and 0 if it is stable, 1 unstable, 2 undecided";
 
-/// Removes the rows of a proof that is written, and the logs of workers.
+/// Removes the files of rows of a finished proof and the workers' logs.
 pub(super) fn remove(folder: &Path, name: &'static str) -> Result<(), Failure> {
     let kept = Kept { folder, name, header: &[] };
     let remove = |path: PathBuf| match std::fs::remove_file(&path) {
@@ -31,31 +31,36 @@ pub(super) fn remove(folder: &Path, name: &'static str) -> Result<(), Failure> {
     kept.read()?.1.into_iter().chain(logs_in(folder)).try_for_each(remove)
 }
 
-/// The proofs of a command, which share the ranges of their keys.
+/// The proofs of a command, one per family. All proofs have the same ranges of keys, and so the same blocks.
 #[derive(Clone, Copy)]
 pub(super) struct Proofs<'a> {
     pub(super) families: &'a [Family],
     pub(super) shared: &'a SharedProof,
     pub(super) kept: Kept<'a>,
+    /// Number of threads; 0 for one thread per core.
     pub(super) threads: usize,
 }
 
-/// The pieces of one proof that are known, and where those go that are found.
+/// The known pieces of one proof, and the file to which newly decided pieces are written.
 pub(super) struct Pieces<'a> {
-    /// Which of the proofs it is.
+    /// Index of the proof, which is also the number of its rows.
     number: usize,
+    /// Verdict of each known piece, by the bits of the piece's ranges.
     known: BTreeMap<Vec<u64>, Guarantee>,
+    /// File of rows, with the first failure to write; `None` if found pieces are not kept.
     file: Option<&'a Mutex<(RowsFile, Option<Failure>)>>,
 }
 
+/// Verdicts in the order of their numbers 0, 1, 2 in rows.
 const WORDS: [Guarantee; 3] = [Guarantee::Stable, Guarantee::Unstable, Guarantee::Undecided];
 
+/// Returns the bits of all ends of the ranges. Bits are compared, because a piece is known only if its ends are exactly the same.
 fn bits(ranges: &[[f64; 2]]) -> Vec<u64> {
     ranges.iter().flatten().map(|value| value.to_bits()).collect()
 }
 
 impl<'a> Pieces<'a> {
-    /// Those of a proof among all rows.
+    /// Selects the pieces of proof `number` among the rows of all proofs. Rows that are no piece are skipped, and their pieces are proven again.
     pub(super) fn of(number: usize, rows: &[Row], file: Option<&'a Mutex<(RowsFile, Option<Failure>)>>) -> Self {
         let piece = |(_, values): &Row| {
             let (place, values) = values.split_last()?;
@@ -77,13 +82,14 @@ impl KnownPieces for Pieces<'_> {
         let values: Vec<f64> = ranges.iter().flatten().copied().chain(place).collect();
         let (file, broken) = &mut *file.lock().unwrap_or_else(PoisonError::into_inner);
         if let Err(failure) = file.add(self.number, &values) {
+            // A proof cannot return the failure from here: the watcher stops the proof, and the shard returns the failure afterwards.
             broken.get_or_insert(failure);
         }
     }
 }
 
 impl Proofs<'_> {
-    /// Whether each block is done.
+    /// Returns every block of every proof with whether the block is done, in the order of the proofs.
     pub(super) fn pieces(self) -> Result<Vec<Piece>, Failure> {
         let (rows, _) = self.kept.read()?;
         let of = |number| {
@@ -93,7 +99,7 @@ impl Proofs<'_> {
         Ok((0..self.families.len()).flat_map(of).collect())
     }
 
-    /// The folder, and its rows from which a proof goes on: of a merge all that it needs.
+    /// Takes the folder, and returns the folder's ownership with the rows from which the proofs continue. A merge fails unless every block is done.
     pub(super) fn rows(self, sharing: Sharing<'_>) -> Result<(Option<OwnFolder>, Vec<Row>), Failure> {
         if let Sharing::Merge(folder) = sharing {
             all_done(folder, NAMES, &self.pieces()?)?;
@@ -102,10 +108,10 @@ impl Proofs<'_> {
         Ok((own, self.kept.read()?.0))
     }
 
-    /// Looks at the blocks of a shard.
+    /// Proves the blocks of a shard. `failed` converts the error of the proof with the given index.
     pub(super) fn shard(self, shard: Shard, failed: impl Fn(usize, ProofError) -> Failure) -> Result<Done, Failure> {
         let folder = self.kept.folder;
-        // Rows of other work are refused before anything is written.
+        // A folder with rows of another computation is refused before the shard writes anything.
         self.kept.read()?;
         std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "create", path: folder.to_path_buf(), error })?;
         let owner = owner();
@@ -123,7 +129,7 @@ impl Proofs<'_> {
         worker.end(done, |failure| failure)
     }
 
-    /// How many blocks the shard has, and how many of them were not known.
+    /// Proves the blocks of a shard that are not known yet. Returns the number of blocks of the shard, and the number of blocks proven now.
     fn blocks_of_shard(self, shard: Shard, name: &str, worker: &Worker, failed: &dyn Fn(usize, ProofError) -> Failure) -> Result<[u64; 2], Failure> {
         let (file, rows) = self.kept.open(Some(name))?;
         let file = Mutex::new((file, None));
@@ -131,6 +137,7 @@ impl Proofs<'_> {
         let (mut mine, mut computed) = (0, 0);
         for (number, family) in self.families.iter().enumerate() {
             let pieces = Pieces::of(number, &rows, Some(&file));
+            // Blocks are numbered through all proofs, so that a shard gets blocks of every proof.
             let first = number as u64 * self.shared.blocks();
             let blocks: Vec<u64> = (0..self.shared.blocks()).filter(|block| shard.has(first + block)).collect();
             mine += blocks.len() as u64;
@@ -142,6 +149,7 @@ impl Proofs<'_> {
             };
             let watch = ShardWatch { shown: PieceWatch::new(), worker, is_broken: &is_broken };
             let looked = on_threads(self.threads, || self.shared.look_at(family, &wanted, &pieces, keep, &watch));
+            // The bar is cleared before a failure is printed.
             drop(watch);
             looked.map_err(|error| failed(number, error))?;
             let done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
@@ -161,7 +169,7 @@ impl Proofs<'_> {
     }
 }
 
-/// The bar of a proof, and the end of its worker.
+/// Watcher of a shard's proof: shows progress, and stops the proof if the worker must end or the file of rows cannot be written.
 struct ShardWatch<'a> {
     shown: PieceWatch,
     worker: &'a Worker,
@@ -182,11 +190,11 @@ impl Watch for ShardWatch<'_> {
     }
 }
 
-/// Works on that number of threads, 0 for one a core.
+/// Runs `work` on a pool of `threads` threads; 0 for one thread per core.
 pub(super) fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
     match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
         Ok(pool) => pool.install(work),
-        // Without threads of its own it uses those that there are.
+        // If the pool cannot be made, the work runs on the global pool, more slowly or faster but with the same result.
         Err(_) => work(),
     }
 }

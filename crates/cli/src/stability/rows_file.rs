@@ -1,10 +1,10 @@
-//! Rows of numbers that are kept while a long computation lasts, so that it can be interrupted and continued.
+//! Files of rows of numbers, which keep the progress of a long computation, so that the same command continues an interrupted computation.
 //!
-//! The file begins with a header in words, which says what the rows belong to; each row is one line: its number, values with the fewest digits that read back as
-//! the same `f64`, and the fingerprint of the line so far. A last line that is not whole, as a machine leaves it that loses its power, is forgotten; a line with
-//! another fingerprint is left out, so that its row is computed again.
+//! A file begins with a header of text lines, which identifies the computation. Each row is one line: the number of the row, the values with the fewest digits
+//! that read back as the same `f64`, and the fingerprint of the line up to there. An incomplete last line, as a power failure leaves it, is ignored. A line
+//! with a wrong fingerprint is skipped, and its row is computed again.
 //!
-//! Workers that share a folder have a file each, `NAME.WORKER.partial` beside `NAME.partial`, and read those of all.
+//! Each worker of a shared folder writes a file of its own, `NAME.WORKER.partial` beside `NAME.partial`, and reads the files of all workers.
 
 use std::fs::{self, File};
 use std::io::{self, Write as _};
@@ -20,33 +20,36 @@ use crate::output;
 #[derive(Debug)]
 pub(crate) struct RowsFile {
     path: PathBuf,
-    /// Those of workers in the same folder.
+    /// Paths of all files with rows of the same computation in the folder when the file was opened, of other workers too.
     others: Vec<PathBuf>,
     file: File,
+    /// Whether opening the file created its folder.
     made_folder: bool,
 }
 
-/// A row, with a number that tells it from others.
+/// A row: its number, by which the computation recognises the row, and its values.
 pub(crate) type Row = (usize, Vec<f64>);
 
-/// Where rows of one work are kept.
+/// Place of the files of rows of one computation.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Kept<'a> {
     pub(crate) folder: &'a Path,
-    /// What the files are called, without their ends.
+    /// Name of the files, without the worker's name and the extension.
     pub(crate) name: &'static str,
-    /// What the rows belong to.
+    /// Header lines, which identify the computation.
     pub(crate) header: &'a [String],
 }
 
 impl Kept<'_> {
-    /// The file of a worker, or of a process that works alone.
+    /// Returns the path of the file of `worker`, or of a process without other workers if `worker` is `None`.
     pub(crate) fn path(self, worker: Option<&str>) -> PathBuf {
         let worker = worker.map_or_else(String::new, |worker| format!(".{worker}"));
         self.folder.join(format!("{}{worker}{PARTIAL}", self.name))
     }
 
-    /// All rows that are known, by whichever worker, and the files that they are in. Nothing is written.
+    /// Reads the rows of all workers, and returns the rows with the paths of the files. A missing folder has no rows. Nothing is written.
+    ///
+    /// A file with another header is an input failure.
     pub(crate) fn read(self) -> Result<(Vec<Row>, Vec<PathBuf>), Failure> {
         let unreadable = |error| Failure::File { verb: "read", path: self.folder.to_path_buf(), error };
         let mut paths = Vec::new();
@@ -62,6 +65,7 @@ impl Kept<'_> {
             Err(error) if error.kind() == io::ErrorKind::NotFound => {}
             Err(error) => return Err(unreadable(error)),
         }
+        // The system lists a folder in any order. Sorted paths make the order of rows the same in each run.
         paths.sort_unstable();
         let mut rows = Vec::new();
         for path in &paths {
@@ -70,9 +74,9 @@ impl Kept<'_> {
         Ok((rows, paths))
     }
 
-    /// Opens the file of a worker, or of a process that works alone, or begins it and makes its folder. Gives the rows of all.
+    /// Opens or creates the file of `worker` (`None`: of a process without other workers) and its folder. Returns the file and the rows of all workers.
     ///
-    /// Nothing is written if it belongs to something else.
+    /// Nothing is written if a file in the folder belongs to another computation.
     pub(crate) fn open(self, worker: Option<&str>) -> Result<(RowsFile, Vec<Row>), Failure> {
         let (rows, others) = self.read()?;
         let (file, _) = RowsFile::open(self.path(worker), self.header)?;
@@ -80,14 +84,14 @@ impl Kept<'_> {
     }
 }
 
-/// What a file of rows holds; nothing if there is none.
+/// Reads the header and the rows of a file. A missing file is read as an empty file.
 fn begun(path: &Path, header: &[String]) -> Result<Begun, Failure> {
     let bytes = match cohaptic_files::read_bytes(path) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
         Err(error) => return Err(Failure::File { verb: "read", path: path.to_path_buf(), error }),
     };
-    // Bytes that are not text are not whole either.
+    // Rows are written as ASCII, so that reading stops at the first byte that is not text, as at an incomplete line.
     let text = match std::str::from_utf8(&bytes) {
         Ok(text) => text,
         Err(error) => std::str::from_utf8(&bytes[..error.valid_up_to()]).unwrap_or_default(),
@@ -96,9 +100,9 @@ fn begun(path: &Path, header: &[String]) -> Result<Begun, Failure> {
 }
 
 impl RowsFile {
-    /// Opens the file, or begins it and makes its folder. Gives the rows that it has; none if it was begun.
+    /// Opens or creates the file at `path`, and creates its folder. Returns the file and the rows in it; a new file has none.
     ///
-    /// Nothing is written if it belongs to something else.
+    /// Nothing is written if the file belongs to another computation.
     fn open(path: PathBuf, header: &[String]) -> Result<(Self, Vec<Row>), Failure> {
         let begun = begun(&path, header)?;
         let made_folder = path.parent().is_some_and(|folder| !folder.exists());
@@ -107,6 +111,7 @@ impl RowsFile {
         Ok((Self { path, others: Vec::new(), file, made_folder }, begun.rows))
     }
 
+    /// Opens the file after its first `whole` bytes, and writes the header into a file that has none.
     fn open_at(path: &Path, whole: usize, header: &[String]) -> io::Result<File> {
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder)?;
@@ -119,7 +124,7 @@ impl RowsFile {
         Ok(file)
     }
 
-    /// Adds a row. It is with the system when this returns.
+    /// Appends a row, and returns when the operating system has the bytes: a killed process loses no added row.
     pub(crate) fn add(&mut self, number: usize, values: &[f64]) -> Result<(), Failure> {
         let mut line = number.to_string();
         for value in values {
@@ -131,7 +136,7 @@ impl RowsFile {
         written.map_err(|error| Failure::File { verb: "write", path: self.path.clone(), error })
     }
 
-    /// Removes the file and those of workers, when all that they were kept for is written.
+    /// Removes the files of rows of all workers and the workers' logs. Called after the results are written.
     pub(crate) fn remove(self) -> Result<(), Failure> {
         let remove = |path: PathBuf| match fs::remove_file(&path) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => Err(Failure::File { verb: "remove", path, error }),
@@ -141,7 +146,8 @@ impl RowsFile {
         std::iter::once(self.path).chain(self.others).chain(logs).try_for_each(remove)
     }
 
-    /// Removes the file and the folder that was made for it: nothing came of it. What cannot be removed stays.
+    /// Removes the file of a computation without results, and its folder if opening the file created the folder. Failures are ignored, because the command
+    /// already reports an error.
     pub(crate) fn abandon(self) {
         let _ = fs::remove_file(&self.path);
         if let Some(folder) = self.path.parent().filter(|_| self.made_folder) {
@@ -150,15 +156,15 @@ impl RowsFile {
     }
 }
 
-/// What a file of rows holds already.
+/// Content of a file of rows.
 struct Begun {
     rows: Vec<Row>,
-    /// How many bytes are whole lines.
+    /// Number of bytes up to the end of the last complete line.
     whole: usize,
 }
 
 impl Begun {
-    /// The line that differs from the header, if there is one.
+    /// Reads a file's text. The error is the first line that differs from `header`.
     fn read(text: &str, header: &[String]) -> Result<Self, Difference> {
         let mut lines = text.split_inclusive('\n').filter_map(|line| line.strip_suffix('\n'));
         let mut whole = 0;
@@ -166,12 +172,13 @@ impl Begun {
             match lines.next() {
                 Some(found) if found == expected => whole += found.len() + 1,
                 Some(found) => return Err(Difference { found: found.to_owned(), expected: expected.clone() }),
-                // Not even the header is whole: nothing is lost by beginning again.
+                // The header itself is incomplete, so that the file has no rows and may begin again.
                 None => return Ok(Self { rows: Vec::new(), whole: 0 }),
             }
         }
         let mut rows = Vec::new();
         for line in lines {
+            // A damaged line still counts into `whole`: the rows after the line are kept.
             rows.extend(row(line));
             whole += line.len() + 1;
         }
@@ -179,7 +186,8 @@ impl Begun {
     }
 }
 
-/// The row of a line; `None` if it is not as it was written. Another byte is another fingerprint: FNV-1a loses nothing of a single byte that differs.
+/// Parses the row of a line; `None` if the line is damaged. A single wrong byte is always found, because FNV-1a maps different bytes to different
+/// fingerprints if all other bytes are equal.
 fn row(line: &str) -> Option<Row> {
     let (line, fingerprint) = line.rsplit_once(' ')?;
     if Fingerprint::of(line).to_string() != fingerprint {
@@ -190,13 +198,14 @@ fn row(line: &str) -> Option<Row> {
     Some((number, words.map(str::parse).collect::<Result<_, _>>().ok()?))
 }
 
-/// A line of the header that is another one than expected.
+/// A header line that differs from the expected line.
 #[derive(Debug)]
 struct Difference {
     found: String,
     expected: String,
 }
 
+/// Returns the failure for a file of another computation. Lines are escaped and cut, since the file may be anything.
 fn refused(path: &Path, Difference { found, expected }: &Difference) -> Failure {
     let shorten = |line: &str| line.chars().flat_map(char::escape_debug).take(200).collect::<String>();
     Failure::Input(format!(
@@ -207,7 +216,7 @@ fn refused(path: &Path, Difference { found, expected }: &Difference) -> Failure 
     ))
 }
 
-/// That of a text, as a number.
+/// Returns the fingerprint of a text as a number.
 pub(crate) fn fingerprint(text: &str) -> u64 {
     Fingerprint::of(text).get()
 }
@@ -246,7 +255,7 @@ mod tests {
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 
-    /// A file with two rows.
+    /// Writes a file with two rows, and returns its text.
     fn written(path: &Path) -> String {
         let (mut file, _) = RowsFile::open(path.to_path_buf(), &header()).unwrap();
         file.add(0, &[0.5]).unwrap();
@@ -254,7 +263,7 @@ mod tests {
         fs::read_to_string(path).unwrap()
     }
 
-    /// A line end that is lost joins two lines, of which neither is taken then; and the header is that of something else.
+    /// Flips every bit of the rows. A flipped line end joins two lines, and then neither row is read.
     #[test]
     fn no_flipped_bit_of_a_row_is_taken() {
         let folder = tempfile::tempdir().unwrap();
@@ -268,7 +277,7 @@ mod tests {
             fs::write(&path, flipped).unwrap();
             let (mut file, known) = RowsFile::open(path.clone(), &header()).unwrap();
             assert!(known.len() < 2 && known.iter().all(|row| rows.contains(row)), "bit {bit}: {known:?}");
-            // Rows that are added after the damaged row are kept.
+            // A row added after the damaged row is read back.
             file.add(3, &[7.0]).unwrap();
             assert_eq!(RowsFile::open(path.clone(), &header()).unwrap().1.last(), Some(&(3, vec![7.0])), "bit {bit}");
         }

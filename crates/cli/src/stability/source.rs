@@ -1,4 +1,4 @@
-//! A scene with keys left open: from arguments to a family, and from its errors to what the user typed.
+//! Parses the ranges of open keys from arguments, and translates errors of a family of scenes to the options that the user typed.
 
 use std::path::{Path, PathBuf};
 
@@ -9,22 +9,22 @@ use super::rows_file::fingerprint;
 use crate::failure::{Failure, not_analysed};
 use crate::{input, output};
 
-/// The range that an option gives to a key.
+/// Parses the range of a key from the text of `option`. The failure names the option.
 pub(super) fn range(option: &str, text: &str) -> Result<KeyRange, Failure> {
     KeyRange::parse(text).map_err(|error| Failure::Input(format!("{option}: {error}")))
 }
 
-/// Where the texts that are put into a scene come from.
+/// Origins of the texts that the command puts into a scene: the file and the options of the user.
 pub(super) struct Said<'a> {
     pub(super) file: &'a Path,
-    /// Options that leave a key open.
+    /// Options that leave a key open, each with its parsed range.
     pub(super) ranges: &'a [(&'static str, KeyRange)],
-    /// An option that overrides keys, and what it says.
+    /// Option that overrides keys, with its `KEY=VALUE` texts.
     pub(super) overrides: (&'static str, &'a [String]),
 }
 
 impl Said<'_> {
-    /// What went wrong, in the words of the user's options.
+    /// Converts an error of the family to a failure that names the user's option, or the scene file if no option is the cause.
     pub(super) fn failure(&self, error: FamilyError) -> Failure {
         match error {
             FamilyError::Scene(error) => {
@@ -40,6 +40,7 @@ impl Said<'_> {
             | FamilyError::Twice { .. }
             | FamilyError::Values { .. }
             | FamilyError::Outside { .. }) => {
+                // Errors about a range begin with its key, by which the option is found.
                 let about =
                     |(option, range): &&(&'static str, KeyRange)| error.to_string().starts_with(&format!("{} ", range.key)).then_some(*option);
                 match self.ranges.iter().find_map(|range| about(&range)) {
@@ -50,7 +51,7 @@ impl Said<'_> {
         }
     }
 
-    /// The option that put this `KEY=VALUE` into the scene; `None` for `--set`.
+    /// Returns the option that put the `KEY=VALUE` text into the scene; `None` for `--set`.
     fn option_of(&self, text: &str) -> Option<&'static str> {
         let (option, overrides) = self.overrides;
         if overrides.iter().any(|given| given == text) {
@@ -61,12 +62,12 @@ impl Said<'_> {
     }
 }
 
-/// What tells the scene at one end of all its keys from others: everything that it says, and that files say which it names.
+/// Returns a fingerprint of the scene with every open key at its lower end. The fingerprint covers all parsed values, content of named files included.
 pub(super) fn fingerprint_of(family: &Family) -> Result<u64, FamilyError> {
     Ok(fingerprint(&format!("{:?}", at_low(family)?)))
 }
 
-/// The scene with every open key at its lower end; it does not know the name of its file.
+/// Returns the scene with every open key at its lower end. The path of the scene's file is cleared, so that the file's place does not change fingerprints.
 pub(super) fn at_low(family: &Family) -> Result<Scene, FamilyError> {
     let low: Vec<f64> = family.keys().iter().map(|range| range.low).collect();
     let mut scene = family.scene(&low)?;
