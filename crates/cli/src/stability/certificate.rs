@@ -1,4 +1,4 @@
-//! Files of certificates: all by which verdicts on sets of scenes can be checked without this program.
+//! Texts of certificates: JSON documents with the scene and all numbers that another program needs to check the verdicts on a set of scenes.
 
 use cohaptic_proofs::{
     BoxCertificate, FrameState, FreeCircle, Guarantee, MomentCertificate, NumberCertificate, PartCertificate, Switching, SwitchingCertificate,
@@ -10,14 +10,14 @@ use serde::Serialize;
 use crate::document_schema::{DocumentSchema, document};
 use crate::failure::Failure;
 
-/// A scene as it was given: its title, its text, and what was put into it.
+/// A scene as the user gave the scene: title, text of the file, and `KEY=VALUE` overrides.
 pub(super) struct Given<'a> {
     pub(super) title: &'a str,
     pub(super) text: &'a str,
     pub(super) overrides: &'a [String],
 }
 
-/// The text of a certificate of boxes that cover the ranges of keys.
+/// Returns the certificate of boxes that cover the ranges of `keys`. `every` is the range of numbers of equal peers; `None` for the scene's number.
 pub(super) fn of_boxes(
     given: &Given<'_>,
     keys: &[&KeyRange],
@@ -34,7 +34,7 @@ pub(super) fn of_boxes(
             keys: keys.iter().map(|range| range.key.as_str()).collect::<Vec<_>>(),
             ranges: keys.iter().map(|range| [range.low, range.high]).collect::<Vec<_>>(),
             units: keys.iter().map(|range| range.unit.as_str()).collect::<Vec<_>>(),
-            // For which numbers N of equal peers; a box then ends with the range of 1/(N - 1). `null`: for those of the scene.
+            // Range of the number N of equal peers. The last range of a box is then that of 1/(N - 1). `null` for the scene's number.
             every_number: every.map(|(from, to)| document! { from: from, to: to }),
             #[serde(flatten)]
             topology: topology.map(|topology| document! { topology: of_topology(topology) }),
@@ -43,16 +43,16 @@ pub(super) fn of_boxes(
     )
 }
 
-/// The text of a certificate of numbers of peers, of which more and more are equal to one.
+/// Returns the certificate of spans of numbers of peers, of which those equal to the peer `growing` (its index) grow in number.
 pub(super) fn of_numbers(given: &Given<'_>, growing: usize, spans: &[NumberCertificate]) -> Result<String, Failure> {
     let spans = spans.iter().map(|span| {
         document! {
             from: span.from,
-            // `null`: without end.
+            // `null` for a span without an end.
             to: span.to,
             verdict: span.guarantee.word(),
             parts: span.parts.iter().map(of_part).collect::<Vec<_>>(),
-            // In the mean square.
+            // Certificates of the verdict in the mean square.
             moments: span.moments.iter().map(of_moment).collect::<Vec<_>>(),
         }
     });
@@ -62,19 +62,19 @@ pub(super) fn of_numbers(given: &Given<'_>, growing: usize, spans: &[NumberCerti
             title: given.title,
             scene: given.text,
             overrides: given.overrides,
-            // The place of the first of the equal peers, counted from 0.
+            // Index of the first of the equal peers, counted from 0.
             growing: growing,
             spans: spans.collect::<Vec<_>>(),
         },
     )
 }
 
-/// The text of a certificate of contacts that open and close.
+/// Returns the certificate of contacts that open and close.
 pub(super) fn of_switching(given: &Given<'_>, found: &Switching) -> Result<String, Failure> {
     let motions = found.motions.iter().map(|motion| {
         document! {
             motion: motion.name.as_str(),
-            // Of a motion that is not proven stable nothing can be checked.
+            // Only a motion that is proven stable has numbers to check; every other motion counts as undecided.
             verdict: if motion.certificate.is_some() { motion.guarantee.word() } else { Guarantee::Undecided.word() },
             #[serde(flatten)]
             proof: motion.certificate.as_ref().map(of_contacts),
@@ -102,12 +102,12 @@ fn of_contacts(of: &SwitchingCertificate) -> impl Serialize + use<'_> {
     });
     document! {
         axis: of.axis,
-        // By which the form shrinks in a frame at least.
+        // Factor by which the form shrinks per frame at least.
         factor: of.factor,
         time: of.time,
         heard: of.heard.map(|gains| [gains.stiffness, gains.damping]),
         parts: parts.collect::<Vec<_>>(),
-        // How the members of classes without contacts differ.
+        // Differences of the members of classes without contacts.
         rest: of.rest.iter().map(of_part).collect::<Vec<_>>(),
         multipliers: of.multipliers.as_str(),
     }
@@ -128,9 +128,9 @@ fn of_box(one: &BoxCertificate) -> impl Serialize {
 
 fn of_topology(topology: &TopologyCertificate) -> impl Serialize + use<'_> {
     document! {
-        // Of the file that the scene names; null: the scene says them.
+        // Weights of the file that the scene names; `null` if the scene itself has the weights.
         weights: topology.weights.as_deref(),
-        // Of the averaging matrix, nearly, but for that of the eigenvalue 1.
+        // Approximate eigenvectors of the averaging matrix, without the eigenvector of the eigenvalue 1.
         eigenvectors: topology.eigenvectors.as_str(),
     }
 }
@@ -141,18 +141,18 @@ fn of_part(part: &PartCertificate) -> impl Serialize {
         FreeCircle::AroundEntry(place, radius) => serde_json::json!(["around-entry", place, radius]),
     };
     document! {
-        // The members of its classes of equal peers, counted from 0, and whether it is how the members of one differ.
+        // Indices of the peers in the part's classes of equal peers, counted from 0, and whether the part is the difference of the members of one class.
         members: part.members.as_slice(),
         difference: part.is_difference,
-        // Of the averaging matrix of a topology, but for 1: between which ends those are that the part stands for.
+        // Ends of the range of eigenvalues of a topology's averaging matrix, without 1, for which the part stands.
         #[serde(flatten)]
         eigenvalues: part.eigenvalues.map(|ends| document! { eigenvalues: ends }),
         states: part.states.iter().map(of_state).collect::<Vec<_>>(),
-        // The gains K and B by which a sample is the number (K·x + B·v)/(K + B/time); null: its position and its velocity.
+        // Gains K and B of a sample that is the number (K·x + B·v)/(K + B/time); `null` for a sample of position and velocity.
         heard: part.heard.map(|gains| [gains.stiffness, gains.damping]),
-        // What velocities are multiplied by, in seconds.
+        // Factor on velocities \[s\].
         time: part.time,
-        // With a server or waves, by what forces are multiplied, in m/N.
+        // Factor on forces \[m/N\], for scenes with a server or with waves.
         #[serde(flatten)]
         compliance: part.compliance.map(|compliance| document! { compliance: compliance }),
         coordinates: part.coordinates.as_str(),
@@ -163,13 +163,13 @@ fn of_part(part: &PartCertificate) -> impl Serialize {
 
 fn of_moment(moment: &MomentCertificate) -> impl Serialize {
     document! {
-        // The moment grows by less than this in a frame if it is stable, and by this at least if it is not.
+        // Bound on the growth of the moment per frame: above the growth if the verdict is stable, and at most the growth if unstable.
         factor: moment.factor,
         time: moment.time,
         heard: moment.heard.map(|gains| [gains.stiffness, gains.damping]),
-        // How many samples of frames before take part.
+        // Number of samples of earlier frames in the state.
         depth: moment.depth,
-        // Of the mean of all peers, of differences from it, and of the rest of the samples held.
+        // Blocks of the mean of all peers, of the differences from the mean, and of the remaining held samples.
         blocks: moment.blocks.as_slice(),
     }
 }

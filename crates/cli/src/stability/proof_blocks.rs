@@ -137,7 +137,7 @@ impl Proofs<'_> {
         let (mut mine, mut computed) = (0, 0);
         for (number, family) in self.families.iter().enumerate() {
             let pieces = Pieces::of(number, &rows, Some(&file));
-            // Blocks are numbered through all proofs, so that a shard gets blocks of every proof.
+            // Shards count blocks through all proofs: the blocks of this proof begin at `first`.
             let first = number as u64 * self.shared.blocks();
             let blocks: Vec<u64> = (0..self.shared.blocks()).filter(|block| shard.has(first + block)).collect();
             mine += blocks.len() as u64;
@@ -194,7 +194,7 @@ impl Watch for ShardWatch<'_> {
 pub(super) fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
     match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
         Ok(pool) => pool.install(work),
-        // If the pool cannot be made, the work runs on the global pool, more slowly or faster but with the same result.
+        // If the pool cannot be made, the work runs on the global pool, with the same result.
         Err(_) => work(),
     }
 }

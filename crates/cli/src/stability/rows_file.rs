@@ -41,7 +41,7 @@ pub(crate) struct Kept<'a> {
 }
 
 impl Kept<'_> {
-    /// Returns the path of the file of `worker`, or of a process without other workers if `worker` is `None`.
+    /// Returns the path of the file of `worker`, or of a process that works alone if `worker` is `None`.
     pub(crate) fn path(self, worker: Option<&str>) -> PathBuf {
         let worker = worker.map_or_else(String::new, |worker| format!(".{worker}"));
         self.folder.join(format!("{}{worker}{PARTIAL}", self.name))
@@ -74,7 +74,7 @@ impl Kept<'_> {
         Ok((rows, paths))
     }
 
-    /// Opens or creates the file of `worker` (`None`: of a process without other workers) and its folder. Returns the file and the rows of all workers.
+    /// Opens or creates the file of `worker` (`None`: of a process that works alone) and its folder. Returns the file and the rows of all workers.
     ///
     /// Nothing is written if a file in the folder belongs to another computation.
     pub(crate) fn open(self, worker: Option<&str>) -> Result<(RowsFile, Vec<Row>), Failure> {

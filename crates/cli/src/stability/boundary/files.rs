@@ -1,4 +1,5 @@
-//! The files of a boundary: the crossings, all values looked at, and a picture of the radius along the key with the crossings marked.
+//! The files of `cohaptic stability boundary --out`: a table of the crossings, a table of all checked values, and a picture of the radius along the key with
+//! the crossings marked.
 
 use std::path::Path;
 
@@ -9,7 +10,7 @@ use cohaptic_picture::Size;
 use crate::failure::Failure;
 use crate::file::write_into;
 
-/// Writes `boundary.csv`, `samples.csv` and `boundary.svg`, and gives their paths.
+/// Writes `boundary.csv`, `samples.csv` and `boundary.svg` into `folder`, and returns their paths.
 pub(super) fn write(folder: &Path, searched: &Searched<'_>, size: Size) -> Result<Vec<String>, Failure> {
     let Searched { title, range, family, found, .. } = searched;
     let picture = boundary_picture(title, range, family.criterion(), family.left_out(), found);

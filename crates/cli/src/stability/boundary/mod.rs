@@ -1,4 +1,7 @@
-//! `cohaptic stability boundary`.
+//! `cohaptic stability boundary`: finds the values of one key at which the stability of a scene changes.
+//!
+//! Without `--prove` the spectral radius is sampled, and each crossing of the limit is located to a tolerance. `prove` decides whole stretches of the range,
+//! and `sharing` divides the search among shards.
 
 mod files;
 mod prove;
@@ -24,24 +27,24 @@ use crate::progress::Progress;
 use crate::shard::{Sharing, all_done, show};
 use crate::{input, interrupt, output, shard};
 
-/// A search that has no end by then says how long it may take, where nobody sees a bar.
+/// Time after which a search without a visible progress bar prints an estimate of its length.
 const TOLD: Duration = Duration::from_secs(1);
 
-/// What files are called in which values looked at are kept.
+/// Name of the files of rows in which checked values are kept.
 const ROWS: &str = "boundary.rows";
 
-/// Everything that is asked for, checked: nothing is written before there is one.
+/// Checked arguments of the command. Nothing is written before the check has passed.
 struct Order {
     text: String,
     title: String,
     range: KeyRange,
     options: BoundaryOptions,
     family: Family,
-    /// What values looked at belong to.
+    /// Header of the file of rows, which identifies the search.
     header: Vec<String>,
 }
 
-/// Finds every crossing along a key.
+/// Finds the crossings along a key and writes the answer, or does the part of a shard.
 pub(crate) fn boundary(arguments: &BoundaryArguments) -> Result<ExitCode, Failure> {
     let sharing = Sharing::of(&arguments.shards, arguments.out.as_deref())?;
     let order = Order::new(arguments)?;
@@ -65,6 +68,7 @@ pub(crate) fn boundary(arguments: &BoundaryArguments) -> Result<ExitCode, Failur
     let found = match found {
         Ok(found) => found,
         Err(error) => {
+            // A new file of rows is useless if the search fails. A file that had rows before is kept.
             if let Some(rows) = rows.filter(|_| known.is_empty()) {
                 rows.abandon();
             }
@@ -75,7 +79,7 @@ pub(crate) fn boundary(arguments: &BoundaryArguments) -> Result<ExitCode, Failur
     if is_interrupted {
         let ended = interrupted(&found, rows, &known, kept);
         if found.samples > 0 {
-            // The crossings found so far are an answer, which says that it is not settled.
+            // The crossings found so far are answered; the answer says that the search is not settled.
             say(&order, arguments, &found, &[])?;
         }
         return Err(ended);
@@ -107,7 +111,7 @@ impl Order {
         }
         options.most = arguments.values;
         if options.samples > options.most && arguments.samples.is_none() {
-            // Fewer values than are usually looked at first: all of them at once.
+            // The limit of --values is below the default number of first samples: all values are samples then.
             options.samples = options.most;
         }
         if options.samples < 2 || options.samples > options.most {
@@ -120,6 +124,7 @@ impl Order {
         if let (Criterion::MeanSquare, None) = (family.criterion(), arguments.tolerance) {
             options.tolerance = BoundaryOptions::of_mean_square(&range).tolerance;
         }
+        // Rows are continued only by a search with the same scene, overrides and range, and by the same version of the program.
         let title = source::at_low(&family).map_err(refused)?.title;
         let header = vec![
             format!("cohaptic {} stability boundary: values looked at; the same command goes on from here", env!("CARGO_PKG_VERSION")),
@@ -137,17 +142,18 @@ impl Order {
     }
 }
 
-/// The values of rows, and what was found there.
+/// Returns the value of each row with the cell found at the value. Rows that are too short are skipped.
 fn cells(rows: &[Row]) -> Vec<(f64, Cell)> {
     let cell = |row: &[f64]| Some(Cell { radius: Radius { value: *row.get(1)?, error: *row.get(2)? }, is_nominal: *row.get(3)? != 0.0 });
     rows.iter().filter_map(|(_, row)| Some((*row.first()?, cell(row)?))).collect()
 }
 
-/// The numbers that are kept of a value.
+/// Returns the numbers of the row that keeps `value` and its cell; the inverse of [`cells`].
 fn row(value: f64, Cell { radius, is_nominal }: &Cell) -> [f64; 4] {
     [value, radius.value, radius.error, f64::from(u8::from(*is_nominal))]
 }
 
+/// Searches the range from the values that `known` holds, with a progress bar or, without one, a note about the length.
 fn look(order: &Order, known: &[Row]) -> Result<Boundary, BoundaryError<cohaptic_stability::FamilyError>> {
     let known = cells(known);
     let most = order.options.most;
@@ -161,7 +167,7 @@ fn look(order: &Order, known: &[Row]) -> Result<Boundary, BoundaryError<cohaptic
         if passed >= TOLD && !progress.is_seen() && !is_told.swap(true, Ordering::Relaxed) {
             #[expect(clippy::cast_precision_loss, reason = "an estimate")]
             let all = passed.as_secs_f64() * most as f64 / count as f64;
-            // If it cannot be said, the search goes on all the same.
+            // A closed standard error must not end the search.
             let words = estimate(all * OPERATIONS_A_SECOND);
             let _ = writeln!(
                 std::io::stderr(),
@@ -177,7 +183,7 @@ fn look(order: &Order, known: &[Row]) -> Result<Boundary, BoundaryError<cohaptic
     found
 }
 
-/// What went wrong, in the words of the user's options.
+/// Converts an error of the search to a failure that names the user's option.
 fn failure(arguments: &BoundaryArguments, range: &KeyRange, error: BoundaryError<cohaptic_stability::FamilyError>) -> Failure {
     match error {
         BoundaryError::Radius(error) => {
@@ -187,10 +193,11 @@ fn failure(arguments: &BoundaryArguments, range: &KeyRange, error: BoundaryError
     }
 }
 
-/// Keeps what was looked at, and says how to go on.
+/// Adds the values checked in this run to the file of rows, and returns the failure that says how to continue.
 fn interrupted(found: &Boundary, rows: Option<RowsFile>, known: &[Row], kept: Option<Kept<'_>>) -> Failure {
     let kept = match (kept, rows) {
         (Some(kept), Some(mut rows)) => {
+            // Bits are compared, because equal numbers may differ in the sign of zero.
             let is_known = |value: f64| known.iter().any(|(_, row)| row.first().is_some_and(|known| known.to_bits() == value.to_bits()));
             let mut new = found.known.iter().filter(|(value, _)| !is_known(*value)).enumerate();
             if let Err(failure) = new.try_for_each(|(number, (value, cell))| rows.add(known.len() + number, &row(*value, cell))) {

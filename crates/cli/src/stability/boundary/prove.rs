@@ -1,4 +1,5 @@
-//! `cohaptic stability boundary --prove`: stretches that are decided throughout, and between them those that hold every crossing.
+//! `cohaptic stability boundary --prove`: divides the range into stretches with a proven verdict and undecided stretches. Every crossing lies in an undecided
+//! stretch.
 
 use std::fmt::Write as _;
 use std::process::ExitCode;
@@ -20,13 +21,14 @@ use crate::stability::guarantee::{self, PieceWatch};
 use crate::stability::proof_blocks::{self, Pieces, Proofs};
 use crate::stability::rows_file::Kept;
 
-/// What files are called in which pieces are kept that shards have looked at.
+/// Name of the files of rows in which shards keep their decided pieces.
 const ROWS: &str = "proof.rows";
 
-/// Proves the line and shows or writes it, or does a shard of that.
+/// Proves the line and writes the answer, or does the part of a shard.
 pub(super) fn prove(order: &Order, arguments: &BoundaryArguments, sharing: Sharing<'_>) -> Result<ExitCode, Failure> {
     let (families, tolerance) = (std::slice::from_ref(&order.family), order.options.tolerance);
     let shared = SharedProof::of_line(&order.family, tolerance).map_err(|error| failure(order, arguments, error))?;
+    // A scene without a certificate is refused before the proof, which may take long.
     if arguments.certificate {
         TopologyCertificate::of(&order.family).map_err(|error| failure(order, arguments, error))?;
     }
@@ -83,13 +85,13 @@ fn answer(order: &Order, line: &ProvenLine, uncertified: Option<usize>, files: &
         unit: order.range.unit.as_str(),
         low: order.range.low,
         high: order.range.high,
-        // Every crossing lies in one that is undecided.
+        // Every crossing lies in an undecided stretch.
         stretches: stretches.collect::<Vec<_>>(),
         tolerance: order.options.tolerance,
         certificates: line.attempts,
-        // Whether the proof was ended before it had looked at all stretches.
+        // Whether the proof was interrupted before all stretches were checked.
         interrupted: !line.is_whole,
-        // How many pieces with a verdict the certificate leaves open; absent without one.
+        // Number of pieces with a verdict for which the certificate has no proof; absent without a certificate.
         #[serde(flatten)]
         certificate: uncertified.map(|uncertified| document! { uncertified: uncertified }),
         files: files,
@@ -102,6 +104,7 @@ fn describe(order: &Order, line: &ProvenLine, uncertified: Option<usize>) -> Str
     for (place, ProvenStretch { low, high, guarantee }) in line.stretches.iter().enumerate() {
         let beside = |other: Option<usize>| other.and_then(|other| line.stretches.get(other)).map(|stretch| stretch.guarantee);
         let between = [beside(place.checked_sub(1)), beside(Some(place + 1))];
+        // An undecided stretch between different verdicts holds at least one crossing.
         let words = match (guarantee, between) {
             (Guarantee::Undecided, [Some(before), Some(after)]) if before != after => "crossing:",
             (Guarantee::Undecided, _) => "undecided:",
@@ -115,7 +118,7 @@ fn describe(order: &Order, line: &ProvenLine, uncertified: Option<usize>) -> Str
     text
 }
 
-/// One row a stretch.
+/// Returns the CSV table of the stretches, one row per stretch.
 fn table(order: &Order, line: &ProvenLine) -> String {
     let key = csv_field(&order.range.key);
     let mut text = format!("{key} from,{key} to,verdict\n");

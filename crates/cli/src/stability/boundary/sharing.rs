@@ -1,5 +1,5 @@
-//! Shards of a boundary: blocks of the range, of which each is searched to its end as if there were no others. What they say of each other across their ends is looked
-//! at by the merge.
+//! Divides the search for a boundary among shards. Each block of the range is searched completely and without regard to the other blocks; the merge checks
+//! what depends on two neighbouring blocks.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -18,7 +18,7 @@ use crate::stability::rows_file::{Kept, Row, RowsFile};
 
 pub(super) const NAMES: Names = Names { piece: "block", unit: "sample" };
 
-/// Every block, and whether it is known.
+/// Returns every block with whether the rows hold all values of the block.
 fn blocks(order: &Order, rows: &[Row]) -> Vec<(BoundaryBlock, bool)> {
     let known = cells(rows);
     let blocks = Boundary::blocks(&order.range, order.options).into_iter();
@@ -30,19 +30,19 @@ fn blocks(order: &Order, rows: &[Row]) -> Vec<(BoundaryBlock, bool)> {
         .collect()
 }
 
-/// How many of the first samples count as those of a block: the last one is the first of the next.
+/// Returns the number of first samples that count for a block. The last sample is left out, because the next block begins with the same sample.
 fn units(block: &BoundaryBlock) -> u64 {
     block.first_values().len() as u64 - 1
 }
 
-/// The blocks as pieces of the work.
+/// Returns the blocks as pieces of work, for the status and the merge.
 pub(super) fn pieces(order: &Order, kept: Kept<'_>) -> Result<Vec<Piece>, Failure> {
     Ok(blocks(order, &kept.read()?.0).into_iter().map(|(block, is_done)| Piece { units: units(&block), is_done }).collect())
 }
 
-/// Searches the blocks of a shard.
+/// Searches the blocks of a shard, as a worker of the folder.
 pub(super) fn shard(order: &Order, arguments: &BoundaryArguments, shard: Shard, kept: Kept<'_>) -> Result<Done, Failure> {
-    // Rows of other work are refused before anything is written.
+    // A folder with rows of another computation is refused before the shard writes anything.
     kept.read()?;
     std::fs::create_dir_all(kept.folder).map_err(|error| Failure::File { verb: "create", path: kept.folder.to_path_buf(), error })?;
     let owner = owner();
@@ -57,6 +57,7 @@ fn search(order: &Order, arguments: &BoundaryArguments, shard: Shard, kept: Kept
     let (pieces, all) = (mine.len() as u64, mine.iter().map(|(_, (block, _))| units(block)).sum());
     let (places, wanted): (Vec<u64>, Vec<BoundaryBlock>) =
         mine.into_iter().filter(|(_, (_, is_done))| !is_done).map(|(place, (block, _))| (place, block)).unzip();
+    // Threads of the search add rows under the lock. The first failure to write stops the search, and is returned below.
     let file: Mutex<(RowsFile, Option<Failure>)> = Mutex::new((file, None));
     let failed = || file.lock().unwrap_or_else(PoisonError::into_inner).1.is_some();
     let progress = Progress::new(wanted.len() as u64, "{bar:30} {percent:>3} %  {pos}/{len} blocks, {eta} left{msg}");

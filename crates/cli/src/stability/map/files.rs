@@ -1,4 +1,5 @@
-//! The files of a map: a table for each variant, and one picture: the outline of the region of each variant, and the region of the first one shaded.
+//! The files of `cohaptic stability map --out`: one table per variant, and one picture with the outline of each variant's region. The region of the first
+//! variant is shaded.
 
 use std::path::Path;
 
@@ -10,7 +11,7 @@ use super::Order;
 use crate::failure::Failure;
 use crate::file::write_into;
 
-/// Writes `map.csv`, `map-2.csv` ... and `map.svg`, and gives their paths.
+/// Writes `map.csv`, `map-2.csv` and so on, and `map.svg` into `folder`, and returns the paths of all files. Each map gets the path of its table.
 pub(super) fn write(folder: &Path, order: &Order, maps: &mut [VariantMap], size: Size) -> Result<Vec<String>, Failure> {
     let mut files = Vec::new();
     for (number, map) in maps.iter_mut().enumerate() {

@@ -1,4 +1,6 @@
-//! Fills maps in parallel, and keeps finished rows, so that the same command goes on where it was interrupted.
+//! Computes the cells of maps in parallel, and keeps finished rows in a file, so that the same command continues after an interruption.
+//!
+//! Rows of all variants share one file. The number of a row is the index of its variant times the rows per map, plus the row's index in the map.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -20,28 +22,28 @@ use crate::stability::rows_file::{Kept, Row, RowsFile, fingerprint};
 use crate::stability::source::fingerprint_of;
 use crate::{interrupt, output};
 
-/// What files are called in which finished rows are kept.
+/// Name of the files of rows in which finished rows are kept.
 const ROWS: &str = "map.rows";
 
-/// What the header of its file says of rows.
+/// Texts of the header: the computation, the size (empty for the size of the grid), and the explanation of the rows.
 const WHAT: [&str; 3] =
     ["stability map: rows that are finished", "", "each row: its number, the radius of each cell, and for each cell 1 if it is nominal"];
 
 const NAMES: Names = Names { piece: "row", unit: "cell" };
 
-/// All maps, whole.
+/// Result of a complete computation of all maps.
 pub(super) struct Filled {
-    /// One for each variant.
+    /// Complete maps, indexed by variant.
     pub(super) maps: Vec<Map>,
-    /// How many cells were computed now.
+    /// Number of cells computed in this run.
     pub(super) cells: usize,
-    /// The file of rows, to be removed when the maps are written.
+    /// File of rows, which the caller removes after the maps are written. `None` without a folder.
     pub(super) rows: Option<RowsFile>,
-    /// The folder, until the maps are written.
+    /// Ownership of the folder, which the caller holds until the maps are written.
     pub(super) own: Option<OwnFolder>,
 }
 
-/// Fills every map, or puts together the rows of shards.
+/// Computes every map from the rows that are known. A merge fails unless shards have finished every row.
 pub(super) fn fill(order: &Order, arguments: &MapArguments, sharing: Sharing<'_>) -> Result<Filled, Failure> {
     let header = header(order, arguments, WHAT)?;
     let kept = sharing.folder().map(|folder| Kept { folder, name: ROWS, header: &header });
@@ -65,6 +67,7 @@ pub(super) fn fill(order: &Order, arguments: &MapArguments, sharing: Sharing<'_>
         Ok((maps, cells)) if maps.len() == order.variants.len() && maps.iter().all(Map::is_complete) => Ok(Filled { maps, cells, rows, own }),
         Ok((maps, _)) => Err(interrupted(&maps, order, sharing.folder())),
         Err((variant, error)) => {
+            // A new file of rows is useless if the computation fails. A file that had rows before is kept.
             if let Some(rows) = rows.filter(|_| !begun_before) {
                 rows.abandon();
             }
@@ -73,16 +76,16 @@ pub(super) fn fill(order: &Order, arguments: &MapArguments, sharing: Sharing<'_>
     }
 }
 
-/// On how many threads, 0 for one a core.
+/// Returns the number of threads of the arguments; 0 for one thread per core.
 fn threads(arguments: &MapArguments) -> usize {
     usize::from(arguments.threads.unwrap_or(0))
 }
 
-/// Fills the rows of a shard.
+/// Computes the rows of a shard, as a worker of the folder.
 pub(super) fn shard(order: &Order, arguments: &MapArguments, shard: Shard, folder: &Path) -> Result<Done, Failure> {
     let header = header(order, arguments, WHAT)?;
     let kept = Kept { folder, name: ROWS, header: &header };
-    // Rows of other work are refused before anything is written.
+    // A folder with rows of another computation is refused before the shard writes anything.
     kept.read()?;
     std::fs::create_dir_all(folder).map_err(|error| Failure::File { verb: "create", path: folder.to_path_buf(), error })?;
     let owner = owner();
@@ -100,7 +103,7 @@ pub(super) fn shard(order: &Order, arguments: &MapArguments, shard: Shard, folde
     worker.end(done, |failure| failure)
 }
 
-/// How many rows and cells the shard has, and how many cells were computed.
+/// Computes the rows of a shard that are not known yet. Returns the number of rows and of cells of the shard, and the number of cells computed now.
 fn rows_of_shard(order: &Order, arguments: &MapArguments, shard: Shard, kept: Kept<'_>, name: &str, worker: &Worker) -> Result<[u64; 3], Failure> {
     let (columns, rows) = (order.grid.columns(), order.grid.rows());
     let (file, known) = kept.open(Some(name))?;
@@ -113,7 +116,7 @@ fn rows_of_shard(order: &Order, arguments: &MapArguments, shard: Shard, kept: Ke
             mine += 1;
             there += usize::from(!cells.radius.is_empty());
         } else {
-            // Of another shard: a row that is known is not computed, and this one is not looked at.
+            // A row of another shard is marked as known, so that the row is not computed. Its values are never read.
             *cells = MapRow { radius: vec![f64::NAN; columns], nominal: vec![false; columns] };
         }
     }
@@ -130,30 +133,31 @@ fn rows_of_shard(order: &Order, arguments: &MapArguments, shard: Shard, kept: Ke
     Ok([mine, mine * columns, computed].map(|number| number as u64))
 }
 
-/// The rows that there are.
+/// Returns every row of every map as a piece of work, with whether the row is known.
 fn pieces(order: &Order, kept: Kept<'_>) -> Result<Vec<Piece>, Failure> {
     let known = sorted(kept.read()?.0, order);
     let piece = |row: &MapRow| Piece { units: order.grid.columns() as u64, is_done: !row.radius.is_empty() };
     Ok(known.iter().flatten().map(piece).collect())
 }
 
-/// That shards have done every row.
+/// Returns a failure unless shards have finished every row.
 fn are_all_there(order: &Order, kept: Kept<'_>) -> Result<(), Failure> {
     all_done(kept.folder, NAMES, &pieces(order, kept)?)
 }
 
-/// Says which rows are done.
+/// Answers with the rows that are finished, for `--status`.
 pub(super) fn status(order: &Order, arguments: &MapArguments, folder: &Path) -> Result<ExitCode, Failure> {
     let header = header(order, arguments, WHAT)?;
     let kept = Kept { folder, name: ROWS, header: &header };
     show(arguments.scene.json, folder, NAMES, &pieces(order, kept)?)
 }
 
-/// Where finished rows go, and what went wrong there.
+/// Destination of finished rows, with the first failure to write. Shared by all threads of the computation.
 struct Keeper<'a> {
     file: Mutex<(Option<RowsFile>, Option<Failure>)>,
+    /// Whether a failure is kept. An atomic, so that `stops` needs no lock.
     broken: AtomicBool,
-    /// Whose shard they are.
+    /// Worker of the shard; `None` if the command computes all rows.
     worker: Option<&'a Worker>,
 }
 
@@ -176,7 +180,7 @@ impl Keeper<'_> {
     }
 }
 
-/// Fills one map after the other, up to the first that is not whole; and how many cells that took.
+/// Computes one map after the other, up to the first incomplete map. Returns the maps with the number of cells computed now; the error has the variant's index.
 fn in_turn(order: &Order, known: Vec<Vec<MapRow>>, keeper: &Keeper<'_>) -> Result<(Vec<Map>, usize), (usize, MapError)> {
     let (columns, rows) = (order.grid.columns(), order.grid.rows());
     let there: usize = known.iter().flatten().filter(|row| !row.radius.is_empty()).count();
@@ -207,11 +211,12 @@ fn in_turn(order: &Order, known: Vec<Vec<MapRow>>, keeper: &Keeper<'_>) -> Resul
     Ok((maps, (finished.saturating_sub(there)) * columns))
 }
 
-/// The rows of each variant by their places; empty where they are not known.
+/// Sorts rows by variant and by row of the map. An unknown row is empty.
 fn sorted(known: Vec<Row>, order: &Order) -> Vec<Vec<MapRow>> {
     let (columns, rows) = (order.grid.columns(), order.grid.rows());
     let mut sorted = vec![vec![MapRow::default(); rows]; order.variants.len()];
     for (number, cells) in known.into_iter().filter(|(_, cells)| cells.len() == 2 * columns) {
+        // A number outside the maps can only come from an edited file, and is skipped.
         if let Some(row) = sorted.get_mut(number / rows).and_then(|variant| variant.get_mut(number % rows)) {
             let nominal = cells[columns..].iter().map(|nominal| *nominal != 0.0).collect();
             *row = MapRow { radius: cells[..columns].to_vec(), nominal };
@@ -220,7 +225,8 @@ fn sorted(known: Vec<Row>, order: &Order) -> Vec<Vec<MapRow>> {
     sorted
 }
 
-/// What the rows belong to. Numbers of another version of the program may differ in their last digits, and are not mixed.
+/// Returns the header of a file of rows, which identifies the computation. The header has the version of the program, because the last digits of numbers may
+/// differ between versions.
 pub(super) fn header(order: &Order, arguments: &MapArguments, [command, size, rows]: [&str; 3]) -> Result<Vec<String>, Failure> {
     let mut lines = vec![
         format!("cohaptic {} {command}; the same command goes on from here", env!("CARGO_PKG_VERSION")),

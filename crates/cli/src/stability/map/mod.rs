@@ -1,4 +1,6 @@
-//! `cohaptic stability map`.
+//! `cohaptic stability map`: judges the stability of a scene over a plane of two keys, for one or several variants of the scene.
+//!
+//! `filling` computes the cells of a grid, `files` writes the maps, and `prove` decides whole boxes of the plane without a grid.
 
 mod files;
 mod filling;
@@ -19,18 +21,18 @@ use crate::variants::Variant;
 use crate::{input, output, shard};
 use filling::Filled;
 
-/// Everything that is asked for, checked: nothing is written before there is one.
+/// Checked arguments of the command. Nothing is written before the check has passed.
 struct Order {
     text: String,
     title: String,
     ranges: [(&'static str, KeyRange); 2],
     grid: Grid,
     variants: Vec<Variant>,
-    /// One for each variant.
+    /// Families of scenes, indexed by variant.
     families: Vec<Family>,
 }
 
-/// Fills the maps and shows or writes them.
+/// Computes the maps and writes the answer, or does the part of a shard.
 pub(crate) fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
     let sharing = Sharing::of(&arguments.shards, arguments.out.as_deref())?;
     let order = Order::new(arguments)?;
@@ -72,7 +74,7 @@ impl Order {
     fn new(arguments: &MapArguments) -> Result<Self, Failure> {
         let ranges = [("--x", source::range("--x", &arguments.x)?), ("--y", source::range("--y", &arguments.y)?)];
         let variants = Variant::all(&arguments.curve, &arguments.against)?;
-        // A proof has no grid.
+        // A proof has no grid; the single cell is never computed.
         let size = arguments.grid.unwrap_or(crate::arguments::GridSize { width: 1, height: 1 });
         if size.width.saturating_mul(size.height).saturating_mul(variants.len()) > crate::arguments::GridSize::MOST_CELLS {
             let most = crate::arguments::GridSize::MOST_CELLS;
@@ -94,7 +96,7 @@ impl Order {
         Ok(Self { text, title, ranges, grid, variants, families })
     }
 
-    /// What went wrong with a map, in the words of the user's options.
+    /// Converts an error of the map with index `variant` to a failure that names the user's option.
     fn failure(&self, variant: usize, arguments: &MapArguments, error: MapError) -> Failure {
         let variant = &self.variants[variant];
         let said = Said { file: &arguments.scene.scene, ranges: &self.ranges, overrides: (variant.option, &variant.overrides) };
@@ -104,7 +106,7 @@ impl Order {
         }
     }
 
-    /// The keys along x and y.
+    /// Returns the ranges of the keys along x and y.
     fn axes(&self) -> [&KeyRange; 2] {
         [self.x(), self.y()]
     }

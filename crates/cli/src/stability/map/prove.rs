@@ -1,4 +1,4 @@
-//! `cohaptic stability map --prove`: a region of boxes that are decided throughout.
+//! `cohaptic stability map --prove`: divides the plane of two keys into boxes, and proves a verdict for all scenes of a box at once.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -23,26 +23,27 @@ use crate::stability::guarantee::{self, PieceWatch};
 use crate::stability::proof_blocks::{self, Pieces, Proofs, on_threads};
 use crate::stability::rows_file::Kept;
 
-/// A variant, and its proof.
+/// A variant with its proof.
 struct Proof {
     name: String,
     overrides: Vec<String>,
     region: ProvenRegion,
     file: Option<String>,
-    /// How many boxes with a verdict its certificate leaves open, if it has one.
+    /// Number of boxes with a verdict but without a proof in the certificate; `None` without a certificate.
     uncertified: Option<usize>,
 }
 
-/// The shares that an answer has, in this order.
+/// Verdicts in the order in which an answer gives their shares of the area.
 const GUARANTEES: [Guarantee; 3] = [Guarantee::Stable, Guarantee::Unstable, Guarantee::Undecided];
 
-/// What files are called in which pieces are kept that shards have looked at.
+/// Name of the files of rows in which shards keep their decided pieces.
 const ROWS: &str = "proof.rows";
 
-/// Proves the region of each variant and shows or writes it, or does a shard of that.
+/// Proves the region of each variant and writes the answer, or does the part of a shard.
 pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32, sharing: Sharing<'_>) -> Result<ExitCode, Failure> {
     let start = Clock::now();
     let shared = SharedProof::of_region(&order.families[0], halvings, arguments.every_number).map_err(|error| failure(order, arguments, 0, error))?;
+    // A variant without a certificate is refused before the proof, which may take long.
     if arguments.certificate {
         for (variant, family) in order.families.iter().enumerate() {
             TopologyCertificate::of(family).map_err(|error| failure(order, arguments, variant, error))?;
@@ -104,7 +105,7 @@ pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32, shar
     if proofs.iter().all(|proof| proof.region.is_whole) { Ok(ExitCode::SUCCESS) } else { Err(guarantee::ended()) }
 }
 
-/// Writes a certificate for each variant, and gives the names of the files.
+/// Writes a certificate for each variant, and returns the paths of the files.
 fn certificates(order: &Order, arguments: &MapArguments, proofs: &mut [Proof], folder: &Path) -> Result<Vec<String>, Failure> {
     let mut files = Vec::new();
     let watch = PieceWatch::new();
@@ -133,11 +134,11 @@ fn answer(order: &Order, arguments: &MapArguments, proofs: &[Proof], wall_s: f64
         document! {
             name: proof.name.as_str(),
             overrides: proof.overrides.as_slice(),
-            // Shares of the area of the ranges.
+            // Shares of the area of the plane, from 0 to 1.
             stable: stable,
             unstable: unstable,
             undecided: undecided,
-            // Boxes without an area, of a single delay, which no share shows.
+            // Numbers of boxes at a single delay. These boxes have no area, so that no share counts them.
             lines: document! {
                 stable: proof.region.lines(Guarantee::Stable),
                 unstable: proof.region.lines(Guarantee::Unstable),
@@ -145,14 +146,14 @@ fn answer(order: &Order, arguments: &MapArguments, proofs: &[Proof], wall_s: f64
             },
             boxes: proof.region.boxes.len(),
             certificates: proof.region.attempts,
-            // Whether the proof was ended before it had looked at all boxes.
+            // Whether the proof was interrupted before all boxes were checked.
             interrupted: !proof.region.is_whole,
-            // The share that is proven stable here and proven unstable for the first, and the other way round.
+            // Share of the area that is proven stable for this variant and unstable for the first, and the share with the verdicts exchanged.
             stable_alone: both(&proof.region, Guarantee::Stable, &proofs[0].region, Guarantee::Unstable),
             unstable_alone: both(&proof.region, Guarantee::Unstable, &proofs[0].region, Guarantee::Stable),
             #[serde(flatten)]
             file: proof.file.as_ref().map(|file| document! { file: file.as_str() }),
-            // How many boxes with a verdict the certificate leaves open; absent without one.
+            // Number of boxes with a verdict for which the certificate has no proof; absent without a certificate.
             #[serde(flatten)]
             certificate: proof.uncertified.map(|uncertified| document! { uncertified: uncertified }),
         }
@@ -165,9 +166,9 @@ fn answer(order: &Order, arguments: &MapArguments, proofs: &[Proof], wall_s: f64
         y_key: y.key.as_str(),
         y_unit: y.unit.as_str(),
         y_range: [y.low, y.high],
-        // How often each range was halved at most.
+        // Largest number of halvings of each range.
         halvings: arguments.prove,
-        // For which numbers of equal peers verdicts hold, the end `null` if there is none; absent: for the number of the scene.
+        // Numbers of equal peers for which the verdicts hold, with `null` for no end. Absent if the verdicts hold for the scene's number.
         #[serde(flatten)]
         every: arguments.every_number.map(|(from, to)| document! { every_number: document! { from: from, to: to } }),
         regions: regions.collect::<Vec<_>>(),
@@ -212,7 +213,7 @@ fn describe(order: &Order, arguments: &MapArguments, proofs: &[Proof], wall_s: f
     text
 }
 
-/// The share of the area in which one region is proven so, and another so.
+/// Returns the share of the area, from 0 to 1, in which region `one` has the verdict `of_one` and region `other` has the verdict `of_other`.
 fn both(one: &ProvenRegion, of_one: Guarantee, other: &ProvenRegion, of_other: Guarantee) -> f64 {
     let chosen = |region: &ProvenRegion, guarantee| region.boxes.iter().filter(|one| one.guarantee == guarantee).copied().collect::<Vec<ProvenBox>>();
     let (ones, others) = (chosen(one, of_one), chosen(other, of_other));
@@ -222,7 +223,7 @@ fn both(one: &ProvenRegion, of_one: Guarantee, other: &ProvenRegion, of_other: G
     common / all + 0.0
 }
 
-/// One row a box.
+/// Returns the CSV table of the boxes, one row per box.
 fn table(order: &Order, region: &ProvenRegion) -> String {
     let [x, y] = [order.x(), order.y()].map(|range| csv_field(&range.key));
     let mut text = format!("{x} from,{x} to,{y} from,{y} to,verdict\n");
@@ -232,7 +233,7 @@ fn table(order: &Order, region: &ProvenRegion) -> String {
     text
 }
 
-/// `proof.svg`, `proof-2.svg` and so on: a picture for each variant.
+/// Writes one picture per variant, `proof.svg`, `proof-2.svg` and so on, and returns their paths.
 fn pictures(order: &Order, proofs: &[Proof], folder: &Path, arguments: &MapArguments) -> Result<Vec<String>, Failure> {
     let mut files = Vec::new();
     for (number, proof) in proofs.iter().enumerate() {

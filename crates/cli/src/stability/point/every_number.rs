@@ -1,4 +1,4 @@
-//! The verdict for every number of equal peers.
+//! The proof of a verdict for every number of equal peers, for `--every-number`.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -16,19 +16,19 @@ use crate::stability::certificate::{self, Given};
 use crate::stability::guarantee::{self, PieceWatch};
 use crate::{input, output};
 
-/// A proof, and its certificate.
+/// Result of the proof, with its certificate if a certificate was written.
 pub(super) struct Proof {
     pub(super) every: EveryNumber,
     pub(super) certificate: Option<Certificate>,
 }
 
-/// The file of a certificate, and of which numbers it says nothing though they have a verdict.
+/// Path of a certificate, and the ranges of numbers that have a verdict but no proof in the certificate.
 pub(super) struct Certificate {
     pub(super) file: String,
     uncertified: Vec<(u64, Option<u64>)>,
 }
 
-/// The proof that is asked for, if one is; refuses scenes that have none.
+/// Prepares the proof, or returns `None` if no option asks for the proof. A scene to which the proof does not apply is a failure.
 pub(super) fn asked(scene: &Scene, arguments: &PointArguments, path: &Path) -> Result<Option<NumberProof>, Failure> {
     let Some((from, to)) = arguments.every_number else { return Ok(None) };
     NumberProof::new(scene, from, to).map(Some).map_err(|error| failure(error, path))
@@ -39,7 +39,7 @@ fn failure(error: ProofError, path: &Path) -> Failure {
     guarantee::failure(error, &option, path, |error| Failure::Input(format!("{option}: {error}")))
 }
 
-/// The proof, if it is asked for.
+/// Runs the prepared proof, and writes the certificate if the proof is complete.
 pub(super) fn of(asked: Option<&NumberProof>, scene: &Scene, arguments: &PointArguments, path: &Path) -> Result<Option<Proof>, Failure> {
     let Some(asked) = asked else { return Ok(None) };
     let failure = |error| failure(error, path);
@@ -54,31 +54,31 @@ pub(super) fn of(asked: Option<&NumberProof>, scene: &Scene, arguments: &PointAr
     Ok(Some(Proof { every, certificate }))
 }
 
-/// The part of the JSON document.
+/// Returns the proof's part of the JSON document.
 pub(super) fn document(scene: &Scene, Proof { every, certificate }: &Proof) -> impl Serialize + use<> {
     let spans = with_reasons(every).map(|(span, reason)| {
         document! {
             from: span.from,
             to: span.to,
             verdict: span.guarantee.word(),
-            // Why, of an undecided one; absent for others.
+            // Reason for an undecided span; absent for decided spans.
             #[serde(flatten)]
             reason: reason.map(|reason| document! { reason: reason }),
         }
     });
     document! {
-        // The first of the equal peers of which there are more and more.
+        // First of the equal peers whose number grows.
         peer: scene.peers[every.growing].name.clone(),
-        // `to` is `null` where there is no end.
+        // `to` is `null` for a span without an end.
         spans: spans.collect::<Vec<_>>(),
-        // Whether it is in the mean square, since links lose.
+        // Whether the verdict is in the mean square, as for links that lose packets.
         mean_square: every.is_mean_square,
-        // What has no limit as N grows; `null` if everything has one, or the numbers end.
+        // The quantity without a limit as N grows; `null` if every quantity has a limit, or if the numbers end.
         without_limit: every.without_limit.clone(),
         certificates: every.attempts,
-        // Whether the proof was ended before it had looked at all numbers.
+        // Whether the proof was interrupted before all numbers were checked.
         interrupted: !every.is_whole,
-        // The file of the certificate, and the numbers with a verdict of which it says nothing; absent if none is asked for.
+        // Path of the certificate, and the numbers with a verdict but without a proof in the certificate; absent without `--certificate`.
         #[serde(flatten)]
         certificate: certificate.as_ref().map(|Certificate { file, uncertified }| {
             let uncertified = uncertified.iter().map(|(from, to)| document! { from: *from, to: *to });
@@ -87,7 +87,7 @@ pub(super) fn document(scene: &Scene, Proof { every, certificate }: &Proof) -> i
     }
 }
 
-/// The spans, and why each is undecided, if it is.
+/// Returns each span, with the reason if the span is undecided.
 fn with_reasons(every: &EveryNumber) -> impl Iterator<Item = (NumberSpan, Option<String>)> {
     let mut open = every.open.iter();
     every
@@ -96,7 +96,7 @@ fn with_reasons(every: &EveryNumber) -> impl Iterator<Item = (NumberSpan, Option
         .map(move |span| (*span, (span.guarantee == Guarantee::Undecided).then(|| open.next().map(|why| reason(span.from, *why))).flatten()))
 }
 
-/// Why numbers from one on are undecided.
+/// Returns the reason for which the numbers from `from` on are undecided.
 fn reason(from: u64, why: Openness) -> String {
     match why {
         Openness::Ended => "the proof was ended".to_owned(),
@@ -108,7 +108,7 @@ fn reason(from: u64, why: Openness) -> String {
     }
 }
 
-/// What bounds of a frame do not tell apart.
+/// Returns the words for an eigenvalue of a frame that the bounds cannot separate from the unit circle or from other eigenvalues.
 fn too_near(Nearness { radius, bound }: Nearness) -> String {
     if !bound.is_finite() {
         return "the bounds of a frame are no finite numbers".to_owned();
@@ -122,7 +122,7 @@ fn too_near(Nearness { radius, bound }: Nearness) -> String {
     format!("the largest eigenvalue of a frame, of the size {size}, is too near to {from} for bounds of {bound:.1e}")
 }
 
-/// Numbers from one to another.
+/// Returns the words for the numbers N from `from` to `to`; `None` means without end.
 fn numbers(from: u64, to: Option<u64>) -> String {
     match to {
         None => format!("N >= {from}"),
@@ -131,7 +131,7 @@ fn numbers(from: u64, to: Option<u64>) -> String {
     }
 }
 
-/// The lines below the verdict.
+/// Returns the lines after the verdict: one line per span, then the notes.
 pub(super) fn words(scene: &Scene, Proof { every, certificate }: &Proof) -> String {
     let mean_square = if every.is_mean_square { " in the mean square" } else { "" };
     let mut text =

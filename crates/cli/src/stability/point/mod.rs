@@ -1,4 +1,6 @@
-//! `cohaptic stability point`.
+//! `cohaptic stability point`: judges the stability of one scene.
+//!
+//! `every_number`, `switching` and `worst` add the proofs that the arguments ask for.
 
 mod every_number;
 mod switching;
@@ -22,25 +24,25 @@ use crate::failure::{Failure, not_analysed};
 use crate::stability::guarantee;
 use crate::{file, input, output};
 
-/// The user asked for the end.
+/// Returns the failure of an analysis that the user interrupted.
 fn ended() -> Failure {
     Failure::Interrupted("the analysis was ended before its verdict".to_owned())
 }
 
-/// The same where the worst case is known already: it took its time, and is told.
+/// Like [`ended`], but the message includes the worst case if its analysis was complete before the interruption.
 fn ended_after(worst: Option<&SceneWorstCase>) -> Failure {
     let Some(worst) = worst else { return ended() };
     Failure::Interrupted(format!("the analysis was ended before its verdict; before that,{}", cohaptic_answers::point::worst_in_words(worst)))
 }
 
-/// Says whether the scene is stable.
+/// Judges the scene, runs the proofs that the arguments ask for, and writes the answer.
 pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
     let path = &arguments.scene.scene;
     let scene = input::with(path, |text, file| Scene::parse(text, file, &arguments.scene.overrides.set))?;
     if arguments.certificate.is_some() && (arguments.every_number.is_some() == arguments.switching) {
         return Err(Failure::Input("--certificate is of one proof: expected --every-number or --switching".to_owned()));
     }
-    // What they refuse is refused before a second moment is followed.
+    // These three may refuse the scene, and so run before the analysis of the second moment, which may take long.
     let asked = every_number::asked(&scene, arguments, path)?;
     let switching = switching::of(&scene, arguments, path)?;
     let worst = worst::of(&scene, arguments, path)?;
@@ -58,10 +60,10 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
         }
     };
     if switching.is_some() {
-        // The answer itself covers it.
+        // The note says that changes of contacts are left out, but this answer covers the changes.
         judgement.analysis.notes.iter_mut().for_each(|note| *note = note.replace(CHANGES_LEFT_OUT, "changing between them is judged apart, below"));
     }
-    // Last of all: what it has found when the user ends it is told with all else.
+    // This proof runs last: if the user interrupts the proof, the answer still has its verdicts so far and all other results.
     let every = every_number::of(asked.as_ref(), &scene, arguments, path)?;
     let more = || {
         let every = every.as_ref().map(|every| every_number::words(&scene, every));
@@ -88,7 +90,7 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
     if every.is_some_and(|every| !every.every.is_whole) { Err(guarantee::ended()) } else { Ok(ExitCode::SUCCESS) }
 }
 
-/// The verdict alone; links that leave something to chance count as if they did not, and a note says so.
+/// Returns the judgement of an analysis without second moment. If the network has chance, a note says that the verdict is nominal.
 fn nominal(scene: &Scene, mut analysis: Analysis, place: &str) -> Judgement {
     if has_chance(scene) {
         analysis.notes.push(format!("the verdict is nominal, with every delay its mean and nothing lost: the second moment is not followed {place}"));
@@ -96,7 +98,7 @@ fn nominal(scene: &Scene, mut analysis: Analysis, place: &str) -> Judgement {
     Judgement::nominal(scene, analysis)
 }
 
-/// The verdict if each peer hears only its neighbours.
+/// Judges the scene if each peer receives samples only from its neighbours on `graph`: a named graph, or a file of weights.
 fn on_graph(scene: &Scene, graph: &str, path: &Path, most_memory: u64) -> Result<Judgement, Failure> {
     let refused = |message: String| Failure::Input(format!("{}: --graph {graph}: {message}", input::named(path).display()));
     if scene.topology.is_some() {
@@ -116,13 +118,14 @@ fn on_graph(scene: &Scene, graph: &str, path: &Path, most_memory: u64) -> Result
     Ok(nominal(scene, analysis, "on a graph"))
 }
 
-/// A file of weights: one line a peer, numbers between commas.
+/// Reads a file of weights: one line per peer, with numbers separated by commas.
 fn weights(file: &Path) -> Result<Graph, Failure> {
     let text = file::read_text(file)?;
     let rows = read_weights(&text).map_err(|fault| {
         let line = text[..fault.span.start].matches('\n').count() + 1;
         Failure::Input(format!("{}:{line}: {}", file.display(), fault.message))
     })?;
+    // The matrix reads every row at every column, so that all rows must be equally long.
     let columns = rows.first().map_or(0, Vec::len);
     if let Some(row) = rows.iter().position(|row| row.len() != columns) {
         let found = rows[row].len();

@@ -1,4 +1,4 @@
-//! Contacts that open and close.
+//! The proof about contacts that open and close, for `--switching`.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -19,13 +19,13 @@ use crate::input;
 use crate::output::{self, figure};
 use crate::stability::certificate::{self, Given};
 
-/// An answer, and the file of its certificate.
+/// Result of the proof, with the path of its certificate if a certificate was written.
 pub(super) struct Proof {
     pub(super) found: Switching,
     pub(super) file: Option<String>,
 }
 
-/// The answer about contacts that open and close, if it is asked for.
+/// Proves the verdict for contacts that open and close and writes the certificate, or returns `None` if no option asks for the proof.
 pub(super) fn of(scene: &Scene, arguments: &PointArguments, path: &Path) -> Result<Option<Proof>, Failure> {
     if !arguments.switching {
         return Ok(None);
@@ -47,18 +47,18 @@ fn prove(scene: &Scene, path: &Path) -> Result<Switching, Failure> {
     })
 }
 
-/// The part of the JSON document.
+/// Returns the proof's part of the JSON document.
 pub(super) fn document(Proof { found: switching, file }: &Proof) -> impl Serialize + use<> {
     let motions = switching.motions.iter().map(|motion| {
         document! {
-            // Which motion; empty if there is but one.
+            // Name of the motion; empty if the scene has only one.
             motion: motion.name.clone(),
             verdict: motion.guarantee.word(),
-            // The factor by which a norm is proven to shrink in a frame; `null` unless stable.
+            // Factor by which a norm is proven to shrink per frame; `null` unless stable.
             rate: motion.rate,
-            // The factor by which a motion that was found grows in a frame; `null` unless unstable.
+            // Factor by which the found motion grows per frame; `null` unless unstable.
             growth: motion.growing.map(|growing| growing.growth),
-            // Over how many frames it was followed, and how often contacts opened or closed in them.
+            // Number of frames over which the motion was followed, and number of openings and closings in these frames.
             frames: motion.growing.map(|growing| growing.frames),
             changes: motion.growing.map(|growing| growing.changes),
         }
@@ -67,13 +67,13 @@ pub(super) fn document(Proof { found: switching, file }: &Proof) -> impl Seriali
         verdict: switching.guarantee().word(),
         motions: motions.collect::<Vec<_>>(),
         notes: switching.notes.clone(),
-        // The file of the certificate; absent if none is asked for.
+        // Path of the certificate; absent without `--certificate`.
         #[serde(flatten)]
         file: file.as_ref().map(|file| document! { file: file.clone() }),
     }
 }
 
-/// The lines below the verdict; `said` are the notes that stand there already.
+/// Returns the lines after the verdict. Notes in `said` are left out, because the verdict has printed these notes already.
 pub(super) fn words(switching: &Switching, said: &[String]) -> String {
     let mut text = "\n  contacts that open and close:\n".to_owned();
     for motion in &switching.motions {

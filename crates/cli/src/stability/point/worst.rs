@@ -1,4 +1,4 @@
-//! The worst case under bounded patterns.
+//! The worst case of a scene under bounded patterns of losses and delays.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use crate::analysis_watch::AnalysisWatch;
 use crate::arguments::{LinksName, PointArguments};
 use crate::failure::{Failure, not_analysed};
 
-/// The worst case, if it is asked for.
+/// Computes the worst case, or returns `None` if no option asks for the worst case. An accuracy that is not above zero is an input failure.
 pub(super) fn of(scene: &Scene, arguments: &PointArguments, path: &Path) -> Result<Option<SceneWorstCase>, Failure> {
     if arguments.losses_in_a_row.is_none() && arguments.delay_within.is_none() {
         return Ok(None);
