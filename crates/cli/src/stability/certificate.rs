@@ -150,9 +150,9 @@ fn of_part(part: &PartCertificate) -> impl Serialize {
         states: part.states.iter().map(of_state).collect::<Vec<_>>(),
         // Gains K and B of a sample that is the number (K·x + B·v)/(K + B/time); `null` for a sample of position and velocity.
         heard: part.heard.map(|gains| [gains.stiffness, gains.damping]),
-        // Factor on velocities \[s\].
+        // Factor on velocities [s].
         time: part.time,
-        // Factor on forces \[m/N\], for scenes with a server or with waves.
+        // Factor on forces [m/N], for scenes with a server or with waves.
         #[serde(flatten)]
         compliance: part.compliance.map(|compliance| document! { compliance: compliance }),
         coordinates: part.coordinates.as_str(),
