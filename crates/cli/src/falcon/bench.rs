@@ -89,6 +89,7 @@ impl Bench {
             if most.is_some_and(|most| self.passed() >= most) {
                 return Ok(End::Over);
             }
+            // The setpoint carries its instant, by which the driver's gate refuses a force that is too old.
             let wanted = task.wants(self.passed(), self.driver.status()).map(|force| Setpoint { force, at: now });
             if let Err(error) = self.driver.exchange(wanted) {
                 return Ok(End::Failed(error));
@@ -106,6 +107,7 @@ impl Bench {
         let now = self.driver.now();
         let late = now.saturating_duration_since(self.next);
         if late.is_zero() {
+            // Sleeping to an absolute instant keeps the mean rate, because the time of an exchange does not add to the period.
             self.driver.sleep_until(self.next);
         } else {
             self.late += u64::from(late > LATE);

@@ -28,6 +28,7 @@ pub(super) fn home(arguments: &HomeArguments) -> Result<ExitCode, Failure> {
     let mut bench = Bench::open(way, WITHOUT_FORCE).map_err(|error| Failure::System(error.to_string()))?;
     let mut homing = Homing { guide: Guide::new(true), line: Progress::new(0, "{msg}"), last: *bench.status(), until: Duration::ZERO };
     let end = bench.run(Some(arguments.length), &mut homing);
+    // The line is cleared before any failure is printed.
     homing.line.clear();
     let (end, traffic) = (end?, Traffic::of(&bench, homing.until));
     let (seen, is_homed, is_active) = (Seen::of(&homing.last), homing.last.reading.is_some(), homing.last.phase == Phase::Active);

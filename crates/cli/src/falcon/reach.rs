@@ -97,6 +97,7 @@ impl Target {
         match self {
             Self::Usb(listed) => UsbTransport::open(listed.serial.as_deref()).map(AnyTransport::new),
             Self::Simulated { in_virtual_time, switched_on } => {
+                // A fixed seed gives the same simulated device on every run.
                 let config = SimulatorConfig { running: !switched_on, seed: 1, ..SimulatorConfig::default() };
                 let hand = Waypoints::homing(Duration::ZERO).swaying(SWAY.0, SWAY.1);
                 let simulator = Simulator::new(config, hand);
@@ -122,6 +123,7 @@ pub(super) fn read_firmware(path: Option<&Path>) -> Result<Option<Firmware>, Fai
 /// The error is the obstacle in words, for the user.
 pub(super) fn make_ready(way: &mut AnyTransport, firmware: Option<&Firmware>) -> Result<FirmwareState, String> {
     let options = BootOptions::DEFAULT;
+    // Without a firmware file the command can only ask the device for an answer.
     let Some(firmware) = firmware else {
         let runs = boot::is_loaded(way, &options).map_err(|error| error.to_string())?;
         let missing = "it does not answer: it has no firmware yet, or no power. Give the path of the firmware that came with it with --firmware FILE";

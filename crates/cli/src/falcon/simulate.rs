@@ -58,6 +58,7 @@ struct Change {
 pub(super) fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failure> {
     let probability = |given: Option<Probability>| given.map_or(0.0, Probability::get);
     let (garbage, drop) = (probability(arguments.garbage), probability(arguments.drop));
+    // Garbage affects only bytes to the host; lost bytes affect both directions.
     let faults = Faults { garble_to_host: garbage, insert_to_host: garbage, drop_to_host: drop, drop_to_device: drop, ..Faults::NONE };
     let config = SimulatorConfig { seed: arguments.seed, running: true, faults, ..SimulatorConfig::default() };
     let transport = SimulatedTransport::in_virtual_time(Simulator::new(config, HeldBy::of(arguments.hand)));
@@ -205,6 +206,7 @@ impl Simulating {
 impl Task for Simulating {
     fn wants(&mut self, at: Duration, _status: &Status) -> Option<Triple> {
         if self.unplug_after.is_some_and(|after| at >= after) {
+            // Unplugging a device again has no effect, so that the instant of the first call counts.
             self.simulator.with(Simulator::unplug);
         }
         self.force

@@ -56,6 +56,7 @@ pub(super) fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
     let mut bench = Bench::open(way, config).map_err(|error| Failure::System(error.to_string()))?;
     let mut watching = Watching::new(push, arguments, *bench.status())?;
     let end = bench.run(arguments.length, &mut watching);
+    // The line is cleared before any failure is printed.
     watching.line.clear();
     // The file is finished before an error of the loop is returned, so that the rows written up to the error are kept.
     let files = watching.file.take().map(SamplesFile::finish).transpose()?.into_iter().collect();
@@ -115,6 +116,7 @@ impl Push {
         match (arguments.force, arguments.spring) {
             (Some(Force(force)), _) => {
                 let length = answer::length(force);
+                // The driver would reduce such a force without an error, and the user would not get the force of the option.
                 if length > arguments.limit {
                     return Err(Failure::Input(format!(
                         "the force of {length} N is above the limit of {} N: ask for less, or raise --limit (docs/falcon.md says what is uncertain about newtons)",
@@ -169,6 +171,7 @@ struct Watching {
 impl Watching {
     fn new(push: Push, arguments: &WatchArguments, last: Status) -> Result<Self, Failure> {
         let prints_rows = !arguments.which.json && !io::stdout().is_terminal();
+        // The header is printed before the device is read, so that a reader of the rows sees the columns at once.
         if prints_rows {
             print_row(HEADER)?;
         }

@@ -147,6 +147,7 @@ fn prepare(
         content,
         ..SessionConfig::new(SocketAddr::from(([127, 0, 0, 1], 0)))
     };
+    // The session is opened before the pages learn of the part, so that a refused scene never appears on a page.
     let session = Session::open(&scene, config, |place| stage.device(place)).map_err(crate::live::refused)?;
     board.begin(onlookers::description(&scene, &pairs));
     let axes = scene.axes.count();

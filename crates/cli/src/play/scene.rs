@@ -86,6 +86,7 @@ impl PlayedScene {
         peer.insert("kind".to_owned(), "pointer".into());
         if !touches(&place) {
             let gains = [("stiffness", GRASP.stiffness), ("damping", GRASP.damping)];
+            // Without contact the visitor would move a device that never touches the object.
             peer.insert("contact".to_owned(), "grasp".into());
             peer.insert("coupling".to_owned(), Value::Table(gains.into_iter().map(|(key, gain)| (key.to_owned(), gain.into())).collect()));
         }
@@ -121,6 +122,7 @@ impl PlayedScene {
             let value = |text: &str| toml::from_str::<Table>(&format!("value = {text}")).ok().and_then(|mut table| table.remove("value"));
             keys.iter().filter_map(|(key, text)| Some((key.to_owned(), value(text)?))).collect()
         };
+        // Equal links need no entry per pair, and peers that are added later get the same keys by themselves.
         if links.iter().all(|(_, other)| other == first) {
             self.table.remove("links");
             self.table.insert("link".to_owned(), Value::Table(keys(first)));
@@ -185,6 +187,7 @@ impl PlayedScene {
             if axes > 0 {
                 other.insert("position".to_owned(), mean.clone());
             }
+            // Nobody holds the pointer of a new peer.
             if let Some(Value::Table(pointer)) = other.get_mut("pointer") {
                 pointer.remove("held");
             }

@@ -214,6 +214,7 @@ impl Stage for PlayStage {
             Some(_) => "somebody has that hand, or nobody can: choose another one".to_owned(),
             None => "every hand is taken: the person who started the session can add a peer".to_owned(),
         })?;
+        // The lock is held since the search, so that no two pages get the same hand.
         taken[place] = true;
         Ok(place)
     }
