@@ -41,7 +41,9 @@ impl Frames {
         self.newest().motion.clone()
     }
 
-    /// Returns the number and the JSON text of the newest motion. The text is `{}` before the first motion of a part.
+    /// Returns the number and the JSON text of the newest motion. The text is `{}` before the first motion.
+    ///
+    /// Between [`begin`](Self::begin) and the first motion of the part, a text that was already written for the part before is returned again.
     pub(super) fn text(&self) -> (u64, Arc<str>) {
         let (number, part, axes, motion) = {
             let newest = self.newest();
