@@ -1,4 +1,4 @@
-//! A run as a JSON document and in words.
+//! Answer of `cohaptic run`, as a JSON document and as text.
 
 pub(crate) use cohaptic_answers::{angle_text, diverged, length, packets};
 use cohaptic_scene::Scene;
@@ -8,8 +8,8 @@ use super::Run;
 use crate::document_schema::document;
 use crate::output;
 
-/// The answer of `cohaptic run --json`. `otherwise`: the differences of the scene from that of the session that is replayed. `against`: the document of the
-/// variant.
+/// Returns the answer of `cohaptic run --json`. `otherwise` holds the differences between the scene and the scene of the replayed session. `against` is the
+/// document of the variant.
 pub(super) fn of(scene: &Scene, run: &Run, otherwise: &[String], against: Option<impl Serialize>) -> impl Serialize {
     document! {
         #[serde(flatten)]
@@ -22,7 +22,7 @@ pub(super) fn of(scene: &Scene, run: &Run, otherwise: &[String], against: Option
     }
 }
 
-/// A run in words.
+/// Describes a run as text for a terminal.
 pub(super) fn describe(scene: &Scene, run: &Run) -> String {
     cohaptic_answers::run_words(scene, &run.summary, &run.measured, run.wall_s, run.positions.as_ref())
 }

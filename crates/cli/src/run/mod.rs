@@ -1,4 +1,4 @@
-//! `cohaptic run`.
+//! `cohaptic run`: simulates a scene, or a scene and a variant of the scene, or replays the inputs of a live session.
 
 pub(crate) mod answer;
 mod motion;
@@ -30,19 +30,19 @@ use crate::{input, interrupt, output};
 use answer::describe;
 use motion::Places;
 
-/// Runs a scene, or a scene and a variant of it, and says what happened.
+/// Runs a scene, or a scene and a variant of the scene, and prints the results.
 pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     let path = &arguments.scene.scene;
     let overrides = &overrides(arguments);
     let scene = match &arguments.inputs {
         None => input::with(path, |text, file| Scene::parse(text, file, overrides))?,
-        // As the session read it.
+        // The scene is read as the live session read it, because a replay has to begin with the same scene.
         Some(_) => input::with(path, |text, file| Scene::parse_live(text, file, overrides))?,
     };
     if let Some(error) = failure::too_large(&scene, overrides, model(arguments), is_watched(arguments, &scene)) {
         return Err(error.into());
     }
-    // Both scenes are read before either runs: a mistake in the second is not found after a long first run.
+    // Both scenes are read before either runs, so that a mistake in the second scene is not found only after a long first run.
     let variant = if arguments.against.is_empty() {
         None
     } else {
@@ -62,6 +62,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     let _own = out.map(own_folder).transpose()?;
     let first = run_one(arguments, &scene, what, out, overrides)?;
     let second = match &variant {
+        // An interrupted first run is printed alone: the variant would only delay the end.
         Some(variant) if !interrupt::requested() => {
             let both: Vec<String> = overrides.iter().chain(&arguments.against).cloned().collect();
             let out = out.map(|out| out.join("against"));
@@ -90,26 +91,26 @@ const fn model(arguments: &RunArguments) -> Model {
     if arguments.general { Model::General } else { Model::Least }
 }
 
-/// Whether positions are drawn in the terminal.
+/// Returns whether the positions are drawn in the terminal.
 const fn is_shown(arguments: &RunArguments) -> bool {
     !arguments.scene.json && !arguments.no_plot
 }
 
-/// Whether a run is looked at.
+/// Returns whether the run has an observer: the plot in the terminal, a record, a motion picture, a replay or measures.
 fn is_watched(arguments: &RunArguments, scene: &Scene) -> bool {
     is_shown(arguments) || arguments.out.is_some() || arguments.motion.is_some() || arguments.inputs.is_some() || Measures::of(scene).is_some()
 }
 
-/// The overrides of the scene: all `--set`, then the seed and the measures.
+/// Returns the overrides of the scene: all `--set`, then the seed and the measures.
 fn overrides(arguments: &RunArguments) -> Vec<String> {
     let seed = arguments.seed.map(|seed| format!("scene.seed={seed}"));
     arguments.scene.overrides.set.iter().cloned().chain(seed).chain(arguments.measure.override_text()).collect()
 }
 
-/// A run and what it left behind.
+/// Results of a run.
 struct Run {
     summary: Summary,
-    /// Empty if nothing is measured.
+    /// Values of the measures. Empty if the scene measures nothing.
     measured: Vec<MeasuredValue>,
     wall_s: f64,
     positions: Option<Bands>,
@@ -117,11 +118,11 @@ struct Run {
     files: Vec<PathBuf>,
 }
 
-/// Where the motion comes from.
+/// Source of the motion of a run.
 #[derive(Clone, Copy)]
 enum What<'a> {
     Simulated,
-    /// The scene with what came from outside in a live session.
+    /// Simulation with the recorded inputs of a live session.
     Replayed(&'a Inputs),
 }
 
@@ -178,15 +179,15 @@ fn execute<O: Observer>(arguments: &RunArguments, scene: &Scene, what: What<'_>,
         }
         What::Replayed(inputs) => replay(scene, inputs, observer),
     };
-    // A run that is too short for a question of the observer has ended too.
+    // A run may end before it asks the observer for the first time. Its summary is a result too.
     interrupt::has_results();
     summary
 }
 
-/// Twice the columns of the plot in the terminal: two dots a column.
+/// Number of spans of time in the plot of the terminal: two per column, because a column has two dots.
 const PLOT_SPANS: usize = 144;
 
-/// Shows progress, collects what the terminal shows, and ends the run when the user asks for it.
+/// Observer of a run. Shows the progress, collects positions for the plot and the motion picture, and ends the run when the user asks for the end.
 struct Watch {
     progress: Progress,
     positions: Option<Bands>,
@@ -227,16 +228,16 @@ impl Observer for &mut Watch {
 
     fn keep_going(&mut self, now: Instant) -> bool {
         self.progress.reach(now);
-        // The run up to here is a result, however short it is.
+        // An interrupted run has results up to this instant. A signal therefore ends the run, and the command still prints and writes.
         interrupt::has_results();
         !interrupt::requested()
     }
 }
 
-/// The folder of the records in such a line. Records do not depend on their folder, and neither does what they say.
+/// Placeholder for the folder of the records in [`command_line`]. The content of records must not depend on the folder that they are written to.
 const FOLDER: &str = "DIR";
 
-/// The command that makes a run again, as a line for a shell, with the options that have an effect on records.
+/// Returns the command that repeats a run, as a line for a shell, with the options that affect the records.
 fn command_line(arguments: &RunArguments) -> String {
     let scene = &arguments.scene.scene;
     let mut words = vec!["cohaptic run".to_owned(), path(scene)];

@@ -1,4 +1,4 @@
-//! The copies in motion, as a picture that moves.
+//! Animated picture of a run (`--motion`): the copies of the object and the devices of the peers at 20 frames per second.
 
 use std::path::Path;
 use std::time::Duration;
@@ -13,16 +13,16 @@ use crate::arguments::RunArguments;
 use crate::failure::Failure;
 use crate::file::write_file;
 
-/// Between two frames: 20 a second, and straight ways between them.
+/// Interval between two frames. The picture moves copies along straight lines between frames.
 const STEP: Duration = Duration::from_millis(50);
 const STEP_S: f64 = 0.05;
 
-/// Positions of the copies and of their devices at each frame.
+/// Positions of the copies and of the devices, per frame. Filled by the ticks of a run.
 pub(super) struct Places {
     peers: usize,
-    /// Positions indexed by frame, then by peer. A position that is not known yet is that of the frame before.
+    /// Positions, indexed by frame, then by peer. A position that is not known yet equals the position of the frame before.
     frames: Vec<Vec<Place>>,
-    /// Next frame of each peer.
+    /// Index of the next frame that lacks a position, indexed by peer.
     next: Vec<usize>,
 }
 
@@ -47,12 +47,14 @@ impl Places {
         self.next.iter().any(|frame| Self::due(*frame) <= at)
     }
 
-    /// Takes the first tick of each peer at or after each frame.
+    /// Stores the positions of the tick for all frames of the peer that are due: each frame gets the first tick at or after the instant of the frame.
     pub(super) fn add(&mut self, row: &TickRow<'_>) {
         let [copy, device] = [row.object, row.device].map(|state| [0, 1].map(|axis| state.position.get(axis).copied().unwrap_or(0.0)));
         let place = Place { copy, device };
         while Self::due(self.next[row.peer]) <= row.at {
             let frame = self.next[row.peer];
+            // The first peer that reaches a frame adds the frame. Other peers keep their positions of the frame before until their own tick comes, so no entry
+            // is ever missing.
             if frame == self.frames.len() {
                 let before = self.frames.last().cloned().unwrap_or_else(|| vec![place; self.peers]);
                 self.frames.push(before);
@@ -62,7 +64,7 @@ impl Places {
         }
     }
 
-    /// The frames of a picture, in which the devices of `held` peers are hands.
+    /// Converts the positions into the frames of a picture. The devices of the peers `held` are drawn as hands.
     fn run(&self, title: String, names: Vec<String>, held: &[usize]) -> MotionRun {
         let hand = |copy: usize| MotionHand { copy, frames: self.frames.iter().map(|places| places[copy].device).collect() };
         let frames = self.frames.iter().map(|places| places.iter().map(|place| place.copy).collect()).collect();
@@ -70,7 +72,7 @@ impl Places {
     }
 }
 
-/// Draws one run, or two beside each other.
+/// Draws one run, or two runs beside each other, and writes the picture into `file`.
 pub(super) fn draw(file: &Path, arguments: &RunArguments, scene: &Scene, runs: [Option<&Run>; 2]) -> Result<(), Failure> {
     let names: Vec<String> = scene.peers.iter().map(|peer| peer.name.clone()).collect();
     let held: Vec<usize> = (0..scene.peers.len()).filter(|peer| scene.peers[*peer].hand.is_some()).collect();

@@ -1,4 +1,4 @@
-//! `run.html`: a run on one page.
+//! `run.html`: the results of a run on one page, with the scene, the pictures, the measures and the tables of links.
 
 use std::collections::BTreeMap;
 
@@ -18,10 +18,10 @@ use crate::expectations::{BARS, cells, columns};
 use crate::failure::Failure;
 use crate::{input, output};
 
-/// More rows of a table stand in a file of the folder only.
+/// Largest number of rows of a table on the page. Further rows stand only in the files of the folder.
 const MOST_ROWS: usize = 400;
 
-/// The page. It depends on the scene and what the command says of it, on nothing else.
+/// Returns the page as HTML. The text depends only on the scene and on the command line, so that equal runs give equal bytes.
 pub(super) fn html(
     arguments: &RunArguments,
     scene: &Scene,
@@ -49,7 +49,7 @@ pub(super) fn html(
     Ok(page.html())
 }
 
-/// A warning where the run did not come to its end.
+/// Returns a warning if the run diverged or was interrupted, otherwise nothing.
 fn ending(scene: &Scene, summary: &Summary) -> Html {
     match summary.ending {
         Ending::Complete | Ending::Diverged(_) => diverged(summary).map_or_else(Html::default, |why| Html::warning(format!("DIVERGED: {why}."))),
@@ -128,7 +128,7 @@ fn links(summary: &Summary) -> Html {
     let shown: Vec<(LinkName, LinkStats)> = access.chain(between).take(MOST_ROWS).collect();
     let mut total = summary.links.total();
     summary.access_lines.iter().for_each(|line| total.add(&line.stats, 1));
-    // Causes that dropped nothing would make the table wide.
+    // Causes that dropped nothing are left out, because they would make the table wide.
     let causes: Vec<DropCause> = DropCause::ALL.into_iter().filter(|cause| total.dropped(*cause) > 0).collect();
     let head = Table::new().column("link").number("offered").number("copies").number("delivered");
     let head = causes.iter().fold(head, |table, cause| table.number(format!("dropped: {}", cause.name())));
@@ -146,12 +146,12 @@ fn more(rows: u64, what: &str, file: &str) -> Html {
     if rows > MOST_ROWS as u64 { Html::paragraph(format!("{MOST_ROWS} of {rows} {what} are shown; {file} has all.")) } else { Html::default() }
 }
 
-/// Three decimals, or as a power of ten where these would be none or many.
+/// Formats a number with three decimals, or with a power of ten if its magnitude is below 0.001 or at least 10⁷.
 fn number(value: f64) -> String {
     if value == 0.0 || (1e-3..1e7).contains(&value.abs()) { format!("{value:.3}") } else { format!("{value:.3e}") }
 }
 
-/// The changes on the way, by the keys of the scene such as `timeline.0.set.loss`.
+/// Returns the table of the changes during the run, taken from keys of the scene such as `timeline.0.set.loss`.
 fn edits(keys: &BTreeMap<String, String>) -> Table {
     let mut changes: BTreeMap<usize, (String, Vec<String>)> = BTreeMap::new();
     for (key, value) in keys {

@@ -1,4 +1,4 @@
-//! What came from outside in a live session, and whether it came into this scene.
+//! Reads the recorded inputs of a live session (`run --inputs`), and checks that the session had the same scene.
 
 use std::io::{self, Write as _};
 use std::path::Path;
@@ -11,11 +11,14 @@ use crate::arguments::RunArguments;
 use crate::failure::Failure;
 use crate::{file, input, output};
 
-/// The most differences that are listed.
+/// Largest number of differences that a message lists.
 const MOST: usize = 20;
 
-/// Reads `inputs.csv` of a session, and says in what the scene differs from that of the session and what the record lacks; if anything, it is refused without
-/// `--force`.
+/// Reads `inputs.csv` of a session. Returns the inputs, and the differences between `scene` and the scene of the session together with what the record lacks.
+///
+/// # Errors
+///
+/// [`Failure::Input`] if the record is not valid. Without `--force` also if there is any difference, or if the record is cut short.
 pub(super) fn read(file: &Path, scene: &Scene, arguments: &RunArguments, overrides: &[String]) -> Result<(Inputs, Vec<String>), Failure> {
     let path = &arguments.scene.scene;
     let text = file::read_text(file)?;
@@ -36,10 +39,10 @@ pub(super) fn read(file: &Path, scene: &Scene, arguments: &RunArguments, overrid
             let way_out = "expected the scene and every --set of the session, which its summary ends with; --force replays it all the same";
             return Err(Failure::Input(format!("{message}{way_out}")));
         }
-        // What cannot be said on standard error stands in the document.
+        // If standard error cannot be written to, the differences still stand in the document.
         let _ = write!(io::stderr(), "warning: {}", visible_lines(&message));
     }
-    // Any link will do: all have the modulators of the scene.
+    // The keys of any link serve, because all links have the modulators of the scene.
     let keys = input::with(path, |text, file| link_keys_of_text(text, file, overrides))?.into_values().next().unwrap_or_default();
     let (inputs, missing) = Inputs::read_cut(&text, scene, &keys).map_err(unreadable)?;
     if let Some(missing) = missing {
@@ -54,7 +57,7 @@ pub(super) fn read(file: &Path, scene: &Scene, arguments: &RunArguments, overrid
     Ok((inputs, differences))
 }
 
-/// A line for each, up to a number of them.
+/// Formats one line per difference, for at most [`MOST`] differences, and a last line with the number of the rest.
 fn listed(differences: &[String]) -> String {
     let mut text: String = differences.iter().take(MOST).map(|difference| format!("  {difference}\n")).collect();
     if let Some(more) = differences.len().checked_sub(MOST).filter(|more| *more > 0) {
