@@ -1,4 +1,5 @@
-//! Live control, if it is asked for: its server, changes of links by their keys, and the numbers of a run as it shows them; and what the terminal shows meanwhile.
+//! Live control of a run in real time: the server of `--control`, changes of links by keys, and the conversion of counters of a run into a snapshot.
+//! Without `--control` the same snapshot feeds the progress line of the terminal.
 
 use std::fs::File;
 use std::io::{self, IsTerminal as _, Read as _, Write as _};
@@ -19,37 +20,41 @@ use crate::arguments::RealTimeArguments;
 use crate::failure::Failure;
 use crate::file;
 
-/// The board of a run, with a server before it if somebody asked for one.
+/// Board on which a run publishes snapshots, and the server that shows the board if the user gave `--control`.
 pub(crate) struct LiveControl {
     board: Arc<Board>,
     server: Option<Server>,
 }
 
 impl LiveControl {
-    /// Opens the server, if it is asked for, and says on standard error where.
+    /// Creates the board, starts the server if `--control` is given, and prints the address of the server on standard error.
     pub(crate) fn open(arguments: &RealTimeArguments, description: Description, editor: Box<dyn LinkEditor>) -> Result<Self, Failure> {
         let board = Arc::new(Board::new(description));
         let Some(address) = arguments.control else { return Ok(Self { board, server: None }) };
         let config = ServerConfig { token: token_of(arguments)?, allow_remote: arguments.allow_remote, ..ServerConfig::new(address) };
         let server = serve(config, Arc::clone(&board), editor).map_err(|error| refused_server(&error))?;
-        // What cannot be said does not keep the run from beginning.
+        // A failed write to standard error does not keep the run from beginning.
         let _ = writeln!(io::stderr(), "live control: {}", server.url());
         Ok(Self { board, server: Some(server) })
     }
 
-    /// What the run publishes on, if anybody looks: a browser or a terminal.
+    /// Returns the handle through which the run publishes snapshots, or `None` if neither a server nor a terminal shows snapshots.
     pub(crate) fn look(&self) -> Option<Look> {
         let is_looked_at = self.server.is_some() || io::stderr().is_terminal();
         is_looked_at.then(|| Look(Arc::clone(&self.board)))
     }
 
-    /// What was published last.
+    /// Returns the snapshot that was published last.
     pub(crate) fn latest(&self) -> Arc<Snapshot> {
         self.board.latest().snapshot
     }
 }
 
-/// The token that a file has, if one was named.
+/// Reads the token of `--token-file`, or returns `None` without that option.
+///
+/// # Errors
+///
+/// [`Failure::File`] if the file cannot be read. [`Failure::Input`] if other users may access the file, or if its content is not a token.
 pub(crate) fn token_of(arguments: &RealTimeArguments) -> Result<Option<Token>, Failure> {
     let Some(path) = &arguments.token_file else { return Ok(None) };
     let unreadable = |error| Failure::File { verb: "read", path: path.clone(), error };
@@ -71,37 +76,38 @@ pub(crate) fn refused_server(error: &ServeError) -> Failure {
     if is_of_system { Failure::System(error.to_string()) } else { Failure::Input(error.to_string()) }
 }
 
-/// Where a run publishes.
+/// Handle through which a run publishes snapshots on a board.
 pub(crate) struct Look(Arc<Board>);
 
 impl Look {
-    /// On a board of one's own.
+    /// Creates a handle for `board`, for commands that make the board without [`LiveControl`].
     pub(crate) fn on(board: &Arc<Board>) -> Self {
         Self(Arc::clone(board))
     }
 
-    /// Puts it up unless somebody is reading at this very moment; the next one comes soon.
+    /// Publishes `snapshot`, unless a reader holds the board at this moment: the thread that has to be on time must not wait, and the next snapshot follows
+    /// soon.
     pub(crate) fn publish(&self, snapshot: Snapshot) {
         let _ = self.0.publish(Arc::new(snapshot));
     }
 }
 
-/// A link from now on.
+/// Change of one link, checked and ready to be applied.
 #[derive(Debug)]
 pub(crate) struct Edit {
-    /// Its number in the description of the run.
+    /// Index of the link in the description of the run.
     pub(crate) link: usize,
     pub(crate) keys: LinkKeys,
     pub(crate) model: LinkModel,
 }
 
-/// The links of a run by their keys. A change is checked here; what makes sense goes to the run.
+/// Editor of the links of a run. Checks each change of keys and sends valid changes to the run.
 #[derive(Debug)]
 pub(crate) struct KeyedLinks {
     pub(crate) keys: Vec<LinkKeys>,
-    /// Where files that keys name are looked for.
+    /// Folder that file names in keys are relative to.
     pub(crate) folder: PathBuf,
-    /// Which of them a change may name.
+    /// Files that a change may name.
     pub(crate) files: ControlFiles,
     pub(crate) changes: Sender<Edit>,
 }
@@ -112,13 +118,13 @@ impl LinkEditor for KeyedLinks {
     }
 
     fn change(&mut self, links: &[usize], keys: &[(String, String)]) -> Result<(), String> {
-        // All are checked before the first is changed.
+        // All edits are checked before the first edit is applied, so that a change of several links applies to all of them or to none.
         let edits = links.iter().map(|link| {
             let old = self.keys.get(*link).ok_or_else(|| format!("there is no link {link}"))?;
             let new = keys.iter().fold(old.clone(), |laid, (key, value)| laid.with(key, value));
             let read = |path: &std::path::Path| self.files.read(old, &self.folder, path);
             let model = new.model_with(&self.folder, FileReader(&read)).map_err(|error| {
-                // A person at the other end may name a file and not see its content.
+                // The bare message has no excerpt: the person at the other end may name a file but must not see the content of the file.
                 let said = error.bare_message();
                 let at = error.diagnostic().map_or("", |diagnostic| diagnostic.override_text().unwrap_or_else(|| diagnostic.key()));
                 let at = at.strip_prefix("link.").unwrap_or(at);
@@ -128,6 +134,7 @@ impl LinkEditor for KeyedLinks {
         });
         let edits: Vec<Edit> = edits.collect::<Result<_, String>>()?;
         for edit in edits {
+            // The index is valid, because `get` found keys for each link of `edits` above.
             self.keys[edit.link] = edit.keys.clone();
             self.changes.send(edit).map_err(|_| "the run has ended".to_owned())?;
         }
@@ -135,7 +142,7 @@ impl LinkEditor for KeyedLinks {
     }
 }
 
-/// What a link did, without what only some commands know.
+/// Converts the statistics of a link into counters. Fields that only some commands know keep their default values.
 pub(crate) fn counters(stats: &LinkStats) -> LinkCounters {
     LinkCounters {
         offered: stats.offered(),
@@ -150,16 +157,17 @@ pub(crate) fn counters(stats: &LinkStats) -> LinkCounters {
     }
 }
 
-/// How late things were.
+/// Converts a summary of lateness into quantiles.
 pub(crate) fn quantiles(summary: &LatenessSummary) -> Quantiles {
     let LatenessSummary { count, sum, p50, p99, p999, max } = *summary;
     Quantiles { count, sum, p50, p99, p999, max }
 }
 
-/// The quantiles of some spans, in any order.
+/// Computes the quantiles of `spans`, which need not be sorted. All quantiles are zero if `spans` is empty.
 pub(crate) fn quantiles_of(spans: &[Duration]) -> Quantiles {
     let mut sorted = spans.to_vec();
     sorted.sort_unstable();
+    // Nearest rank: the smallest span that at least `thousandths` of 1000 spans do not exceed. Ranks count from 1, indices from 0.
     let at = |thousandths: usize| sorted.get((sorted.len() * thousandths).div_ceil(1000).saturating_sub(1)).copied().unwrap_or_default();
     Quantiles {
         count: sorted.len() as u64,

@@ -1,4 +1,4 @@
-//! Files of which live control may read: those that the user named, and those of one folder, if the user gave one.
+//! Files that live control may read: the files that the user named at the start, and the files of the folder of `--control-files`, if the user gave a folder.
 
 use std::cell::Cell;
 use std::fs::File;
@@ -14,18 +14,18 @@ use rustix::fs::{Mode, OFlags};
 use crate::arguments::RealTimeArguments;
 use crate::failure::Failure;
 
-/// The files that somebody at the other end of live control may name in keys of links.
+/// Files that a person at the other end of live control may name in keys of links.
 ///
 /// A person with the token may change links. Keys that name files must neither show the files of the user to that person nor stop the server with a file that
 /// never ends.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ControlFiles {
-    /// The folder of `--control-files`, without symbolic links; `None`: no file may be named but those that the user named at the start.
+    /// Folder of `--control-files`, with symbolic links resolved. `None` if only the files that the user named at the start may be named.
     folder: Option<PathBuf>,
 }
 
 impl ControlFiles {
-    /// Reads the folder that the command line allows.
+    /// Resolves the folder that the command line allows. Without `--control-files`, no folder is allowed.
     pub(crate) fn of(arguments: &RealTimeArguments) -> Result<Self, Failure> {
         let Some(path) = &arguments.control_files else { return Ok(Self::default()) };
         let refused = |error: io::Error| Failure::Input(format!("--control-files {}: {error}: expected a folder", path.display()));
@@ -36,26 +36,29 @@ impl ControlFiles {
         Ok(Self { folder: Some(folder) })
     }
 
-    /// The bytes of a file that changed keys of a link name. `keys` are those from before the change; `base` is the folder that their names are relative to.
+    /// Reads the bytes of the file `path`, which the changed keys of a link name. `keys` are the keys of that link before the change. `base` is the folder that
+    /// file names in `keys` are relative to.
     ///
     /// # Errors
     ///
-    /// [`io::ErrorKind::PermissionDenied`] for a file that may not be named, whether there is such a file or not. What the system says, and a refusal of
-    /// whatever is no regular file.
+    /// [`io::ErrorKind::PermissionDenied`] for a file that may not be named, whether the file exists or not. Errors of the system, and an error for a file that
+    /// is not a regular file.
     pub(crate) fn read(&self, keys: &LinkKeys, base: &Path, path: &Path) -> io::Result<Vec<u8>> {
         if let Some(within) = self.within(path) {
             let file = open_regular(&within, OFlags::NOFOLLOW)?;
-            // A link that was put in place of a folder after the path was resolved leads to a file of another path.
+            // After the path was resolved, somebody may have replaced a folder of the path by a symbolic link. The opened file then has another path and may
+            // lie outside the folder.
             if std::fs::read_link(format!("/proc/self/fd/{}", file.as_raw_fd()))? != within {
                 return Err(self.refusal());
             }
             return read(file);
         }
-        // Keys name only files of the user and files of the folder, so a file that they name outside the folder is the user's choice.
+        // Earlier changes could add only files of the folder. A file outside the folder that the old keys name is therefore a file that the user named at the
+        // start.
         if names(keys, base, path) { read(open_regular(path, OFlags::empty())?) } else { Err(self.refusal()) }
     }
 
-    /// The path without symbolic links, if it lies in the folder.
+    /// Returns the path with symbolic links resolved, if the path lies in the folder. A path with `..` is never accepted.
     fn within(&self, path: &Path) -> Option<PathBuf> {
         let folder = self.folder.as_ref()?;
         if path.components().any(|part| part == Component::ParentDir) {
@@ -64,7 +67,7 @@ impl ControlFiles {
         path.canonicalize().ok().filter(|real| real.starts_with(folder))
     }
 
-    /// Says the same of every path, so that nobody learns which files there are.
+    /// Returns the error for a file that may not be named. The message is the same for every path, so that nobody learns which files exist.
     fn refusal(&self) -> io::Error {
         let message = match &self.folder {
             Some(folder) => format!("live control reads the files of {} alone (--control-files)", folder.display()),
@@ -74,22 +77,23 @@ impl ControlFiles {
     }
 }
 
-/// Whether these keys name that file. The files are read for it: a law of which one table cannot be had does not ask for the next one.
+/// Returns whether `keys` name the file `path`. Reads all files that the keys name, because a law whose first table cannot be read does not ask for the second
+/// table.
 fn names(keys: &LinkKeys, base: &Path, path: &Path) -> bool {
     let is_named = Cell::new(false);
     let reader = |named: &Path| {
         is_named.set(is_named.get() || named == path);
         read(open_regular(named, OFlags::empty())?)
     };
-    // Only the names count. Whether the keys still make a link is told by those after the change.
+    // Only the names of the files are wanted here. The caller checks whether the keys make a valid link after the change.
     let _ = keys.model_with(base, FileReader(&reader));
     is_named.get()
 }
 
-/// Opens a regular file, and nothing else: a pipe is not waited for.
+/// Opens a regular file and refuses everything else. `NONBLOCK` keeps the call from waiting for the writer of a named pipe.
 fn open_regular(path: &Path, also: OFlags) -> io::Result<File> {
     let file = File::from(rustix::fs::open(path, OFlags::RDONLY | OFlags::CLOEXEC | OFlags::NONBLOCK | also, Mode::empty())?);
-    // The open file is asked, not the path, which may name another file by now.
+    // The type is taken from the open file, because the path may name another file by now.
     if file.metadata()?.is_file() { Ok(file) } else { Err(io::Error::other("it is no regular file")) }
 }
 

@@ -1,4 +1,4 @@
-//! What the commands that run in real time share.
+//! Parts that the commands that run in real time share (`live`, `relay`, `router` and others): live control, messages, and the options for pacing and priority.
 
 mod control;
 mod control_files;
@@ -15,15 +15,17 @@ pub(crate) use control_files::ControlFiles;
 pub(crate) use words::{ConfiguredDelay, Publisher, carried, counts, lasted, late, loading, notes, say, some_length, status};
 
 impl RealTimeArguments {
+    /// Returns how the thread waits for its next deadline: by spinning with `--spin`, otherwise by sleeping.
     pub(crate) const fn pacing(&self) -> Pacing {
         if self.spin { Pacing::SPIN } else { Pacing::Sleep }
     }
 
+    /// Returns the real-time privileges to ask the system for: none with `--no-priority`, otherwise the default set.
     pub(crate) fn wishes(&self) -> Wishes {
         if self.no_priority { Wishes::NONE } else { Wishes::default() }
     }
 
-    /// Later than what was said is late, or than 1 ms.
+    /// Returns the lateness above which an event counts as late: the value of `--tolerance`, by default 1 ms.
     pub(crate) fn tolerance(&self) -> Tolerance {
         Tolerance { limit: self.tolerance.unwrap_or(Duration::from_millis(1)) }
     }

@@ -1,4 +1,4 @@
-//! What the commands that run in real time say in words, and how they publish what a run does.
+//! Messages of the commands that run in real time, and the publisher that limits how often a run takes a snapshot.
 
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
@@ -15,7 +15,7 @@ use super::Look;
 use crate::documents::micros;
 use crate::failure::Failure;
 
-/// `p50 31.2 µs, p99 76 µs, p99.9 120 µs, worst 1.2 ms`.
+/// Formats a summary of lateness: `p50 31.2 µs, p99 76.0 µs, p99.9 120.0 µs, worst 1.20 ms`.
 pub(crate) fn late(summary: &LatenessSummary) -> String {
     let LatenessSummary { p50, p99, p999, max, .. } = *summary;
     let [p50, p99, p999, max] = [p50, p99, p999, max].map(|span| {
@@ -25,7 +25,7 @@ pub(crate) fn late(summary: &LatenessSummary) -> String {
     format!("p50 {p50}, p99 {p99}, p99.9 {p999}, worst {max}")
 }
 
-/// What the system granted, and each thing that it refused with the way out.
+/// Lists the real-time privileges that the system granted, and each privilege that the system refused, with advice how to get it. One indented line each.
 pub(crate) fn notes(prepared: &Prepared) -> String {
     let mut text = String::new();
     let granted: Vec<&str> = prepared.granted.iter().copied().map(Wish::name).collect();
@@ -38,7 +38,7 @@ pub(crate) fn notes(prepared: &Prepared) -> String {
     text
 }
 
-/// How far the loading of a Falcon's firmware is; `None` for what comes too often to be said.
+/// Describes the progress of loading the firmware of a Falcon. Returns `None` for events that are too frequent to be printed.
 pub(crate) fn loading(progress: Progress) -> Option<String> {
     match progress {
         Progress::Attempt(attempt) => Some(format!("loading the firmware, attempt {attempt}")),
@@ -49,13 +49,17 @@ pub(crate) fn loading(progress: Progress) -> Option<String> {
     }
 }
 
-/// Says something on standard error.
+/// Prints a line on standard error, with control characters escaped.
 pub(crate) fn say(line: &str) {
-    // What cannot be said does not keep the run from beginning.
+    // A failed write to standard error does not keep the run from beginning.
     let _ = writeln!(io::stderr(), "{}", visible_lines(line));
 }
 
-/// How long a run is to last, if that was said.
+/// Checks the length of a run (`--for`). `None` stands for a run without an end.
+///
+/// # Errors
+///
+/// [`Failure::Input`] if the length is zero.
 pub(crate) fn some_length(length: Option<Duration>) -> Result<Option<Duration>, Failure> {
     if length.is_some_and(|length| length.is_zero()) {
         return Err(Failure::Input("--for 0s: expected more than nothing".to_owned()));
@@ -63,7 +67,7 @@ pub(crate) fn some_length(length: Option<Duration>) -> Result<Option<Duration>, 
     Ok(length)
 }
 
-/// Publishes what a run does, not more often than is worth its time: to take a snapshot makes packets wait.
+/// Publishes snapshots of a run at limited intervals, because packets wait while a snapshot is taken.
 pub(crate) struct Publisher {
     look: Option<Look>,
     every: Duration,
@@ -75,7 +79,7 @@ impl Publisher {
         Self { look, every, last: None }
     }
 
-    /// Publishes if somebody looks and it is time.
+    /// Takes and publishes a snapshot if a server or terminal shows snapshots and the interval since the last snapshot is over.
     pub(crate) fn offer(&mut self, snapshot: impl FnOnce() -> Snapshot) {
         let Some(look) = &self.look else { return };
         let now = Clock::now();
@@ -86,7 +90,7 @@ impl Publisher {
     }
 }
 
-/// One line for a terminal.
+/// Formats a snapshot as one line for a terminal.
 pub(crate) fn status(snapshot: &Snapshot) -> String {
     let packets: u64 = snapshot.links.iter().map(|link| link.offered).sum();
     let in_links: u64 = snapshot.links.iter().map(cohaptic_control::LinkCounters::dropped_in_all).sum();
@@ -95,7 +99,8 @@ pub(crate) fn status(snapshot: &Snapshot) -> String {
     format!("{} over links, {} dropped, release error p99 {p99:.0} µs", Counted(packets, "packet"), in_links + beside)
 }
 
-/// `4000 offered, 3960 delivered, 40 dropped (loss), 8 on the way; mean delay 24.031 ms, asked 24.000 ms`. `beside` is what was dropped outside the link.
+/// Formats the statistics of a link: `4000 offered, 3952 delivered, 40 dropped (loss), 8 on the way; mean delay 24.031 ms, asked 24.000 ms`.
+/// `beside` holds the causes and numbers of packets that were dropped outside the link.
 pub(crate) fn carried(stats: &LinkStats, asked: &ConfiguredDelay, beside: &[(&str, u64)]) -> String {
     let mut text = format!("{} offered, {} delivered", stats.offered(), stats.delivered());
     let in_link = DropCause::ALL.into_iter().map(|cause| (cause.name(), stats.dropped(cause)));
@@ -114,21 +119,21 @@ pub(crate) fn carried(stats: &LinkStats, asked: &ConfiguredDelay, beside: &[(&st
     text
 }
 
-/// How long a run lasted, to the millisecond.
+/// Cuts the length of a run to whole milliseconds.
 pub(crate) fn lasted(span: Duration) -> Span {
     Span(Duration::from_millis(u64::try_from(span.as_millis()).unwrap_or(u64::MAX)))
 }
 
-/// Those that are not zero: `3 strangers, 1 to itself`. `None` if all are.
+/// Lists the counts that are not zero, with their names: `3 stranger, 1 to-itself`. Returns `None` if all counts are zero.
 pub(crate) fn counts(all: &[(&str, u64)]) -> Option<String> {
     let some: Vec<String> = all.iter().filter(|(_, count)| *count > 0).map(|(name, count)| format!("{count} {name}")).collect();
     (!some.is_empty()).then(|| some.join(", "))
 }
 
-/// The mean delay that a link was asked for when the run began, and how often it was changed since.
+/// Configured mean delay of a link at the start of a run, and the number of changes of the link since.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) struct ConfiguredDelay {
-    /// `None` where only a recording knows.
+    /// Configured mean delay at the start. `None` for a link that replays a recording, which has no configured delay.
     pub(crate) first: Option<Duration>,
     pub(crate) changes: u64,
 }
@@ -139,7 +144,7 @@ impl ConfiguredDelay {
         Self { first: (!is_recording).then(|| model.mean_delay()), changes: 0 }
     }
 
-    /// Its propagation delay, as it was asked for and as it was.
+    /// Formats the measured and the configured mean delay. Returns `None` if the link has delivered nothing.
     pub(crate) fn beside(&self, stats: &LinkStats) -> Option<String> {
         let mean = stats.mean_delay()?;
         let asked = self.first.map_or_else(String::new, |first| format!(", asked {}", millis(first)));
