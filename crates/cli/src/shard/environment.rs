@@ -1,8 +1,8 @@
-//! `--shard auto`: which shard a scheduler or launcher means, by the variables that it sets.
+//! `--shard auto`: finds the shard of this process from the environment variables that schedulers and launchers set.
 
 use cohaptic_campaign::Shard;
 
-/// A scheduler or a launcher, and the variables by which it says which of how many tasks a process is.
+/// Scheduler or launcher, with the environment variables that hold the index of a task and the number of tasks.
 struct Source {
     name: &'static str,
     index: &'static str,
@@ -10,26 +10,26 @@ struct Source {
     count: Count,
 }
 
-/// Which index the first task has.
+/// Index of the first task.
 enum First {
     Is(u64),
-    /// It stands in a variable: users choose it.
+    /// Name of the variable that holds the index, for schedulers whose users choose the first index.
     In(&'static str),
 }
 
-/// How many tasks there are.
+/// Source of the number of tasks.
 enum Count {
     In(&'static str),
-    /// The last index, and the step between two of them, stand in variables.
+    /// The number follows from the last index and from the step between two indices, which stand in these variables.
     Upto {
         last: &'static str,
         step: &'static str,
     },
-    /// It is not said: users say it.
+    /// No variable holds the number: the user gives it, as in `auto/8`.
     Unknown,
 }
 
-/// Job arrays: tasks that a scheduler starts one by one. Of several the first counts.
+/// Job arrays: tasks that a scheduler starts one by one. If the variables of several entries are set, the first entry of this list counts.
 const ARRAYS: [Source; 7] = [
     Source {
         name: "Slurm array",
@@ -50,26 +50,31 @@ const ARRAYS: [Source; 7] = [
     Source { name: "Torque array", index: "PBS_ARRAYID", first: First::Is(1), count: Count::Unknown },
 ];
 
-/// Launchers: processes that are started together, also within each task of an array. Of several the first counts: `mpirun` within a job of Slurm sets its own, and
-/// leaves those of `srun` as they are.
+/// Launchers: programs that start several processes together, possibly within each task of an array. If the variables of several entries are set, the first
+/// entry of this list counts: `mpirun` within a Slurm job sets its own variables and leaves the variables of `srun` as they are.
 const LAUNCHERS: [Source; 5] = [
     Source { name: "Open MPI", index: "OMPI_COMM_WORLD_RANK", first: First::Is(0), count: Count::In("OMPI_COMM_WORLD_SIZE") },
     Source { name: "MVAPICH2", index: "MV2_COMM_WORLD_RANK", first: First::Is(0), count: Count::In("MV2_COMM_WORLD_SIZE") },
     Source { name: "MPI (PMI)", index: "PMI_RANK", first: First::Is(0), count: Count::In("PMI_SIZE") },
-    // The script of a batch job has SLURM_PROCID and SLURM_NTASKS too, and is one process: the step's count is that of `srun`.
+    // The script of a batch job is one process but has SLURM_PROCID and SLURM_NTASKS too. Only `srun` sets the number of tasks of a step.
     Source { name: "srun", index: "SLURM_PROCID", first: First::Is(0), count: Count::In("SLURM_STEP_NUM_TASKS") },
     Source { name: "GNU parallel", index: "PARALLEL_SEQ", first: First::Is(1), count: Count::Unknown },
 ];
 
-/// One task of a number of tasks.
+/// Place of this process among the tasks of a source.
 struct Task {
     of: &'static Source,
-    /// From 0.
+    /// Place of the task, counted from 0.
     place: u64,
+    /// Number of tasks, or `None` if the source does not tell it.
     count: Option<u64>,
 }
 
-/// The shard that the variables mean. `count` is how many shards there are, where the user says it.
+/// Returns the shard that the environment variables give to this process. `get` looks up a variable. `count` is the number of shards, if the user gave it.
+///
+/// # Errors
+///
+/// A message if no source is found, if the number of shards is unknown or differs from `count`, or if a variable has no valid value.
 pub(super) fn auto(get: &dyn Fn(&str) -> Option<String>, count: Option<u64>) -> Result<Shard, String> {
     let array = ARRAYS.iter().find_map(|source| source.task(get).transpose()).transpose()?;
     let launcher = LAUNCHERS.iter().find_map(|source| source.task(get).transpose()).transpose()?;
@@ -79,6 +84,7 @@ pub(super) fn auto(get: &dyn Fn(&str) -> Option<String>, count: Option<u64>) -> 
             let Some(each) = launcher.count else {
                 return Err(format!("{name}: the number of tasks within each is not known: expected --shard I/N"));
             };
+            // The processes of a launcher within each task of an array have consecutive shards: the array is the outer index, the launcher is the inner index.
             (array.place * each + launcher.place, array.count.map(|count| count * each), name)
         }
         (Some(task), None) | (None, Some(task)) => (task.place, task.count, task.of.name.to_owned()),
@@ -96,14 +102,14 @@ pub(super) fn auto(get: &dyn Fn(&str) -> Option<String>, count: Option<u64>) -> 
 }
 
 impl Source {
-    /// The task that this process is; `None` if this source started none.
+    /// Returns the task of this process, or `None` if this source did not start the process.
     fn task(&'static self, get: &dyn Fn(&str) -> Option<String>) -> Result<Option<Task>, String> {
         let number = |variable: &'static str| match get(variable) {
             Some(text) => text.trim().parse::<u64>().map(Some).map_err(|_| format!("{variable} is \"{}\": expected a number", text.escape_debug())),
             None => Ok(None),
         };
         let needed = |variable: &'static str| number(variable)?.ok_or_else(|| format!("{} is set and {variable} is not: expected both", self.index));
-        // Jobs of SGE that are no array have this.
+        // SGE sets the value "undefined" for jobs that are no array.
         let Some(index) = (if get(self.index).as_deref() == Some("undefined") { None } else { number(self.index)? }) else { return Ok(None) };
         let first = match self.first {
             First::Is(first) => first,
@@ -112,7 +118,7 @@ impl Source {
         let below = || format!("{} is {index}: expected {first} or more, the index of the first task", self.index);
         let place = index.checked_sub(first).ok_or_else(below)?;
         match self.count {
-            // A batch script that starts no step.
+            // SLURM_PROCID without the number of a step belongs to a batch script, which `srun` did not start.
             Count::In(variable) if self.name == "srun" && number(variable)?.is_none() => Ok(None),
             Count::In(variable) => Ok(Some(Task { of: self, place, count: Some(needed(variable)?) })),
             Count::Unknown => Ok(Some(Task { of: self, place, count: None })),
@@ -152,7 +158,7 @@ mod tests {
             ("OMPI_COMM_WORLD_RANK=0 OMPI_COMM_WORLD_SIZE=3", Some(3), "1/3"),
             ("MV2_COMM_WORLD_RANK=2 MV2_COMM_WORLD_SIZE=3", None, "3/3"),
             ("SLURM_PROCID=1 SLURM_STEP_NUM_TASKS=2 SLURM_NTASKS=9", None, "2/2"),
-            // mpirun within a step, and srun within an array.
+            // `mpirun` within a step of Slurm; then `srun` within an array.
             ("OMPI_COMM_WORLD_RANK=5 OMPI_COMM_WORLD_SIZE=6 SLURM_PROCID=1 SLURM_STEP_NUM_TASKS=2", None, "6/6"),
             (
                 "SLURM_ARRAY_TASK_ID=2 SLURM_ARRAY_TASK_MIN=1 SLURM_ARRAY_TASK_MAX=3 SLURM_ARRAY_TASK_STEP=1 SLURM_PROCID=3 SLURM_STEP_NUM_TASKS=4",
@@ -186,7 +192,7 @@ mod tests {
         }
     }
 
-    /// An array with gaps has fewer tasks than indices.
+    /// An array with gaps has fewer tasks than indices, and the number of shards is the number of indices.
     #[test]
     fn an_array_with_gaps_leaves_shards_out_and_renumbers_none() {
         let of = |index: u64| {

@@ -1,5 +1,5 @@
-//! Work that several processes share, each of which does a shard of it in the same folder: `--shard`, `--merge` and `--status` of campaigns, comparisons, maps
-//! and boundaries.
+//! Work that several processes share: `--shard`, `--merge` and `--status` of campaigns, comparisons, maps and boundaries. Each process does one shard of the
+//! work, and all write into the same folder.
 
 mod environment;
 mod status;
@@ -23,21 +23,25 @@ pub(crate) use status::{all_done, logs_in, missing, show};
 use worker::nobody_works_in;
 pub(crate) use worker::{Worker, owner};
 
-/// What a command does of its work.
+/// Part of the work that a command does.
 #[derive(Clone, Copy)]
 pub(crate) enum Sharing<'a> {
-    /// All, in the folder of `--out` if there is one.
+    /// The whole work, in the folder of `--out` if the option is given.
     Whole(Option<&'a Path>),
-    /// A shard, in the folder.
+    /// One shard, in the folder.
     Shard(Shard, &'a Path),
-    /// Puts together what shards did in the folder.
+    /// Merges the results that shards left in the folder.
     Merge(&'a Path),
-    /// Says what shards did in the folder.
+    /// Reports which pieces shards have done in the folder.
     Status(&'a Path),
 }
 
 impl<'a> Sharing<'a> {
-    /// What the options say.
+    /// Reads the options of a command. `out` is the folder of `--out`.
+    ///
+    /// # Errors
+    ///
+    /// [`Failure::Input`] if `--shard auto` finds no shard of this process.
     pub(crate) fn of(arguments: &'a ShardArguments, out: Option<&'a Path>) -> Result<Self, Failure> {
         let (shard, folder) = match (arguments, out) {
             (ShardArguments { merge: Some(folder), .. }, _) => return Ok(Self::Merge(folder)),
@@ -54,14 +58,14 @@ impl<'a> Sharing<'a> {
         Ok(Self::Shard(shard, folder))
     }
 
-    /// Takes the folder for this process alone, if the process does all of the work or puts shards together. A merge leaves workers that are still at work
-    /// alone.
+    /// Takes the folder for this process alone if the process does the whole work or merges shards. A merge does not check for workers that still hold a lease.
     pub(crate) fn own_folder(self) -> Result<Option<OwnFolder>, Failure> {
         match self {
             Self::Whole(None) | Self::Shard(..) | Self::Status(_) => Ok(None),
             Self::Merge(folder) => own_folder(folder).map(Some),
             Self::Whole(Some(folder)) => {
-                // A worker that begins looks for the owner of the folder after it has its lease, so that one of the two sees the other.
+                // A worker takes its lease first and looks for the owner of the folder second. This process does both in the opposite order, so at least one of
+                // the two sees the other.
                 let own = own_folder(folder)?;
                 nobody_works_in(folder)?;
                 Ok(Some(own))
@@ -69,7 +73,7 @@ impl<'a> Sharing<'a> {
         }
     }
 
-    /// The folder that files are written into, if there is one.
+    /// Returns the folder that files are written into, or `None` if `--out` is not given.
     pub(crate) const fn folder(self) -> Option<&'a Path> {
         match self {
             Self::Whole(folder) => folder,
@@ -78,7 +82,7 @@ impl<'a> Sharing<'a> {
     }
 }
 
-/// Says that a shard is done.
+/// Prints that a shard is done.
 pub(crate) fn answer(json: bool, done: &Done) -> Result<ExitCode, Failure> {
     output::answer(json, DocumentSchema::SHARD, &done_document(done), || done_words(done), NO_FILES)?;
     Ok(ExitCode::SUCCESS)

@@ -1,4 +1,4 @@
-//! A worker: it holds its shard, says that it lives, and writes down what it did.
+//! Worker on a shard: holds the lease of the shard in the shared folder, renews the lease on a thread of its own, and logs finished pieces for `--status`.
 
 use std::fs::{File, OpenOptions};
 use std::io::Write as _;
@@ -14,27 +14,29 @@ use cohaptic_files::{BEAT, Holder, Lease, OwnFolder, Owner, STALE, Taking};
 use crate::failure::Failure;
 use crate::{interrupt, output};
 
-/// A process that does a shard in a folder.
+/// This process as the worker on one shard in a folder.
 pub(crate) struct Worker {
     shard: Shard,
     folder: PathBuf,
     begun: Clock,
     log: Mutex<File>,
-    /// Whether another process has the shard now.
+    /// Set by the heart once another process holds the lease of the shard.
     is_lost: Arc<AtomicBool>,
-    /// Ends the heart when it is dropped.
+    /// Sender that nothing is ever sent through: dropping the sender closes the channel and thereby ends the heart.
     alive: Option<mpsc::Sender<()>>,
+    /// Thread that renews the lease ([`renew`]).
     heart: Option<JoinHandle<()>>,
 }
 
-/// This process as the owner of files.
+/// Returns this process as an owner of files, made unique by the current time \[ns since 1970\].
 pub(crate) fn owner() -> Owner {
     let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     Owner::here(u64::try_from(since.as_nanos()).unwrap_or_default())
 }
 
 impl Worker {
-    /// Takes a shard in a folder that is there. If another worker has it, waits until that is seen to live, which is refused, or to be gone.
+    /// Takes the lease of a shard in an existing folder, opens the log and starts to renew the lease. If another worker holds the lease, waits until that
+    /// worker renews the lease, which is an error, or until the lease is stale.
     pub(crate) fn begin(folder: &Path, shard: Shard, owner: &Owner) -> Result<Self, Failure> {
         let lease = take(folder, shard, owner)?;
         if OwnFolder::is_taken(folder) {
@@ -60,12 +62,12 @@ impl Worker {
         Ok(Self { shard, folder, begun: Clock::now(), log: Mutex::new(log), is_lost, alive: Some(alive), heart: Some(heart) })
     }
 
-    /// Whether it may go on.
+    /// Returns whether the worker may continue: the user has not asked for the end, and no other process has taken the shard.
     pub(crate) fn goes_on(&self) -> bool {
         !interrupt::requested() && !self.is_lost.load(Ordering::Relaxed)
     }
 
-    /// Writes down that a piece of work is kept. What cannot be written is not in the status; the work is done all the same.
+    /// Logs that a piece of work with `units` units is kept. A line that cannot be written is missing in the status; the work itself is not affected.
     pub(crate) fn kept(&self, piece: u64, units: u64) {
         self.write(&format!("piece {piece} {units} {:.3}\n", self.begun.elapsed().as_secs_f64()));
     }
@@ -74,12 +76,13 @@ impl Worker {
         let _ = self.log.lock().unwrap_or_else(PoisonError::into_inner).write_all(line.as_bytes());
     }
 
-    /// How long it has been at work \[s\].
+    /// Returns the wall time since the worker began \[s\].
     pub(crate) fn wall_s(&self) -> f64 {
         self.begun.elapsed().as_secs_f64()
     }
 
-    /// Ends it, and gives what it came to, or the reason why it did not: also that another process has the shard now.
+    /// Logs the end, gives up the lease and returns `outcome`. If the work failed because another process has the shard now, returns an error that says so,
+    /// made by `said`.
     pub(crate) fn end<T, E>(mut self, outcome: Result<T, E>, said: impl FnOnce(Failure) -> E) -> Result<T, E> {
         let word = match &outcome {
             Ok(_) => "done",
@@ -102,7 +105,7 @@ impl Worker {
     fn stop(&mut self) {
         drop(self.alive.take());
         if let Some(heart) = self.heart.take() {
-            // It waits for nothing but the end of the channel.
+            // The heart waits only for the channel, which is closed now, so the join returns soon.
             let _ = heart.join();
         }
     }
@@ -114,10 +117,11 @@ impl Drop for Worker {
     }
 }
 
-/// Renews a lease until the worker ends or it is lost.
+/// Renews a lease at each beat until the worker ends or the lease is lost. A lost lease sets `is_lost`.
 fn renew(mut lease: Lease, ended: &mpsc::Receiver<()>, is_lost: &AtomicBool) {
     while ended.recv_timeout(BEAT) == Err(mpsc::RecvTimeoutError::Timeout) {
-        // A file server that is away for a moment is asked again. If it is away for longer, another process may take the lease, and that is seen then.
+        // An error may be a short outage of a file server, so the next beat tries again. After a long outage another process may have taken the lease, and the
+        // first successful renewal reports that loss.
         if lease.renew().is_ok_and(|is_mine| !is_mine) {
             is_lost.store(true, Ordering::Relaxed);
             return;
@@ -125,7 +129,7 @@ fn renew(mut lease: Lease, ended: &mpsc::Receiver<()>, is_lost: &AtomicBool) {
     }
 }
 
-/// How often a worker that waits looks again.
+/// Interval at which a waiting worker tries again to take the lease.
 const LOOK: Duration = Duration::from_millis(500);
 
 fn take(folder: &Path, shard: Shard, owner: &Owner) -> Result<Lease, Failure> {
@@ -137,6 +141,7 @@ fn take(folder: &Path, shard: Shard, owner: &Owner) -> Result<Lease, Failure> {
             Taking::Taken(lease) => return Ok(lease),
             Taking::Held(holder) => holder,
         };
+        // Only a renewal between two looks proves that the holder lives: a killed process leaves its lease behind.
         if seen.as_ref().is_some_and(|seen| holder.has_lived_since(seen)) {
             return Err(busy(folder, shard, &holder));
         }
@@ -164,7 +169,7 @@ fn busy(folder: &Path, shard: Shard, holder: &Holder) -> Failure {
 }
 
 fn say_that_it_waits(folder: &Path, shard: Shard, holder: &Holder) {
-    // If it cannot be said, it waits all the same.
+    // A failed write to standard error does not end the wait.
     let _ = writeln!(
         std::io::stderr(),
         "{} has shard {shard} in {} and was heard of {} s ago: waiting until it is heard of again, or has not been for {} s",
@@ -175,7 +180,7 @@ fn say_that_it_waits(folder: &Path, shard: Shard, holder: &Holder) {
     );
 }
 
-/// That no worker does a shard in a folder, so that this process may work there alone.
+/// Checks that no worker holds the lease of a shard in a folder, so that this process may work there alone.
 pub(super) fn nobody_works_in(folder: &Path) -> Result<(), Failure> {
     let unreadable = |error| Failure::File { verb: "read", path: folder.to_path_buf(), error };
     let leases = cohaptic_files::leases(folder, &owner(), |name| Shard::of_lease(name).is_some()).map_err(unreadable)?;
