@@ -1,4 +1,4 @@
-//! What came of a session, as a JSON document and in words.
+//! Answer of `cohaptic live`, as a JSON document and as text.
 
 use std::collections::BTreeMap;
 
@@ -18,7 +18,7 @@ use crate::output;
 use crate::realtime::{late, notes};
 use crate::run::answer::{diverged, length, packets};
 
-/// The answer of `cohaptic live --json`.
+/// Returns the answer of `cohaptic live --json`.
 pub(super) fn of(scene: &Scene, report: &Report) -> impl Serialize {
     let summary = &report.summary;
     let peers = summary.peers.iter().enumerate().map(|(place, summary)| {
@@ -58,7 +58,7 @@ pub(super) fn of(scene: &Scene, report: &Report) -> impl Serialize {
     }
 }
 
-/// The arrivals from a remote peer.
+/// Returns the counts of datagrams that arrived from a remote peer.
 fn of_seat(seat: &SeatStats) -> impl Serialize + use<> {
     let SeatStats { taken, joined, refused, out_of_order, late, most_late } = *seat;
     document! { taken: taken, joined: joined, refused: refused, out_of_order: out_of_order, late: late, most_late_us: micros(most_late) }

@@ -1,4 +1,4 @@
-//! `cohaptic live`.
+//! `cohaptic live`: runs a scene by the wall clock, with peers that are attached by network or as Falcons.
 
 mod answer;
 pub(crate) mod onlookers;
@@ -30,7 +30,7 @@ use crate::{input, interrupt, output};
 use onlookers::SessionConductor;
 use onlookers::{Elapsed, Planned, TimedLinks};
 
-/// Runs a scene by the wall clock with the peers that are attached, and says how it went.
+/// Runs a scene by the wall clock with the attached peers and prints the report; or writes a new session key (`--new-key`).
 pub(crate) fn live(arguments: &LiveArguments) -> Result<ExitCode, Failure> {
     let (path, new_key) = (arguments.scene.as_deref(), arguments.new_key.as_deref());
     match (path, new_key) {
@@ -50,7 +50,8 @@ fn make_key(file: &Path) -> Result<ExitCode, Failure> {
 fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
     let mut overrides = arguments.overrides.set.clone();
     if let Some(length) = arguments.length {
-        // Expectations of the whole scene, which may be longer, are not looked at in a session anyway.
+        // Expectations may name instants after the shortened end, which would refuse the scene. A session does not check expectations, so the override removes
+        // them.
         overrides.extend([format!("scene.duration={}", Span(length)), "expect={}".to_owned()]);
     }
     let overrides = overrides.as_slice();
@@ -97,7 +98,8 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
     Ok(if interrupt::requested() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }
 
-/// Everything that must be had before time begins; `None` if the user did not want to wait for it.
+/// Opens everything that the session needs before its time begins: the key, the devices and the sockets. Returns `None` if the user asked for the end while
+/// waiting.
 fn open(arguments: &LiveArguments, scene: &Scene, content: SceneContent) -> Result<Option<Session>, Failure> {
     let real_time = &arguments.real_time;
     let key = match &arguments.key_file {
@@ -119,14 +121,15 @@ fn open(arguments: &LiveArguments, scene: &Scene, content: SceneContent) -> Resu
 }
 
 fn conduct(scene: &Scene, session: Session, mut host: SessionConductor, control: &LiveControl) -> Result<Report, Failure> {
-    // Samples are recorded from the first one on, and the session asks the conductor 50 times a second.
+    // From its first sample on, the session has a record worth keeping, and it asks the conductor 50 times per second whether to go on. A signal therefore ends
+    // the session in order.
     interrupt::has_results();
     let progress = Progress::through_scene(&scene.title, scene.duration);
     let report = thread::scope(|scope| {
         let running = thread::Builder::new().name("live".to_owned()).spawn_scoped(scope, move || session.run(&mut host));
         let running = running.map_err(|error| Failure::System(format!("the session gets no thread: {error}")))?;
         while !running.is_finished() {
-            // Not the thread that has to be on time.
+            // The session runs on its own thread, so this sleep does not delay its ticks.
             thread::sleep(Duration::from_millis(50));
             let latest = control.latest();
             progress.reach(Instant::ZERO.saturating_add(latest.elapsed));
@@ -146,7 +149,8 @@ pub(crate) fn refused(error: SessionError) -> Failure {
     if is_of_system { Failure::System(error.to_string()) } else { Failure::Input(error.to_string()) }
 }
 
-/// Opens the Falcons of the scene and waits until the hands of simulated ones have homed them; `None` if the user did not want to wait.
+/// Opens the Falcons of the scene and waits until all simulated Falcons are homed by their simulated hands. Returns `None` if the user asked for the end while
+/// waiting. Real Falcons are homed by their users during the session.
 fn ready_falcons(scene: &Scene, firmware: Option<&Path>, wishes: Wishes) -> Result<Option<Falcons>, Failure> {
     let told = |peer: &str, progress: boot::Progress| {
         if let Some(said) = loading(progress) {
@@ -182,7 +186,7 @@ fn ready_falcons(scene: &Scene, firmware: Option<&Path>, wishes: Wishes) -> Resu
     Ok(Some(falcons))
 }
 
-/// Says where whom the session waits for is to send.
+/// Prints the address to which the remote peers of the scene have to send, if there is any remote peer.
 fn announce(scene: &Scene, address: Option<SocketAddr>, has_key: bool) {
     let Some(address) = address else { return };
     let peers = scene.peers.iter().enumerate().filter(|(_, peer)| matches!(peer.kind, PeerKind::Udp(_)));

@@ -1,4 +1,5 @@
-//! Between a session and onlookers, live control among them: nothing here waits.
+//! Connects a session with its onlookers: the terminal and live control. Publishes snapshots of the session and passes on changes of links.
+//! No function here waits, because the thread of the session calls these functions.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -18,14 +19,14 @@ use crate::documents::micros;
 use crate::interrupt;
 use crate::realtime::{Edit, KeyedLinks, Look, counters, quantiles, quantiles_of};
 
-/// Publishes the session and hands in what live control changes.
+/// Conductor of a session. Publishes snapshots and passes the changes of live control on to the session.
 pub(super) struct SessionConductor {
     look: Option<Look>,
     wanted: Receiver<Edit>,
-    /// The links in the order of the description.
+    /// Sender and receiver of each link, indexed as the links of the description.
     pairs: Vec<(usize, usize)>,
     elapsed: Elapsed,
-    /// Of the scene.
+    /// Number of axes of the scene. Positions and forces in snapshots have this length.
     axes: usize,
 }
 
@@ -56,14 +57,14 @@ impl Conductor for SessionConductor {
     }
 }
 
-/// The next change that somebody wants of a link.
+/// Returns the next change of a link that live control asks for, or `None` if no change is waiting.
 pub(crate) fn change(wanted: &Receiver<Edit>, pairs: &[(usize, usize)]) -> Option<LinkChange> {
     let Edit { link, keys, model } = wanted.try_recv().ok()?;
     let (from, to) = *pairs.get(link)?;
     Some(LinkChange { from, to, keys, model })
 }
 
-/// Every directed link, by sender, then receiver.
+/// Returns sender and receiver of every directed link, ordered by sender, then by receiver.
 pub(crate) fn pairs(scene: &Scene) -> Vec<(usize, usize)> {
     let places = 0..scene.peers.len();
     places.clone().flat_map(|from| places.clone().map(move |to| (from, to))).filter(|(from, to)| from != to).collect()
@@ -95,7 +96,7 @@ pub(crate) fn snapshot(status: &Status, axes: usize) -> Snapshot {
     let validity = status.validity.to_string();
     Snapshot {
         elapsed: status.elapsed,
-        // The page says itself that it is not valid, and then why.
+        // The page writes "not valid" itself and adds this text as the reason.
         invalid: (!status.validity.is_valid()).then(|| validity.trim_start_matches("not valid: ").to_owned()),
         lateness: vec![quantiles(&status.ticks), quantiles(&status.releases)],
         links: status.links.iter().map(link).collect(),
@@ -108,7 +109,7 @@ pub(crate) fn snapshot(status: &Status, axes: usize) -> Snapshot {
     }
 }
 
-/// What a terminal shows behind the progress: how late ticks are, and which peers are absent.
+/// Formats the text after the progress bar: the lateness of ticks, and the peers that are absent or stale.
 pub(super) fn note(scene: &Scene, snapshot: &Snapshot) -> String {
     let late = snapshot.lateness.first().map_or_else(String::new, |ticks| format!("  ticks p99 {:.0} µs late", micros(ticks.p99)));
     let missing = snapshot.peers.iter().zip(&scene.peers).filter(|(peer, _)| matches!(peer.status, Shown::Absent | Shown::Stale));
@@ -136,10 +137,10 @@ fn view(peer: &PeerStatus, axes: usize, now: Instant) -> PeerView {
     PeerView { status, age, position: state.object.position[..axes].to_vec(), force: peer.force[..axes].to_vec(), turn }
 }
 
-/// Keys that links have from an instant on: the links by their numbers.
+/// Changes of the timeline, ordered by instant: the links that change, by their index in the description, and the keys of each link from this instant on.
 pub(super) type Planned = VecDeque<(Instant, Vec<(usize, LinkKeys)>)>;
 
-/// How far a session is, for onlookers: shared between two threads, of which one writes.
+/// Elapsed time of a session, for onlookers. Shared between the thread of the session, which writes, and the thread of live control, which reads.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Elapsed(Arc<AtomicU64>);
 
@@ -153,7 +154,7 @@ impl Elapsed {
     }
 }
 
-/// The links of a session, which its timeline changes too: what it sets replaces what somebody has changed before.
+/// Editor of the links of a session that has a timeline. A change by the timeline replaces all earlier changes by live control of the same link.
 pub(super) struct TimedLinks {
     pub(super) links: KeyedLinks,
     pub(super) planned: Planned,
@@ -163,6 +164,7 @@ pub(super) struct TimedLinks {
 impl LinkEditor for TimedLinks {
     fn keys(&self, link: usize) -> Vec<(String, String)> {
         let now = self.elapsed.get();
+        // Changes of the timeline that have happened since the last call of `change` are not in `links` yet. The last of them gives the current keys.
         let past = self.planned.iter().take_while(|(at, _)| *at <= now).flat_map(|(_, links)| links);
         match past.filter(|(changed, _)| *changed == link).last() {
             Some((_, keys)) => keys.iter().map(|(key, value)| (key.to_owned(), value.to_owned())).collect(),
@@ -172,6 +174,7 @@ impl LinkEditor for TimedLinks {
 
     fn change(&mut self, links: &[usize], keys: &[(String, String)]) -> Result<(), String> {
         let now = self.elapsed.get();
+        // The past changes of the timeline enter `links` before the new keys, because the new keys are laid over the current ones.
         let past = self.planned.partition_point(|(at, _)| *at <= now);
         for (link, keys) in self.planned.drain(..past).flat_map(|(_, changed)| changed) {
             self.links.keys[link] = keys;
