@@ -1,4 +1,4 @@
-//! What a relay did, as a JSON document and in words.
+//! Answer of `cohaptic relay`, as a JSON document and as text.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -13,7 +13,7 @@ use crate::document_schema::document;
 use crate::documents::{self, lateness};
 use crate::realtime::{ConfiguredDelay, carried, counts, lasted, late, notes};
 
-/// What `cohaptic relay --json` prints.
+/// Returns the answer of `cohaptic relay --json`. `asked` holds the configured delays, indexed as the links of the report.
 pub(super) fn document(setup: &Setup, report: &Report, asked: &[ConfiguredDelay], is_interrupted: bool) -> impl Serialize {
     let totals = Totals::of(report);
     document! {
@@ -66,19 +66,20 @@ fn port_document(port: &PortReport) -> impl Serialize + use<> {
     }
 }
 
-/// Datagrams that were refused on arrival, by cause.
+/// Returns the numbers of datagrams that were refused on arrival, by cause.
 pub(super) fn refused(intake: &IntakeCounts) -> [(&'static str, u64); 4] {
     [("stranger", intake.strangers), ("to-itself", intake.to_itself), ("no-room", intake.no_room), ("overload", intake.overload)]
 }
 
-/// Sums over everything.
+/// Sums over all links and ports of a relay.
 struct Totals {
-    /// What came in, whatever became of it.
+    /// Datagrams that came in, including all that were dropped later.
     packets: u64,
-    /// What was dropped by the relay, by its links, or by the kernel on the way out; not what the kernel dropped before anybody saw it.
+    /// Datagrams that were dropped by the relay, by its links, or by the kernel on sending. Datagrams that the kernel dropped before the relay read them are
+    /// not counted.
     dropped: u64,
     sent: u64,
-    /// What had come out of its link and was not sent when the run ended.
+    /// Datagrams that had left their link and were not sent yet when the run ended.
     unsent: u64,
 }
 
@@ -100,15 +101,15 @@ impl Totals {
     }
 }
 
-/// The number of links that are named.
+/// Largest number of links with traffic that the text names.
 const MOST_LINKS: usize = 64;
 
-/// The number of links without traffic that are named.
+/// Largest number of links without traffic that the text names.
 const MOST_IDLE: usize = 8;
 
 pub(super) fn describe(setup: &Setup, report: &Report, asked: &[ConfiguredDelay]) -> String {
     let mut text = format!("{}\n", setup.title);
-    // Writing to a string does not fail.
+    // Writing to a string cannot fail.
     let mut line = |line: String| {
         let _ = writeln!(text, "  {line}");
     };
@@ -163,7 +164,7 @@ fn links(links: &[LinkReport], asked: &[ConfiguredDelay], line: &mut impl FnMut(
     }
 }
 
-/// What went wrong at a port, if anything did.
+/// Adds lines about failures at a port: datagrams that were not sent or not read, and datagrams that the kernel dropped.
 fn at(port: &PortReport, line: &mut impl FnMut(String)) {
     let mut all = port.counts.failures.by_reason().map(|(reason, count)| (reason, count)).to_vec();
     all.extend([("oversized", port.counts.oversized), ("errors on reading", port.counts.receive_errors)]);
@@ -177,9 +178,9 @@ fn at(port: &PortReport, line: &mut impl FnMut(String)) {
     }
 }
 
-/// What the system let wait at a port, where it is less than was asked for.
+/// Returns a line about the smallest receive buffer of the ports, if the system granted less than the relay asked for.
 fn small_buffer(ports: &[PortReport]) -> Option<String> {
-    // The kernel grants twice the size asked for.
+    // Linux reports twice the requested size, because it reserves memory for bookkeeping.
     let wanted = 2 * cohaptic_realtime::udp::EndpointConfig::default().receive_buffer;
     let least = ports.iter().map(|port| port.receive_buffer).filter(|granted| *granted > 0).min()?;
     (least < wanted).then(|| {

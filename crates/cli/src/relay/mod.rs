@@ -1,4 +1,4 @@
-//! `cohaptic relay`.
+//! `cohaptic relay`: forwards UDP datagrams between programs over emulated links.
 
 mod answer;
 mod setup;
@@ -24,7 +24,7 @@ use crate::realtime::{self, ControlFiles, Edit, KeyedLinks, LiveControl, Publish
 use crate::{interrupt, output};
 use setup::Setup;
 
-/// Puts the emulator between programs, and says what it did.
+/// Runs a relay between programs and prints its report.
 pub(crate) fn relay(arguments: &RelayArguments) -> Result<ExitCode, Failure> {
     let length = some_length(arguments.length)?;
     let mut setup = Setup::new(arguments)?;
@@ -56,7 +56,7 @@ fn failure(error: RelayError) -> Failure {
     if matches!(error, RelayError::Config(_)) { Failure::Input(error.to_string()) } else { Failure::System(error.to_string()) }
 }
 
-/// Runs until its end, or until the user asks for it. Says too how often each link was changed from outside.
+/// Runs the relay until its end, or until the user asks for the end. Returns the report and the number of changes from outside, indexed by link.
 fn conduct(
     relay: &mut Relay,
     setup: &Setup,
@@ -65,7 +65,7 @@ fn conduct(
     wanted: &Receiver<Edit>,
 ) -> Result<(Report, Vec<u64>), Failure> {
     const GLANCE: Duration = Duration::from_millis(50);
-    // Counters are a report from the first moment on, and the relay looks at `stop` all the time.
+    // The counters are a report from the first moment on, and the relay checks `stop` all the time. A signal therefore ends the run in order.
     interrupt::has_results();
     let mut publisher = Publisher::new(control.look(), publish_every(setup.pairs.len()));
     let (say, heard) = channel();
@@ -74,7 +74,7 @@ fn conduct(
     let progress = Progress::of_traffic(&setup.title);
     let report = thread::scope(|scope| {
         let running = thread::Builder::new().name("relay".to_owned()).spawn_scoped(scope, || {
-            // Moved, so that it is this thread's alone.
+            // A receiver cannot be shared between threads, so the closure takes it by value.
             let heard = heard;
             relay.run(options, &heard, &stop, |view| publisher.offer(|| snapshot(view, &setup.pairs, options.tolerance)))
         });
@@ -83,13 +83,13 @@ fn conduct(
             match wanted.recv_timeout(GLANCE) {
                 Ok(Edit { link, model, .. }) => {
                     if let (Some((from, to)), Some(edits)) = (setup.pairs.get(link), edits.get_mut(link)) {
-                        // If it has ended meanwhile, so has what could be changed.
+                        // A relay that has just ended no longer receives. Such a change is not counted.
                         let is_heard = say.send(Control::SetLink { from: *from, to: *to, model: Box::new(model) }).is_ok();
                         *edits += u64::from(is_heard);
                     }
                 }
                 Err(RecvTimeoutError::Timeout) => {}
-                // Nobody can change anything.
+                // Without live control no change can come, and the receiver returns at once. The sleep keeps this loop from spinning.
                 Err(RecvTimeoutError::Disconnected) => thread::sleep(GLANCE),
             }
             stop.store(interrupt::requested(), Ordering::Relaxed);
@@ -117,14 +117,15 @@ fn description(setup: &Setup) -> Description {
     }
 }
 
-/// How often a relay with that number of links is looked at: a snapshot of a large mesh takes milliseconds, and packets wait meanwhile.
+/// Returns the interval between two snapshots of a relay with `links` links. A snapshot of a large mesh takes milliseconds, in which packets wait, so the
+/// interval grows with the number of links.
 fn publish_every(links: usize) -> Duration {
     const LINKS_IN_A_MOMENT: usize = 500;
     let moments = u32::try_from(links.div_ceil(LINKS_IN_A_MOMENT)).unwrap_or(u32::MAX).clamp(1, 50);
     Duration::from_millis(100) * moments
 }
 
-/// `pairs` are the links in the order of the description.
+/// Takes a snapshot of the relay. `pairs` holds sender and receiver of each link in the order of the description.
 fn snapshot(view: &View<'_>, pairs: &[(NodeId, NodeId)], tolerance: Tolerance) -> Snapshot {
     let links = view.links();
     let validity = tolerance.judge(view.release());

@@ -1,4 +1,4 @@
-//! What was said on the command line, as a relay.
+//! Configuration of a relay, from a relay file or from the options `--listen` and `--to`.
 
 use std::ffi::OsString;
 use std::net::SocketAddr;
@@ -18,17 +18,17 @@ use crate::input;
 use crate::link::link_and_keys;
 use crate::realtime::ConfiguredDelay;
 
-/// A relay, and what it is called.
+/// Configuration of a relay, with the names and keys that messages and live control need.
 pub(super) struct Setup {
     pub(super) title: String,
     pub(super) config: RelayConfig,
     pub(super) tolerance: Tolerance,
-    /// Those at whom links begin and end.
+    /// Names of the programs at the ends of links, indexed by node.
     pub(super) nodes: Vec<String>,
-    /// The links by sender and receiver, as reports have them.
+    /// Sender and receiver of each link, in the order of reports.
     pub(super) pairs: Vec<(NodeId, NodeId)>,
     pub(super) keys: Vec<LinkKeys>,
-    /// Where files that keys name are looked for.
+    /// Folder that file names in keys are relative to.
     pub(super) folder: PathBuf,
 }
 
@@ -92,7 +92,7 @@ impl Setup {
         })
     }
 
-    /// Where programs are to send, in words. A free port is known now.
+    /// Returns the lines that tell programs where to send. Called after the ports are bound, because the system chooses a port that was given as 0 only then.
     pub(super) fn opened<'a>(&mut self, ports: impl Iterator<Item = (&'a str, SocketAddr)>) -> Vec<String> {
         let (title, form) = (&mut self.title, &self.config.form);
         let line = |(place, (_, port)): (usize, (&str, SocketAddr))| match form {
@@ -113,7 +113,8 @@ impl Setup {
         self.nodes.get(node.index()).map_or("", String::as_str)
     }
 
-    /// What each link was asked for, when a run is over in which each was changed so often from outside.
+    /// Returns the configured delay of each link after a run of the length `lasted`. `edits` holds the number of changes from outside, indexed by link; changes
+    /// of the timeline are added.
     pub(super) fn asked(&self, edits: &[u64], lasted: Duration) -> Vec<ConfiguredDelay> {
         let end = Instant::ZERO.saturating_add(lasted);
         let asked = |((from, to), edits): (&(NodeId, NodeId), &u64)| {
@@ -136,7 +137,7 @@ fn words(spec: &[OsString]) -> Result<Vec<String>, Failure> {
     spec.iter().map(word).collect()
 }
 
-/// Refuses an address that other machines reach, or that is on one.
+/// Refuses an address that is not on this machine's loopback interface.
 fn local(option: &str, address: SocketAddr) -> Result<(), Failure> {
     if address.ip().is_loopback() {
         return Ok(());
