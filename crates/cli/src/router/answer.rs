@@ -1,4 +1,4 @@
-//! What a router did, as a JSON document and in words.
+//! Answer of `cohaptic router`, as a JSON document and as text.
 
 use std::fmt::Write as _;
 
@@ -14,11 +14,11 @@ use crate::documents::{self, lateness};
 use crate::output;
 use crate::realtime::{ConfiguredDelay, carried, counts, lasted, late, notes};
 
-/// What `cohaptic router --json` prints.
+/// Returns the answer of `cohaptic router --json`.
 pub(super) fn document(file: &RouterFile, ran: &RouterRun) -> impl Serialize {
     let RouterRun { report, prepared, validity, asked, ending } = ran;
     let counters = &report.counters;
-    // A side: what came from it, and what was handed to its device.
+    // Counts of one side: packets received from its device, and packets written to its device.
     let side = |side: Side, device: &str| {
         let Received { all, not_ip, malformed, passed, dropped } = counters.received[side.index()];
         let Written { packets, bytes, full, too_long, refused } = report.written[side.index()];
@@ -58,7 +58,7 @@ pub(super) fn document(file: &RouterFile, ran: &RouterRun) -> impl Serialize {
     }
 }
 
-/// One direction of a link.
+/// Returns the counts of one direction of a link.
 fn of_lane(lane: &LaneSnapshot, asked: &ConfiguredDelay) -> impl Serialize + use<> {
     let (from, to) = (lane.from.name().to_owned(), lane.from.opposite().name().to_owned());
     document! {
@@ -79,7 +79,7 @@ fn count(Count { packets, bytes }: Count) -> impl Serialize {
 pub(super) fn describe(file: &RouterFile, ran: &RouterRun) -> String {
     let RouterRun { report, prepared, validity, asked, ending } = ran;
     let mut text = format!("{}\n", output::path(&file.file));
-    // Writing to a string does not fail.
+    // Writing to a string cannot fail.
     let mut line = |line: String| {
         let _ = writeln!(text, "  {line}");
     };

@@ -1,4 +1,4 @@
-//! `cohaptic router`.
+//! `cohaptic router`: forwards IP packets between two network devices over emulated links.
 
 mod answer;
 
@@ -22,7 +22,7 @@ use crate::progress::Progress;
 use crate::realtime::{self, ConfiguredDelay, ControlFiles, Edit, KeyedLinks, LiveControl, Publisher, counters, quantiles, say, some_length};
 use crate::{input, interrupt, output};
 
-/// Puts the emulator between two devices, and says what it did.
+/// Runs a router between two devices and prints its report.
 pub(crate) fn router(arguments: &RouterArguments) -> Result<ExitCode, Failure> {
     let until = some_length(arguments.length)?.map(|length| Instant::ZERO.saturating_add(length));
     let file = input::with(&arguments.file, |text, file| RouterFile::parse(text, file, &arguments.set))?;
@@ -30,7 +30,7 @@ pub(crate) fn router(arguments: &RouterArguments) -> Result<ExitCode, Failure> {
     let mut router = Router::open(&file, real_time.pacing()).map_err(|error| Failure::System(error.to_string()))?;
     say(&format!("between {} and {}", attached(&file, Side::Left), attached(&file, Side::Right)));
     let (changes, wanted) = channel();
-    // Each direction has keys of its own: it can be changed by itself.
+    // Each direction of a link has keys of its own, because live control can change one direction alone. Lanes 2 n and 2 n + 1 are the directions of link n.
     let keys = file.links.iter().flat_map(|link| [link.keys.clone(), link.keys.clone()]).collect();
     let folder = arguments.file.parent().map(Path::to_path_buf).unwrap_or_default();
     let editor = KeyedLinks { keys, folder, files: ControlFiles::of(real_time)?, changes };
@@ -49,7 +49,7 @@ pub(crate) fn router(arguments: &RouterArguments) -> Result<ExitCode, Failure> {
     }
 }
 
-/// `left (tun left0 in the namespace lab)`.
+/// Describes the device of a side: `left (tun left0 in the namespace lab)`.
 fn attached(file: &RouterFile, side: Side) -> String {
     use cohaptic_linkfile::router::Attachment;
     let attachment = match side {
@@ -64,26 +64,26 @@ fn attached(file: &RouterFile, side: Side) -> String {
     format!("{} ({kind} {}{within})", side.name(), attachment.device())
 }
 
-/// What a router did.
+/// Results of the run of a router.
 struct RouterRun {
     report: Report,
     prepared: Prepared,
     validity: Validity,
-    /// What each link was asked for, from the left and then from the right.
+    /// Configured delays, indexed by lane: for each link the direction from the left, then the direction from the right.
     asked: Vec<ConfiguredDelay>,
     ending: Ending,
 }
 
-/// How it came to its end.
+/// Cause of the end of a run.
 #[derive(Debug)]
 enum Ending {
     Complete,
     Interrupted,
-    /// A device is gone.
+    /// A device failed or vanished.
     Failed(RunError),
 }
 
-/// Runs until its end, or until the user asks for it.
+/// Runs the router on a thread of its own until its end, or until the user asks for the end. The calling thread shows the progress.
 fn conduct(
     router: &mut Router,
     file: &RouterFile,
@@ -93,7 +93,7 @@ fn conduct(
     wanted: Receiver<Edit>,
 ) -> Result<RouterRun, Failure> {
     const GLANCE: Duration = Duration::from_millis(50);
-    // Counters are a report from the first moment on, and the router looks at `stop` all the time.
+    // The counters are a report from the first moment on, and the router checks `stop` all the time. A signal therefore ends the run in order.
     interrupt::has_results();
     let stop = AtomicBool::new(false);
     let progress = Progress::of_traffic(&input::named(&arguments.file).display().to_string());
@@ -114,7 +114,7 @@ fn conduct(
     ran
 }
 
-/// The thread that has to be on time.
+/// Runs the router on the current thread, which has to be on time: applies changes of links and publishes snapshots between packets.
 fn route(
     router: &mut Router,
     file: &RouterFile,
@@ -124,7 +124,7 @@ fn route(
     wanted: Receiver<Edit>,
     mut publisher: Publisher,
 ) -> RouterRun {
-    /// So soon is a change taken up.
+    /// Longest time until the router takes up a change.
     const LOOK: Duration = Duration::from_millis(20);
     let prepared = prepare_thread(&arguments.real_time.wishes());
     let tolerance = arguments.real_time.tolerance();
@@ -148,12 +148,12 @@ fn route(
     RouterRun { report: router.report(), prepared, validity: tolerance.judge(router.lateness()), asked, ending }
 }
 
-/// Every link twice: from the left and from the right.
+/// Returns the description of the router, in which every link stands twice: from the left and from the right.
 fn description(file: &RouterFile) -> Description {
     let lanes = file.links.iter().flat_map(|link| {
         Side::BOTH.map(|from| {
             let (from, to) = (from.name(), from.opposite().name());
-            // As its random streams are called.
+            // The name equals the name of the random streams of this direction.
             LinkName { name: format!("{0}.{from}->{0}.{to}", link.name), from: from.to_owned(), to: to.to_owned() }
         })
     });
@@ -189,7 +189,7 @@ fn link(lane: &LaneSnapshot) -> LinkCounters {
     LinkCounters { delivered_bytes: lane.delivered_bytes, recent_delay: quantiles(&lane.recent_delay), ..counters(&lane.stats) }
 }
 
-/// What was dropped outside of links, by cause.
+/// Returns the numbers of packets that were dropped outside of links, by cause.
 fn refused(report: &Report) -> [(&'static str, u64); 6] {
     let [left, right] = &report.counters.received;
     let written = |count: fn(&Written) -> u64| report.written.iter().map(count).sum();
