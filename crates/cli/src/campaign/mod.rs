@@ -1,4 +1,5 @@
-//! `cohaptic campaign`.
+//! `cohaptic campaign`: runs a scene with all combinations of varied keys. Also the steps that `compare` shares with campaigns: pool, verdicts, runs and
+//! failures.
 
 pub(crate) mod sharing;
 
@@ -23,13 +24,13 @@ use crate::progress::Progress;
 use crate::shard::Sharing;
 use crate::{input, interrupt, output, shard};
 
-/// The program, as a campaign remembers it.
+/// Name and version of the program, which the folder of a campaign records.
 pub(crate) const PROGRAM: &str = concat!("cohaptic ", env!("CARGO_PKG_VERSION"));
 
-/// Judges until the user asks for the end.
+/// Judge of combinations, by analysis. Stops when the user asks for the end.
 const JUDGE: ByAnalysis<'static> = ByAnalysis(&Interruptible);
 
-/// Does the runs that are missing, all or those of a shard, and says what came out.
+/// Does the missing runs of the whole campaign or of one shard, and prints the results.
 pub(crate) fn campaign(arguments: &CampaignArguments) -> Result<ExitCode, Failure> {
     let sharing = Sharing::of(&arguments.shards, arguments.out.as_deref())?;
     let plan = plan(arguments, sharing)?;
@@ -67,7 +68,11 @@ pub(crate) fn campaign(arguments: &CampaignArguments) -> Result<ExitCode, Failur
     Ok(ExitCode::SUCCESS)
 }
 
-/// Does something on a pool of threads of its own.
+/// Does `work` on a new pool of `threads` threads. `None` stands for one thread per processor.
+///
+/// # Errors
+///
+/// [`Failure::System`] if the system refuses the threads.
 pub(crate) fn pool<T: Send>(threads: Option<u16>, work: impl FnOnce() -> T + Send) -> Result<T, Failure> {
     let threads = usize::from(threads.unwrap_or(0));
     match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
@@ -76,7 +81,7 @@ pub(crate) fn pool<T: Send>(threads: Option<u16>, work: impl FnOnce() -> T + Sen
     }
 }
 
-/// The file of the scene, for messages about it; that of the folder if none was named.
+/// Returns the file of the scene for messages: the file that the user named, otherwise the file of the campaign in its folder.
 fn scene_file(arguments: &CampaignArguments) -> &Path {
     arguments.scene.as_deref().unwrap_or_else(|| Path::new("campaign.json"))
 }
@@ -104,11 +109,13 @@ fn plan(arguments: &CampaignArguments, sharing: Sharing<'_>) -> Result<CampaignP
     Ok(if arguments.verdicts { plan.with_verdicts() } else { plan })
 }
 
-/// The figures of the campaign, with its table of runs and its table of verdicts, if it has one.
+/// Judges the combinations and does the runs. Returns the report, and the paths of the table of runs and of the table of verdicts, if the campaign has
+/// verdicts.
 fn execute(sharing: Sharing<'_>, out: &Path, plan: CampaignPlan) -> Result<(Report, Vec<PathBuf>), Ended> {
     let combinations = plan.combinations();
     let mut campaign = open(sharing, plan, out)?;
     let judging = Shown::judging(combinations);
+    // A merge takes the verdicts of the shards: a missing verdict is reported, not computed.
     let by: &dyn Judge = if matches!(sharing, Sharing::Merge(_)) { &Nobody } else { &JUDGE };
     let missing = campaign.judge(by, &judging);
     judging.clear();
@@ -120,7 +127,7 @@ fn execute(sharing: Sharing<'_>, out: &Path, plan: CampaignPlan) -> Result<(Repo
     Ok((report, std::iter::once(campaign.table_file()).chain(campaign.verdicts_file()).collect()))
 }
 
-/// Judges nothing: verdicts are those that shards made.
+/// Judge of a merge. Makes no verdict, because a merge takes only the verdicts that shards made.
 pub(crate) struct Nobody;
 
 impl Judge for Nobody {
@@ -129,7 +136,7 @@ impl Judge for Nobody {
     }
 }
 
-/// Begins or continues a campaign, and shows how far the check of its combinations is; or opens one whose runs shards have done.
+/// Begins or continues a campaign and shows the progress of checking its combinations. For a merge, opens the campaign whose runs shards have done.
 pub(crate) fn open(sharing: Sharing<'_>, plan: CampaignPlan, out: &Path) -> Result<Campaign, Ended> {
     if let Sharing::Merge(folder) = sharing {
         return Campaign::open_whole(plan, folder).map_err(|error| {
@@ -142,7 +149,7 @@ pub(crate) fn open(sharing: Sharing<'_>, plan: CampaignPlan, out: &Path) -> Resu
     opened.map_err(Ended::Error)
 }
 
-/// There are not verdicts on all combinations: the user ended it before, or no shard has judged them.
+/// Returns the failure for a campaign without verdicts on all combinations: the user ended the judging, or a shard that should have judged is missing.
 pub(crate) fn not_all_judged(sharing: Sharing<'_>, judged: u64, combinations: u64, out: &Path) -> Failure {
     let kept = format!("{judged} of {combinations} verdicts are kept in {}", output::path(out));
     match sharing {
@@ -153,13 +160,16 @@ pub(crate) fn not_all_judged(sharing: Sharing<'_>, judged: u64, combinations: u6
     }
 }
 
-/// A command on a campaign that ended before its result: in words already, or with an error of the campaign.
+/// Reason why a command on a campaign ended without its result.
 pub(crate) enum Ended {
+    /// A failure whose message is complete.
     Said(Failure),
+    /// An error of the campaign, which the caller words with its own options.
     Error(CampaignError),
 }
 
 impl Ended {
+    /// Returns the failure, converting an error of the campaign by `said`.
     pub(crate) fn unwrap_or_else(self, said: impl FnOnce(CampaignError) -> Failure) -> Failure {
         match self {
             Self::Said(failure) => failure,
@@ -168,7 +178,7 @@ impl Ended {
     }
 }
 
-/// Does the runs that are missing, and shows how far they are.
+/// Does the missing runs and shows their progress.
 pub(crate) fn run_to_end(campaign: &mut Campaign, out: &Path) -> Result<Report, Ended> {
     let runs = campaign.runs();
     let running = Shown::running(runs, campaign.kept());
@@ -189,10 +199,11 @@ pub(crate) fn run_to_end(campaign: &mut Campaign, out: &Path) -> Result<Report, 
     }
 }
 
-/// Why there is no campaign, in the words of the user's options. `strategies` are overrides that came from `--strategies`.
+/// Converts an error of a campaign into a failure that names the option at fault. `strategies` holds the overrides that came from `--strategies`.
 pub(crate) fn failure(error: CampaignError, scene: &Path, strategies: &[String]) -> Failure {
     match error {
         CampaignError::Scene { error, varied } => {
+            // The override at fault is looked for among the overrides of each option. A strategy is a variation too, so `--strategies` is asked first.
             let culprit = error.diagnostic().and_then(Diagnostic::override_text).unwrap_or_default();
             let among = |texts: &[String]| texts.iter().any(|text| text == culprit);
             let option = match (among(strategies), among(&varied)) {
@@ -215,12 +226,12 @@ pub(crate) fn failure(error: CampaignError, scene: &Path, strategies: &[String])
     }
 }
 
-/// A line on which combination it is; empty if there is but one.
+/// Returns a line that names the combination of a fault. Empty if the campaign varies nothing.
 fn combination(varied: &[String]) -> String {
     if varied.is_empty() { String::new() } else { format!("\nnote: in the combination {}", varied.join(", ")) }
 }
 
-/// Shows how far it came on the terminal, and ends it when the user asks for it.
+/// Progress of a campaign on the terminal. Ends the campaign when the user asks for the end.
 pub(crate) struct Shown(Progress);
 
 impl Shown {
@@ -263,7 +274,7 @@ impl Watch for Shown {
     }
 
     fn damaged(&self, file: &Path, fault: &str) {
-        // If it cannot be said, the file is computed again all the same.
+        // The damaged file is computed again even if standard error cannot be written to.
         self.0.aside(|| drop(writeln!(std::io::stderr(), "note: {} is damaged: {}", output::path(file), fault)));
     }
 }

@@ -1,4 +1,4 @@
-//! Shards of a campaign, and their status.
+//! Shards of a campaign or comparison, and the status of a folder that shards work in.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -12,7 +12,7 @@ use crate::shard::{Done, Names, Piece, Worker, owner, show};
 
 const NAMES: Names = Names { piece: "part", unit: "run" };
 
-/// Judges and does a shard. `judge` gives how many combinations of it have no verdict because it was ended.
+/// Judges the combinations of a shard and does its runs. `judge` returns the number of combinations that have no verdict because the judging was ended.
 pub(crate) fn shard(
     plan: CampaignPlan,
     shard: Shard,
@@ -25,6 +25,7 @@ pub(crate) fn shard(
     let opened = SharedCampaign::open(plan, folder, &owner.name(), &checking);
     checking.clear();
     let mut shared = opened.map_err(Ended::Error)?;
+    // The campaign is opened before the lease is taken, so that a campaign that is refused leaves no lease and no log.
     let worker = Worker::begin(folder, shard, &owner).map_err(Ended::Said)?;
     let done = work(&mut shared, shard, folder, &worker, judge);
     worker.end(done, Ended::Said)
@@ -62,7 +63,7 @@ fn work(
     Ok(Done { shard, folder: output::path(folder), names: NAMES, pieces: report.parts, units: report.runs, computed: report.computed, wall_s })
 }
 
-/// Shows how far a shard is, and ends it when it must.
+/// Progress of a shard. Ends the shard when the user asks for the end or when another process has taken the shard.
 struct Working<'a> {
     shown: &'a Shown,
     worker: &'a Worker,
@@ -90,7 +91,7 @@ impl Watch for Working<'_> {
     }
 }
 
-/// Says what is done in a folder.
+/// Prints which parts of the campaign are done in a folder.
 pub(crate) fn status(json: bool, plan: CampaignPlan, folder: &Path) -> Result<ExitCode, Ended> {
     let parts = SharedCampaign::parts_in(plan, folder).map_err(Ended::Error)?;
     let pieces: Vec<Piece> = parts.iter().map(|part| Piece { units: part.runs, is_done: part.is_done }).collect();
