@@ -1,4 +1,4 @@
-//! `cohaptic link`.
+//! `cohaptic link`: drives one link with a steady stream of packets and measures what the link does.
 
 mod spec;
 
@@ -23,10 +23,10 @@ use crate::{interrupt, output};
 use spec::Spec;
 pub(crate) use spec::link_and_keys;
 
-/// Without `--packets`.
+/// Number of packets without `--packets`, for links that are not a replay.
 const PACKETS: u64 = 100_000;
 
-/// Drives one link and says what it was asked for and what it achieved.
+/// Drives one link, and prints what the configuration asks for beside what was measured.
 pub(crate) fn link(arguments: &LinkArguments) -> Result<ExitCode, Failure> {
     let (measured, written) = drive(arguments, Spec::read(arguments)?)?;
     let document = cohaptic_answers::link::document(&measured, Some(&written));
@@ -67,13 +67,13 @@ fn drive(arguments: &LinkArguments, spec: Spec) -> Result<(Measured, Written), F
     Ok((meter.finish(spec.said, spec.asked, [sent, wanted]), Written { packets_per_s, files }))
 }
 
-/// The files that are written.
+/// Files that the packets of a link are written to.
 struct Sinks {
     fates: Option<Sink<FateWriter<WholeFile>>>,
     capture: Option<Sink<CaptureWriter<WholeFile>>>,
 }
 
-/// A file that is written, and its name.
+/// Path of a file, and the writer of the file.
 type Sink<W> = (PathBuf, W);
 
 impl Sinks {
@@ -106,7 +106,7 @@ impl Sinks {
     }
 }
 
-/// Begins a file, if it is asked for.
+/// Creates a file and its writer, or returns `None` if the user gave no path.
 fn begin<W>(path: Option<&PathBuf>, writer: impl FnOnce(WholeFile) -> io::Result<W>) -> Result<Option<Sink<W>>, Failure> {
     let begun = path.map(|path| WholeFile::create(path).and_then(writer).map(|writer| (path.clone(), writer)).map_err(unwritten(path)));
     begun.transpose()

@@ -1,4 +1,4 @@
-//! What the link is told to do: from words, keys or a file.
+//! Configuration of the link of `cohaptic link`, from words of tc-netem, from keys of a scene, or from a log of fates.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -15,12 +15,13 @@ use crate::arguments::{LinkArguments, Profile};
 use crate::failure::Failure;
 use crate::{file, output};
 
-/// A link, and what it is asked for.
+/// Model of a link, with the figures that the configuration asks for.
 pub(super) struct Spec {
+    /// Configuration as the user wrote it, for the report.
     pub(super) said: String,
     pub(super) model: LinkModel,
     pub(super) asked: Asked,
-    /// How many packets are in the log, if it is a replay.
+    /// Number of packets in the log of a replay. `None` for other links, and if the number exceeds 64 bits.
     pub(super) packets: Option<u64>,
 }
 
@@ -39,7 +40,11 @@ impl Spec {
     }
 }
 
-/// Whether a link is said in keys, as opposed to words of tc-netem; a failure if it is said half in one way and half in the other.
+/// Returns whether a link is written in keys of a scene (`true`) or in words of tc-netem (`false`).
+///
+/// # Errors
+///
+/// [`Failure::Input`] if `spec` mixes keys and words.
 fn is_keys(spec: &[String]) -> Result<bool, Failure> {
     let (keys, words): (Vec<&str>, Vec<&str>) = spec.iter().map(String::as_str).partition(|word| word.contains('='));
     if keys.is_empty() || words.is_empty() {
@@ -59,7 +64,8 @@ fn of_keys(arguments: &LinkArguments) -> Result<(LinkModel, Asked), Failure> {
     Ok((model, asked))
 }
 
-/// The link that words of tc-netem or keys make, and its keys: words are one key, `netem`. Nothing said makes an ideal link.
+/// Returns the link that words of tc-netem or keys describe, and the keys of the link. Words are stored under the one key `netem`. An empty `spec` gives an
+/// ideal link.
 pub(crate) fn link_and_keys(spec: &[String]) -> Result<(LinkModel, LinkKeys), Failure> {
     let nothing = LinkKeys::default();
     if spec.is_empty() {
@@ -83,13 +89,18 @@ fn not_exact(said: &str, error: &ExactError) -> Failure {
     Failure::Input(format!("{error}\n{}", below(said, error.option())))
 }
 
-/// The link that does what the words say, if one can; a failure if a table that they name cannot be read.
+/// Returns the link that does exactly what the words say, or the reason why no link can.
+///
+/// # Errors
+///
+/// A failure if a table of a distribution that the words name cannot be read.
 fn exact(netem: &Netem) -> Result<Result<LinkConfig, ExactError>, Failure> {
     let mut fault = None;
     let exact = netem.to_link_config(&mut |name| {
         let text = table(name, &mut fault)?;
         DistTable::parse(&text).map_err(|error| fault = Some(in_table(name, &error))).ok().map(Arc::new)
     });
+    // A fault of a table comes first: without its table, `exact` only says that the distribution is unknown.
     fault.map_or(Ok(exact), Err)
 }
 
@@ -113,7 +124,7 @@ fn of_words(arguments: &LinkArguments, said: &str) -> Result<(LinkModel, Asked),
             let tables = tables.collect();
             fault.map_or(Ok(()), Err)?;
             let kernel = KernelNetem::new(netem, tables).map_err(|error| Failure::Input(error.to_string()))?;
-            // What the words ask for is what they say, also where the kernel does something else.
+            // The report compares with what the words say, also where the kernel is known to do something else.
             Ok((kernel.into(), asked))
         }
     }
@@ -126,7 +137,8 @@ fn slot_distribution(netem: &Netem) -> Option<cohaptic_wan::netem::Distribution>
     }
 }
 
-/// The text of `NAME.dist` in the current folder; `None` if there is no such file.
+/// Reads the text of `NAME.dist` in the current folder. Returns `None` if the file does not exist, and also if the file cannot be read; the latter sets
+/// `fault`.
 fn table(name: &TableName, fault: &mut Option<Failure>) -> Option<String> {
     let path = Path::new(name.as_str()).with_extension("dist");
     match file::read_text(&path) {
@@ -143,7 +155,8 @@ fn in_table(name: &TableName, error: &cohaptic_wan::law::DistTableError) -> Fail
     Failure::Input(format!("{}.dist: {error}", name.as_str()))
 }
 
-/// The words with a mark under the option to blame. An option may have been cut short: then the first word that it begins with.
+/// Returns the words with a mark under the option at fault. The user may have abbreviated the option, so the mark stands under the longest word that the name
+/// of the option begins with, and under the first of equal words.
 fn below(said: &str, option: &str) -> String {
     let words = said.split(' ').scan(0, |start, word| {
         let at = *start;
