@@ -1,4 +1,4 @@
-//! `cohaptic check`.
+//! `cohaptic check`: checks scenes against their expectations, several scenes at a time.
 
 mod page;
 
@@ -25,17 +25,18 @@ struct Checked {
     file: String,
     passed: bool,
     failures: Vec<String>,
-    /// What came out of each expectation; empty if the scene could not be checked.
+    /// Outcome of each expectation. Empty if the scene could not be checked.
     expectations: Vec<OutcomeDocument>,
-    /// What was told in another way than it could be with more time.
+    /// Notes on results that more computing time would make stronger or more exact.
     notes: Vec<String>,
-    /// Whether the scene has an `[expect]` at all.
+    /// Whether the scene has an `[expect]` table.
     expects: bool,
+    /// Exit status that this scene alone would give the command.
     #[serde(skip)]
     status: u8,
 }
 
-/// Checks every scene, says one line each, and goes on after a scene that fails or cannot be read.
+/// Checks every scene and prints one line per scene. Continues after a scene that fails or cannot be read.
 pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitCode, Failure> {
     let mut files: Vec<Result<PathBuf, Checked>> = Vec::new();
     let mut first_error = None;
@@ -48,19 +49,20 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitCode, Failure> {
             }
         }
     }
+    // If no path could be read, nothing was checked: the first error is then the failure of the command.
     if let Some(error) = first_error.filter(|_| files.iter().all(Result::is_err)) {
         return Err(error.into());
     }
     let progress = Progress::new(files.len() as u64, "checking scenes {bar:30} {pos}/{len}");
     let model = if arguments.general { Model::General } else { Model::Least };
-    // A scene that is not finished in time was interrupted.
+    // Each slot begins as "interrupted", so that a list printed by a signal names the scenes that were not finished.
     let begun = files.iter().map(|file| file.as_ref().map_or_else(Clone::clone, |file| Checked::interrupted(file))).collect();
     let known: Arc<Mutex<Vec<Checked>>> = Arc::new(Mutex::new(begun));
     let (keeper, json) = (Arc::clone(&known), arguments.json);
     interrupt::keep(move || {
         let scenes = keeper.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let said = finished(&scenes);
-        // The exit status is all that is left to say that it could not be printed.
+        // If standard output cannot be written to, only the message on standard error remains.
         if print(scenes, json).is_ok() { said } else { format!("{said}, and cannot be printed") }
     });
     let check = |(place, file): (usize, Result<PathBuf, Checked>)| {
@@ -74,13 +76,13 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitCode, Failure> {
     let threads = usize::from(arguments.threads.unwrap_or(0));
     let scenes: Vec<Checked> = match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
         Ok(pool) => pool.install(|| files.into_par_iter().enumerate().map(check).collect()),
-        // Without threads it takes longer.
+        // If the system refuses the threads, the scenes are checked one after another.
         Err(_) => files.into_iter().enumerate().map(check).collect(),
     };
     interrupt::has_results();
     progress.clear();
     let (status, finished) = (scenes.iter().map(|scene| scene.status).max().unwrap_or(0), finished(&scenes));
-    // What was checked is printed even if the disk is full.
+    // The error of the page is reported only after the results are printed, so that a full disk does not lose the results.
     let written = arguments.page.as_ref().map_or(Ok(()), |file| write_file(file, page::html(&scenes, &arguments.overrides.set)));
     print(scenes, arguments.json)?;
     written?;
@@ -90,7 +92,7 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitCode, Failure> {
     if interrupt::requested() { Err(Failure::Interrupted(finished)) } else { Ok(ExitCode::from(status)) }
 }
 
-/// How many scenes were checked before the end, in words.
+/// Describes how many scenes were checked before the end.
 fn finished(scenes: &[Checked]) -> String {
     let finished = scenes.iter().filter(|scene| !scene.is_interrupted()).count();
     format!("{finished} of {} scenes were checked", scenes.len())
@@ -100,7 +102,7 @@ fn print(scenes: Vec<Checked>, json: bool) -> Result<(), Failure> {
     if json { output::json(DocumentSchema::CHECK, &document! { scenes: scenes }) } else { output::text(&describe(&scenes)) }
 }
 
-/// The scenes that a path means; standard input means itself.
+/// Returns the scene files of a path: the file, the scenes of a folder, or standard input (`-`).
 fn files_of(path: &Path) -> Result<Vec<PathBuf>, SceneError> {
     if input::is_standard_input(path) { Ok(vec![path.to_path_buf()]) } else { scene_files(path) }
 }
@@ -117,7 +119,7 @@ fn check_one(file: &Path, overrides: &[String], model: Model) -> Checked {
             }
             let Answered { failures, expectations, notes } = check_scene(&scene, model, &Interruptible);
             if !failures.is_empty() && interrupt::requested() {
-                // What failed may have failed by the interruption alone.
+                // The interruption itself may be the cause of these failures.
                 return Checked { expects: scene.expect.is_some(), ..Checked::interrupted(file) };
             }
             let status = if failures.is_empty() { 0 } else { EXPECTATION };
@@ -132,7 +134,7 @@ impl Checked {
         Self::unchecked(path, error.to_string(), scene_status(error))
     }
 
-    /// What nothing is known of, because the user asked for the end first.
+    /// Returns the result of a scene that was not checked because the user asked for the end before.
     fn interrupted(path: &Path) -> Self {
         Self::unchecked(path, "interrupted before it was checked".to_owned(), INTERRUPTED)
     }

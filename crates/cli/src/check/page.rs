@@ -1,11 +1,11 @@
-//! All scenes of a check on one page.
+//! Page of `cohaptic check --page`: all checked scenes with their expectations.
 
 use cohaptic_picture::page::{Html, Mark, Page};
 
 use super::Checked;
 use crate::expectations::{BARS, cells, columns, verdict};
 
-/// The page: a list of the scenes, then each with a row for each expectation.
+/// Returns the page as HTML: a list of the scenes, then one section per scene with one row per expectation.
 pub(super) fn html(scenes: &[Checked], overrides: &[String]) -> String {
     let failed = scenes.iter().filter(|scene| !scene.passed).count();
     let outcomes = || scenes.iter().flat_map(|scene| &scene.expectations);
@@ -41,7 +41,7 @@ fn section(scene: &Checked) -> Html {
     if !scene.expectations.is_empty() {
         content = content.and(Html::table(&scene.expectations.iter().fold(columns(), |table, outcome| table.row(cells(outcome)))));
     }
-    // Lines of a place in a file are set below each other.
+    // Preformatted, because a message that shows a place in a file has several lines that must stay aligned.
     for failure in &scene.failures {
         content = content.and(Html::preformatted(failure));
     }
