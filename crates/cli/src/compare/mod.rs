@@ -1,4 +1,4 @@
-//! `cohaptic compare`.
+//! `cohaptic compare`: compares strategies of coordination in the same scene, by runs and by analysis.
 
 mod page;
 mod preset;
@@ -22,10 +22,10 @@ use crate::shard::Sharing;
 use crate::{input, output, shard};
 use preset::Asked;
 
-/// Judges until the user asks for the end.
+/// Judge of combinations, by analysis or by runs. Stops when the user asks for the end.
 const JUDGE: ByAnalysisOrRuns<'static> = ByAnalysisOrRuns(&Interruptible);
 
-/// Does the runs that are missing, and sets the strategies side by side.
+/// Does the missing runs, and writes and prints the comparison of the strategies.
 pub(crate) fn compare(arguments: &CompareArguments) -> Result<ExitCode, Failure> {
     let asked = Asked::of(arguments).map_err(|error| Failure::Input(format!("--strategies: {error}")))?;
     let settings: Vec<String> = overrides(&asked.strategies);
@@ -61,13 +61,13 @@ pub(crate) fn compare(arguments: &CompareArguments) -> Result<ExitCode, Failure>
     Ok(ExitCode::SUCCESS)
 }
 
-/// All that the strategies put into scenes.
+/// Returns all overrides that the strategies put into scenes.
 fn overrides(strategies: &Strategies) -> Vec<String> {
     let variation = strategies.variation();
     (0..variation.count()).flat_map(|place| variation.overrides(place)).collect()
 }
 
-/// What every run has: the overrides of the user, and all measures.
+/// Returns the overrides of every run: the overrides of the user, and all measures.
 fn set(arguments: &CompareArguments) -> Vec<String> {
     arguments.scene.overrides.set.iter().cloned().chain(MeasureArguments::all().override_text()).collect()
 }
@@ -93,7 +93,7 @@ fn plan(arguments: &CompareArguments, asked: &Asked) -> Result<CampaignPlan, cam
     Ok(plan.map_err(campaign::Ended::Error)?.leaving_out(Strategies::fallback()))
 }
 
-/// The comparison, with the table of runs and the table of verdicts.
+/// Judges the combinations and does the runs. Returns the comparison, and the paths of the table of runs and of the table of verdicts.
 fn execute(arguments: &CompareArguments, sharing: Sharing<'_>, out: &Path, plan: CampaignPlan) -> Result<(Finished, [PathBuf; 2]), campaign::Ended> {
     let failed = campaign::Ended::Error;
     let combinations = plan.combinations();
@@ -109,6 +109,7 @@ fn execute(arguments: &CompareArguments, sharing: Sharing<'_>, out: &Path, plan:
     let report = campaign::run_to_end(&mut campaign, out)?;
     let comparison = campaign.compare().map_err(failed)?;
     let plan = campaign.plan().clone();
+    // The title is taken from the first combination that was not refused, because a refused combination has no scene.
     let first = (0..combinations).find(|combination| !report.refused.contains_key(combination)).unwrap_or_default();
     let title = plan.scene(first).map_or_else(|_| output::path(input::named(&arguments.scene.scene)), |scene| scene.title);
     let files = [campaign.table_file(), campaign.stability_file()];

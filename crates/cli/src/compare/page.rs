@@ -1,4 +1,4 @@
-//! What `compare.html` says about where its numbers come from.
+//! Origin of the numbers in `compare.html`: the commands, the parameters of the strategies, and the scene.
 
 use cohaptic_answers::compare::{Finished, PageSource};
 use cohaptic_scene::scene_content_of_text;
@@ -9,27 +9,28 @@ use crate::failure::Failure;
 use crate::input;
 use crate::shell::{path, quoted};
 
-/// The folder of a command on a page, which does not depend on where it was written.
+/// Placeholder for the output folder in commands, because the content of the page must not depend on the folder that the page is written to.
 const FOLDER: &str = "FOLDER";
 
-/// `scene`: the text of the scene.
+/// Returns the origin of the numbers of a comparison. `scene` is the text of the scene.
 pub(super) fn source<'a>(arguments: &CompareArguments, finished: &Finished, scene: &'a str) -> Result<PageSource<'a>, Failure> {
     let (command, campaign) = (command_line(arguments), campaign_line(arguments, finished));
     Ok(PageSource { strategies: strategies(arguments, finished)?, command, campaign, scene })
 }
 
-/// The parameters of each strategy with their values in the scene.
+/// Returns, for each strategy, its description and its parameters with their values in the scene.
 fn strategies(arguments: &CompareArguments, finished: &Finished) -> Result<Vec<(&'static str, String)>, Failure> {
     let strategies = Asked::of(arguments).map_err(|error| Failure::Input(error.to_string()))?.strategies;
     let all = (0..finished.comparison.strategies.len()).map(|place| {
         let (about, parameters) = strategies.registered(place);
         let varied = strategies.variation().overrides(place);
         let overrides: Vec<String> = arguments.scene.overrides.set.iter().chain(&varied).cloned().collect();
-        // A scene that is refused has no content, and its overrides say enough.
+        // A scene that is refused has no content. Only the values of its overrides and the defaults are shown then.
         let keys = input::with(&arguments.scene.scene, |text, file| scene_content_of_text(text, file, &overrides))
             .map(|content| content.keys)
             .unwrap_or_default();
         let given = |(key, default): &(String, &str)| {
+            // The last override of a key wins, as in the scene; then the key of the scene, then the default.
             let own = varied.iter().rev().find_map(|text| text.strip_prefix(key.as_str())?.strip_prefix('='));
             let value = own.or_else(|| keys.get(key).map(String::as_str)).unwrap_or(*default);
             format!("{} {}", key.rsplit('.').next().unwrap_or_default(), value.trim_matches('"'))
@@ -41,7 +42,7 @@ fn strategies(arguments: &CompareArguments, finished: &Finished) -> Result<Vec<(
     Ok(all.collect())
 }
 
-/// The command that makes this page.
+/// Returns the command that makes this page.
 fn command_line(arguments: &CompareArguments) -> String {
     let scene = &arguments.scene.scene;
     let mut words = vec!["cohaptic compare".to_owned(), path(scene)];
@@ -57,7 +58,7 @@ fn command_line(arguments: &CompareArguments) -> String {
     words.join(" ")
 }
 
-/// The campaign whose table of runs is that of the comparison.
+/// Returns the command of the campaign that has the same table of runs as the comparison.
 fn campaign_line(arguments: &CompareArguments, finished: &Finished) -> String {
     let set = arguments.scene.overrides.set.iter().map(|key| format!("--set {}", quoted(key)));
     let vary = finished.plan.variations().iter().map(|key| format!("--vary {}", quoted(key.text())));

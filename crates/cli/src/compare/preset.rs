@@ -1,23 +1,24 @@
-//! What a preset stands for.
+//! Strategies and varied keys of a comparison, from a preset or from the arguments.
 
 use cohaptic_campaign::{Strategies, StrategiesError};
 
 use crate::arguments::{CompareArguments, PresetName};
 
-/// Strategies, and texts `KEY=VALUES` of keys that vary.
+/// Strategies to compare, and the keys that vary, as texts `KEY=VALUES`.
 pub(super) struct Asked {
     pub(super) strategies: Strategies,
     pub(super) vary: Vec<String>,
 }
 
-/// The grid of `field`: delays of a laboratory to those of the other side of the earth, losses from none to those that make calls useless.
+/// Grid of the preset `field`: delays from a laboratory network to the other side of the earth, and losses from none to a level that makes calls useless.
 const FIELD: [&str; 2] = ["link.delay=0ms..200ms/9", "link.loss=0%..30%/4"];
 
-/// Beside the strategies of the registry: a dead band on velocities, by Weber's law for the sense of touch, with the fraction usual in teleoperation.
+/// Strategy that the preset `field` adds to the registered strategies: a dead band on velocities by Weber's law for the sense of touch, with the fraction that
+/// is usual in teleoperation.
 const DEAD_BAND: &str = "average-position{coordination.send-when.velocity=10%}";
 
 impl Asked {
-    /// What the arguments ask for.
+    /// Returns the strategies and the varied keys that the arguments ask for.
     pub(super) fn of(arguments: &CompareArguments) -> Result<Self, StrategiesError> {
         match arguments.preset {
             Some(PresetName::Field) => {
