@@ -1,4 +1,4 @@
-//! Progress of an analysis on the terminal, and its end when the user asks for it.
+//! Progress of an analysis on the terminal, and the end of an analysis when the user asks for the end.
 
 use std::io::Write as _;
 
@@ -8,16 +8,16 @@ use cohaptic_stability::{PartCost, Watch};
 use crate::interrupt;
 use crate::progress::Progress;
 
-/// What takes fewer seconds than this has no bar.
+/// Estimated time \[s\] up to which an analysis has no bar.
 const SHORT: f64 = 1.0;
 
-/// Of what takes more seconds than this, the cost is said before it is begun, also where nobody sees a bar.
+/// Estimated time \[s\] from which the cost of a part is printed before the part begins, also if standard error is no terminal.
 const TOLD: f64 = 2.0;
 
-/// The steps of the bar: millions of operations.
+/// Operations per step of the bar.
 const STEP: f64 = 1e6;
 
-/// Ends an analysis when the user asks for it, and shows nothing.
+/// Watch that ends an analysis when the user asks for the end, and shows nothing.
 pub(crate) struct Interruptible;
 
 impl Watch for Interruptible {
@@ -26,19 +26,19 @@ impl Watch for Interruptible {
     }
 }
 
-/// Shows how far an analysis is, if it takes long, and ends it when the user asks for it.
+/// Watch that shows the progress of a long analysis, and ends the analysis when the user asks for the end.
 pub(crate) struct AnalysisWatch {
     shown: std::sync::Mutex<Shown>,
-    /// The most memory of a part \[bytes\].
+    /// Largest memory that a part may take \[bytes\].
     most_memory: u64,
 }
 
 #[derive(Default)]
 struct Shown {
     bar: Option<Progress>,
-    /// Of all that was said of.
+    /// Operations of all announced parts.
     expected: f64,
-    /// Of what was done, what no step was shown for yet.
+    /// Operations that are done but not shown yet.
     left: f64,
 }
 
@@ -67,7 +67,7 @@ impl Watch for AnalysisWatch {
         if cost.operations / OPERATIONS_A_SECOND < TOLD {
             return;
         }
-        // If it cannot be said, the analysis goes on all the same.
+        // The analysis continues even if standard error cannot be written to.
         let say = || drop(writeln!(std::io::stderr(), "note: {cost}: {}", estimate(cost.operations)));
         match &self.shown().bar {
             Some(bar) => bar.aside(say),
@@ -80,7 +80,7 @@ impl Watch for AnalysisWatch {
         shown.expected += operations;
         let all = estimate(shown.expected);
         if shown.bar.is_some() || operations / OPERATIONS_A_SECOND > SHORT {
-            // Its length comes on the way.
+            // The bar begins with length 0, because each announced part adds its length.
             let bar = shown.bar.get_or_insert_with(|| {
                 let bar = Progress::new(0, "{bar:30} {percent:>3} %  {elapsed} passed, {msg}");
                 bar.tick();
@@ -106,7 +106,7 @@ impl Watch for AnalysisWatch {
     }
 }
 
-/// How long that number of operations takes, in words.
+/// Describes the estimated time of a number of operations.
 pub(crate) fn estimate(operations: f64) -> String {
     let seconds = operations / OPERATIONS_A_SECOND;
     match seconds {
@@ -118,13 +118,14 @@ pub(crate) fn estimate(operations: f64) -> String {
     }
 }
 
-/// Shows, behind a bar of another kind, how far the cells or values are that take long, and ends them when the user asks for it.
+/// Watch of the cells or values of a picture whose bar counts cells. Shows the progress of long cells after that bar, and ends the cells when `stops` returns
+/// true.
 pub(crate) struct CellWatch<'a> {
     progress: &'a Progress,
-    /// What a cell is called.
+    /// Word for a cell in the note, such as "cell".
     name: &'static str,
     stops: &'a (dyn Fn() -> bool + Sync),
-    /// How many operations the cells take that were begun, how many are done, and the largest estimate of one.
+    /// Operations of all begun cells, operations done, and the largest number of operations that was announced at once.
     operations: std::sync::Mutex<[f64; 3]>,
 }
 
@@ -143,7 +144,7 @@ impl<'a> CellWatch<'a> {
     }
 }
 
-/// The words about cells that take long; none about others.
+/// Returns the note about long cells, or `None` if no begun cell takes longer than [`SHORT`].
 fn note(name: &str, [expected, done, largest]: [f64; 3]) -> Option<String> {
     let long = largest / OPERATIONS_A_SECOND > SHORT;
     long.then(|| format!("; a {name} takes {}, {:.0} % of those begun", estimate(largest), 100.0 * (done / expected).min(1.0)))

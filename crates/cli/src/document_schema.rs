@@ -1,10 +1,9 @@
-//! The kinds of JSON documents, each of which says of which kind and version it is, before all else; and how a document is made.
+//! Kinds of JSON documents. Each document begins with its kind and version. Also the macro that makes documents.
 
 pub(crate) use cohaptic_answers::document;
 use serde::Serialize;
 
-/// A kind of JSON document: its name, which never changes, and its version, which counts up where a key vanishes or changes its meaning; new keys do not
-/// change it.
+/// Kind of a JSON document. The name never changes. The version increases when a key vanishes or changes its meaning, but not for new keys.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DocumentSchema {
     name: &'static str,
@@ -40,13 +39,13 @@ impl DocumentSchema {
     pub(crate) const PAPER: Self = Self { name: "cohaptic/paper", version: 1 };
     pub(crate) const ERROR: Self = Self { name: "cohaptic/error", version: 1 };
 
-    /// The document with its kind and version in front.
+    /// Returns the document with its kind and version before all other keys.
     pub(crate) const fn of<D: Serialize>(self, document: &D) -> Versioned<'_, D> {
         Versioned { schema: self.name, version: self.version, document }
     }
 }
 
-/// A document that says of which kind and version it is.
+/// Document with its kind and version.
 #[derive(Serialize)]
 pub(crate) struct Versioned<'a, D: Serialize> {
     schema: &'static str,

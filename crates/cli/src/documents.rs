@@ -1,4 +1,4 @@
-//! Parts that the JSON documents of several commands share.
+//! Parts of JSON documents that several commands share.
 
 use std::time::Duration;
 
@@ -9,14 +9,14 @@ use serde::Serialize;
 
 use crate::document_schema::document;
 
-/// How late things were, in microseconds.
+/// Returns the quantiles of a lateness \[µs\].
 #[cfg(target_os = "linux")]
 pub(crate) fn lateness(summary: &LatenessSummary) -> impl Serialize + use<> {
     let LatenessSummary { count, p50, p99, p999, max, sum: _ } = *summary;
     document! { count: count, p50: micros(p50), p99: micros(p99), p999: micros(p999), max: micros(max) }
 }
 
-/// A span in microseconds.
+/// Converts a span to microseconds.
 pub(crate) fn micros(span: Duration) -> f64 {
     span.as_secs_f64() * 1e6
 }

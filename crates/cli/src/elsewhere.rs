@@ -1,6 +1,6 @@
-//! The commands that need Linux, on other systems: each takes its arguments, says that it needs Linux, and ends with status 3.
+//! Stand-ins for the commands that need Linux, on other systems: each command takes its arguments, prints that it needs Linux, and ends with status 3.
 
-/// A module for each command, with the function that stands in for the command.
+/// Makes one module per command, with the function that stands in for the command.
 macro_rules! need_linux {
     ($($command:ident: $arguments:ident),* $(,)?) => {
         $(

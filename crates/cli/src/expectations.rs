@@ -1,10 +1,10 @@
-//! Expectations of scenes and what came out, as a table on a page.
+//! Table of expectations and their outcomes, for the pages of `run` and `check`.
 
 use cohaptic_answers::OutcomeDocument;
 use cohaptic_picture::Gauge;
 use cohaptic_picture::page::{Html, Mark, Table};
 
-/// The cells of a row: verdict, expectation, what was expected, what came out, and both as a bar.
+/// Returns the cells of a row: verdict, name of the expectation, expected range, measured value, and a bar of range and value.
 pub(crate) fn cells(outcome: &OutcomeDocument) -> [Html; 5] {
     let OutcomeDocument { name, low, high, measured, passed, expected, found, .. } = outcome;
     let gauge = Gauge { low: *low, high: *high, measured: *measured, passed: *passed };
@@ -12,16 +12,16 @@ pub(crate) fn cells(outcome: &OutcomeDocument) -> [Html; 5] {
     [verdict(*passed), name.as_str().into(), expected.as_str().into(), found.as_str().into(), bar]
 }
 
-/// A verdict that is read without colours too.
+/// Returns a verdict whose text and mark tell the result also without colours.
 pub(crate) fn verdict(passed: bool) -> Html {
     if passed { Html::mark(Mark::Good, "✓ passed") } else { Html::mark(Mark::Bad, "✗ FAILED") }
 }
 
-/// The columns of [`cells`].
+/// Returns an empty table with the columns of [`cells`].
 pub(crate) fn columns() -> Table {
     Table::new().column("verdict").column("expectation").column("expected").column("came out").column("limits and value")
 }
 
-/// What the bars of such a table mean.
+/// Explanation of the bars, for the page that shows the table.
 pub(crate) const BARS: &str = "All bars have one axis: the lower limit lies at the left mark and the upper limit at the right one, and grey is the expected range. The value that came out is a \
     disc where it passed and a cross where it failed; beyond the axis it is a triangle at the end. Where there is one limit, zero, or twice a lower limit, lies where the other mark would be.";

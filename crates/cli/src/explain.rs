@@ -1,4 +1,4 @@
-//! `cohaptic explain`.
+//! `cohaptic explain`: lists the models that the program chooses for a scene, and with `--cost` measures the cost of the methods.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -18,7 +18,7 @@ use crate::file::{own_folder, write_into};
 use crate::progress::Progress;
 use crate::{input, interrupt, output};
 
-/// Says what a scene makes the program model, and with `--cost` what its methods cost.
+/// Prints what the program models for a scene, and with `--cost` the measured cost of its methods.
 pub(crate) fn explain(arguments: &ExplainArguments) -> Result<ExitCode, Failure> {
     let scene = read(arguments, &[])?;
     let _own = arguments.out.as_deref().map(own_folder).transpose()?;
@@ -53,13 +53,13 @@ fn measured(arguments: &ExplainArguments, scene: &Scene, explanation: &Explanati
     measured
 }
 
-/// An analysis that takes longer is not measured. Frames of clocks that drift are minutes long, and no estimate tells of them.
+/// Longest time of an analysis that is measured. Needed because no estimate covers clocks that drift, whose frames are minutes long.
 const LONG: Duration = Duration::from_secs(1);
 
-/// Shows which method is measured, and ends the measurement when the user asks for it.
+/// Progress of a measurement: shows which method is measured, and ends the measurement when the user asks for the end.
 struct Shown {
     bar: Progress,
-    /// Instant at which the last method began.
+    /// Instant at which the current method began.
     begun: Mutex<Instant>,
 }
 
@@ -79,13 +79,13 @@ impl MeasurementWatch for Shown {
     }
 }
 
-/// The processor time that all threads of the program have used.
+/// Returns the processor time that all threads of the program have used.
 #[cfg(target_os = "linux")]
 fn processor_time() -> Duration {
     rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime).try_into().unwrap_or_default()
 }
 
-/// The wall time since the first call, which is at least the processor time of one thread.
+/// Returns the wall time since the first call, which is at least the processor time of one thread in that span.
 #[cfg(not(target_os = "linux"))]
 fn processor_time() -> Duration {
     static START: std::sync::OnceLock<Instant> = std::sync::OnceLock::new();
@@ -96,7 +96,7 @@ fn draw(folder: &Path, arguments: &ExplainArguments, scene: &Scene, measured: &M
     write_into(folder, "cost.svg", cost_picture(&scene.title, measured).size(arguments.pictures.size()).svg())
 }
 
-/// The measured methods, kind by kind.
+/// Formats the measured methods, grouped by kind.
 fn table(measured: &Measured) -> String {
     let mut text = format!("\nMeasured on this machine, over {} of the scene, set-up included\n", Span(measured.span));
     for kind in Kind::ALL {

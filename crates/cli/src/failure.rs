@@ -1,4 +1,4 @@
-//! Why a command ended without its result, and with which exit status.
+//! Reasons why a command ended without its result, and their exit statuses.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -9,21 +9,21 @@ use cohaptic_scene::{Diagnostic, Scene, SceneError, at_peer};
 
 use crate::input;
 
-/// An expectation failed.
+/// Exit status if an expectation failed.
 pub(crate) const EXPECTATION: u8 = 1;
-/// A bad argument or scene.
+/// Exit status for a bad argument or scene.
 pub(crate) const BAD_INPUT: u8 = 2;
-/// An input or output error.
+/// Exit status for an error of input or output.
 pub(crate) const INPUT_OUTPUT: u8 = 3;
-/// Interrupted, as shells say it: 128 and the number of SIGINT.
+/// Exit status of an interrupted command, by the convention of shells: 128 plus the number of SIGINT.
 pub(crate) const INTERRUPTED: u8 = 130;
-/// Nobody reads standard output any more, as shells say it: 128 and the number of SIGPIPE.
+/// Exit status if the reader closed standard output, by the convention of shells: 128 plus the number of SIGPIPE.
 pub(crate) const CLOSED: u8 = 141;
 
 #[derive(Debug)]
 pub(crate) enum Failure {
     Scene(SceneError),
-    /// A fault in what an option other than `--set` puts into the scene.
+    /// A fault in an override that an option other than `--set` puts into the scene.
     Override {
         option: &'static str,
         error: SceneError,
@@ -33,25 +33,25 @@ pub(crate) enum Failure {
         error: Box<SceneError>,
         /// The option that gave the value with the fault.
         option: &'static str,
-        /// Which combination it is, as a line of its own.
+        /// Line that names the combination. Empty if the campaign varies nothing.
         combination: String,
     },
     Record(RecordError),
     /// A fault in the keys of a link.
     LinkKeys(SceneError),
-    /// A fault in an argument or in a file that was read, in words.
+    /// A fault in an argument or in a file that was read, as a message.
     Input(String),
     /// A file that cannot be read or written.
     File {
-        /// What cannot be done to it: "read".
+        /// Action that failed, such as "read" or "write".
         verb: &'static str,
         path: PathBuf,
         error: io::Error,
     },
     StandardOutput(io::Error),
-    /// The system, a device or the network refuses something, in words.
+    /// A refusal by the system, a device or the network, as a message.
     System(String),
-    /// The user asked for the end before there was a result; how to go on, in words.
+    /// The user asked for the end before there was a result. The message tells how to continue.
     Interrupted(String),
 }
 
@@ -78,7 +78,7 @@ impl Failure {
         }
     }
 
-    /// A message of the scene, which knows of overrides and not with which option they were given.
+    /// Rewrites a message about the scene, which always names `--set`, so that it names the option that the user gave.
     fn in_words_of_options(&self, message: String) -> String {
         let option = self.option();
         if matches!(self, Self::LinkKeys(_)) {
@@ -90,7 +90,7 @@ impl Failure {
         }
     }
 
-    /// The option that a fault in an override was given with.
+    /// Returns the option that gave the override at fault.
     pub(crate) const fn option(&self) -> &'static str {
         match self {
             Self::Override { option, .. } => option,
@@ -106,7 +106,7 @@ impl Failure {
         }
     }
 
-    /// Why the scene is refused, if it is.
+    /// Returns the error of the scene or of the keys of a link, or `None` for other failures.
     pub(crate) fn scene_error(&self) -> Option<&SceneError> {
         match self {
             Self::Scene(error) | Self::Override { error, .. } | Self::LinkKeys(error) => Some(error),
@@ -116,13 +116,14 @@ impl Failure {
     }
 }
 
-/// Why the variant of a scene that can be read cannot be had, where an option other than `--set` gave the difference.
+/// Returns the failure for a variant of a valid scene. If the fault lies in one of the `overrides` of the variant, the failure names `option`.
 pub(crate) fn of_variant(error: SceneError, option: &'static str, overrides: &[String]) -> Failure {
     let text = error.diagnostic().and_then(Diagnostic::override_text);
     if text.is_some_and(|text| overrides.iter().any(|given| given == text)) { Failure::Override { option, error } } else { Failure::Scene(error) }
 }
 
-/// Why a scene that makes sense is not simulated, at the place where there are too many peers; `None` if it can be.
+/// Returns the error for a valid scene with too many peers for a simulation, at the place of the peers in the file. Returns `None` if the scene can be
+/// simulated.
 pub(crate) fn too_large(scene: &Scene, overrides: &[String], model: Model, watched: bool) -> Option<SceneError> {
     let TooLarge { peer, reason } = cohaptic_harness::too_large(scene, model, watched)?;
     let path = if scene.file == input::named(Path::new("-")) { Path::new("-") } else { &scene.file };
@@ -130,12 +131,12 @@ pub(crate) fn too_large(scene: &Scene, overrides: &[String], model: Model, watch
     input::with(path, refused).err()
 }
 
-/// Why a scene that makes sense cannot be analysed.
+/// Returns the failure for a valid scene that cannot be analysed.
 pub(crate) fn not_analysed(scene: &Path, error: &impl std::fmt::Display) -> Failure {
     Failure::Input(format!("{}: {error}", input::named(scene).display()))
 }
 
-/// The exit status for a scene that could not be had.
+/// Returns the exit status for a scene that cannot be read or is not valid.
 pub(crate) fn scene_status(error: &SceneError) -> u8 {
     if error.is_io() { INPUT_OUTPUT } else { BAD_INPUT }
 }

@@ -1,4 +1,4 @@
-//! `cohaptic fit`.
+//! `cohaptic fit`: estimates the parameters of a link from measurements.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -13,11 +13,11 @@ use crate::failure::{EXPECTATION, Failure};
 use crate::file::write_file;
 use crate::{file, output};
 
-/// Estimates a link.
+/// Estimates a link, writes the link into a file and prints the estimate.
 pub(crate) fn fit(arguments: &FitArguments) -> Result<ExitCode, Failure> {
     let source = read(arguments)?;
     let out = arguments.out.as_deref().unwrap_or_else(|| Path::new("link.toml"));
-    // Beside the file with the link, so that a scene in that folder finds both.
+    // The delays stand beside the file with the link, so that a scene in that folder finds both files.
     let delays_file = out.with_extension("delays.csv");
     let delays_name = delays_file.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let corrections = Corrections { offset_s: arguments.offset, least: arguments.least, skew: arguments.skew };
@@ -37,10 +37,10 @@ pub(crate) fn fit(arguments: &FitArguments) -> Result<ExitCode, Failure> {
     Ok(if law_is_missing { ExitCode::from(EXPECTATION) } else { ExitCode::SUCCESS })
 }
 
-/// The options that help where clocks are apart.
+/// Advice on the options that help if the clocks of sender and receiver differ.
 const CLOCKS: &str = "--offset TIME adds a time to the clock of the receiver, --least TIME says what the least delay is";
 
-/// What went wrong, in the words of the user's options.
+/// Converts an error of the estimate into a failure that names the options that may help.
 fn failure(file: &Path, error: FitFailure) -> Failure {
     let named = |why: String| Failure::Input(format!("{}: {why}", output::path(file)));
     match error {

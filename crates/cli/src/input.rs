@@ -1,4 +1,4 @@
-//! Scenes, relay files and router files as the user names them: by a path, or `-` for standard input.
+//! Reads scenes, relay files and router files, which the user names by a path, or by `-` for standard input.
 
 use std::io::{self, Read as _};
 use std::path::Path;
@@ -10,25 +10,30 @@ use cohaptic_scene::SceneError;
 
 const STANDARD_INPUT: &str = "<standard input>";
 
-/// What came from standard input, which can be read only once.
+/// Bytes of standard input, kept because several callers need the text and standard input can be read only once.
 static READ: Mutex<Option<Vec<u8>>> = Mutex::new(None);
 
-/// Whether standard input is meant.
+/// Returns whether the path stands for standard input.
 pub(crate) fn is_standard_input(path: &Path) -> bool {
     path == Path::new("-")
 }
 
-/// What messages call the file. Its folder is where files that it names are looked for: of standard input the working directory.
+/// Returns the name of the file in messages. File names within the file are relative to the folder of this name, which for standard input is the working
+/// directory.
 pub(crate) fn named(path: &Path) -> &Path {
     if is_standard_input(path) { Path::new(STANDARD_INPUT) } else { path }
 }
 
-/// The text of a file and what it is called, read by `read`.
+/// Calls `read` with the text of a file and the name of the file in messages.
 pub(crate) fn with<T>(path: &Path, read: impl FnOnce(&str, &Path) -> Result<T, SceneError>) -> Result<T, SceneError> {
     read(&text(path)?, named(path))
 }
 
-/// The text of a file.
+/// Returns the text of a file or of standard input.
+///
+/// # Errors
+///
+/// [`SceneError`] if the file cannot be read, is too long or is not UTF-8.
 pub(crate) fn text(path: &Path) -> Result<String, SceneError> {
     if !is_standard_input(path) {
         return file_text(path);
@@ -39,6 +44,7 @@ pub(crate) fn text(path: &Path) -> Result<String, SceneError> {
         Some(bytes) => bytes,
         nothing => {
             let mut bytes = Vec::new();
+            // One byte more than the limit is read, so that a text that is too long is refused instead of cut.
             io::stdin().lock().take(MOST_TOML_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
             if bytes.len() as u64 > MOST_TOML_BYTES {
                 return Err(unreadable(io::Error::other(format!("longer than {} MiB: expected a scene", MOST_TOML_BYTES >> 20))));

@@ -1,9 +1,9 @@
 //! Ctrl-C, SIGTERM and SIGHUP: the first asks the command to stop computing, the second ends the program at once.
 //!
-//! A command computes, and then writes its results. The first signal ends the first of these within a second and never the second: once a command has results
-//! ([`has_results`]), it stops computing by itself, because it looks at [`requested`], and writes the results however long that takes. A computation that has
-//! no result yet and cannot look at [`requested`], such as the eigenvalues of a large matrix, is ended when [`TO_STOP`] is over. A command that has whole
-//! results of parts while it computes others leaves word of what to do with these ([`keep`]).
+//! A command computes, and then writes its results. The first signal ends the computation within a second, and never the writing. Once a command has results
+//! ([`has_results`]), the command stops computing by itself, because it checks [`requested`], and writes the results however long the writing takes.
+//! A computation that has no result yet and cannot check [`requested`], such as the eigenvalues of a large matrix, is ended after [`TO_STOP`]. A command that
+//! has whole results of some parts while it computes other parts registers a function that writes these results ([`keep`]).
 
 use std::io::Write as _;
 use std::mem;
@@ -14,59 +14,62 @@ use std::time::Duration;
 
 static ASKED: AtomicBool = AtomicBool::new(false);
 
-/// What must be done even if the program ends at once.
+/// Actions to do even if the program ends at once.
 static LAST: Mutex<Vec<Box<dyn Fn() + Send>>> = Mutex::new(Vec::new());
 
 static STAGE: Mutex<Stage> = Mutex::new(Stage::Computes);
 
-/// How far the command is.
+/// Stage of the command.
 enum Stage {
-    /// There is no result yet that could be written.
+    /// The command has no result yet.
     Computes,
-    /// Parts of the result are there, and this function writes them; the command cannot look at [`requested`] often enough to do so itself.
+    /// Parts of the result exist, and this function writes the parts. Used by commands that cannot check [`requested`] often enough to write the parts
+    /// themselves.
     Keeps(Box<dyn FnOnce() -> String + Send>),
-    /// There are results, which the command writes itself.
+    /// The command has results and writes them itself.
     HasResults,
-    /// The time of the command is over. Only this thread may still write.
+    /// The time of the command is over. Only the thread with this id may still write.
     Ends(ThreadId),
 }
 
-/// How long after the first signal a command may compute that has no results; a second, less the time that a process takes to end.
+/// Time after the first signal in which a command without results may still compute: a second, less the time that a process takes to end.
 const TO_STOP: Duration = Duration::from_millis(800);
-/// How long results may be written without a word about it.
+/// Time in which results are written before a line on standard error says so.
 const TO_WRITE_SILENTLY: Duration = Duration::from_millis(200);
-/// How long what must be done at last may take.
+/// Time that the program waits for the effects of the last actions.
 const LAST_MOMENT: Duration = Duration::from_millis(50);
 
-/// The line for results that take long to write.
+/// Line about results that take long to write.
 const WRITES: &str = "what was computed is written before the program ends, however long that takes; a second signal ends the program at once";
-/// The line of a computation that had no results.
+/// Line about a computation that ended without results.
 const ENDED: &str = "the computation was ended where it stood; files that are whole are kept";
 
-/// Begins to listen. Where that is impossible, signals end the program as they always do.
+/// Installs the handler of signals. If that is impossible, signals end the program at once, as the system's default.
 pub(crate) fn listen() {
     let _ = ctrlc::set_handler(|| {
         if ASKED.swap(true, Ordering::Relaxed) {
             end();
         }
+        // Without a thread nobody could end the computation in time, so the program ends at once.
         if thread::Builder::new().name("end".to_owned()).spawn(end_in_time).is_err() {
             end();
         }
     });
 }
 
-/// Has something done before the program ends without its own end: that a device lets go of somebody's hand. It must not wait.
+/// Registers an action to do before the program ends at once, such as switching off the force of a device that a person holds. The action must not wait.
 pub(crate) fn before_exit(act: impl Fn() + Send + 'static) {
     LAST.lock().unwrap_or_else(PoisonError::into_inner).push(Box::new(act));
 }
 
-/// Has whole results of parts written if the command computes for too long after a signal; the function says what it wrote. Until [`has_results`] is called.
+/// Registers a function that writes the whole results of parts if the command still computes [`TO_STOP`] after a signal. The function returns a line about what
+/// was written. A call of [`has_results`] removes the function.
 pub(crate) fn keep(act: impl FnOnce() -> String + Send + 'static) {
     *stage() = Stage::Keeps(Box::new(act));
 }
 
-/// The command has results: from now on only a second signal ends the program before the command does. The caller looks at [`requested`] between any two
-/// steps of what it still computes. Everything that is printed or written as a whole file calls this itself.
+/// Marks that the command has results: from now on only a second signal ends the program before the command does. The caller checks [`requested`] between any
+/// two steps that it still computes. All functions that print, or write a whole file, call this function themselves.
 ///
 /// Does not return if the time of the command is over already.
 pub(crate) fn has_results() {
@@ -76,7 +79,7 @@ pub(crate) fn has_results() {
         Stage::HasResults => {}
         Stage::Ends(by) => {
             drop(stage);
-            // Half of a document must not stand before or behind what the other thread prints.
+            // The other thread may be printing. This thread waits for the end of the program, so that no part of a second document mixes with that output.
             while thread::current().id() != by {
                 thread::park();
             }
@@ -84,12 +87,12 @@ pub(crate) fn has_results() {
     }
 }
 
-/// Whether the user has asked for the end.
+/// Returns whether the user has asked for the end.
 pub(crate) fn requested() -> bool {
     ASKED.load(Ordering::Relaxed)
 }
 
-/// Ends the program unless it ends by itself, or has results to write.
+/// Waits for [`TO_STOP`] and ends the program, unless the command has results to write. Writes the results of parts before the end.
 fn end_in_time() {
     thread::sleep(TO_STOP);
     let mut stage = stage();
@@ -107,7 +110,7 @@ fn end_in_time() {
     end();
 }
 
-/// Writes the results of parts, and says so if that takes long.
+/// Writes the results of parts and returns the line about them. Prints [`WRITES`] if the writing takes long.
 fn said_of(act: Box<dyn FnOnce() -> String + Send>) -> String {
     let (done, is_done) = mpsc::channel::<()>();
     let late = thread::Builder::new().name("late".to_owned()).spawn(move || {
@@ -117,17 +120,17 @@ fn said_of(act: Box<dyn FnOnce() -> String + Send>) -> String {
     });
     let said = act();
     drop(done);
-    // Its line comes before the last one.
+    // The line of that thread has to come before the last line of the program.
     let _ = late.map(thread::JoinHandle::join);
     said
 }
 
-/// If standard error cannot be written to either, the exit status is all that is left to say it with.
+/// Prints a line on standard error. If standard error cannot be written to, only the exit status tells of the interruption.
 fn say(line: &str) {
     let _ = writeln!(std::io::stderr(), "interrupted: {line}");
 }
 
-/// Ends it at once.
+/// Does the last actions and ends the program at once.
 fn end() -> ! {
     let last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
     last.iter().for_each(|act| act());

@@ -88,7 +88,7 @@ fn main() -> ExitCode {
         Command::Man(arguments) => texts::man(&arguments),
     };
     match done {
-        // What was asked to end has ended, whatever came of it.
+        // A command that ends by a signal has the status of an interruption, whatever its own status is.
         Ok(_) if interrupt::requested() => ExitCode::from(failure::INTERRUPTED),
         Ok(code) => code,
         Err(failure) => report::report(&failure),

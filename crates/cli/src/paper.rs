@@ -1,4 +1,4 @@
-//! `cohaptic paper`.
+//! `cohaptic paper`: reproduces the claims and figures of a paper.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -27,7 +27,7 @@ impl Watch for Bar {
     }
 }
 
-/// Computes the paper again.
+/// Computes the claims and figures of the paper and compares them with the printed values.
 pub(crate) fn paper(arguments: &PaperArguments) -> Result<ExitCode, Failure> {
     let options = Options { quick: arguments.quick, size: arguments.pictures.size() };
     let _own = arguments.out.as_deref().map(own_folder).transpose()?;
@@ -90,14 +90,14 @@ fn write_files(folder: &Path, reproduction: &Reproduction) -> Result<(), Failure
             write_file(&folder.join(format!("{}.toml", claim.id)), scene.as_bytes())?;
         }
     }
-    // Without the time that it took: the same bytes every time.
+    // The document leaves out the wall time, so that every reproduction writes the same bytes.
     let mut claims = serde_json::to_vec_pretty(&DocumentSchema::PAPER.of(&document(reproduction, true, None))).unwrap_or_default();
     claims.push(b'\n');
     write_file(&folder.join("claims.json"), &claims)?;
     write_file(&folder.join("index.html"), page::html(reproduction).as_bytes())
 }
 
-/// How wide the text is.
+/// Width of the text \[characters\].
 const WIDTH: usize = 100;
 
 fn describe(reproduction: &Reproduction) -> String {
@@ -112,7 +112,7 @@ fn describe(reproduction: &Reproduction) -> String {
     text
 }
 
-/// A cell of the table, broken between words, beside its name.
+/// Appends a name and its value to `text`. The value is broken between words at [`WIDTH`] and indented.
 fn wrap(text: &mut String, name: &str, value: &str) {
     let indent = 12;
     let _ = write!(text, "  {name:<width$}", width = indent - 2);

@@ -1,4 +1,4 @@
-//! A progress bar on standard error, only when that is a terminal.
+//! Progress bar on standard error, shown only if standard error is a terminal and `--quiet` is not given.
 
 use std::io::IsTerminal as _;
 use std::time::Duration;
@@ -11,7 +11,7 @@ use crate::output;
 pub(crate) struct Progress(ProgressBar);
 
 impl Progress {
-    /// Progress up to a length, zero where nobody knows it, shown as a template of indicatif says.
+    /// Creates a bar with `length` steps, in the format of an indicatif template. A length of 0 stands for an unknown length.
     pub(crate) fn new(length: u64, template: &str) -> Self {
         let target = if std::io::stderr().is_terminal() && !output::is_quiet() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
@@ -22,31 +22,32 @@ impl Progress {
         Self(self.0.with_prefix(Visible(title).to_string()))
     }
 
-    /// Progress through a scene, in simulated time.
+    /// Creates a bar through the simulated time of a scene, in steps of 1 ms.
     pub(crate) fn through_scene(title: &str, duration: Duration) -> Self {
         let length = u64::try_from(duration.as_millis()).unwrap_or(u64::MAX);
         Self::new(length, "{prefix} {bar:30} {percent:>3} %  {elapsed} passed, {eta} left{msg}").titled(title)
     }
 
-    /// Progress through the runs of a campaign, some of which are done already.
+    /// Creates a bar through `count` runs of a campaign, of which `done` runs are done already.
     pub(crate) fn through_runs(count: u64, done: u64) -> Self {
         let progress = Self::new(count, "{bar:30} {percent:>3} %  {pos}/{len} runs, {per_sec}, {eta} left");
         progress.reach_number(done);
+        // Runs of an earlier command took none of this command's time and must not enter its rate.
         progress.0.reset_eta();
         progress
     }
 
-    /// Shows the elapsed time anew, for work that cannot say how far it is.
+    /// Refreshes the elapsed time every half second, for work that cannot report its progress.
     pub(crate) fn tick(&self) {
         self.0.enable_steady_tick(Duration::from_millis(500));
     }
 
-    /// That number of steps more is to be done.
+    /// Adds a number of steps to the length.
     pub(crate) fn expect(&self, number: u64) {
         self.0.inc_length(number);
     }
 
-    /// One line about a run that goes on until it is stopped.
+    /// Creates a line without a bar, for a run that continues until it is stopped.
     pub(crate) fn of_traffic(title: &str) -> Self {
         Self::new(0, "{prefix}: {msg}, {elapsed} passed").titled(title)
     }
@@ -59,7 +60,7 @@ impl Progress {
         self.0.set_position(now.as_nanos() / 1_000_000);
     }
 
-    /// What stands behind the bar.
+    /// Sets the text after the bar.
     pub(crate) fn note(&self, text: String) {
         self.0.set_message(text);
     }
@@ -72,18 +73,18 @@ impl Progress {
         self.0.inc(number);
     }
 
-    /// Shows one line, which is written again and again.
+    /// Shows one line, which the next call replaces.
     pub(crate) fn show(&self, line: String) {
         self.0.set_message(line);
         self.0.tick();
     }
 
-    /// Whether anybody sees it.
+    /// Returns whether the bar is shown on a terminal.
     pub(crate) fn is_seen(&self) -> bool {
         !self.0.is_hidden()
     }
 
-    /// Does something else to the terminal.
+    /// Hides the bar while `work` writes to the terminal.
     pub(crate) fn aside(&self, work: impl FnOnce()) {
         self.0.suspend(work);
     }

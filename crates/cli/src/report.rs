@@ -1,4 +1,5 @@
-//! How a command that ended without its result says so: in words on standard error, under `--json` in a document on standard output in place of the answer.
+//! Reports a command that ended without its result: as a message on standard error, and under `--json` also as a document on standard output in place of the
+//! answer.
 
 use std::io::{self, IsTerminal as _, Write as _};
 use std::process::ExitCode;
@@ -15,17 +16,17 @@ use crate::document_schema::{DocumentSchema, document};
 use crate::failure::{BAD_INPUT, CLOSED, Failure, INTERRUPTED};
 use crate::output;
 
-/// Says on standard error what went wrong, under `--json` in a document on standard output too, and gives the exit status.
+/// Prints a failure on standard error, and under `--json` also as a document on standard output. Returns the exit status.
 pub(crate) fn report(failure: &Failure) -> ExitCode {
     let status = failure.status();
-    // A reader that closes a pipe has read enough: that is no error, and there is nothing to be said.
+    // A reader that closes a pipe has read enough. This is no error for the user, so no message is printed.
     if status == CLOSED {
         return ExitCode::from(status);
     }
     let message = failure.message();
     let (kind, colour) = if status == INTERRUPTED { ("interrupted", AnsiColor::Yellow) } else { ("error", AnsiColor::Red) };
     let style = if AutoStream::choice(&io::stderr()) == ColorChoice::Never { Style::new() } else { colour.on_default().bold() };
-    // If standard error cannot be written to either, the exit status is all that is left to say it with.
+    // If standard error cannot be written to, only the exit status tells of the failure.
     let _ = io::stderr()
         .write_all(visible_lines(&format!("{kind}: {message}\n")).replacen(&format!("{kind}:"), &format!("{style}{kind}:{style:#}"), 1).as_bytes());
     if output::wants_json_error() {
@@ -34,14 +35,14 @@ pub(crate) fn report(failure: &Failure) -> ExitCode {
     ExitCode::from(status)
 }
 
-/// Reports arguments that make no sense as clap does, under `--json` in a document too, and gives the exit status. Help and version are no errors, unless they
-/// cannot be printed.
+/// Reports invalid arguments as clap does, and under `--json` also as a document. Returns the exit status. Help and version are no errors, unless they cannot
+/// be printed.
 pub(crate) fn wrong_usage(error: &clap::Error) -> ExitCode {
-    // On a terminal clap prints them, with the colours that it has.
+    // Help and version are printed here if standard output is no terminal, so that a failed write is reported. On a terminal clap prints them with colours.
     if !error.use_stderr() && !io::stdout().is_terminal() {
         return output::raw(error.render().to_string().as_bytes()).map_or_else(|failure| report(&failure), |()| ExitCode::SUCCESS);
     }
-    // As clap itself does it: what cannot be printed is not said.
+    // A message that cannot be printed is dropped, as in clap itself.
     let _ = error.print();
     if is_former_command(error) {
         let _ = writeln!(io::stderr(), "{FORMER_COMMAND}");
@@ -53,7 +54,7 @@ pub(crate) fn wrong_usage(error: &clap::Error) -> ExitCode {
     ExitCode::from(status)
 }
 
-/// The program that took over the command `accuracy`.
+/// Hint for users of the former command `accuracy`, which became a program of its own.
 const FORMER_COMMAND: &str =
     "\nSpeed against error is a program of its own: cargo run --release -p cohaptic-accuracy. Of one scene: cohaptic explain SCENE --cost.";
 
@@ -62,7 +63,7 @@ fn is_former_command(error: &clap::Error) -> bool {
     matches!(error.get(ContextKind::InvalidSubcommand), Some(ContextValue::String(command)) if command == "accuracy")
 }
 
-/// The refusal of an argument, in which nothing that was typed disturbs a terminal.
+/// Escapes control characters in the typed texts that a refusal of an argument repeats, because they could disturb a terminal.
 pub(crate) fn visible(mut error: clap::Error) -> clap::Error {
     let shown = |text: &String| Visible(text).to_string();
     let texts: Vec<(ContextKind, ContextValue)> = error
@@ -70,7 +71,7 @@ pub(crate) fn visible(mut error: clap::Error) -> clap::Error {
         .filter_map(|(kind, value)| match value {
             ContextValue::String(text) => Some((kind, ContextValue::String(shown(text)))),
             ContextValue::Strings(texts) => Some((kind, ContextValue::Strings(texts.iter().map(shown).collect()))),
-            // Advice repeats what was typed; it loses its colours.
+            // Advice may repeat the typed text, so it is escaped too and loses its colours.
             ContextValue::StyledStrs(texts) => {
                 Some((kind, ContextValue::StyledStrs(texts.iter().map(|text| StyledStr::from(shown(&text.to_string()))).collect())))
             }
@@ -83,14 +84,14 @@ pub(crate) fn visible(mut error: clap::Error) -> clap::Error {
     error
 }
 
-/// Prints the document of a failure. `message`: as on standard error, without `error:`.
+/// Prints the document of a failure. `message` is the message on standard error without `error:`.
 fn print(failure: &Failure, message: &str, status: u8) -> Result<(), Failure> {
     let location = failure.scene_error().and_then(|error| error.diagnostic()).map(|diagnostic| location(failure, diagnostic));
-    // The place is `null` where no text is meant.
+    // The place is `null` for a failure that has no place in a text.
     output::json(DocumentSchema::ERROR, &document! { status: status, message: message, place: location })
 }
 
-/// Prints the document of arguments that make no sense.
+/// Prints the document of invalid arguments.
 fn print_usage(message: &str, status: u8) -> Result<(), Failure> {
     let message = message.strip_prefix("error: ").unwrap_or(message).trim_end();
     output::json(DocumentSchema::ERROR, &document! { status: status, message: message, place: None::<()> })
@@ -98,7 +99,7 @@ fn print_usage(message: &str, status: u8) -> Result<(), Failure> {
 
 fn location(failure: &Failure, diagnostic: &Diagnostic) -> impl Serialize {
     let argument = diagnostic.override_text().map(|text| {
-        // Keys of a link are words of their own, and no override.
+        // The user types the keys of a link as plain words, without `--set` and without `link.`.
         let is_word = matches!(failure, Failure::LinkKeys(_));
         if is_word { text.strip_prefix("link.").unwrap_or(text).to_owned() } else { format!("{} {text}", failure.option()) }
     });

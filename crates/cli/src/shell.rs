@@ -1,15 +1,15 @@
-//! Words of a command as POSIX shells read them.
+//! Quotes words of a command for POSIX shells.
 
 use std::path::Path;
 
 use crate::output;
 
-/// A path as a word.
+/// Returns a path as one word, quoted if necessary.
 pub(crate) fn path(path: &Path) -> String {
     quoted(&output::path(path))
 }
 
-/// A word as POSIX shells read it.
+/// Returns a word that POSIX shells read as `word`. Words of plain characters stay unquoted.
 pub(crate) fn quoted(word: &str) -> String {
     let plain = |letter: char| letter.is_ascii_alphanumeric() || "-_./=:,%+@".contains(letter);
     if !word.is_empty() && word.chars().all(plain) { word.to_owned() } else { format!("'{}'", word.replace('\'', "'\\''")) }

@@ -1,4 +1,5 @@
-//! Texts for other programs: manual pages (`cohaptic man`) and completions of shells (`cohaptic completions`), made of the arguments themselves, and JSON Schemas of files (`cohaptic schema`).
+//! Texts for other programs: manual pages (`cohaptic man`) and completions of shells (`cohaptic completions`), both generated from the definitions of the
+//! arguments, and JSON Schemas of files (`cohaptic schema`).
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -23,10 +24,10 @@ pub(crate) fn schema(arguments: &SchemaArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Prints the page of a command, or writes all pages into a folder.
+/// Prints the manual page of a command, or writes the manual pages of all commands into a folder.
 pub(crate) fn man(arguments: &ManArguments) -> Result<ExitCode, Failure> {
     let mut program = Arguments::program().disable_help_subcommand(true);
-    // Gives the commands their full names.
+    // `build` gives the subcommands their full names, which the pages and their file names need.
     program.build();
     let Some(folder) = &arguments.out else {
         output::raw(&page(find(&program, &arguments.command)?)?)?;
@@ -62,7 +63,7 @@ fn page(command: &Command) -> Result<Vec<u8>, Failure> {
     Ok(page)
 }
 
-/// Prints what a shell needs to complete commands and options.
+/// Prints the script with which a shell completes commands and options.
 pub(crate) fn completions(arguments: &CompletionsArguments) -> Result<ExitCode, Failure> {
     let mut script = Vec::new();
     clap_complete::generate(arguments.shell, &mut Arguments::program(), "cohaptic", &mut script);

@@ -1,22 +1,26 @@
-//! `--curve` and `--against`: the same map or curve of a scene that differs.
+//! Variants of a scene for `--curve` and `--against`: the same map or curve is drawn for each variant.
 
 use cohaptic_campaign::split_at_commas;
 
 use crate::failure::Failure;
 
-/// A scene that a picture is made of.
+/// Variant of a scene that a picture shows.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Variant {
-    /// In the legend; of the scene as it stands "as it stands".
+    /// Name in the legend. The unchanged scene is called "as it stands".
     pub(crate) name: String,
-    /// What differs from the scene as it stands, on top of all `--set`.
+    /// Overrides of the variant, applied after all `--set`.
     pub(crate) overrides: Vec<String>,
-    /// What the user said it with.
+    /// Option that gave the overrides, for messages.
     pub(crate) option: &'static str,
 }
 
 impl Variant {
-    /// All that a picture shows: the scene as it stands first, then those of `--curve`, then that of `--against`.
+    /// Returns the variants of a picture: the unchanged scene, then one variant per `--curve`, then the variant of `--against`.
+    ///
+    /// # Errors
+    ///
+    /// [`Failure::Input`] if a part of `--curve` is not of the form `KEY=VALUE`.
     pub(crate) fn all(curves: &[String], against: &[String]) -> Result<Vec<Self>, Failure> {
         let mut all = vec![Self { name: "as it stands".to_owned(), overrides: Vec::new(), option: "--set" }];
         for text in curves {
@@ -32,7 +36,7 @@ impl Variant {
         Ok(all)
     }
 
-    /// Everything that is overridden.
+    /// Returns all overrides of the variant: the overrides `set`, then its own.
     pub(crate) fn on_top_of(&self, set: &[String]) -> Vec<String> {
         set.iter().chain(&self.overrides).cloned().collect()
     }

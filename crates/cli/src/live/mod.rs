@@ -50,8 +50,7 @@ fn make_key(file: &Path) -> Result<ExitCode, Failure> {
 fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
     let mut overrides = arguments.overrides.set.clone();
     if let Some(length) = arguments.length {
-        // Expectations may name instants after the shortened end, which would refuse the scene. A session does not check expectations, so the override removes
-        // them.
+        // Expectations are about the whole scene, which may be longer than this session. A session does not check expectations, so the override removes them.
         overrides.extend([format!("scene.duration={}", Span(length)), "expect={}".to_owned()]);
     }
     let overrides = overrides.as_slice();
