@@ -82,6 +82,7 @@ impl Failure {
     fn in_words_of_options(&self, message: String) -> String {
         let option = self.option();
         if matches!(self, Self::LinkKeys(_)) {
+            // `--set link.` stands before the key at fault. The user typed the key without it.
             message.replacen("--set link.", "", 1)
         } else if option == "--set" {
             message

@@ -13,7 +13,7 @@ use crate::failure::{EXPECTATION, Failure};
 use crate::file::write_file;
 use crate::{file, output};
 
-/// Estimates a link, writes the link into a file and prints the estimate.
+/// Estimates a link and prints the estimate. With `--out`, also writes the link into a file, unless `--require-law` is given and no law fits the delays.
 pub(crate) fn fit(arguments: &FitArguments) -> Result<ExitCode, Failure> {
     let source = read(arguments)?;
     let out = arguments.out.as_deref().unwrap_or_else(|| Path::new("link.toml"));
@@ -25,6 +25,7 @@ pub(crate) fn fit(arguments: &FitArguments) -> Result<ExitCode, Failure> {
     let law_is_missing = arguments.require_law && answered.delays.is_some();
     let mut written: Vec<&Path> = Vec::new();
     if arguments.out.is_some() && !law_is_missing {
+        // The delays are written first, so that the file with the link never names a file that does not exist.
         if let Some(csv) = &answered.delays {
             write_file(&delays_file, csv)?;
             written.push(&delays_file);

@@ -54,6 +54,7 @@ fn drive(arguments: &LinkArguments, spec: Spec) -> Result<(Measured, Written), F
             sinks.write(record)
         },
         |sent| {
+            // The packets sent so far are a result, so a signal ends the stream and the report covers these packets.
             progress.reach_number(sent);
             interrupt::has_results();
             !interrupt::requested()

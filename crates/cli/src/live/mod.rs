@@ -157,6 +157,7 @@ fn ready_falcons(scene: &Scene, firmware: Option<&Path>, wishes: Wishes) -> Resu
         }
     };
     let falcons = Falcons::open(scene, firmware, wishes, told).map_err(|fault| Failure::System(fault.to_string()))?;
+    // A second signal ends the program without running destructors, so the motors are stopped by actions before the exit.
     for stopper in falcons.stoppers() {
         interrupt::before_exit(move || stopper.stop());
     }

@@ -167,7 +167,7 @@ pub(crate) fn quantiles(summary: &LatenessSummary) -> Quantiles {
 pub(crate) fn quantiles_of(spans: &[Duration]) -> Quantiles {
     let mut sorted = spans.to_vec();
     sorted.sort_unstable();
-    // Nearest rank: the smallest span that at least `thousandths` of 1000 spans do not exceed. Ranks count from 1, indices from 0.
+    // Nearest rank: the smallest span such that at least `thousandths` per thousand of all spans are not longer. Ranks count from 1, indices from 0.
     let at = |thousandths: usize| sorted.get((sorted.len() * thousandths).div_ceil(1000).saturating_sub(1)).copied().unwrap_or_default();
     Quantiles {
         count: sorted.len() as u64,

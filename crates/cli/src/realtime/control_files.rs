@@ -61,6 +61,7 @@ impl ControlFiles {
     /// Returns the path with symbolic links resolved, if the path lies in the folder. A path with `..` is never accepted.
     fn within(&self, path: &Path) -> Option<PathBuf> {
         let folder = self.folder.as_ref()?;
+        // `..` after a symbolic link leads to a folder that the text of the path does not show, so such paths are refused before they are resolved.
         if path.components().any(|part| part == Component::ParentDir) {
             return None;
         }

@@ -96,6 +96,7 @@ impl Totals {
             packets: intake.offered + at_the_door,
             dropped: at_the_door + over_links(|link| link.stats.dropped_in_all()) + undeliverable + failed,
             sent,
+            // Each delivered datagram is undeliverable, sent, failed, or still unsent.
             unsent: delivered.saturating_sub(undeliverable + sent + failed),
         }
     }

@@ -121,6 +121,7 @@ fn description(setup: &Setup) -> Description {
 /// interval grows with the number of links.
 fn publish_every(links: usize) -> Duration {
     const LINKS_IN_A_MOMENT: usize = 500;
+    // 100 ms per 500 links, at most 5 s.
     let moments = u32::try_from(links.div_ceil(LINKS_IN_A_MOMENT)).unwrap_or(u32::MAX).clamp(1, 50);
     Duration::from_millis(100) * moments
 }

@@ -216,6 +216,7 @@ impl Observer for &mut Watch {
             positions.add_positions(ticks, 0);
         }
         if let Some(places) = &mut self.places
+            // Most ticks lie between two frames. Rows are built only for ticks at which a frame is due.
             && places.wants(ticks.at())
         {
             return ticks.each(|row| {

@@ -26,6 +26,7 @@ pub(super) fn read(file: &Path, scene: &Scene, arguments: &RunArguments, overrid
     let of_the_session = RecordedScene::read(&text).map_err(unreadable)?;
     let mut differences: Vec<String> = match of_the_session {
         Some(recorded) => {
+            // The content of the scene is compared key by key, so that the message names the keys that differ.
             let now = RecordedScene::of(scene, input::with(path, |text, file| scene_content_of_text(text, file, overrides))?);
             recorded.differences(&now).iter().map(ToString::to_string).collect()
         }

@@ -91,6 +91,7 @@ impl Worker {
         };
         self.write(&format!("end {word} {:.3}\n", self.begun.elapsed().as_secs_f64()));
         self.stop();
+        // Work that is complete stays valid even if another process took the shard meanwhile, because both processes compute the same pieces.
         if outcome.is_ok() || !self.is_lost.load(Ordering::Relaxed) {
             return outcome;
         }
