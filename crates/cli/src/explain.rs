@@ -120,6 +120,7 @@ fn table_of(kind: Kind, methods: &[&MeasuredMethod]) -> String {
         [format!("  {}{chosen}", method.name), cost(method), error_in_words(method.error), words.join("; ")]
     });
     let lines: Vec<[String; 4]> = std::iter::once(head).chain(rows).collect();
+    // Widths are counted in characters, because `format!` pads by characters and units contain characters of several bytes.
     let width = |column: usize| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or_default();
     let [name, cost, error] = [width(0), width(1), width(2)];
     let mut text = String::new();

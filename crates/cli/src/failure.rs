@@ -120,6 +120,7 @@ impl Failure {
 /// Returns the failure for a variant of a valid scene. If the fault lies in one of the `overrides` of the variant, the failure names `option`.
 pub(crate) fn of_variant(error: SceneError, option: &'static str, overrides: &[String]) -> Failure {
     let text = error.diagnostic().and_then(Diagnostic::override_text);
+    // The overrides of the variant stand on top of `--set`. A fault in a `--set` would also have refused the scene without the variant.
     if text.is_some_and(|text| overrides.iter().any(|given| given == text)) { Failure::Override { option, error } } else { Failure::Scene(error) }
 }
 
@@ -127,6 +128,7 @@ pub(crate) fn of_variant(error: SceneError, option: &'static str, overrides: &[S
 /// simulated.
 pub(crate) fn too_large(scene: &Scene, overrides: &[String], model: Model, watched: bool) -> Option<SceneError> {
     let TooLarge { peer, reason } = cohaptic_harness::too_large(scene, model, watched)?;
+    // A scene from standard input has a name for messages as its file. The path `-` gives the kept bytes of standard input.
     let path = if scene.file == input::named(Path::new("-")) { Path::new("-") } else { &scene.file };
     let refused = |text: &str, file: &Path| Err::<(), SceneError>(at_peer(text, file, overrides, peer, &reason));
     input::with(path, refused).err()

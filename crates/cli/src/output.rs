@@ -12,13 +12,13 @@ use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
 use crate::interrupt;
 
-/// Whether answers are JSON documents, including the answer to a wrong argument.
+/// Set if answers are JSON documents, including the answer to a wrong argument.
 static WANTS_JSON: AtomicBool = AtomicBool::new(false);
 
-/// Whether anything was written to standard output already.
+/// Set once anything was written to standard output.
 static ANSWERED: AtomicBool = AtomicBool::new(false);
 
-/// Whether standard error is for errors alone.
+/// Set if standard error is for errors alone.
 static QUIET: AtomicBool = AtomicBool::new(false);
 
 /// Suppresses the progress and the names of written files on standard error.

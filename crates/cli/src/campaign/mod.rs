@@ -89,6 +89,7 @@ fn scene_file(arguments: &CampaignArguments) -> &Path {
 fn plan(arguments: &CampaignArguments, sharing: Sharing<'_>) -> Result<CampaignPlan, Failure> {
     let refused = |error: CampaignError| failure(error, scene_file(arguments), &[]);
     let Some(file) = &arguments.scene else {
+        // Without a scene, the command continues the campaign that the folder records. Options that describe a campaign could contradict that record.
         let CampaignArguments { overrides, vary, measure, verdicts, .. } = arguments;
         if !overrides.set.is_empty() || !vary.is_empty() || measure.word().is_some() || *verdicts {
             return Err(Failure::Input("the options of a campaign stand beside no scene: expected its scene too, or none of them".to_owned()));
@@ -190,6 +191,7 @@ pub(crate) fn run_to_end(campaign: &mut Campaign, out: &Path) -> Result<Report, 
             let out = output::path(out);
             Err(Ended::Said(Failure::Interrupted(format!("{kept} of {runs} runs are kept in {out}; the same command goes on from there"))))
         }
+        // An error of a file, such as a full disk, does not harm the runs that are kept, so the message tells how to continue.
         Err(error @ CampaignError::File { .. }) => {
             let kept = campaign.kept();
             let going_on = format!("{error}\n{kept} of {runs} runs are kept: once that can be done, the same command goes on from there");

@@ -77,6 +77,7 @@ fn plan(arguments: &CompareArguments, asked: &Asked) -> Result<CampaignPlan, cam
     let mut variations = vec![asked.strategies.variation()];
     for text in &asked.vary {
         let variation = Variation::parse(text).map_err(|error| campaign::Ended::Error(error.into()))?;
+        // The first variation already varies the key of the strategies, and a key can vary only once.
         if variation.is_key(Strategies::KEY) {
             return Err(said(Failure::Input(format!("--vary {text}: the strategies are those of --strategies: expected another key"))));
         }

@@ -69,6 +69,7 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
         .into_iter()
         .map(|(at, links)| (at, numbered(links)))
         .collect();
+    // The keys are ordered by sender, then by receiver, as `pairs` is. A link therefore has the same index in both.
     let keys = input::with(path, |text, file| link_keys_of_text(text, file, overrides))?.into_values().collect();
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     let (changes, wanted) = channel();

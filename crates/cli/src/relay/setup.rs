@@ -46,6 +46,7 @@ impl Setup {
 
     fn of_file(arguments: &RelayArguments, path: &Path) -> Result<Self, Failure> {
         let mut overrides = arguments.set.clone();
+        // Options of their own come after all `--set`, so that they win over `--set` and over the file.
         let mut lay = |key: &str, value: Option<String>| overrides.extend(value.map(|value| format!("relay.{key}={value}")));
         lay("seed", arguments.seed.map(|seed| seed.to_string()));
         lay("most-packets", arguments.packets.map(|packets| packets.to_string()));
@@ -88,6 +89,7 @@ impl Setup {
             nodes: vec!["client".to_owned(), "server".to_owned()],
             pairs: vec![(NodeId(0), NodeId(1)), (NodeId(1), NodeId(0))],
             keys: vec![forth_keys, back_keys],
+            // Keys on the command line name files relative to the working directory.
             folder: PathBuf::new(),
         })
     }

@@ -131,6 +131,7 @@ fn route(
     let mut asked: Vec<ConfiguredDelay> = file.links.iter().flat_map(|link| [ConfiguredDelay::of(&link.model); 2]).collect();
     let ended = router.run(stop, until, LOOK, |router| {
         for Edit { link: lane, model, .. } in wanted.try_iter() {
+            // Each link has two lanes in the description: `lane / 2` is the link, `lane % 2` is the side that packets come from.
             let (Some(link), Some(asked)) = (file.links.get(lane / 2), asked.get_mut(lane)) else { continue };
             let changed = router.set_link(&link.name, Some(Side::BOTH[lane % 2]), &model);
             asked.changes += u64::from(changed.is_ok());

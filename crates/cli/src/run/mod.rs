@@ -249,6 +249,7 @@ fn command_line(arguments: &RunArguments) -> String {
     words.extend(arguments.inputs.as_deref().map(|file| format!("--inputs {}", path(file))));
     words.extend(arguments.force.then(|| "--force".to_owned()));
     words.extend(arguments.general.then(|| "--general".to_owned()));
+    // `--motion`, `--links` and options of the terminal do not change the records and are left out.
     words.push(format!("--out {FOLDER}"));
     words.extend(arguments.pictures.word().map(|size| format!("--size {}", quoted(size))));
     if input::is_standard_input(scene) {

@@ -28,7 +28,7 @@ pub(crate) use worker::{Worker, owner};
 pub(crate) enum Sharing<'a> {
     /// The whole work, in the folder of `--out` if the option is given.
     Whole(Option<&'a Path>),
-    /// One shard, in the folder.
+    /// A single shard, in the folder.
     Shard(Shard, &'a Path),
     /// Merges the results that shards left in the folder.
     Merge(&'a Path),

@@ -14,7 +14,7 @@ use cohaptic_files::{BEAT, Holder, Lease, OwnFolder, Owner, STALE, Taking};
 use crate::failure::Failure;
 use crate::{interrupt, output};
 
-/// This process as the worker on one shard in a folder.
+/// Work of this process on one shard in a folder, from taking the lease to its end.
 pub(crate) struct Worker {
     shard: Shard,
     folder: PathBuf,
