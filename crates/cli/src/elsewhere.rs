@@ -1,4 +1,4 @@
-//! Stand-ins for the commands that need Linux, on other systems: each command takes its arguments, prints that it needs Linux, and ends with status 3.
+//! Stand-ins, on other systems, for the commands that need Linux: each stand-in takes the arguments of the command, prints an error, and ends with status 3.
 
 /// Makes one module per command, with the function that stands in for the command.
 macro_rules! need_linux {

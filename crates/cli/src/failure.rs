@@ -1,4 +1,4 @@
-//! Reasons why a command ended without its result, and their exit statuses.
+//! Failures of commands, with messages and exit statuses.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -78,7 +78,7 @@ impl Failure {
         }
     }
 
-    /// Rewrites a message about the scene, which always names `--set`, so that it names the option that the user gave.
+    /// Replaces `--set` in a message about the scene by the option of the user: the scene crate knows only `--set`.
     fn in_words_of_options(&self, message: String) -> String {
         let option = self.option();
         if matches!(self, Self::LinkKeys(_)) {

@@ -66,7 +66,7 @@ pub(crate) fn own_folder(path: &Path) -> Result<OwnFolder, Failure> {
     OwnFolder::take(path).map_err(unwritten(path))
 }
 
-/// Returns a function that makes the failure for a file that cannot be written.
+/// Returns a function from the error of writing `path` to a failure.
 pub(crate) fn unwritten(path: &Path) -> impl Fn(io::Error) -> Failure {
     |error| Failure::File { verb: "write", path: path.to_path_buf(), error }
 }

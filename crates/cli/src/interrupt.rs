@@ -96,6 +96,7 @@ pub(crate) fn requested() -> bool {
 fn end_in_time() {
     thread::sleep(TO_STOP);
     let mut stage = stage();
+    // The lock is held while the stage changes, so that `has_results` either comes first, and the results are written, or finds the end and waits.
     if matches!(*stage, Stage::HasResults) {
         drop(stage);
         say(WRITES);

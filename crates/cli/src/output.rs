@@ -93,7 +93,7 @@ pub(crate) fn wrote(files: impl IntoIterator<Item = impl AsRef<Path>>) {
     }
 }
 
-/// Converts a path to text. Bytes that are not Unicode are replaced, because JSON cannot represent them.
+/// Converts a path to text. Bytes that are not Unicode are replaced, because JSON cannot represent such bytes.
 pub(crate) fn path(path: &Path) -> String {
     path.to_string_lossy().into_owned()
 }

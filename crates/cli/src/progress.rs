@@ -37,7 +37,7 @@ impl Progress {
         progress
     }
 
-    /// Refreshes the elapsed time every half second, for work that cannot report its progress.
+    /// Refreshes the elapsed time every half second, for work without reports of progress.
     pub(crate) fn tick(&self) {
         self.0.enable_steady_tick(Duration::from_millis(500));
     }

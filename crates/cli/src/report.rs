@@ -54,16 +54,16 @@ pub(crate) fn wrong_usage(error: &clap::Error) -> ExitCode {
     ExitCode::from(status)
 }
 
-/// Hint for users of the former command `accuracy`, which became a program of its own.
+/// Hint for users of the former command `accuracy`, now a separate program.
 const FORMER_COMMAND: &str =
     "\nSpeed against error is a program of its own: cargo run --release -p cohaptic-accuracy. Of one scene: cohaptic explain SCENE --cost.";
 
-/// Returns whether the command that was typed is `accuracy`, which earlier versions had.
+/// Returns whether the user typed `accuracy`, a command of earlier versions.
 fn is_former_command(error: &clap::Error) -> bool {
     matches!(error.get(ContextKind::InvalidSubcommand), Some(ContextValue::String(command)) if command == "accuracy")
 }
 
-/// Escapes control characters in the typed texts that a refusal of an argument repeats, because they could disturb a terminal.
+/// Escapes control characters in the typed texts of a refused argument, because control characters could disturb a terminal.
 pub(crate) fn visible(mut error: clap::Error) -> clap::Error {
     let shown = |text: &String| Visible(text).to_string();
     let texts: Vec<(ContextKind, ContextValue)> = error
@@ -71,7 +71,7 @@ pub(crate) fn visible(mut error: clap::Error) -> clap::Error {
         .filter_map(|(kind, value)| match value {
             ContextValue::String(text) => Some((kind, ContextValue::String(shown(text)))),
             ContextValue::Strings(texts) => Some((kind, ContextValue::Strings(texts.iter().map(shown).collect()))),
-            // Advice may repeat the typed text, so it is escaped too and loses its colours.
+            // Advice may repeat the typed text. The advice is therefore escaped too, and loses its colours.
             ContextValue::StyledStrs(texts) => {
                 Some((kind, ContextValue::StyledStrs(texts.iter().map(|text| StyledStr::from(shown(&text.to_string()))).collect())))
             }

@@ -27,7 +27,7 @@ pub(crate) fn schema(arguments: &SchemaArguments) -> Result<ExitCode, Failure> {
 /// Prints the manual page of a command, or writes the manual pages of all commands into a folder.
 pub(crate) fn man(arguments: &ManArguments) -> Result<ExitCode, Failure> {
     let mut program = Arguments::program().disable_help_subcommand(true);
-    // `build` gives the subcommands their full names, which the pages and their file names need.
+    // `build` gives the subcommands their full names. Pages and file names need the full names.
     program.build();
     let Some(folder) = &arguments.out else {
         output::raw(&page(find(&program, &arguments.command)?)?)?;

@@ -89,7 +89,7 @@ fn scene_file(arguments: &CampaignArguments) -> &Path {
 fn plan(arguments: &CampaignArguments, sharing: Sharing<'_>) -> Result<CampaignPlan, Failure> {
     let refused = |error: CampaignError| failure(error, scene_file(arguments), &[]);
     let Some(file) = &arguments.scene else {
-        // Without a scene, the command continues the campaign that the folder records. Options that describe a campaign could contradict that record.
+        // Without a scene, the command continues the campaign recorded in the folder. Options of a new campaign could contradict the record.
         let CampaignArguments { overrides, vary, measure, verdicts, .. } = arguments;
         if !overrides.set.is_empty() || !vary.is_empty() || measure.word().is_some() || *verdicts {
             return Err(Failure::Input("the options of a campaign stand beside no scene: expected its scene too, or none of them".to_owned()));
@@ -201,7 +201,7 @@ pub(crate) fn run_to_end(campaign: &mut Campaign, out: &Path) -> Result<Report, 
     }
 }
 
-/// Converts an error of a campaign into a failure that names the option at fault. `strategies` holds the overrides that came from `--strategies`.
+/// Converts an error of a campaign into a failure with the name of the option at fault. `strategies` holds the overrides of `--strategies`.
 pub(crate) fn failure(error: CampaignError, scene: &Path, strategies: &[String]) -> Failure {
     match error {
         CampaignError::Scene { error, varied } => {

@@ -25,7 +25,7 @@ pub(crate) fn shard(
     let opened = SharedCampaign::open(plan, folder, &owner.name(), &checking);
     checking.clear();
     let mut shared = opened.map_err(Ended::Error)?;
-    // The campaign is opened before the lease is taken, so that a campaign that is refused leaves no lease and no log.
+    // The campaign is opened before the lease is taken, so that a refused campaign leaves no lease and no log.
     let worker = Worker::begin(folder, shard, &owner).map_err(Ended::Said)?;
     let done = work(&mut shared, shard, folder, &worker, judge);
     worker.end(done, Ended::Said)

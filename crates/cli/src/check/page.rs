@@ -41,7 +41,7 @@ fn section(scene: &Checked) -> Html {
     if !scene.expectations.is_empty() {
         content = content.and(Html::table(&scene.expectations.iter().fold(columns(), |table, outcome| table.row(cells(outcome)))));
     }
-    // Preformatted, because a message that shows a place in a file has several lines that must stay aligned.
+    // Preformatted, because a message with a place in a file has several lines, and the lines must stay aligned.
     for failure in &scene.failures {
         content = content.and(Html::preformatted(failure));
     }

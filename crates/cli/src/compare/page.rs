@@ -18,14 +18,14 @@ pub(super) fn source<'a>(arguments: &CompareArguments, finished: &Finished, scen
     Ok(PageSource { strategies: strategies(arguments, finished)?, command, campaign, scene })
 }
 
-/// Returns, for each strategy, its description and its parameters with their values in the scene.
+/// Returns the description of each strategy, and the parameters of the strategy with the values in the scene.
 fn strategies(arguments: &CompareArguments, finished: &Finished) -> Result<Vec<(&'static str, String)>, Failure> {
     let strategies = Asked::of(arguments).map_err(|error| Failure::Input(error.to_string()))?.strategies;
     let all = (0..finished.comparison.strategies.len()).map(|place| {
         let (about, parameters) = strategies.registered(place);
         let varied = strategies.variation().overrides(place);
         let overrides: Vec<String> = arguments.scene.overrides.set.iter().chain(&varied).cloned().collect();
-        // A scene that is refused has no content. Only the values of its overrides and the defaults are shown then.
+        // A refused scene has no content. Only the values of overrides and the defaults are shown then.
         let keys = input::with(&arguments.scene.scene, |text, file| scene_content_of_text(text, file, &overrides))
             .map(|content| content.keys)
             .unwrap_or_default();

@@ -26,7 +26,7 @@ pub(crate) use spec::link_and_keys;
 /// Number of packets without `--packets`, for links that are not a replay.
 const PACKETS: u64 = 100_000;
 
-/// Drives one link, and prints what the configuration asks for beside what was measured.
+/// Drives one link, and prints the configured figures beside the measured figures.
 pub(crate) fn link(arguments: &LinkArguments) -> Result<ExitCode, Failure> {
     let (measured, written) = drive(arguments, Spec::read(arguments)?)?;
     let document = cohaptic_answers::link::document(&measured, Some(&written));

@@ -164,7 +164,7 @@ pub(super) struct TimedLinks {
 impl LinkEditor for TimedLinks {
     fn keys(&self, link: usize) -> Vec<(String, String)> {
         let now = self.elapsed.get();
-        // Changes of the timeline that have happened since the last call of `change` are not in `links` yet. The last of them gives the current keys.
+        // Changes of the timeline since the last call of `change` are not in `links` yet. The last such change of the link gives the current keys.
         let past = self.planned.iter().take_while(|(at, _)| *at <= now).flat_map(|(_, links)| links);
         match past.filter(|(changed, _)| *changed == link).last() {
             Some((_, keys)) => keys.iter().map(|(key, value)| (key.to_owned(), value.to_owned())).collect(),

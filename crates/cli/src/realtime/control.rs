@@ -142,7 +142,7 @@ impl LinkEditor for KeyedLinks {
     }
 }
 
-/// Converts the statistics of a link into counters. Fields that only some commands know keep their default values.
+/// Converts the statistics of a link into counters. Fields known only to some commands keep their default values.
 pub(crate) fn counters(stats: &LinkStats) -> LinkCounters {
     LinkCounters {
         offered: stats.offered(),
@@ -191,7 +191,7 @@ mod tests {
         let keys = vec![LinkKeys::default().with("delay", "\"8ms\""), LinkKeys::default().with("netem", "\"delay 3ms\"")];
         let mut links = KeyedLinks { keys, folder: PathBuf::new(), files: ControlFiles::default(), changes };
         let loss = |value: &str| vec![("loss".to_owned(), value.to_owned())];
-        // The second link is written in words of tc-netem, which no other key stands beside.
+        // The keys of the second link are words of tc-netem. No other key may stand beside words.
         let error = links.change(&[0, 1], &loss("\"1%\"")).unwrap_err();
         assert!(error.contains("netem"), "{error}");
         assert_eq!(links.keys(0), [("delay".to_owned(), "\"8ms\"".to_owned())]);

@@ -61,7 +61,7 @@ impl ControlFiles {
     /// Returns the path with symbolic links resolved, if the path lies in the folder. A path with `..` is never accepted.
     fn within(&self, path: &Path) -> Option<PathBuf> {
         let folder = self.folder.as_ref()?;
-        // `..` after a symbolic link leads to a folder that the text of the path does not show, so such paths are refused before they are resolved.
+        // `..` after a symbolic link leads to a folder not visible in the text of the path, so paths with `..` are refused before resolution.
         if path.components().any(|part| part == Component::ParentDir) {
             return None;
         }
@@ -113,7 +113,7 @@ mod tests {
 
     const TRACE: &str = "0\n10\n20\n";
 
-    /// A folder `open` with files in it and a file beside it.
+    /// Makes a folder `open` with files, and a file beside the folder.
     fn desk() -> (tempfile::TempDir, ControlFiles) {
         let desk = tempfile::tempdir().unwrap();
         let open = desk.path().join("open");
@@ -148,7 +148,7 @@ mod tests {
         assert_eq!(said(&at("open/a.trace")), said(Path::new("/none")), "nobody learns which files there are");
     }
 
-    /// A pipe that nobody writes to has no end: were it read, this test would not return.
+    /// A read of a pipe without a writer never ends, so this test would not return if the pipe were read.
     #[test]
     fn what_is_no_regular_file_is_not_waited_for() {
         let (desk, files) = desk();

@@ -1,4 +1,4 @@
-//! Messages of the commands that run in real time, and the publisher that limits how often a run takes a snapshot.
+//! Messages of the commands in real time, and the publisher, which limits the number of snapshots of a run.
 
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
@@ -124,7 +124,7 @@ pub(crate) fn lasted(span: Duration) -> Span {
     Span(Duration::from_millis(u64::try_from(span.as_millis()).unwrap_or(u64::MAX)))
 }
 
-/// Lists the counts that are not zero, with their names: `3 stranger, 1 to-itself`. Returns `None` if all counts are zero.
+/// Lists all counts above zero with the name of each count: `3 stranger, 1 to-itself`. Returns `None` if all counts are zero.
 pub(crate) fn counts(all: &[(&str, u64)]) -> Option<String> {
     let some: Vec<String> = all.iter().filter(|(_, count)| *count > 0).map(|(name, count)| format!("{count} {name}")).collect();
     (!some.is_empty()).then(|| some.join(", "))
@@ -133,7 +133,7 @@ pub(crate) fn counts(all: &[(&str, u64)]) -> Option<String> {
 /// Configured mean delay of a link at the start of a run, and the number of changes of the link since.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) struct ConfiguredDelay {
-    /// Configured mean delay at the start. `None` for a link that replays a recording, which has no configured delay.
+    /// Configured mean delay at the start. `None` for the replay of a recording, because a recording has no configured delay.
     pub(crate) first: Option<Duration>,
     pub(crate) changes: u64,
 }

@@ -73,7 +73,7 @@ pub(super) fn refused(intake: &IntakeCounts) -> [(&'static str, u64); 4] {
 
 /// Sums over all links and ports of a relay.
 struct Totals {
-    /// Datagrams that came in, including all that were dropped later.
+    /// Received datagrams, including datagrams dropped later.
     packets: u64,
     /// Datagrams that were dropped by the relay, by its links, or by the kernel on sending. Datagrams that the kernel dropped before the relay read them are
     /// not counted.

@@ -18,7 +18,7 @@ use crate::realtime::{ConfiguredDelay, carried, counts, lasted, late, notes};
 pub(super) fn document(file: &RouterFile, ran: &RouterRun) -> impl Serialize {
     let RouterRun { report, prepared, validity, asked, ending } = ran;
     let counters = &report.counters;
-    // Counts of one side: packets received from its device, and packets written to its device.
+    // Counts of one side: packets received from the device of the side, and packets written to that device.
     let side = |side: Side, device: &str| {
         let Received { all, not_ip, malformed, passed, dropped } = counters.received[side.index()];
         let Written { packets, bytes, full, too_long, refused } = report.written[side.index()];

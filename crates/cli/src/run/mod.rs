@@ -235,7 +235,7 @@ impl Observer for &mut Watch {
     }
 }
 
-/// Placeholder for the folder of the records in [`command_line`]. The content of records must not depend on the folder that they are written to.
+/// Placeholder for the folder of the records in [`command_line`]. The content of records must not depend on their folder.
 const FOLDER: &str = "DIR";
 
 /// Returns the command that repeats a run, as a line for a shell, with the options that affect the records.

@@ -128,7 +128,7 @@ fn links(summary: &Summary) -> Html {
     let shown: Vec<(LinkName, LinkStats)> = access.chain(between).take(MOST_ROWS).collect();
     let mut total = summary.links.total();
     summary.access_lines.iter().for_each(|line| total.add(&line.stats, 1));
-    // Causes that dropped nothing are left out, because they would make the table wide.
+    // Causes without a drop are left out, because their columns would make the table wide.
     let causes: Vec<DropCause> = DropCause::ALL.into_iter().filter(|cause| total.dropped(*cause) > 0).collect();
     let head = Table::new().column("link").number("offered").number("copies").number("delivered");
     let head = causes.iter().fold(head, |table, cause| table.number(format!("dropped: {}", cause.name())));

@@ -66,7 +66,7 @@ struct Task {
     of: &'static Source,
     /// Place of the task, counted from 0.
     place: u64,
-    /// Number of tasks, or `None` if the source does not tell it.
+    /// Number of tasks, or `None` if no variable of the source holds the number.
     count: Option<u64>,
 }
 

@@ -39,6 +39,7 @@ impl Worker {
     /// worker renews the lease, which is an error, or until the lease is stale.
     pub(crate) fn begin(folder: &Path, shard: Shard, owner: &Owner) -> Result<Self, Failure> {
         let lease = take(folder, shard, owner)?;
+        // The lease is taken before this check, and a process that takes the whole folder checks in the opposite order. At least one of the two sees the other.
         if OwnFolder::is_taken(folder) {
             let folder = output::path(folder);
             return Err(Failure::System(format!("another process works on all shards in {folder}: expected to be the only one; wait for it")));
@@ -67,7 +68,8 @@ impl Worker {
         !interrupt::requested() && !self.is_lost.load(Ordering::Relaxed)
     }
 
-    /// Logs that a piece of work with `units` units is kept. A line that cannot be written is missing in the status; the work itself is not affected.
+    /// Logs a finished piece of work with `units` units. If the line cannot be written, the piece is missing in the status, but the work itself is not
+    /// affected.
     pub(crate) fn kept(&self, piece: u64, units: u64) {
         self.write(&format!("piece {piece} {units} {:.3}\n", self.begun.elapsed().as_secs_f64()));
     }
@@ -142,7 +144,7 @@ fn take(folder: &Path, shard: Shard, owner: &Owner) -> Result<Lease, Failure> {
             Taking::Taken(lease) => return Ok(lease),
             Taking::Held(holder) => holder,
         };
-        // Only a renewal between two looks proves that the holder lives: a killed process leaves its lease behind.
+        // A killed process leaves its lease behind. Only a renewal between two looks proves a living holder.
         if seen.as_ref().is_some_and(|seen| holder.has_lived_since(seen)) {
             return Err(busy(folder, shard, &holder));
         }
