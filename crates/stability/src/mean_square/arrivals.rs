@@ -1,68 +1,70 @@
-//! At which of the receiver's ticks a sample may be taken in, and with which probability.
+//! Ticks of a receiver at which a sample may be taken in, and the probability of each.
 //!
-//! What a receiver holds of a sender is the newest sample that has arrived. Let n be a sample sent at s, with G(x) the probability that it has arrived x
-//! after it was sent; at a tick t its *hazard* is the probability that it arrives there if it has not arrived before,
+//! A receiver holds the newest sample that has arrived from a sender. Let n be a sample sent at s, and G(x) the probability that n has arrived by the time x
+//! after its sending. The *hazard* of n at a tick t is the probability that n arrives by t, given that n has not arrived by the tick before:
 //!
 //! ```text
 //! (G(t − s) − G(t₋ − s)) / (1 − G(t₋ − s)),    t₋ the tick before.
 //! ```
 //!
-//! To take in, at each tick, sample n with its hazard, independently of everything else, gives n the right law: it is not held after t with probability
-//! Π(1 − hazard) = 1 − G. That it may be taken in twice does not matter, because the second time changes nothing. What does matter is that a sample older than
-//! the one held must not be taken in. Where every sample has its last possible tick before, or at, the first one of the next sample, that cannot
-//! happen, and the hazards are all there is. Otherwise it must be known *which* sample is held, as far as that decides whether one that may yet arrive is
-//! newer. If a is the newest sample that has arrived, then none after a has, so the hazards of those after a hold given a: the *place*
-//! r = max(a − lo, 0), with lo the oldest sample that may arrive yet, is a Markov chain.
+//! Taking in sample n at each tick with its hazard, independently of everything else, gives n the right law: the probability that n has not been taken in
+//! by t is Π(1 − hazard) = 1 − G. In this model n may be taken in twice, but the second time changes nothing. A sample older than the held sample, however,
+//! must not be taken in. If the last possible tick of every sample is not after the first possible tick of the next sample, an older sample never arrives
+//! later, and the hazards suffice. Otherwise the model must know *which* sample is held, as far as the held sample decides whether a sample that may still
+//! arrive is newer. If a is the newest sample that has arrived, then no sample after a has arrived, so the hazards of the samples after a hold given a.
+//! Hence the *place* r = max(a − lo, 0), with lo the oldest sample that may still arrive, is a Markov chain.
 
-/// The probability that a sample has arrived that number of nanoseconds after it was sent.
+/// Law of the time from the sending of a sample to its arrival \[ns\].
 pub(crate) trait Arrival {
-    /// Zero before it can arrive; not decreasing.
-    fn within(&self, nanos: i128) -> f64;
-    /// No sample arrives sooner than this.
+/// Returns the probability that a sample has arrived `nanos` nanoseconds after its sending. Zero below the least time, and not decreasing. The limit is
+/// below 1 if samples can be lost.
+fn within(&self, nanos: i128) -> f64;
+/// Returns a lower bound of the time from sending to arrival \[ns\].
     fn least(&self) -> i128;
 }
 
-/// When the samples of a link may be taken in, in a frame that repeats.
+/// Ticks at which the samples of a link may be taken in, with their hazards, in a periodic frame.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Hazards {
-    /// For each tick of the receiver: the samples and their hazards, oldest first; samples are numbered from the first of this frame.
+    /// Samples that may be taken in, with their hazards, oldest sample first. Indexed by the receiver's tick. Sample 0 is the first one sent in this frame.
     pub at: Vec<Vec<Hazard>>,
-    /// How many places there are; one if no sample overtakes another.
+    /// Largest number of places at any tick; 1 if no sample overtakes another.
     pub(crate) places: usize,
-    /// Whether a sample has more than one tick at which it may arrive.
+    /// Whether any sample has several ticks at which it may arrive.
     pub(crate) spread: bool,
-    /// The oldest sample that may arrive at or after each tick, and after the last.
+    /// Oldest sample that may arrive at or after a tick. Indexed by tick; the last entry belongs to the first tick of the next frame.
     oldest: Vec<i64>,
-    /// The newest that may have arrived by the tick before each, and by the last.
+    /// Newest sample that may have arrived before a tick. Indexed by tick; the last entry belongs to the first tick of the next frame.
     newest: Vec<i64>,
-    /// For each sample of the frame: the number of its first tick, counted from the first tick of the frame, and the probability that it has arrived by that
-    /// tick and by each one after it, up to its last.
+    /// For each sample of the frame, the number of the first tick at which the sample may arrive, counted from the first tick of the frame, and the
+    /// probabilities that the sample has arrived by that tick and by each later tick, up to the last possible one.
     arrived: Vec<(i64, Vec<f64>)>,
 }
 
-/// A sample that may be taken in at a tick.
+/// Sample that may be taken in at a tick.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hazard {
-    /// The number of the sample, counted from the first of the frame.
+    /// Number of the sample. Sample 0 is the first one sent in the frame; samples of earlier frames are negative.
     pub sample: i64,
-    /// The probability that the sample is taken in at the tick, if it was not before.
+    /// Probability that the sample is taken in at the tick, given that the sample has not arrived at an earlier tick.
     pub hazard: f64,
 }
 
-/// The samples that matter at a tick.
+/// Range of the samples that may arrive, or may be held, around a tick.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Window {
-    /// The oldest sample that may arrive at the tick or later.
-    pub(crate) before: i64,
-    /// The oldest sample that may arrive later.
-    pub(crate) after: i64,
-    /// The newest sample that may have arrived by the tick.
-    pub(crate) newest: i64,
-    /// Places at the beginning of the tick.
+/// Oldest sample that may arrive at the tick or later. Place 0 at the beginning of the tick.
+pub(crate) before: i64,
+/// Oldest sample that may arrive after the tick. Place 0 at the end of the tick.
+pub(crate) after: i64,
+/// Newest sample that may have arrived by the end of the tick.
+pub(crate) newest: i64,
+/// Number of places at the beginning of the tick.
     pub(crate) places: usize,
 }
 
-/// What may happen at a tick: from one place to another, taking in a sample or none.
+/// Possible transition of a link's chain at a tick: from one state to another, with the sample that is taken in, if any. Without a chain of losses the
+/// states are the places.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Outcome {
     pub(crate) from: usize,
@@ -71,22 +73,24 @@ pub(crate) struct Outcome {
     pub(crate) probability: f64,
 }
 
-/// More ticks than this between the first and the last at which a sample may arrive are refused.
+/// Largest number of ticks between the first and the last possible arrival of a sample.
 const MOST_TICKS: usize = 1_000_000;
 
 impl Hazards {
-    /// The hazards of samples sent and ticks made at those instants \[ns\] of a frame, each list in order and not empty; `None` if a sample may take too
-    /// long.
+    /// Computes the hazards of a link. `frame` is the length of the frame \[ns\]; `sends` and `ticks` are the instants \[ns\] within the frame at which samples
+    /// are sent and the receiver ticks, both ascending and not empty. Returns `None` if a sample may take longer than [`MOST_TICKS`] ticks.
     pub(crate) fn new(frame: u64, sends: &[u64], ticks: &[u64], arrival: &impl Arrival) -> Option<Self> {
         let frame = i128::from(frame);
         let count = i128::try_from(ticks.len()).ok()?;
+        // Returns the instant \[ns\] of the tick with a number that counts on over frames, negative numbers included.
         let tick = |number: i128| -> Option<i128> {
             let place = usize::try_from(number.rem_euclid(count)).ok()?;
             Some(i128::from(*ticks.get(place)?) + frame * number.div_euclid(count))
         };
+        // Below 1 if samples can be lost. A sample that has reached this probability does not arrive later.
         let final_probability = arrival.within(i128::MAX);
         let mut at: Vec<Vec<Hazard>> = vec![Vec::new(); ticks.len()];
-        // The first and the last tick of each sample of the frame, counted on over frames.
+        // First and last possible tick of each sample of the frame. The numbers count on over frames.
         let mut spans: Vec<(i128, i128)> = Vec::with_capacity(sends.len());
         let mut arrived = Vec::with_capacity(sends.len());
         for (sample, sent) in sends.iter().enumerate() {
@@ -101,6 +105,7 @@ impl Hazards {
                 let now = arrival.within(tick(number)? - sent);
                 let hazard = if before < 1.0 { (now - before) / (1.0 - before) } else { 0.0 };
                 if hazard > 0.0 {
+                    // The frame repeats: a sample that arrives some frames after its sending is, at that tick of this frame, a sample of an earlier frame.
                     let place = usize::try_from(number.rem_euclid(count)).ok()?;
                     let frames = i64::try_from(number.div_euclid(count)).ok()?;
                     let sample = i64::try_from(sample).ok()? - frames * i64::try_from(sends.len()).ok()?;
@@ -126,6 +131,8 @@ impl Hazards {
         for hazards in &mut at {
             hazards.sort_unstable_by_key(|hazard| hazard.sample);
         }
+        // Each sample recurs in every frame with its number raised by `shift`. The oldest recurrence that may still arrive at tick `number` is the first one
+        // whose last tick is not before `number`, and the newest that may have arrived is the last one whose first tick is before `number`.
         let shift = i128::try_from(sends.len()).ok()?;
         let numbered = || spans.iter().zip(0_i128..);
         let (mut oldest, mut newest) = (Vec::new(), Vec::new());
@@ -140,28 +147,28 @@ impl Hazards {
         Some(Self { at, places, spread, oldest, newest, arrived })
     }
 
-    /// How many samples of earlier frames may be taken in.
+    /// Returns the number of samples of earlier frames that the sender's state must keep, because they may be taken in during this frame.
     pub fn depth(&self) -> usize {
         self.at.iter().flatten().map(|hazard| usize::try_from(-hazard.sample).unwrap_or(0)).max().unwrap_or(0)
     }
 
-    /// Returns the samples that matter at a tick.
+    /// Returns the range of the samples that may arrive, or may be held, around a tick of the frame.
     pub(crate) fn window(&self, tick: usize) -> Window {
         let (before, after) = (self.oldest[tick], self.oldest[tick + 1]);
         Window { before, after, newest: self.newest[tick + 1], places: reach(before, self.newest[tick]) + 1 }
     }
 
-    /// Returns the probabilities that a sample has arrived by the tick before a tick of the frame, and by that tick.
+    /// Returns two probabilities: that the sample has arrived by the tick before `tick`, and that the sample has arrived by `tick`.
     pub(crate) fn arrived(&self, sample: i64, tick: usize) -> (f64, f64) {
         let (sends, ticks) = (i64::try_from(self.arrived.len()).unwrap_or(1), i64::try_from(self.at.len()).unwrap_or(1));
         let (first, reached) = &self.arrived[usize::try_from(sample.rem_euclid(sends)).unwrap_or(0)];
-        // The tick as the sample of the frame counts it that is sent as this one is.
+        // `arrived` lists samples of the frame only. The recurrence of this sample within the frame sees the tick shifted by as many frames.
         let tick = i64::try_from(tick).unwrap_or(i64::MAX) - sample.div_euclid(sends) * ticks;
         let by = |tick: i64| usize::try_from(tick - first).map_or(0.0, |place| reached.get(place).or_else(|| reached.last()).copied().unwrap_or(0.0));
         (by(tick - 1), by(tick))
     }
 
-    /// What may happen at a tick, from every place that can be reached.
+    /// Returns the outcomes of a tick from every place that can be reached, for a link without a chain of losses.
     pub(crate) fn outcomes(&self, tick: usize) -> Vec<Outcome> {
         let (before, after) = (self.oldest[tick], self.oldest[tick + 1]);
         let place = |sample: i64| usize::try_from(sample - after).unwrap_or(0);
@@ -170,7 +177,7 @@ impl Hazards {
             let held = before + i64::try_from(from).unwrap_or(i64::MAX);
             let mut left = 1.0;
             for Hazard { sample, hazard, .. } in self.at[tick].iter().rev().copied() {
-                // Place 0 is that of all samples up to the oldest.
+                // Place 0 stands for all samples up to the oldest that may arrive. That oldest sample itself may therefore still arrive, and only from place 0.
                 if sample < held || (sample == held && from > 0) {
                     break;
                 }
@@ -183,6 +190,7 @@ impl Hazards {
     }
 }
 
+/// Returns the largest place if `oldest` may still arrive and `newest` may have arrived; 0 if `newest` is not after `oldest`.
 fn reach(oldest: i64, newest: i64) -> usize {
     usize::try_from(newest - oldest).unwrap_or(0)
 }

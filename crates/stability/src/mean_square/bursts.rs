@@ -1,47 +1,48 @@
-//! Arrivals on a link whose losses depend on each other: which sample is held, and the state of the losses at that sample.
+//! Arrivals on a link whose losses depend on each other. The link's chain knows which sample is held, and the state of the losses at that sample.
 //!
-//! A chain gives each sample a state: the probability of its loss follows from its own state, and its state from that of the sample before. A sample that is
-//! not lost takes a time of its own. Let b be the newest sample that has arrived, or the oldest one that may arrive yet if that is newer, and s the state of
-//! b. Then (b, s) is a Markov chain, whatever overtakes what:
+//! A chain of losses gives each sample a state. The probability that a sample is lost follows from its own state, and its state from the state of the sample
+//! before. The delays of samples that are not lost are independent. Let b be the newest sample that has arrived, or the oldest sample that may still arrive
+//! if the latter is newer, and s the state of b. Then (b, s) is a Markov chain, even if samples overtake each other:
 //!
-//! - None of the samples after b has arrived. Given s, their states depend on nothing that happened to samples before b, because the chain of losses is a
-//!   Markov chain. So the probabilities of what they do at a tick are those of their prior law, given that none of them has arrived.
-//! - Where b may arrive yet, its hazard given s depends on nothing else either. That it may be taken in twice changes nothing.
+//! - No sample after b has arrived. Given s, the states of the samples after b do not depend on anything that happened to samples before b, because the chain
+//!   of losses is a Markov chain. So the probabilities of their arrivals at a tick follow from their prior law, given that none of them has arrived.
+//! - If b may still arrive, the hazard of b given s depends on nothing else either. In this model b may be taken in twice, but the second time changes nothing.
 //!
-//! The probabilities of a tick come from a recursion forwards and backwards over the samples after b, as in hidden Markov models (Baum & Petrie 1966). A link
-//! has as many states as the places of [`Hazards`] times those of its chain of losses: no memory of which samples under way are lost.
+//! The probabilities of a tick come from a recursion forwards and backwards over the samples after b, as in hidden Markov models (Baum & Petrie 1966). The
+//! number of states of a link is the number of places of [`Hazards`] times the number of states of the chain of losses. The states do not record which of the
+//! samples under way are lost.
 
 use super::arrivals::{Hazards, Outcome};
 use super::law::LossChain;
 
-/// A link with a chain of losses.
+/// Random link with a chain of losses.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bursts<'a, G> {
     pub(crate) hazards: &'a Hazards,
     pub(crate) chain: LossChain,
-    /// The span between a sample and the sample before it \[s\].
+    /// Function from the number of a sample to the span between the sending of the sample before and of that sample \[s\].
     pub(crate) gap: G,
 }
 
-/// A sample at a tick: the states that it may come into, and what it does in each.
+/// Probabilities of a sample at a tick.
 struct At {
-    /// The probability of its state, in columns, after each state of the sample before, in rows.
-    moves: Vec<Vec<f64>>,
-    /// The probability that it has not arrived by the tick before, by its state.
-    waiting: Vec<f64>,
-    /// The probability that it arrives at the tick, by its state.
+/// Probability of each state of the sample, given the state of the sample before: `moves[state before][state]`.
+moves: Vec<Vec<f64>>,
+/// Probability that the sample has not arrived by the tick before, indexed by the state of the sample.
+waiting: Vec<f64>,
+/// Probability that the sample arrives at the tick, indexed by the state of the sample.
     arriving: Vec<f64>,
 }
 
 impl At {
-    /// The probability that the sample has not arrived by the end of the tick, in a state.
+    /// Returns the probability that the sample has not arrived by the end of the tick, given the state of the sample.
     fn still_waiting(&self, state: usize) -> f64 {
         (self.waiting[state] - self.arriving[state]).max(0.0)
     }
 }
 
 impl<G: Fn(i64) -> f64> Bursts<'_, G> {
-    /// Number of states of the link.
+    /// Returns the number of states of the link. State `place * own + state`, with `own` the number of states of the chain of losses.
     pub(crate) fn states(&self) -> usize {
         self.hazards.places * self.chain.states()
     }
@@ -57,15 +58,16 @@ impl<G: Fn(i64) -> f64> Bursts<'_, G> {
         }
     }
 
-    /// Returns what may happen at a tick, from every state that can be reached.
+    /// Returns the outcomes of a tick from every state of the link that can be reached.
     pub(crate) fn outcomes(&self, tick: usize) -> Vec<Outcome> {
         let own = self.chain.states();
         let window = self.hazards.window(tick);
-        // Samples beyond the newest wait for certain; the oldest of the next tick may be one of them.
+        // Samples after `newest` cannot have arrived. They are left out, except up to `after`, whose state the end of the tick may need.
         let last = window.newest.max(window.after);
         let samples: Vec<At> = (window.before..=last).map(|sample| self.at(sample, tick)).collect();
         let of = |sample: i64| &samples[usize::try_from(sample - window.before).unwrap_or(0)];
-        // For each sample, the probability that no later one has arrived by the end of the tick, by its state.
+        // Probability that no later sample has arrived by the end of the tick, indexed by sample and by the state of that sample. Computed backwards, because
+        // each entry needs the entry of the next sample.
         let mut silent = vec![vec![1.0; own]; samples.len()];
         for place in (1..samples.len()).rev() {
             let next = &samples[place];
@@ -73,10 +75,11 @@ impl<G: Fn(i64) -> f64> Bursts<'_, G> {
             silent[place - 1] = (0..own).map(|from| (0..own).map(|to| next.moves[from][to] * next.still_waiting(to) * later[to]).sum()).collect();
         }
         let silent = |sample: i64| &silent[usize::try_from(sample - window.before).unwrap_or(0)];
-        // The state of the link when the newest sample is `held`, in each of its states with that probability, and no later one has arrived.
+        // Returns the states of the link at the end of the tick with their probabilities, if `held` is the newest sample that has arrived. `law` is the
+        // probability of each state of `held`.
         let ends = |held: i64, law: &[f64]| -> Vec<(usize, f64)> {
             let mut law = law.to_vec();
-            // A sample before the oldest that may arrive yet has no place: the state of the oldest stands for it.
+            // A held sample older than `after` has no place of its own. The state of `after`, which has not arrived, stands for the held sample.
             for sample in held + 1..=window.after {
                 let next = of(sample);
                 law = (0..own).map(|to| (0..own).map(|from| law[from] * next.moves[from][to]).sum::<f64>() * next.still_waiting(to)).collect();
@@ -89,12 +92,15 @@ impl<G: Fn(i64) -> f64> Bursts<'_, G> {
         for (base, state) in (0..window.places).flat_map(|place| (0..own).map(move |state| (place, state))) {
             let (from, base) = (base * own + state, window.before + i64::try_from(base).unwrap_or(i64::MAX));
             let certain: Vec<f64> = (0..own).map(|other| f64::from(u8::from(other == state))).collect();
-            // States to which no newer sample comes; and, if that may be, states to which the oldest sample comes.
+            // First the outcomes without a newer sample. Only the oldest sample may be the base of a place without having arrived, so only `window.before`
+            // may be taken in again, with its hazard given its state.
             let mut all: Vec<(usize, Option<i64>, f64)> = Vec::new();
             let taken = if base == window.before { of(base).arriving[state] / of(base).waiting[state].max(f64::MIN_POSITIVE) } else { 0.0 };
             for (to, probability) in ends(base, &certain) {
                 all.extend([(to, Some(base), taken * probability), (to, None, (1.0 - taken) * probability)]);
             }
+            // Then the outcomes in which `sample` is the newest arrival. `waiting` is the joint probability of the state of the sample before and of no arrival
+            // between `base` and that sample before this tick.
             let mut waiting = certain;
             for sample in base + 1..=window.newest {
                 let next = of(sample);
@@ -103,7 +109,8 @@ impl<G: Fn(i64) -> f64> Bursts<'_, G> {
                 all.extend(ends(sample, &arrives).into_iter().map(|(to, probability)| (to, Some(sample), probability)));
                 waiting = law.iter().zip(&next.waiting).map(|(law, waiting)| law * waiting).collect();
             }
-            // Given that none after `base` had arrived. A state in which one of them must have has no outcome.
+            // The condition that no sample after `base` had arrived before this tick. A state for which that has probability zero cannot be reached and has
+            // no outcome.
             let given: f64 = all.iter().map(|(.., probability)| probability).sum();
             let certain = all.into_iter().filter(|(.., probability)| *probability > 0.0);
             outcomes.extend(certain.map(|(to, take, probability)| Outcome { from, to, take, probability: probability / given }));

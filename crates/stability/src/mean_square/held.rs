@@ -1,15 +1,17 @@
-//! What a receiver holds and does not feel.
+//! The part of a held sample that exerts no force on the receiver.
 //!
-//! A held sample is a position and a velocity, and only KT·x + BT·v acts. The other combination, w, changes nothing and is changed by nothing but the
-//! next sample, so the whole second moment is block triangular: what acts, and the moments that have w in them. E w² is multiplied by the probability that
-//! nothing arrives, in the long run by q per frame, the spectral radius of the moves of the link's chain on which nothing is taken in. By the inequality of
-//! Cauchy and Schwarz the moments of two such combinations, and of one and what acts, grow no faster than the faster of the two. So the radius of the whole is
-//! the larger of the radius of what acts and of all q. What a link of certain delay brings is overwritten in every frame: q = 0.
+//! A held sample is a position and a velocity, and only KT·x + BT·v exerts a force. The other combination, w, changes no other state, and only the next
+//! sample changes w. So the operator on the second moment is block triangular: one block for the moments without w, one for the moments that contain w. E w²
+//! is multiplied by the probability that nothing arrives. In the long run that is a factor q per frame, the spectral radius of those moves of the link's
+//! chain on which no sample is taken in. By the inequality of Cauchy and Schwarz the moment of w with another w, or with a state that exerts a force, grows no
+//! faster than the faster of the two. So the radius of the whole is the largest of the radius without w and of all q. A link of constant delay overwrites
+//! the held sample in every frame, so that its q is 0.
 
 use super::arrivals::Outcome;
 use crate::{Matrix, Radius, spectrum};
 
-/// The probability, per frame in the long run, that nothing arrives on a link whose chain has this number of states, given what may happen in a frame.
+/// Returns the probability per frame, in the long run, that nothing arrives on a link. `states` is the number of states of the link's chain, and `frame`
+/// lists the outcomes of each tick of a frame at which a sample may arrive or the state may change.
 pub(crate) fn staying(states: usize, frame: &[Vec<Outcome>]) -> Radius {
     let mut stay = Matrix::identity(states);
     let mut roundings = 0;
@@ -18,7 +20,7 @@ pub(crate) fn staying(states: usize, frame: &[Vec<Outcome>]) -> Radius {
         for outcome in outcomes.iter().filter(|outcome| outcome.take.is_none()) {
             step[(outcome.to, outcome.from)] += outcome.probability;
         }
-        // A place that no outcome leads from cannot be reached.
+        // A state without outcomes at a tick has a zero column here. That state cannot be reached at the tick, so nothing is lost from the product.
         stay = step.times(&stay);
         roundings += states + outcomes.len() + 1;
     }
@@ -44,7 +46,7 @@ mod tests {
         assert!((staying(1, &[]).value - 1.0).abs() < 1e-16);
     }
 
-    /// In the bad state everything is lost, in the good one nothing: to hear nothing for ever is to stay in the bad one.
+    /// All samples are lost in the bad state and none in the good state, so that silence lasts exactly as long as the chain stays in the bad state.
     #[test]
     fn a_chain_is_silent_as_long_as_it_stays_bad() {
         let frame =

@@ -5,15 +5,15 @@
 //! 1 (Costa, Fragoso & Marques 2005, Theorem 3.9). A packet carries all axes of a sample, and every axis obeys the same equations, so the operator on the moments
 //! of two axes is that of one, and the radius is that of a scene of one axis.
 //!
-//! Every sample enters a receiver's force as one number only, KT·x + BT·v, so each link adds one state, what its receiver holds. The other combination of a
-//! held position and velocity is not felt, but it is there: it adds the probability that nothing arrives as an eigenvalue, known without any
-//! computation (`held`).
+//! Every sample enters a receiver's force as one number only, KT·x + BT·v, so each link adds one state: that number of the sample held by the receiver. The
+//! other combination of the held position and velocity exerts no force, but is part of the state. The probability per frame that nothing arrives is its
+//! eigenvalue (`held`).
 //!
 //! # How sure the radii are
 //!
 //! The bounds are proven (`positive`) for the operator with the step maps and probabilities as they are stored. The errors of the step maps' products are
-//! counted among the roundings on the assumption that each term of a tick has no more than 48 of them, coefficients included (`tracked`). Not
-//! counted: rounding errors of the probabilities themselves, and numbers that underflow.
+//! counted among the roundings on the assumption that each term of a tick is rounded at most 48 times, coefficients included (`tracked`). Rounding errors
+//! of the probabilities themselves, and numbers that underflow, are not counted.
 
 pub(crate) mod arrivals;
 mod build;
@@ -51,28 +51,28 @@ use crate::structure::{Contacts, Structure, has_equal_clocks, linear_law};
 use crate::timetable::{Instants, NodeClock, Timetable};
 use crate::{AnalysisError, Limits, Matrix, Method, PartCost, Radius, Verdict, Watch};
 
-/// More unknowns of the second moment than this are refused, whatever the caller allows: they take minutes.
+/// Largest number of unknowns of the second moment, whatever the caller allows. More unknowns take minutes.
 const MOST_UNKNOWNS: usize = 1 << 20;
-/// Unknowns that take some seconds at most.
+/// Number of unknowns of the second moment up to which an analysis takes some seconds at most.
 pub const QUICK_UNKNOWNS: usize = 1 << 17;
-/// More numbers than this at once are refused: a gibibyte, of which a step makes a second one.
+/// Largest number of `f64` in memory at once, one gibibyte. A step may copy all moments, which takes the same amount again.
 const MOST_NUMBERS: usize = 1 << 27;
-/// More peers than this are not looked at one by one.
+/// Largest number of peers for an analysis that treats each peer and link separately.
 const MOST_PEERS: usize = 64;
 
-/// How the second moment of a scene was followed.
+/// Method by which the second moment of a scene was analysed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum MeanSquareMethod {
-    /// Nothing is left to chance: the second moment is the square of the motion.
+    /// No link is random. The radius of the second moment is the square of the radius of the motion.
     Nominal,
-    /// Equal peers over equal links that lose independently: by the symmetry of the scene, at a cost that does not depend on their number.
+    /// Symmetry of equal peers over equal links with independent losses. The cost does not depend on the number of peers.
     Symmetric,
-    /// Event by event over a frame, all peers and links one by one.
+    /// Event by event over a frame, with separate states for each peer and each link.
     Events,
 }
 
 impl MeanSquareMethod {
-    /// The word in JSON.
+    /// Returns the name of the method in JSON.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
@@ -86,48 +86,49 @@ impl MeanSquareMethod {
 /// The result of the analysis of the second moment of a scene.
 #[derive(Clone, PartialEq, Debug)]
 pub struct MeanSquare {
-    /// By what a frame multiplies the second moment of the relative motion, in the long run: below 1 the scene is stable in the mean square.
+    /// Factor by which a frame multiplies the second moment of the relative motion in the long run. The scene is stable in the mean square if it is below 1.
     pub radius: Radius,
-    /// The part of it that acts on nothing: of a held sample only KT·x + BT·v is felt, and the other combination stays as long as nothing arrives. The
-    /// probability, per frame in the long run, that nothing does, of the random link where it is largest; the radius is at least that.
+    /// Probability per frame, in the long run, that nothing arrives on a random link: the largest such probability over all random links. Only KT·x + BT·v of
+    /// a held sample exerts a force. The other combination stays until a sample arrives, so `radius` is at least this probability.
     pub held: Radius,
-    /// The square of the spectral radius over a frame if nothing were left to chance: every delay its mean, nothing lost.
+    /// Square of the spectral radius over a frame of the same scene without randomness: every delay is its mean and no packet is lost.
     pub nominal_squared: Radius,
-    /// How it was reached; of several modes of contact, for the one with the largest radius.
+    /// Method of the analysis. With several combinations of contacts: the method for the combination with the largest radius.
     pub method: MeanSquareMethod,
-    /// The span that the radii are over.
+    /// Span over which the radii count.
     pub frame: Duration,
-    /// How many numbers describe the second moment.
+    /// Number of unknowns that describe the second moment; 0 with [`MeanSquareMethod::Nominal`].
     pub unknowns: usize,
-    /// What it leaves out, in words.
+    /// Sentences about the limits of the analysis, such as a timeline that is left out.
     pub notes: Vec<String>,
 }
 
 impl MeanSquare {
-    /// Stable or not in the mean square.
+    /// Returns whether the scene is stable in the mean square, as far as `radius` and its error decide that.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
         self.radius.verdict()
     }
 }
 
-/// The growth of the second moment of a scene as it begins; its timeline is left out.
+/// Returns the growth of the second moment of a scene in its initial configuration. The timeline is left out.
 ///
-/// Losses may be independent at any number of equal peers, or of up to 64 different ones. Losses in bursts, and delays so random that samples overtake, are
-/// followed through the joint states of all links, which is feasible for two peers or three.
+/// Losses may be independent among any number of equal peers, or among up to 64 different peers. Losses in bursts, and delays so random that samples
+/// overtake, need the joint states of the chains of all links, which is feasible for two or three peers.
 ///
 /// # Errors
 ///
-/// [`AnalysisError`] as [`analyse`](crate::analyse), and if a link does at random what has no second moment here, or there are too many joint states.
+/// [`AnalysisError`] as [`analyse`](crate::analyse); also if a link has a random impairment without a law of moments in this crate, or if the links have too
+/// many joint states.
 pub fn mean_square(scene: &Scene) -> Result<MeanSquare, AnalysisError> {
     mean_square_watched(scene, &Limits::of_unknowns(MOST_UNKNOWNS))
 }
 
-/// [`mean_square`] within limits, watched.
+/// Like [`mean_square`], but within `limits`, whose watcher sees the progress and can end the analysis.
 ///
 /// # Errors
 ///
-/// As for [`mean_square`]; [`AnalysisError::TooManyOperations`] beyond the limit, [`AnalysisError::Stopped`] if the watcher ends it.
+/// As for [`mean_square`]; [`AnalysisError::TooManyOperations`] beyond the limit of operations, [`AnalysisError::Stopped`] if the watcher ends the analysis.
 pub fn mean_square_watched(scene: &Scene, limits: &Limits<'_>) -> Result<MeanSquare, AnalysisError> {
     let limits = &Limits { unknowns: limits.unknowns.min(MOST_UNKNOWNS), ..*limits };
     refuse_topology(scene, "the mean square")?;
@@ -176,7 +177,7 @@ pub fn mean_square_watched(scene: &Scene, limits: &Limits<'_>) -> Result<MeanSqu
 
 const NOTHING: Radius = Radius { value: 0.0, error: 0.0 };
 
-/// The only model of all links, if there is but one.
+/// Returns whether all links have the same model.
 fn only_model(scene: &Scene) -> bool {
     scene.links.is_uniform()
 }
@@ -206,7 +207,8 @@ fn of_contacts(
     if structure.is_silent(scene) {
         found = Found { held: found.held, ..nothing };
     }
-    // What nobody touches moves on its own.
+    // A device that touches nothing moves on its own and is in no operator. Its radius counts over the structure's frame, and a random frame may be a multiple
+    // of that frame, hence the power.
     for part in parts.iter().filter(|part| matches!(part.kind, PartKind::LooseDevice { .. })) {
         let frames = found.frame.as_nanos() / frame.as_nanos().max(1);
         found.radius = found.radius.or(part.radius.over(u32::try_from(2 * frames).unwrap_or(u32::MAX)));
@@ -216,7 +218,7 @@ fn of_contacts(
     Ok(MeanSquare { radius, held, nominal_squared, method, frame, unknowns, notes: Vec::new() })
 }
 
-/// The links that leave something to chance; one stands for all if there is but one model.
+/// Returns the random links as pairs (sender, receiver). If all links have the same model, the link from peer 0 to peer 1 stands for all.
 fn random_links(scene: &Scene) -> Result<Vec<(usize, usize)>, AnalysisError> {
     let random = if only_model(scene) {
         if is_random(scene.links.between(0, 1)) { vec![(0, 1)] } else { Vec::new() }
@@ -228,6 +230,7 @@ fn random_links(scene: &Scene) -> Result<Vec<(usize, usize)>, AnalysisError> {
         let pairs = (0..peers).flat_map(|to| (0..peers).filter(move |from| *from != to).map(move |from| (from, to)));
         pairs.filter(|(from, to)| is_random(scene.links.between(*from, *to))).collect()
     };
+    // An access line is shared by all links of its peer, so chance on it correlates these links, whose chains are taken as independent.
     let access = |model: Option<&cohaptic_wan::LinkModel>| model.is_some_and(is_random);
     let queues = |model: Option<&cohaptic_wan::LinkModel>| model.is_some_and(|model| !model.is_constant_delay());
     if let Some(peer) = scene
@@ -243,7 +246,7 @@ fn random_links(scene: &Scene) -> Result<Vec<(usize, usize)>, AnalysisError> {
     Ok(random)
 }
 
-/// The law of a random link and when its samples may arrive.
+/// Returns the law of a random link, and the ticks at which its samples may arrive; `None` if nothing ever arrives.
 fn hazards(
     scene: &Scene,
     network: &NominalNetwork,
@@ -267,6 +270,7 @@ fn hazards(
     if hazards.spread && law.correlated_delays {
         return Err(refuse("its delays depend on each other"));
     }
+    // Several places mean that a sample can overtake another one. A link in order delays the overtaking sample, which `Arrival` does not describe.
     if hazards.places > 1 && law.in_order {
         return Err(refuse("its samples wait for each other (order = \"in-order\")"));
     }
@@ -276,7 +280,7 @@ fn hazards(
     Ok(Some((hazards, law)))
 }
 
-/// The radii of the moments that act, and of those that are held without acting.
+/// Radii of one combination of contacts: of the moments that exert forces, and of the held moments that exert none.
 #[derive(Clone, Copy, Debug)]
 struct Found {
     radius: Radius,
@@ -287,7 +291,7 @@ struct Found {
 }
 
 impl Found {
-    /// The operations of one image of the operator.
+    /// Computes the radius of `operator`. One image of the operator takes `operations` operations, of which the watcher hears.
     fn of(
         operator: &impl Positive,
         operations: f64,
@@ -302,15 +306,15 @@ impl Found {
     }
 }
 
-/// A link on which nothing ever arrives: a held sample stays for certain.
+/// Probability per frame that a held sample stays, on a link on which nothing ever arrives.
 const SILENT: Radius = Radius { value: 1.0, error: 0.0 };
 
-/// When the samples of equal peers over equal links are sent and may arrive.
+/// Instants at which equal peers over equal links send samples, and at which these samples may arrive.
 struct Alike {
-    /// Of one peer, without deliveries.
-    timetable: Timetable,
-    instants: Instants,
-    /// `None` if nothing ever arrives.
+/// Events of one peer, without deliveries.
+timetable: Timetable,
+instants: Instants,
+/// Hazards and law of every link; `None` if nothing ever arrives.
     hazards: Option<(Hazards, LinkLaw)>,
 }
 
@@ -322,25 +326,25 @@ impl Alike {
         Ok(Self { timetable, instants, hazards })
     }
 
-    /// The hazards, if links lose independently, nothing overtakes, and the frame is that of the scene.
+    /// Returns the hazards if losses are independent, no sample overtakes another, and the frame of one peer is that of the scene.
     fn independent(&self, structure: &Structure) -> Option<&Hazards> {
         let (hazards, law) = self.hazards.as_ref()?;
         (hazards.places == 1 && law.chain.is_none() && self.timetable.frame == structure.timetable.frame).then_some(hazards)
     }
 
-    /// The probability, per frame, that nothing arrives on a link.
+    /// Returns the probability per frame that nothing arrives on a link.
     fn held(&self, hazards: &Hazards) -> Radius {
         let line = Line { from: 0, to: 0, chance: Some((hazards.clone(), None)) };
         line.staying(&self.instants, self.timetable.frame).unwrap_or(NOTHING)
     }
 }
 
-/// Whether all peers are equal, over equal links, and hear one number of each sample.
+/// Returns whether all peers and all links are equal, and a receiver uses one number of each sample.
 fn alike(scene: &Scene, structure: &Structure) -> bool {
     structure.classes.len() == 1 && only_model(scene) && structure.sampling(scene).channels() == 1
 }
 
-/// Equal peers over equal links, if these lose independently and nothing overtakes.
+/// Computes the radii of equal peers over equal links by symmetry; `None` if losses are not independent, or samples overtake.
 fn symmetric(
     scene: &Scene,
     network: &NominalNetwork,
@@ -354,7 +358,7 @@ fn symmetric(
     let node = structure.node(scene, 0);
     let lifted = Lifted { timetable, ..structure.quotient(scene, std::slice::from_ref(&node)) };
     if alike.hazards.is_none() {
-        // Nobody hears of anybody: each peer alone, pulled to where the others were at the beginning.
+        // No peer hears another, so each peer moves alone, pulled towards the constant initial positions of the others. That pull ties the peer to the ground.
         let alone = Lifted { tied: true, ..lifted };
         let operator = events_watched(&alone, &[], instants, limits.watch).ok_or(AnalysisError::Stopped)?;
         let cost = frame_cost(scene, timetable, 0);
@@ -370,23 +374,23 @@ fn symmetric(
     Found::of(&operator, operator.operations(), alike.held(hazards), (MeanSquareMethod::Symmetric, frame), limits.watch).map(Some)
 }
 
-/// How the second moment of scenes that differ in numbers only is followed again and again, in one combination of contacts.
+/// Method for the second moments of many scenes that differ in numbers only, in one combination of contacts.
 #[derive(Clone, Debug)]
 pub(crate) enum Followed {
-    /// Nothing is left to chance: the square of the spectral radius.
+    /// No link is random: the radius is the square of the spectral radius of the motion.
     Certain,
-    /// Equal peers over equal links that lose independently; and samples that are held without acting.
+    /// Equal peers over equal links with independent losses. `held` is the probability per frame that nothing arrives on a link.
     Equal { frame: Equal, held: f64 },
-    /// By [`mean_square`], each time anew.
+    /// [`mean_square`] for each scene, because no part of the computation is common to all scenes.
     Anew,
 }
 
 impl Followed {
-    /// How the scenes are followed of which this is one, whose classes are those of all of them.
+    /// Chooses the method for all scenes that differ from `scene` in numbers only. `structure` holds the classes of peers, which all these scenes share.
     ///
     /// # Errors
     ///
-    /// As [`mean_square`], as far as that can be said before its computation.
+    /// The errors of [`mean_square`] that can be known before the computation.
     pub(crate) fn of(scene: &Scene, network: &NominalNetwork, structure: &Structure) -> Result<Self, AnalysisError> {
         if random_links(scene)?.is_empty() {
             return Ok(Self::Certain);
@@ -398,23 +402,23 @@ impl Followed {
     }
 }
 
-/// When samples of equal peers arrive over equal links that lose independently, and on which nothing overtakes.
+/// Arrivals among equal peers over equal links with independent losses, on which no sample overtakes another.
 #[derive(Clone, Debug)]
 pub struct Independent {
-    /// Of one peer, without deliveries.
-    pub timetable: Timetable,
-    /// When its samples may arrive.
-    pub hazards: Hazards,
-    /// The probability, per frame, that nothing arrives on a link.
+/// Events of one peer, without deliveries.
+pub timetable: Timetable,
+/// Ticks at which samples of a link may arrive, with their probabilities.
+pub hazards: Hazards,
+/// Probability per frame that nothing arrives on a link.
     pub held: Radius,
 }
 
 impl Independent {
-    /// `None` if peers or links differ, or links do something else.
+    /// Returns the arrivals of a scene; `None` if peers or links differ, no link is random, losses depend on each other, or samples overtake.
     ///
     /// # Errors
     ///
-    /// Those of [`mean_square`] for a link whose chance has no moments.
+    /// The errors of [`mean_square`] for a random link without a law of moments.
     pub fn of(scene: &Scene, network: &NominalNetwork, structure: &Structure) -> Result<Option<Self>, AnalysisError> {
         if random_links(scene)?.is_empty() || !alike(scene, structure) {
             return Ok(None);
@@ -425,6 +429,7 @@ impl Independent {
     }
 }
 
+/// Computes the radii with separate states for each peer and each link. `random` lists the random links, or one of them if all links have the same model.
 fn one_by_one(
     scene: &Scene,
     network: &NominalNetwork,
@@ -445,12 +450,12 @@ fn one_by_one(
     let certain: Vec<(usize, usize, LinkTiming)> = certain.map(|(from, to)| (*from, *to, network.timing(*from, *to).clone())).collect();
     let timetable = Timetable::new(&clocks, &certain)?;
     let cost = frame_cost(scene, &timetable, pairs.len());
-    // Joint states make it more, never less.
+    // The joint states of the chains only add to this cost. Refusing here avoids building an operator that is refused afterwards.
     within(cost, limits)?;
     let instants = Instants::of(&timetable);
     let horizon = linear_law(scene, 0).and_then(|law| law.horizon);
     let beyond = horizon.is_some_and(|horizon| timetable.oldest() > horizon).then_some(BEYOND_HORIZON);
-    // Samples whose ages include a difference of clocks may be beyond the horizon, or sent later than now.
+    // With different clocks the age of a sample includes their difference. Such an age may exceed the horizon or be negative.
     let apart = (horizon.is_some() && !has_equal_clocks(scene)).then_some(AGES_BY_CLOCKS);
     if let Some(why) = beyond.or(apart) {
         let link = format!("{} → {}", scene.peers[0].name, scene.peers[1].name);
@@ -463,7 +468,7 @@ fn one_by_one(
             return Err(AnalysisError::Stopped);
         }
         if let Some((_, _, timing)) = certain.iter().find(|(one, other, _)| (*one, *other) == (from, to)) {
-            // What never changes is a constant force.
+            // A link that never delivers leaves the receiver with a constant initial position. The resulting constant force needs no state.
             if !matches!(timing, LinkTiming::Pattern(pattern) if pattern.iter().all(Option::is_none)) {
                 lines.push(Line { from, to, chance: None });
             }
@@ -482,6 +487,7 @@ fn one_by_one(
                 }
                 lines.push(line);
             }
+            // Nothing ever arrives: the constant initial position of the sender ties the receiver to the ground.
             None => {
                 tied = true;
                 held = SILENT;
@@ -509,14 +515,14 @@ fn one_by_one(
     Ok(Found { radius, held, method: MeanSquareMethod::Events, frame: timetable.frame, unknowns })
 }
 
-/// The probability that a sample is held beyond the horizon of a law that extrapolates which counts as none.
+/// Largest probability, counted as zero, that a sample is held for longer than the horizon of an extrapolating law.
 const NEVER: f64 = 1e-9;
 const AGES_BY_CLOCKS: &str = "the strategy uses the ages of its samples by clocks that differ: expected one tick, offset and drift for all peers";
 
 const BEYOND_HORIZON: &str = "its samples may be held for longer than the strategy extrapolates them: expected a longer horizon";
 
-/// Whether a link whose samples arrive within `depth` frames, and on which nothing arrives in a frame with the probability `stays`, brings a newer sample
-/// before one is older than `horizon` \[s\], up to which a law extrapolates; but for a probability of [`NEVER`].
+/// Returns whether a link delivers a newer sample before the held sample is older than `horizon` \[s\], except with a probability of at most [`NEVER`].
+/// Samples of the link arrive within `depth` frames, and `stays` is the probability that nothing arrives in a frame. Without a horizon always true.
 fn within_horizon(horizon: Option<f64>, frame: Duration, stays: Radius, depth: usize) -> bool {
     horizon.is_none_or(|horizon| {
         let frames = horizon / frame.as_secs_f64() - real(depth + 1);
@@ -524,16 +530,16 @@ fn within_horizon(horizon: Option<f64>, frame: Duration, stays: Radius, depth: u
     })
 }
 
-/// The sizes of a frame with a number of random links, each of which brings every sample that is sent; without the joint states of their chains.
+/// Returns the cost of a frame with `links` random links, each of which delivers every sample. The joint states of the links' chains are not included.
 fn frame_cost(scene: &Scene, timetable: &Timetable, links: usize) -> FrameCost {
     let peers = scene.peers.len().max(1);
     let sent: usize = timetable.sent.iter().sum();
-    // Position and velocity of a device and of a copy.
+    // Four rows per peer: position and velocity of its device and of its copy.
     let rows = 4 * peers + sent + timetable.depth.iter().sum::<usize>() + links;
     FrameCost { events: timetable.events.len() + sent / peers * links, rows, joint: 1, sums: 0 }
 }
 
-/// Refuses what takes longer than it may, or more memory than there is.
+/// Refuses a computation with more operations than `limits` allow, or with more than [`MOST_NUMBERS`] numbers in memory.
 fn within(cost: FrameCost, limits: &Limits<'_>) -> Result<(), AnalysisError> {
     let operations = cost.operations();
     if operations > limits.operations {

@@ -1,24 +1,26 @@
-//! The second moment of a linear system that is driven by unit noise and grows by a given factor, in triangular coordinates.
+//! Second moment of a linear system in triangular coordinates, driven by unit noise once per step, for a given growth factor γ per step.
 
 use num_complex::Complex64;
 
-/// The solution X of γX = T·X·T* + b·b* for an upper triangular T, from its last row up.
+/// Solution X of γX = T·X·T* + b·b* for an upper triangular T and a vector b. Buffers are kept for the next solution.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Variance {
     size: usize,
-    /// X, row by row; Hermitian.
+    /// Entries of X, row by row; Hermitian.
     moment: Vec<Complex64>,
-    /// X·T*.
+    /// Entries of X·T*, row by row.
     product: Vec<Complex64>,
+    /// Entries of T, row by row.
     triangle: Vec<Complex64>,
+    /// Entries of b.
     input: Vec<Complex64>,
 }
 
 impl Variance {
-    /// Solves for a number of rows.
+    /// Solves the equation for `size` rows. Only entries of `matrix` (row, column) on and above the diagonal are read.
     ///
-    /// Each entry of X follows from those below it and to its right (Bartels & Stewart 1972; Kitagawa 1977, for the discrete equation): nothing is
-    /// assumed of the eigenvalues but that γ is above the products of any two.
+    /// Each entry of X follows from the entries below and to the right (Bartels & Stewart 1972; Kitagawa 1977, for the discrete equation). The only
+    /// assumption about the eigenvalues of T is that γ is above the modulus of the product of any two of them.
     pub(crate) fn solve(&mut self, gamma: f64, size: usize, matrix: impl Fn(usize, usize) -> Complex64, input: impl Fn(usize) -> Complex64) {
         self.size = size;
         let Self { moment, product, triangle, input: source, .. } = self;
@@ -36,12 +38,12 @@ impl Variance {
         for row in (0..size).rev() {
             let own = triangle[row * size + row];
             for column in (0..=row).rev() {
-                // From the rows below, which are known.
+                // Rows below `row` of X·T* are complete, since rows are solved from the last one up.
                 let mut sum = source[row] * source[column].conj();
                 for below in row + 1..size {
                     sum += triangle[row * size + below] * product[below * size + column];
                 }
-                // From this row, right of the entry; above the diagonal by symmetry.
+                // Entries of this row right of the diagonal are known by symmetry from the rows below, the other ones from this loop.
                 let mut right = Complex64::default();
                 for place in column + 1..size {
                     right += moment[row * size + place] * triangle[column * size + place].conj();
@@ -56,12 +58,12 @@ impl Variance {
         }
     }
 
-    /// The variance of the last state.
+    /// Returns the variance of the last state.
     pub(crate) fn of_noise(&self) -> f64 {
         self.moment.last().map_or(0.0, |last| last.re)
     }
 
-    /// The variance of an output, and its covariance with the last state.
+    /// Returns the variance of an output Σ output(i)·state(i), and the covariance of that output with the last state.
     pub(crate) fn of_output(&self, output: impl Fn(usize) -> Complex64) -> (f64, f64) {
         let size = self.size;
         let (mut square, mut product) = (Complex64::default(), Complex64::default());
@@ -78,7 +80,7 @@ impl Variance {
 mod tests {
     use super::*;
 
-    /// Against the series Σ γ^(−k−1)·T^k·b·(T^k·b)* itself, for a matrix with a block that is nearly defective.
+    /// Compares the solution with the series Σ γ^(−k−1)·T^k·b·(T^k·b)* for a matrix with a nearly defective block.
     #[test]
     fn the_solution_is_the_sum_of_the_series() {
         let complex = Complex64::new;
@@ -95,7 +97,7 @@ mod tests {
         variance.solve(gamma, 4, |row, column| matrix[row][column], |row| input[row]);
         let (mut state, mut share) = (input, 1.0 / gamma);
         let (mut square, mut product, mut noise) = (0.0, 0.0, 0.0);
-        // The eigenvalues are below 0.9056, 0.8201/0.95 = 0.863 a step: 400 steps leave 10⁻²⁵.
+        // The moduli of the eigenvalues are below 0.9056, so that a term shrinks by 0.8201/0.95 = 0.863 per step. 400 steps leave 10⁻²⁵.
         for _ in 0..400 {
             let seen: Complex64 = output.iter().zip(&state).map(|(output, state)| output * state).sum();
             square += share * seen.norm_sqr();
