@@ -1,4 +1,4 @@
-//! The frame of a scene's peers, event by event.
+//! Builds the operator of [`Events`] from the timetable, the nodes and the links of a scene.
 
 use std::time::Duration;
 
@@ -13,25 +13,25 @@ use crate::lifted::node::Scale;
 use crate::timetable::{Event, Instants};
 use crate::{Radius, Watch};
 
-/// A link of the scene.
+/// Link of the scene whose samples change a state of the operator.
 #[derive(Clone, Debug)]
 pub(crate) struct Line {
     pub(crate) from: usize,
     pub(crate) to: usize,
-    /// `None`: what arrives when is in the timetable.
+    /// Hazards, and chain of losses if losses depend on each other. `None` for a link without randomness, whose deliveries are in the timetable.
     pub(crate) chance: Option<(Hazards, Option<LossChain>)>,
 }
 
-/// The frame of nodes over lines; those that are not there hold nothing.
+/// Builds the frame of the nodes over `lines`. A pair of nodes without a line exchanges no samples.
 #[cfg(test)]
 pub(crate) fn events(lifted: &Lifted<'_>, lines: &[Line], instants: &Instants) -> Events {
     events_watched(lifted, lines, instants, &crate::Unwatched).unwrap_or_default()
 }
 
-/// How many events are worked out before it is asked whether to go on.
+/// Number of events between two questions to the watcher.
 const LOOK: usize = 1024;
 
-/// [`events`]; `None` if the watcher ends it.
+/// Builds the frame of the nodes over `lines`; `None` if the watcher ends the computation. A pair of nodes without a line exchanges no samples.
 pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Instants, watch: &dyn Watch) -> Option<Events> {
     let nodes = lifted.nodes.len();
     let scale = Scale { time: lifted.time, compliance: lifted.nodes[0].compliance(lifted.time) };
@@ -42,7 +42,7 @@ pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Ins
             depth[line.from] = depth[line.from].max(hazards.depth());
         }
     }
-    // Rows: states of nodes, samples of nodes, samples held.
+    // Order of the rows: states of all nodes, then samples of each node (of earlier frames, then of this frame), then the held sample of each line.
     let mut first = Vec::with_capacity(nodes);
     let mut count = 0;
     let mut made = Events::default();
@@ -60,6 +60,7 @@ pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Ins
     }
     let mut first_sample = Vec::with_capacity(nodes);
     for (depth, sent) in depth.iter().zip(&lifted.timetable.sent) {
+        // At the end of the frame its samples become samples of an earlier frame: the rows move by the number of samples sent per frame.
         for place in 0..depth * numbers {
             made.kept.push((count + place + sent * numbers, count + place));
             moved.push(translation(place % numbers));
@@ -74,6 +75,8 @@ pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Ins
     }
     made.rows = count + lines.len() * numbers;
     made.chains = lines.iter().map(chain_states).collect();
+    // Without a tie to the ground a common translation grows or stays for ever. Positions relative to the first copy remove that direction, and with it the
+    // state of that copy's position, which is always zero.
     if !lifted.tied {
         let reference = lifted.nodes[0].rows(0).object;
         let place = made.kept.iter().position(|(row, _)| *row == reference).unwrap_or(0);
@@ -85,7 +88,8 @@ pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Ins
         let signed = |number: usize| i64::try_from(number).unwrap_or(i64::MAX);
         usize::try_from(signed(first_sample[node]) + signed(numbers) * sample).unwrap_or(0)
     };
-    // The rows of the positions of all samples, if the law uses ages: these are extrapolated to the present at every tick.
+    // Rows of the positions of all samples, sent and held, if the law uses the ages of samples. Each position is then extrapolated to the present at every
+    // tick, which spares the operator a state for the age.
     let extrapolates = lifted.nodes.iter().any(|node| node.law.horizon.is_some());
     let of_samples = first_sample.iter().zip(depth.iter().zip(&lifted.timetable.sent));
     let samples = of_samples.flat_map(|(first, (depth, sent))| (first - depth * numbers..first + sent * numbers).step_by(numbers));
@@ -97,6 +101,8 @@ pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Ins
         let of = || lines.iter().enumerate().filter(|(_, line)| line.to == node);
         (0..numbers).map(|number| of().map(|(place, line)| (held_row(place) + number, lifted.weights[(node, line.from)])).collect()).collect()
     };
+    // Ticks of a node between two other events that concern the node are multiplied into one map. The map must be flushed before a sample reads the node's
+    // states, and before a delivery changes the samples that the node holds.
     let flush = |pending: &mut Vec<Option<Tracked>>, made: &mut Events, node: usize| {
         if let Some(map) = pending[node].take() {
             made.roundings += map.roundings();
@@ -140,7 +146,7 @@ pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Ins
                 let map = pending[node].get_or_insert_with(|| Tracked::new(states, states, numbers));
                 map.tick(&lifted.nodes[node], lifted, span, scale);
                 if node + 1 == nodes && !extrapolated.is_empty() {
-                    // All tick together: the last one ends the instant.
+                    // The nodes have equal clocks if the law extrapolates, so the tick of the last node ends the instant, and all samples age by `span`.
                     (0..nodes).for_each(|node| flush(&mut pending, &mut made, node));
                     let share = span.as_secs_f64() / lifted.time;
                     made.steps.extend(extrapolated.iter().map(|row| Step::Sample { row: *row, of: [(*row, 1.0), (row + 1, share)] }));
@@ -155,7 +161,7 @@ pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Ins
 }
 
 impl Line {
-    /// The probability, per frame in the long run, that nothing arrives; `None` where nothing is left to chance.
+    /// Returns the probability per frame, in the long run, that nothing arrives on the line; `None` for a line without randomness.
     pub(crate) fn staying(&self, instants: &Instants, frame: Duration) -> Option<Radius> {
         self.chance.as_ref()?;
         let ticks = 0..instants.ticks[self.to].len();
@@ -164,7 +170,7 @@ impl Line {
     }
 }
 
-/// Number of states of a link's chain: its places, and in each of them those of its losses.
+/// Returns the number of states of a line's chain: the number of places, times the number of states of the chain of losses if there is one.
 fn chain_states(line: &Line) -> usize {
     match &line.chance {
         None => 1,
@@ -173,11 +179,11 @@ fn chain_states(line: &Line) -> usize {
     }
 }
 
-/// What may happen on a line at a tick of its receiver, one after the other.
+/// Returns the outcomes on a line at a tick of its receiver: a list of one entry, or an empty list if the tick changes neither sample nor state.
 fn outcomes(line: &Line, tick: usize, sends: &[u64], frame: u64) -> Vec<Vec<Outcome>> {
     let Some((hazards, chain)) = &line.chance else { return Vec::new() };
     let window = hazards.window(tick);
-    // A sample that does not arrive leaves the count of places as it is.
+    // Without hazards the tick still changes the state if places are counted from another oldest sample after the tick.
     if hazards.at[tick].is_empty() && (hazards.places == 1 && chain.is_none() || window.before == window.after) {
         return Vec::new();
     }
@@ -187,10 +193,11 @@ fn outcomes(line: &Line, tick: usize, sends: &[u64], frame: u64) -> Vec<Vec<Outc
     }]
 }
 
-/// How long before a sample the one before it was sent \[s\].
+/// Returns the span between the sending of the sample before `sample` and of `sample` itself \[s\]. `sends` are the instants of the frame \[ns\].
 fn gap(sample: i64, sends: &[u64], frame: u64) -> f64 {
     let count = i64::try_from(sends.len()).unwrap_or(1);
     let place = usize::try_from(sample.rem_euclid(count)).unwrap_or(0);
+    // The sample before the first one of a frame is the last one of the previous frame, at a negative instant. Both wraps cancel in the difference.
     let before = if place == 0 { sends[sends.len() - 1].wrapping_sub(frame) } else { sends[place - 1] };
     Duration::from_nanos(sends[place].wrapping_sub(before)).as_secs_f64()
 }

@@ -99,8 +99,8 @@ impl<G: Fn(i64) -> f64> Bursts<'_, G> {
             for (to, probability) in ends(base, &certain) {
                 all.extend([(to, Some(base), taken * probability), (to, None, (1.0 - taken) * probability)]);
             }
-            // Then the outcomes in which `sample` is the newest arrival. `waiting` is the joint probability of the state of the sample before and of no arrival
-            // between `base` and that sample before this tick.
+            // Then the outcomes in which `sample` is the newest arrival. `waiting` is indexed by the state of the sample before `sample`: the probability of
+            // that state and that no sample from `base + 1` up to the sample before `sample` had arrived before this tick.
             let mut waiting = certain;
             for sample in base + 1..=window.newest {
                 let next = of(sample);

@@ -1,13 +1,14 @@
-//! Equal peers over equal links that lose independently: the mean-square radius from two small matrices, without a bound of its error.
+//! Mean-square radius of equal peers over equal links with independent losses, from two small matrices and without a bound of the error.
 //!
-//! A delivery with the probability p = 1 − q turns the sample held, h, into h + p·(u − h) + ξ, where u is the sample and ξ a noise of mean zero and variance
-//! p·q·E(u − h)², independent of everything before it and from link to link. So the scene is its *mean* motion, in which every link passes on p of each
-//! sample, driven by noise whose variance follows from the motion: multiplicative noise, for which stability in the mean square is a gain condition
-//! (Willems & Blankenship 1971; Elia 2005, Theorem 6.4; Lu & Skelton 2002).
+//! A delivery with the probability p = 1 − q turns the held sample h into h + p·(u − h) + ξ. Here u is the delivered sample and ξ a noise of mean 0 and
+//! variance p·q·E(u − h)², which is independent of all earlier events and of the other links. So the scene is its *mean* motion, in which every link passes on
+//! the share p of each sample, driven by noise whose variance follows from the motion. For such multiplicative noise, stability in the mean square is a gain
+//! condition (Willems & Blankenship 1971; Elia 2005, Theorem 6.4; Lu & Skelton 2002).
 //!
-//! The mean motion of equal peers falls into the common motion and the differences, as in [`Structure`](crate::structure::Structure): a node that hears
-//! itself with the weight w = 1, or w = −1/(N−1). With n the sample held if losses were replaced by their average, and ζ the mean over the senders of the noise that
-//! is still held, each has the states y = (a, n), a those of the peer and its samples on the way:
+//! The mean motion of equal peers splits into the common motion and the differences, as in [`Structure`](crate::structure::Structure). Each is a node that
+//! hears itself, with the weight w = 1 for the common motion and w = −1/(N−1) for the differences. Let a be the states of the peer and of its samples on the
+//! way, n the held sample if losses are replaced by their average, and ζ the mean over the senders of the noise that is still held. Each node has the states
+//! y = (a, n):
 //!
 //! ```text
 //! a ← F·a + f·(w·n + ζ)                            motion
@@ -16,11 +17,11 @@
 //! ```
 //!
 //! Let γ be the factor by which the second moment grows in a frame, X the solution of γX = M·X·Mᵀ + Σ b_e·b_eᵀ for the frame's matrix M of (y, ζ) and the
-//! unit noise b_e of each delivery. Then σ at each delivery is linear in the variances of the noise, with coefficients ≥ 0 that fall with γ, and
-//! the radius is the γ at which the spectral radius of that relation is 1; or that of M squared, if it is larger.
+//! unit noise b_e of each delivery. Then σ at each delivery is linear in the variances of the noise, with coefficients ≥ 0 that fall as γ rises. The radius
+//! is the γ at which the spectral radius of that relation is 1, or the square of the spectral radius of M if the square is larger.
 //!
-//! [`Symmetric`](super::symmetric::Symmetric) computes the same radius by the second moment itself, some thirty times as slowly and with a bound; each is
-//! tested against the other.
+//! [`Symmetric`](super::symmetric::Symmetric) computes the same radius from the second moment itself, more slowly and with a bound of the error. The tests
+//! compare both.
 
 use num_complex::Complex64;
 
@@ -34,37 +35,43 @@ use crate::spectrum::{Schur, Workspace};
 
 use crate::timetable::{Event, Timetable};
 
-/// How near to the true γ the search ends, relative to it.
+/// Relative distance from the zero at which the search for γ ends.
 const TOLERANCE: f64 = 1e-13;
-/// More steps than this are not needed by any function with one sign change.
+/// Largest number of steps of the search for γ.
 const STEPS: usize = 200;
 
-/// A frame of equal peers, without the numbers of their bodies and gains.
+/// Frame of equal peers, without the parameters of their bodies and gains.
 #[derive(Clone, Debug)]
 pub(crate) struct Equal {
+    /// Number of peers.
     peers: f64,
-    /// The events of one node, without deliveries.
+    /// Events of one node, without deliveries.
     timetable: Timetable,
+    /// Deliveries on a link within the frame, in the order in which they happen.
     deliveries: Vec<Delivery>,
+    /// Number of samples of earlier frames that may be taken in.
     depth: usize,
-    /// By what a frame multiplies the noise that is held: the probability that nothing arrives.
+    /// Factor by which a frame multiplies the held noise: the probability that nothing arrives.
     kept: f64,
 }
 
-/// What may be taken in at a tick.
+/// Possible delivery of a sample at a tick.
 #[derive(Clone, Debug)]
 struct Delivery {
-    tick: usize,
-    /// Counted from the first sample sent in the frame.
-    sample: i64,
-    arrives: f64,
-    /// The rest, at this delivery, of a unit of the noise held when the frame begins, and of that of each delivery before.
-    left: Vec<f64>,
-    /// The rest of its own noise at the end of the frame.
+/// Number of the tick in the frame.
+tick: usize,
+/// Number of the sample, counted from the first sample sent in the frame.
+sample: i64,
+/// Probability of the delivery.
+arrives: f64,
+/// Share still held just before this delivery of the noise that was held at the beginning of the frame, followed by the shares of the noise of each
+/// earlier delivery.
+left: Vec<f64>,
+/// Share of this delivery's noise that is still held at the end of the frame.
     at_end: f64,
 }
 
-/// Room for the computation, to be used again.
+/// Reusable buffers of [`Equal::radius`].
 #[derive(Debug, Default)]
 pub(crate) struct EqualScratch {
     rows: Matrix,
@@ -77,18 +84,20 @@ pub(crate) struct EqualScratch {
     workspace: Workspace,
 }
 
-/// The mean motion of one kind, in the coordinates of its triangular form.
+/// Mean motion of one kind, common or difference, in the coordinates of its triangular form.
 #[derive(Debug, Default)]
 struct Block {
-    schur: Schur,
-    size: usize,
-    /// For each delivery, how u − n depends on the noise held when the frame begins and on that of each delivery before.
+/// Triangular form of the frame's matrix, with the responses u − n of the deliveries as further rows and the noises as further columns.
+schur: Schur,
+/// Number of states y at the beginning of a frame.
+size: usize,
+/// Coefficients of u − n at each delivery: of the noise held at the beginning of the frame, then of the noise of each earlier delivery.
     direct: Vec<Vec<f64>>,
     variance: Variance,
 }
 
 impl Equal {
-    /// The operator of a number of peers with the clock of that timetable of a single node; `hazards` are those of every link.
+    /// Returns the frame of `peers` equal peers with the clock of `timetable`, the timetable of a single node. `hazards` are the hazards of every link.
     pub(crate) fn new(peers: usize, timetable: Timetable, hazards: &Hazards) -> Self {
         let listed = hazards.at.iter().enumerate().flat_map(|(tick, at)| at.iter().map(move |hazard| (tick, *hazard)));
         let mut deliveries: Vec<Delivery> = Vec::new();
@@ -105,16 +114,16 @@ impl Equal {
         Self { peers: real(peers), timetable, deliveries, depth: hazards.depth(), kept: left[0] }
     }
 
-    /// The radius of the second moment of what acts, over a frame; `None` where the numbers leave their range.
+    /// Returns the radius over a frame of the second moment of the states that exert forces; `None` if numbers overflow.
     ///
-    /// `lifted` has one node; its timetable and weights are not looked at.
+    /// `lifted` has one node. Its timetable and weights are ignored.
     pub(crate) fn radius(&self, lifted: &Lifted<'_>, scratch: &mut EqualScratch) -> Option<f64> {
         let EqualScratch { rows, node, seen, heard, common, apart, relation, workspace } = scratch;
         let n1 = self.peers - 1.0;
         self.block(lifted, 1.0, lifted.tied, (rows, node, seen, heard), common)?;
         self.block(lifted, -1.0 / n1, true, (rows, node, seen, heard), apart)?;
         let lowest = common.modulus().max(apart.modulus()).max(self.kept).powi(2);
-        // The coefficients of the relation only fall as γ grows, so its inverse rises.
+        // The coefficients of the relation fall as γ rises, so the inverse of its spectral radius rises and crosses 1 once.
         let mut rise = |gamma: f64| {
             self.relation(gamma, common, apart, relation);
             1.0 / workspace.radius(relation) - 1.0
@@ -123,7 +132,7 @@ impl Equal {
         found.is_finite().then_some(found)
     }
 
-    /// The frame of the mean motion of a node that hears itself with that weight.
+    /// Computes the frame of the mean motion of a node that hears itself with the weight `weight`, in triangular form; `None` if numbers overflow.
     fn block(
         &self,
         lifted: &Lifted<'_>,
@@ -137,7 +146,8 @@ impl Equal {
         let scale = Scale { time: lifted.time, compliance: node.compliance(lifted.time) };
         let own = node.rows(0);
         let (states, depth, sent) = (node.states(), self.depth, self.timetable.sent[0]);
-        // Rows: of the peer, its samples on the way, those of this frame, n, ζ. Columns: the states when the frame begins, ζ, the noise of each delivery.
+        // Rows: states of the peer, its samples on the way, its samples of this frame, n, ζ. Columns: states at the beginning of the frame, ζ, noise of each
+        // delivery.
         let (mean, noise) = (states + depth + sent, states + depth + sent + 1);
         let reference = (!tied).then_some(own.object);
         let size = states + depth + 1 - usize::from(!tied);
@@ -152,7 +162,7 @@ impl Equal {
         seen.resize(columns, 0.0);
         block.size = size;
         block.direct.clear();
-        // u − n at each delivery is a row below those of the end of the frame.
+        // The output u − n of each delivery becomes a row below the rows of the states at the end of the frame.
         let mut outputs = Matrix::zeros(self.deliveries.len(), size);
         let (mut tick, mut sample, mut next) = (0, 0, 0);
         for event in &self.timetable.events {
@@ -194,7 +204,8 @@ impl Equal {
                 }
             }
         }
-        // Where nothing ties the scene to ground positions are relative to the copy's; a sample moves with KT only.
+        // If nothing ties the scene to the ground, positions are relative to the position of the copy. A translation moves a sample by its share of the
+        // position only.
         let moves = |row: usize| if row >= states { position_share } else { node.displacement(own, row, lifted.time) };
         let ends: Vec<(usize, f64)> = begins
             .map(|row| (if row >= states && row < mean { row + sent } else { row }, if reference.is_some() { moves(row) } else { 0.0 }))
@@ -206,12 +217,14 @@ impl Equal {
         block.schur.triangularise().then_some(())
     }
 
-    /// By what the variances of the deliveries follow from one another if the second moment grows by γ in a frame.
+    /// Computes the matrix by which the variances at the deliveries (rows) follow from the variances at the deliveries (columns), if the second moment grows by
+    /// γ in a frame.
     fn relation(&self, gamma: f64, common: &mut Block, apart: &mut Block, relation: &mut Matrix) {
         let (n, n1, size) = (self.peers, self.peers - 1.0, self.deliveries.len());
         relation.reset(size, size);
         for (from, source) in self.deliveries.iter().enumerate() {
             let variance = source.arrives * (1.0 - source.arrives) / n1;
+            // A certain delivery makes no noise, so its column stays zero.
             if variance == 0.0 {
                 continue;
             }
@@ -223,14 +236,14 @@ impl Equal {
                 let [one, other] = [&*common, &*apart].map(|block| block.seen(to, from, (delivery.left[0], within)));
                 let square = (one.square + n1 * other.square) / n - 2.0 / n * (one.product - other.product);
                 let noise = n1 * (delivery.left[0].powi(2) * held + within * within);
-                // A variance: where it comes out below zero it is rounding.
+                // The sum is a variance, so a negative result is rounding.
                 relation[(to, from)] = (variance * (square + noise)).max(0.0);
             }
         }
     }
 }
 
-/// Second moments of u − n: with itself, and with ζ.
+/// Second moments of u − n at a delivery: with itself (`square`), and with ζ (`product`).
 #[derive(Clone, Copy, Debug)]
 struct Seen {
     square: f64,
@@ -238,17 +251,17 @@ struct Seen {
 }
 
 impl Block {
-    /// The largest modulus of an eigenvalue.
+    /// Returns the largest modulus of an eigenvalue of the frame's matrix.
     fn modulus(&self) -> f64 {
         (0..self.size).map(|place| self.schur.at(place, place).norm()).fold(0.0, f64::max)
     }
 
-    /// The second moment of (y, ζ) for unit noise at that delivery.
+    /// Computes the second moment of (y, ζ) for unit noise at the delivery with the index `delivery`, once per frame.
     fn solve(&mut self, gamma: f64, kept: f64, delivery: usize, at_end: f64) {
         let Self { schur, size, variance, .. } = self;
         let size = *size;
         let matrix = |row: usize, column: usize| match (row < size, column < size) {
-            // The sample held when the frame begins is the first input.
+            // Column `size` of the triangular form is the first input, ζ at the beginning of the frame.
             (true, _) => schur.at(row, column),
             (false, true) => Complex64::default(),
             (false, false) => Complex64::from(kept),
@@ -257,8 +270,8 @@ impl Block {
         variance.solve(gamma, size + 1, matrix, input);
     }
 
-    /// The response at a delivery to unit noise at another one: of the part that lasts from frame to frame, and, of a noise before it, within this one.
-    /// `left`: the rest of ζ from the beginning of the frame, and of that noise.
+    /// Returns the moments at delivery `to` for unit noise at delivery `from`: the part of earlier frames, plus the part within this frame if `from` is earlier
+    /// than `to`. `left` and `within` are the shares still held of ζ at the beginning of the frame and of the noise of `from`.
     fn seen(&self, to: usize, from: usize, (left, within): (f64, f64)) -> Seen {
         let direct = &self.direct[to];
         let size = self.size;
@@ -269,12 +282,14 @@ impl Block {
     }
 }
 
-/// Where a function that rises with γ becomes zero; `lowest` if it is not below zero within 10⁻⁹ above there.
+/// Returns the γ above `lowest` at which a rising function is zero; `lowest` if the function is not negative within 10⁻⁹ above `lowest`. NaN if the function
+/// is NaN.
 ///
-/// The inverse of the relation's radius is nearly a straight line from its pole on, so secants are near at once; bisection is the way out if not.
+/// The inverse of the relation's radius is nearly a straight line above the pole at `lowest`, so secants converge quickly. Bisection follows if a secant
+/// leaves the bounds.
 fn root(lowest: f64, rise: &mut impl FnMut(f64) -> f64) -> f64 {
     let mut before = (lowest, 0.0);
-    // Nearest to the pole rounding may leave nothing of a variance, as if the zero were not above it.
+    // Close to the pole rounding can cancel a variance, so that the function seems positive although its zero is above. Hence several distances.
     for away in [1e-12, 1e-11, 1e-10, 1e-9] {
         let gamma = lowest * (1.0 + away);
         before = (gamma, rise(gamma));
@@ -286,7 +301,7 @@ fn root(lowest: f64, rise: &mut impl FnMut(f64) -> f64) -> f64 {
         return if before.1.is_nan() { f64::NAN } else { lowest };
     }
     let (mut low, mut high) = (before.0, f64::INFINITY);
-    // From the pole, where the inverse is zero, through the first point.
+    // First secant: at the pole the inverse is zero, that is, the function is −1.
     let mut gamma = lowest + (before.0 - lowest) / (1.0 + before.1).max(f64::EPSILON);
     for _ in 0..STEPS {
         let value = rise(gamma);
@@ -305,7 +320,7 @@ fn root(lowest: f64, rise: &mut impl FnMut(f64) -> f64) -> f64 {
             (false, true) => 0.5 * (low + high),
             (false, false) => low + 2.0 * (low - lowest),
         };
-        // A secant that no longer moves, or bounds between which there is nothing.
+        // The search ends when the secant no longer moves, or when the bounds are within the tolerance.
         if value == 0.0 || (secant - gamma).abs() <= TOLERANCE * gamma || (high.is_finite() && high - low <= TOLERANCE * high) {
             return if inside { secant } else { gamma };
         }

@@ -1,18 +1,19 @@
-//! Any peers over any links: the second moment carried through a frame event by event.
+//! Operator on the second moment for any peers over any links, applied event by event through a frame.
 //!
-//! The only things left to chance are deliveries, and each concerns one scalar, what i holds of j. So the operator is a product of simple ones: motion and
-//! sampling act as X ← T·X·Tᵀ on the rows and columns of one peer, and a delivery mixes X with what it becomes when the row and column of h_ij are
-//! replaced by those of the sample. No matrix of n² × n² is formed.
+//! Only deliveries are random, and each delivery concerns one held sample h_ij, the sample that peer i holds of peer j. So the operator is a product of simple
+//! operators. Motion and sampling act as X ← T·X·Tᵀ on the rows and columns of one peer. A delivery mixes X with the matrix in which the row and column of
+//! h_ij are replaced by the row and column of the sample. No matrix of n² × n² is formed.
 //!
-//! Where a link remembers (a chain of losses, or which sample is held when samples overtake) the moments are kept apart by the joint state of all chains,
-//! V_s = E\[z·zᵀ·1(state = s)\], and a delivery acts on the factor of its own link. Fewer numbers would not do for many links: what a peer's force does to
-//! E\[z·zᵀ·1(s_l)\] depends on all that it holds, whose next change depends on the chains of the other links, and so on until all are joined.
+//! A link may have a chain: of losses, or of the held sample if samples overtake. The operator then has one moment for each joint state of all chains,
+//! V_s = E\[z·zᵀ·1(state = s)\], and a delivery changes the part of the joint state that belongs to its link. Moments per state of one link do not suffice for
+//! many links: the effect of a peer's force on E\[z·zᵀ·1(s_l)\] depends on all samples that the peer holds, and the next change of each depends on the chain of
+//! its own link.
 
 use super::arrivals::Outcome;
 use super::positive::{Positive, pack, unpack};
 use crate::Matrix;
 
-/// Whether a computation keeps its signs, or adds up the sizes of all terms.
+/// Mode of a computation: with the signs of all terms, or with the sizes of all terms added up.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Signs {
     Kept,
@@ -20,7 +21,7 @@ pub(crate) enum Signs {
 }
 
 impl Signs {
-    /// What stands before a term that is subtracted.
+    /// Returns the factor of a subtracted term: −1 with signs, 1 for sizes.
     pub(crate) const fn minus(self) -> f64 {
         match self {
             Self::Kept => -1.0,
@@ -29,40 +30,44 @@ impl Signs {
     }
 }
 
-/// One frame.
+/// Operator of one frame.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub(crate) struct Events {
-    /// How many rows there are within a frame.
-    pub(crate) rows: usize,
-    pub(crate) steps: Vec<Step>,
-    /// How many states the chain of each link has.
-    pub(crate) chains: Vec<usize>,
-    /// For each state between frames, the row that it is at the end of one; and its row at the beginning.
-    pub(crate) kept: Vec<(usize, usize)>,
-    /// The row that positions are relative to, and how far each kept state moves with it.
-    pub(crate) reference: Option<(usize, Vec<f64>)>,
-    /// How many roundings the maps of all steps have together.
+/// Number of rows of a moment within a frame.
+pub(crate) rows: usize,
+/// Steps of the frame in order.
+pub(crate) steps: Vec<Step>,
+/// Number of states of each link's chain, indexed by link; 1 for a link without a chain.
+pub(crate) chains: Vec<usize>,
+/// For each state between frames, its row at the end of a frame and its row at the beginning of the next frame.
+pub(crate) kept: Vec<(usize, usize)>,
+/// Row of the reference position, and the displacement of each kept state per unit of the reference, indexed as `kept`. `None` if the scene is tied to the
+/// ground.
+pub(crate) reference: Option<(usize, Vec<f64>)>,
+/// Sum of the roundings of the maps of all steps.
     pub(crate) roundings: usize,
 }
 
+/// Step of a frame.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) enum Step {
-    /// The rows from `first` on become `map` times (those rows and, last, the mean of each number of the samples held); `sizes` are those of the terms of the
-    /// map.
+/// Motion of a node: the rows from `first` on become `map` times (these rows, then the weighted sum of each number of the held samples). `sizes` bounds the
+/// terms of `map`; `held` lists, for each number, the rows of the held samples with their weights.
     Move { first: usize, map: Matrix, sizes: Matrix, held: Vec<Vec<(usize, f64)>> },
-    /// The row becomes that combination.
+    /// Sampling: `row` becomes the linear combination `of` of two rows, given as (row, factor).
     Sample { row: usize, of: [(usize, f64); 2] },
-    /// The rows of a held sample, as many as a sample has numbers, may become those of another sample: `take` is its first row. Outcomes are in the order of
-    /// their ends, and of their beginnings where these are equal.
+    /// Delivery on a link: the `numbers` rows of the held sample, from `row` on, may become the rows of another sample. `outcomes` are sorted by final state,
+    /// then by initial state.
     Deliver { link: usize, row: usize, numbers: usize, outcomes: Vec<Arrive> },
 }
 
-/// An outcome with the row that it takes.
+/// Outcome of a delivery, with the row of the sample in place of its number.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Arrive {
-    pub(crate) from: usize,
-    pub(crate) to: usize,
-    pub(crate) take: Option<usize>,
+pub(crate) from: usize,
+pub(crate) to: usize,
+/// First row of the sample that is taken in; `None` if the held sample stays.
+pub(crate) take: Option<usize>,
     pub(crate) probability: f64,
 }
 
@@ -74,7 +79,7 @@ impl Arrive {
 }
 
 impl Events {
-    /// How many joint states the chains have; `None` beyond measure.
+    /// Returns the number of joint states of all chains; `None` if the number exceeds `usize`.
     pub(crate) fn joint(&self) -> Option<usize> {
         self.chains.iter().try_fold(1_usize, |product, states| product.checked_mul(*states))
     }
@@ -83,7 +88,7 @@ impl Events {
         self.chains.iter().product()
     }
 
-    /// Returns how many moments deliveries on links that remember add up in a frame.
+    /// Returns the number of moments that the deliveries on links with a chain add up in a frame, for the estimate of the cost.
     pub(crate) fn sums(&self) -> usize {
         let of = |step: &Step| match step {
             Step::Deliver { link, outcomes, .. } if self.chains[*link] > 1 => ways(outcomes).count() * (self.states() / self.chains[*link]),
@@ -92,13 +97,14 @@ impl Events {
         self.steps.iter().map(of).sum()
     }
 
-    /// Delivers on a link that remembers. `after` is room of the size of `moments`, which is taken once for all deliveries of a frame: thousands of moments that
-    /// were made and dropped at each of them took as long as their sums.
+    /// Delivers on a link with a chain of several states. `after` is a buffer of the size of `moments`, reused by all deliveries of a frame, because the
+    /// allocation of thousands of moments per delivery is expensive.
     fn deliver(&self, moments: &mut Vec<Matrix>, after: &mut Vec<Matrix>, link: usize, (row, numbers): (usize, usize), outcomes: &[Arrive]) {
+        // Joint states count with the last link fastest: `inner` joint states of later links lie between two neighbouring states of this link.
         let inner: usize = self.chains[link + 1..].iter().product();
         let own = self.chains[link];
         after.resize_with(moments.len(), || Matrix::zeros(self.rows, self.rows));
-        // Chains with many places have a thousand outcomes and more, which each joint state would look through.
+        // Grouped once for all joint states: chains with many places have a thousand outcomes and more, and a search through them per joint state is avoided.
         let ways: Vec<(&[Arrive], f64)> = ways(outcomes).map(|way| (way, way.iter().map(|outcome| outcome.probability).sum())).collect();
         for (joint, sum) in after.iter_mut().enumerate() {
             let to = joint / inner % own;
@@ -133,7 +139,7 @@ impl Events {
                 }
             }
             Step::Deliver { link, row, numbers, outcomes } => match (self.chains[*link], outcomes.as_slice()) {
-                // Nothing to keep apart: in place.
+                // With one state no other moment contributes, so that each moment is changed in place.
                 (1, _) => {
                     for moment in moments {
                         let mut taken = Taken::new(*numbers, self.rows);
@@ -146,7 +152,7 @@ impl Events {
         }
     }
 
-    /// The states between frames at the end of one, relative to the reference.
+    /// Returns the moment of the kept states at the end of a frame, relative to the reference. `moment` has all rows.
     fn at_end(&self, moment: &Matrix, signs: Signs) -> Matrix {
         let minus = signs.minus();
         let size = self.kept.len();
@@ -209,14 +215,14 @@ impl Positive for Events {
         self.run(element, Signs::Dropped)
     }
 
-    /// All steps one after the other, as if every term went through all of them.
+    /// Sums the roundings of all steps, as if every term went through every step.
     fn roundings(&self) -> usize {
         let of = |step: &Step| match step {
-            // Twice a product with the map, of whose columns the last is a weighted sum, and the mean of the two triangles.
+            // Two products with the map, the weighted sums of the held samples that its last columns multiply, and the mean of the two triangles.
             Step::Move { map, held, .. } => 2 * (map.columns() + 2 * held.iter().map(Vec::len).sum::<usize>() + 2) + 2,
-            // Two products, a sum, and the factors' own: twice.
+            // Rows and then columns: each has two products, a sum, and the roundings of the factors.
             Step::Sample { .. } => 12,
-            // A term goes into one end alone.
+            // A term contributes to one final state only, so the longest list of outcomes with the same final state counts.
             Step::Deliver { outcomes, .. } => 2 * outcomes.chunk_by(|one, other| one.to == other.to).map(<[Arrive]>::len).max().unwrap_or(0) + 4,
         };
         self.steps.iter().map(of).sum::<usize>() + 2 * self.roundings + 8
@@ -234,15 +240,16 @@ impl Positive for Events {
     }
 }
 
-/// Outcomes by their end and their beginning.
+/// Returns the groups of outcomes with the same final and initial state.
 fn ways(outcomes: &[Arrive]) -> impl Iterator<Item = &[Arrive]> {
     outcomes.chunk_by(|one, other| (one.to, one.from) == (other.to, other.from))
 }
 
-/// The rows of a held sample after a delivery, in the making.
+/// Rows of a held sample after a delivery, added up outcome by outcome.
 struct Taken {
-    lines: Vec<Vec<f64>>,
-    /// Their products with one another.
+/// Moments of each number of the held sample with all rows.
+lines: Vec<Vec<f64>>,
+/// Moments of the numbers of the held sample with one another.
     corner: Matrix,
 }
 
@@ -251,7 +258,7 @@ impl Taken {
         Self { lines: vec![vec![0.0; rows]; numbers], corner: Matrix::zeros(numbers, numbers) }
     }
 
-    /// Adds an outcome that takes rows of `source`; the held sample stands from `row` on.
+    /// Adds an outcome from the moment `source`. The held sample has the rows from `row` on.
     fn add(&mut self, source: &Matrix, outcome: &Arrive, row: usize) {
         let (taken, probability) = (outcome.take.unwrap_or(row), outcome.probability);
         for (number, line) in self.lines.iter_mut().enumerate() {
@@ -262,6 +269,7 @@ impl Taken {
         }
     }
 
+    /// Writes the rows and columns of the held sample into `moment`, from `row` on.
     fn put(mut self, moment: &mut Matrix, row: usize) {
         for (number, line) in self.lines.iter_mut().enumerate() {
             line[row..row + self.corner.columns()].copy_from_slice(self.corner.row(number));
@@ -270,10 +278,10 @@ impl Taken {
     }
 }
 
-/// X ← T·X·Tᵀ for a T that changes a few rows.
+/// Computes X ← T·X·Tᵀ for a T that changes the rows of one node only, in place and without forming T.
 fn advance(moment: &mut Matrix, first: usize, map: &Matrix, held: &[Vec<(usize, f64)>]) {
     let (own, size) = (map.rows(), moment.rows());
-    // The rows that it depends on: its own and the means of the samples held.
+    // Rows that the new rows depend on: the node's own rows and the weighted sums of the held samples.
     let mut sources = Matrix::zeros(own + held.len(), size);
     for place in 0..own {
         sources.row_mut(place).copy_from_slice(moment.row(first + place));
@@ -284,7 +292,7 @@ fn advance(moment: &mut Matrix, first: usize, map: &Matrix, held: &[Vec<(usize, 
         }
     }
     let lines = map.times(&sources);
-    // Of the new rows, the columns of the same rows change too.
+    // The columns of the node's own rows change as well. `lines` has them before the product with Tᵀ.
     let mut corner = Matrix::zeros(own, own + held.len());
     for row in 0..own {
         for place in 0..own {
@@ -308,7 +316,7 @@ fn advance(moment: &mut Matrix, first: usize, map: &Matrix, held: &[Vec<(usize, 
     }
 }
 
-/// Adds the part of a symmetric matrix on and above the diagonal.
+/// Adds `factor` times the part of a symmetric matrix on and above the diagonal.
 fn add_upper(sum: &mut Matrix, matrix: &Matrix, factor: f64) {
     for row in 0..sum.rows() {
         sum.row_mut(row)[row..].iter_mut().zip(&matrix.row(row)[row..]).for_each(|(sum, entry)| *sum += factor * entry);
@@ -324,6 +332,7 @@ fn mirror(matrix: &mut Matrix) {
     }
 }
 
+/// Replaces a row of a symmetric matrix and the column of the same index.
 fn set_line(moment: &mut Matrix, row: usize, line: &[f64]) {
     moment.row_mut(row).copy_from_slice(line);
     for (column, entry) in line.iter().enumerate() {

@@ -1,4 +1,6 @@
-//! What a link leaves to chance, as the second moment needs it: which samples are lost, and by when one that is not lost has arrived.
+//! Law of a random link for the second moment: the probability that a sample is lost, and the distribution of the delay of a sample that is not lost.
+//!
+//! Refused are links whose randomness ties samples together in a way that neither independent arrivals nor a chain of losses describes.
 
 use std::time::Duration;
 
@@ -9,32 +11,39 @@ use cohaptic_wan::{
 
 use super::arrivals::Arrival;
 
-/// Delays outside the central 1 − 2·10⁻⁹ of a law count as at its ends: no law without an end can be followed to it.
+/// Probability of each tail of a law that counts as lying at the end of the remaining part. A law without an end needs infinitely many ticks otherwise.
 const TAIL: f64 = 1e-9;
 
-/// What a link does to samples.
+/// Law of the losses and delays of a link's samples.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct LinkLaw {
+    /// Chain of losses, if losses depend on each other.
     pub(crate) chain: Option<LossChain>,
-    /// The probability that a sample is lost, whatever happened to the others.
+    /// Probability that a sample is lost, independently of other samples. Zero if there is a `chain`.
     loss: f64,
-    /// The probability that a copy of it is thrown away for itself.
+    /// Probability that a packet is discarded as corrupted. Original and duplicate are discarded independently.
     discarded: f64,
+    /// Probability that a sample is duplicated.
     duplicated: f64,
+    /// Whether the link has the layout of netem, which loses original and duplicate independently.
     netem: bool,
-    /// The time added to every delay \[ns\].
+    /// Constant time added to every delay \[ns\].
     extra: i128,
+    /// Mean of the configured delay \[ns\]: every delay without a `law`.
     mean: i128,
+    /// Law of the configured delay \[ns\], if the delay has jitter.
     law: Option<Law>,
-    /// With this probability, the delay is replaced by none, or made longer by this \[ns\].
+    /// Probability that a packet is displaced, and the time by which its delay is then longer \[ns\]. `None` as time: the delay is skipped.
     displaced: Option<(f64, Option<i128>)>,
+    /// Whether the delays of successive packets depend on each other.
     pub(crate) correlated_delays: bool,
+    /// Whether a sample waits for the samples before.
     pub(crate) in_order: bool,
-    /// Whether delays are cut at the ends of a law.
+    /// Whether delays are cut at an end of `law`.
     pub(crate) cut: bool,
 }
 
-/// Losses that depend on what happened to the samples before: a chain that gives each sample a state, from which the probability of its loss follows.
+/// Markov chain of losses that depend on earlier losses. The chain gives each sample a state, from which the probability of the sample's loss follows.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum LossChain {
     GilbertElliott(GilbertElliott),
@@ -44,11 +53,12 @@ pub(crate) enum LossChain {
 }
 
 impl LossChain {
-    /// The states that it is ever in: a link begins in the chain's stationary law, so one of probability zero is not among them.
+    /// Returns the states of positive probability. A link begins in the chain's stationary law, so a state with stationary probability zero is never reached.
+    /// Other functions number the states by their position in this list.
     fn live(&self) -> Vec<usize> {
         let two = |bad: f64| vec![1.0 - bad, bad];
         let stationary = match self {
-            // One that never moves begins, and stays, in the good one.
+            // A chain with p = 0 begins and stays in the good state. With r = 0 too, the quotient below would be 0/0.
             Self::GilbertElliott(chain) if chain.p.get() == 0.0 => two(0.0),
             Self::GilbertElliott(chain) => two(chain.p.get() / (chain.p.get() + chain.r.get())),
             Self::InTime(chain) => two(chain.bad_fraction()),
@@ -58,35 +68,36 @@ impl LossChain {
         (0..stationary.len()).filter(|state| stationary[*state] > 0.0).collect()
     }
 
-    /// How many states there are.
+    /// Returns the number of states of positive probability.
     pub(crate) fn states(&self) -> usize {
         self.live().len()
     }
 
-    /// Whether everything is lost.
+    /// Returns whether every sample is lost in every state.
     fn loses_all(&self) -> bool {
         (0..self.states()).all(|state| self.lost(state) >= 1.0)
     }
 
-    /// Returns the probability that a sample is lost in a state. The second state of two is the bad one.
+    /// Returns the probability that a sample with that state is lost. Of two states the second one is bad.
     pub(crate) fn lost(&self, state: usize) -> f64 {
         let state = self.live()[state];
         match self {
-            // The state before a packet's move decides, which is therefore the state of that packet.
+            // The state before a packet's move decides about the packet's loss, and is therefore the state of that packet.
             Self::GilbertElliott(chain) => [1.0 - chain.k.get(), 1.0 - chain.h.get()][state],
             Self::InTime(chain) => [1.0 - chain.k.get(), 1.0 - chain.h.get()][state],
             Self::Correlated(_) => [0.0, 1.0][state],
-            // Lost within a burst or between bursts.
+            // The third and the fourth state lose the packet, within a burst or between bursts.
             Self::FourState(_) => [0.0, 0.0, 1.0, 1.0][state],
         }
     }
 
-    /// Returns the probabilities of the states of a sample, in columns, after each state of the sample before, in rows, which was sent `gap` seconds earlier.
+    /// Returns the probability of each state of a sample (columns) for each state of the sample before (rows), which was sent `gap` seconds earlier.
     pub(crate) fn moves(&self, gap: f64) -> Vec<Vec<f64>> {
         let live = self.live();
         live.iter().map(|from| live.iter().map(|to| self.way(*from, *to, gap)).collect()).collect()
     }
 
+    /// Returns the probability of a move between two states of the model, numbered as in the model and not as in [`live`](Self::live).
     fn way(&self, from: usize, to: usize, gap: f64) -> f64 {
         let pick = |to_bad: f64| if to == 1 { to_bad } else { 1.0 - to_bad };
         match self {
@@ -94,6 +105,7 @@ impl LossChain {
             Self::InTime(chain) => {
                 let (good, bad) = chain.mean_times();
                 let (rate, share) = (1.0 / good.as_secs_f64() + 1.0 / bad.as_secs_f64(), chain.bad_fraction());
+                // Share of the initial state that is forgotten after `gap`: 1 − e^(−rate·gap), without cancellation for a short gap.
                 let forgotten = -libm::expm1(-rate * gap);
                 pick([share * forgotten, 1.0 - (1.0 - share) * forgotten][from])
             }
@@ -107,11 +119,11 @@ impl LossChain {
 }
 
 impl LinkLaw {
-    /// The law of a link. `nominal` is the delay of all its packets if nothing is left to chance.
+    /// Returns the law of a link. `nominal` is the delay of all packets of the same link without randomness.
     ///
     /// # Errors
     ///
-    /// What of it has no law here, in words.
+    /// A sentence about the part of the link that this law does not describe.
     pub(crate) fn of(model: &LinkModel, nominal: Duration) -> Result<Self, &'static str> {
         let Some(config) = model.as_fixed() else {
             return Err("it is modulated, or a kernel's netem");
@@ -152,6 +164,7 @@ impl LinkLaw {
         };
         let law = config.delay.law().cloned();
         let correlated = config.delay.jitter().is_some_and(|jitter| jitter.correlation != cohaptic_wan::Correlation::None);
+        // A law with values so far from its mean has a tail, of which TAIL cuts a part.
         let cut = law.as_ref().is_some_and(|law| law.survival(law.mean() + 100.0 * law.sd()) > 0.0 || law.cdf(law.mean() - 7.0 * law.sd()) > 0.0);
         Ok(Self {
             chain,
@@ -169,12 +182,12 @@ impl LinkLaw {
         })
     }
 
-    /// Whether nothing ever arrives.
+    /// Returns whether no sample ever arrives.
     pub(crate) fn is_silent(&self) -> bool {
         self.within(i128::MAX) <= 0.0 || self.chain.is_some_and(|chain| chain.loses_all())
     }
 
-    /// The probability that the delay of a packet is at most that.
+    /// Returns the probability that the configured delay of a packet is at most `nanos` nanoseconds.
     fn delay(&self, nanos: i128) -> f64 {
         let Some(law) = &self.law else {
             return if nanos >= self.mean { 1.0 } else { 0.0 };
@@ -182,7 +195,7 @@ impl LinkLaw {
         if nanos < 0 {
             return 0.0;
         }
-        // Delays are rounded to nanoseconds.
+        // The link rounds delays to nanoseconds, so that every delay below `nanos + 0.5` counts.
         let at = real(nanos) + 0.5;
         let (below, above) = (law.cdf(at), law.survival(at));
         if above < TAIL {
@@ -208,7 +221,7 @@ impl Arrival for LinkLaw {
         };
         let one = (1.0 - self.discarded) * way;
         let copied = |one: f64| (1.0 - self.duplicated) * one + self.duplicated * one * (2.0 - one);
-        // The copy of netem is lost for itself; otherwise there is none of a lost packet.
+        // netem loses original and duplicate independently. In the other layouts a lost packet has no duplicate.
         if self.netem { copied((1.0 - self.loss) * one) } else { (1.0 - self.loss) * copied(one) }
     }
 
@@ -222,7 +235,7 @@ impl Arrival for LinkLaw {
     }
 }
 
-/// Refuses what has no law here.
+/// Refuses a configuration with a part that [`LinkLaw`] does not describe.
 fn refuse(config: &LinkConfig) -> Result<(), &'static str> {
     let queues = config.bottleneck.is_some() || config.token_bucket.is_some() || config.limit.is_some();
     let spread = config.delay.jitter().is_some() || config.reorder.is_some() || !config.duplication.is_never();
@@ -244,11 +257,11 @@ fn refuse(config: &LinkConfig) -> Result<(), &'static str> {
     Ok(())
 }
 
-/// Whether something about a link is left to chance.
+/// Returns whether losses or delays of a link are random.
 pub(crate) fn is_random(model: &LinkModel) -> bool {
     match model {
         LinkModel::Fixed(config) => {
-            // What never happens is not random.
+            // A loss of probability zero, or by a pattern, is not random.
             let certain = config.loss == Loss::None || config.loss.mean() == Some(0.0) || matches!(config.loss, Loss::Pattern(_));
             let LinkConfig { loss, .. } = LinkConfig::default();
             let rest = LinkConfig { loss, ..config.clone() };

@@ -1,4 +1,4 @@
-//! The spectral radius of a positive operator, between two bounds that are checked.
+//! Spectral radius of a positive operator, enclosed by two checked bounds.
 //!
 //! L maps positive semidefinite matrices to positive semidefinite matrices. By the theorem of Krein & Rutman (1948) its spectral radius ρ is an
 //! eigenvalue. Let Y be such that γY − L(Y) is positive definite.
@@ -6,56 +6,57 @@
 //! - If Y is positive definite, then L(Y) < γY, and L maps the interval −Y ≤ X ≤ Y into γ' times itself for a γ' < γ: **ρ < γ**.
 //! - If γ > ρ, then Y = Σ L^k(γY − L(Y))/γ^(k+1), which is positive definite. So if Y is not, **γ ≤ ρ**.
 //!
-//! Both are decided by looking at signs, however Y was found and however ill-conditioned the eigenvectors of L are. Y is found as the Y for which
-//! γY − L(Y) is nearest to a fixed positive definite E, in the Krylov space of E, which is the same for every γ: one Arnoldi factorisation answers for all.
+//! Both bounds are decided by signs alone, whatever the origin of Y and the condition of the eigenvectors of L. The chosen Y is the element of the Krylov
+//! space of a fixed positive definite E for which γY − L(Y) is nearest to E. That space is the same for every γ, so one Arnoldi factorisation serves all γ.
 //!
 //! # Rounding
 //!
 //! A computation of sums, products and constants changes each of its terms by at most as many roundings as the term goes through. If these are at most K
 //! (`roundings`) and S are the sizes of the terms of each entry, added up (`sizes`), then the computed image is within γ_K·S of the exact image (Higham 2002,
-//! Section 3.1). That γY − L(Y) is positive definite whatever these errors are is shown by Cholesky's factorisation with Rump's criterion
-//! (`definite`). That Y is not is shown by an entry of its diagonal below zero, with no rounding at all. So the bounds hold for the operator with
-//! the coefficients as stored, and as far as the errors of these are counted among the roundings for the exact one; numbers that underflow are not counted.
+//! Section 3.1). Cholesky's factorisation with Rump's criterion (`definite`) shows that γY − L(Y) is positive definite whatever these errors are. A diagonal
+//! entry of Y below zero shows, without any rounding, that Y is not positive definite. So the bounds hold for the operator with the coefficients as stored.
+//! They hold for the exact operator as far as the errors of the coefficients are counted among the roundings. Numbers that underflow are not counted.
 
 use crate::definite::is_positive;
 use crate::rounding::{gamma, outward};
 use crate::{Matrix, Radius, Watch};
 
-/// An operator on symmetric matrices, or tuples of them, that maps positive ones to positive ones. Elements are vectors of coordinates.
+/// Linear operator on symmetric matrices, or on tuples of symmetric matrices, that maps positive semidefinite elements to positive semidefinite elements.
+/// An element is given by its vector of coordinates.
 pub trait Positive: Sync {
-    /// How many coordinates there are.
+    /// Returns the number of coordinates of an element.
     fn unknowns(&self) -> usize;
-    /// A positive definite element of norm about 1.
+    /// Returns a positive definite element, the start of the Krylov space.
     fn base(&self) -> Vec<f64>;
-    /// The image of an element.
+    /// Returns the image of an element.
     fn apply(&self, element: &[f64]) -> Vec<f64>;
-    /// The image of an element without signs if no coefficient had a sign: for each coordinate, the terms that [`apply`](Self::apply) adds up.
+    /// Returns, for each coordinate, the sum of the absolute values of the terms that [`apply`](Self::apply) adds up. `element` has no negative coordinate.
     fn sizes(&self, element: &[f64]) -> Vec<f64>;
-    /// How many roundings a term of `apply` goes through at most, those of the coefficients included.
+    /// Returns an upper bound of the number of roundings of a term of `apply`, the roundings of the coefficients included.
     fn roundings(&self) -> usize;
-    /// The symmetric matrices that are all positive definite if and only if an element is.
+    /// Returns the symmetric matrices that are all positive definite if and only if the element is positive definite.
     fn matrices(&self, element: &[f64]) -> Vec<Matrix>;
 }
 
-/// Both bounds within this of each other, relative to the radius, are good enough.
+/// Distance of both bounds, relative to the upper one, at which the search ends.
 const GOOD: f64 = 1e-11;
-/// Where the bounds are first looked for, relative to the radius.
+/// Distance of the first candidate for a bound from the guess, relative to the guess.
 const NEAREST: f64 = 1e-12;
-/// How much farther each time.
+/// Factor by which the distance of the next candidate grows if a candidate is no bound.
 const FARTHER: f64 = 2.0;
-/// The guess is settled if it changed by no more than this, relative, since it was last looked at.
+/// Largest relative change of a settled guess since the previous look at the guess.
 const SETTLED: f64 = 1e-12;
-/// The numbers that a Krylov space may take in memory.
+/// Largest number of `f64` in the basis of a Krylov space.
 const MOST_NUMBERS: usize = 1 << 26;
-/// Its largest dimension.
+/// Largest dimension of a Krylov space.
 const MOST_STEPS: usize = 400;
-/// A direction that is left with less than this is nothing but rounding.
+/// Share of an image's norm below which the part outside the Krylov space counts as rounding.
 const BREAKDOWN: f64 = 1e-14;
 
-/// The spectral radius. The error covers the whole interval from zero where no lower bound is found. Where numbers overflow, the operator is divided by a
-/// power of two, which is exact; where that does not help either, nothing is known.
+/// Returns the spectral radius with its error; `None` if the watcher ends the computation. One image takes `operations` operations.
 ///
-/// One image takes a number of `operations`; `None` if the watch ends it.
+/// If no lower bound is found, the error covers the whole interval from zero. If numbers overflow, the operator is divided by a power of two, which is exact.
+/// If numbers overflow even then, the result is [`Radius::UNKNOWN`].
 pub fn radius_watched(operator: &impl Positive, operations: f64, watch: &dyn Watch) -> Option<Radius> {
     let watched = Images { operator, factor: 1.0, operations, watch };
     match within_range(&watched, watch) {
@@ -63,7 +64,7 @@ pub fn radius_watched(operator: &impl Positive, operations: f64, watch: &dyn Wat
         Err(Ended::Stopped) => None,
         Err(Ended::Overflow) => {
             let largest = operator.apply(&operator.base()).into_iter().fold(1.0_f64, |largest, entry| largest.max(entry.abs()));
-            // The sizes may be larger than the entries; and no number is larger than 2^1024.
+            // The sizes of terms may be larger than the entries, hence 64 more. The exponent stays at most 1000, so that the factor is not subnormal.
             let exponent = (libm::log2(largest).ceil() + 64.0).min(1000.0);
             match within_range(&Images { factor: libm::exp2(-exponent), ..watched }, watch) {
                 Ok(radius) => Some(radius.scaled(libm::exp2(exponent))),
@@ -74,7 +75,8 @@ pub fn radius_watched(operator: &impl Positive, operations: f64, watch: &dyn Wat
     }
 }
 
-/// γ as it is chosen for a spectral radius, nearly that of the operator, and some Y for which γY − L(Y) is nearly the base; whether it is has to be checked.
+/// Returns γ and a Y for which γY − L(Y) is nearly the base. The function `gamma` chooses γ for an estimate of the spectral radius. The result is not proven:
+/// the caller must check that γY − L(Y) is positive definite. `None` if numbers overflow.
 pub fn solution(operator: &impl Positive, gamma: impl Fn(f64) -> f64) -> Option<(f64, Vec<f64>)> {
     let mut krylov = Krylov::new(operator.base());
     let most = MOST_STEPS.min(operator.unknowns());
@@ -93,12 +95,12 @@ pub fn solution(operator: &impl Positive, gamma: impl Fn(f64) -> f64) -> Option<
     }
 }
 
-/// Whether γY − L(Y) is positive definite whatever was rounded.
+/// Returns whether γY − L(Y) is shown to be positive definite despite all rounding errors, with γ = `factor` and Y = `solution`.
 pub fn leaves_less(operator: &impl Positive, factor: f64, solution: &[f64]) -> bool {
     let image = operator.apply(solution);
     let left: Vec<f64> = solution.iter().zip(&image).map(|(solution, image)| factor * solution - image).collect();
     let absolute: Vec<f64> = solution.iter().map(|entry| entry.abs()).collect();
-    // The product with γ and the difference round too; the sizes were computed with as many roundings.
+    // Two more roundings for the product with γ and for the difference. The sizes themselves are rounded as often, hence the factor 1 + share.
     let share = gamma(operator.roundings() + 2);
     let sizes = operator.sizes(&absolute);
     let error: Vec<f64> = absolute.iter().zip(&sizes).map(|(entry, size)| outward(share * (1.0 + share) * (factor * entry + size))).collect();
@@ -106,19 +108,19 @@ pub fn leaves_less(operator: &impl Positive, factor: f64, solution: &[f64]) -> b
     left.iter().zip(&error).all(|(left, error)| is_positive(left, error))
 }
 
-/// As near as this to the base, relative to it, is near enough for a solution that is checked over a box.
+/// Distance of γY − L(Y) from the base, relative to the base, at which [`solution`] ends. Near enough for a Y that is then checked over a box of operators.
 const NEARLY: f64 = 1e-6;
 
-/// Why there is no radius.
+/// Reason for the absence of a radius.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Ended {
     /// Numbers overflowed.
     Overflow,
-    /// The watcher ended it.
+    /// The watcher ended the computation.
     Stopped,
 }
 
-/// An operator times a power of two, each image of which is shown to the watcher.
+/// Operator times a power of two. The watcher hears of each image.
 struct Images<'a, O> {
     operator: &'a O,
     factor: f64,
@@ -129,7 +131,7 @@ struct Images<'a, O> {
 impl<O> Images<'_, O> {
     fn seen(&self, image: Vec<f64>) -> Vec<f64> {
         self.watch.done(self.operations);
-        // A product with 1 changes nothing.
+        // A product with a power of two, 1 included, is exact unless the number underflows.
         image.into_iter().map(|entry| self.factor * entry).collect()
     }
 }
@@ -160,7 +162,7 @@ impl<O: Positive> Positive for Images<'_, O> {
     }
 }
 
-/// The spectral radius, as far as numbers go.
+/// Returns the spectral radius, or the error `Overflow` if a number overflows.
 fn within_range(operator: &impl Positive, watch: &dyn Watch) -> Result<Radius, Ended> {
     let unknowns = operator.unknowns();
     if unknowns == 0 {
@@ -175,6 +177,7 @@ fn within_range(operator: &impl Positive, watch: &dyn Watch) -> Result<Radius, E
         if watch.stops() {
             return Err(Ended::Stopped);
         }
+        // `going` is false once the space is invariant. A larger space does not exist then, so the present guess is the last one.
         let going = krylov.step(operator);
         let steps = krylov.steps();
         let last = !going || steps == most;
@@ -191,7 +194,7 @@ fn within_range(operator: &impl Positive, watch: &dyn Watch) -> Result<Radius, E
         let width = high - low;
         let (below, above) = krylov.bounds(operator, guess, watch).ok_or(Ended::Stopped)?;
         (low, high) = (low.max(below), high.min(above));
-        // Where rounding sets the limit a larger space does not help.
+        // If a larger space did not halve the width, rounding limits the bounds, and a still larger space does not help.
         let no_better = width.is_finite() && high - low > 0.5 * width;
         if last || no_better || high - low <= GOOD * high {
             break;
@@ -201,16 +204,19 @@ fn within_range(operator: &impl Positive, watch: &dyn Watch) -> Result<Radius, E
         return Ok(Radius::at_least(low));
     }
     let value = 0.5 * (low + high);
-    // The middle of the two rounds.
+    // The middle of the two bounds is rounded too, which the last term covers.
     Ok(Radius { value, error: outward((high - value).max(value - low)) + f64::EPSILON * value })
 }
 
-/// An orthonormal basis of the space of E, L(E), L²(E), …, in which L is an upper Hessenberg matrix.
+/// Krylov space of E, L(E), L²(E), …, with an orthonormal basis in which L is an upper Hessenberg matrix.
 struct Krylov {
-    base: Vec<f64>,
-    norm: f64,
-    basis: Vec<Vec<f64>>,
-    /// The columns of the Hessenberg matrix, each with one entry more than the one before.
+/// Coordinates of E.
+base: Vec<f64>,
+/// Norm of E.
+norm: f64,
+/// Orthonormal basis; the first vector is E divided by its norm.
+basis: Vec<Vec<f64>>,
+/// Columns of the Hessenberg matrix. Each column has one entry more than the column before.
     columns: Vec<Vec<f64>>,
 }
 
@@ -225,12 +231,12 @@ impl Krylov {
         self.columns.len()
     }
 
-    /// One more dimension; answers whether there is another.
+    /// Adds a column to the Hessenberg matrix, and returns whether the basis could be extended for another column.
     fn step(&mut self, operator: &impl Positive) -> bool {
         let mut image = operator.apply(&self.basis[self.columns.len()]);
         let size = dot(&image, &image).sqrt();
         let mut column = vec![0.0; self.basis.len() + 1];
-        // Twice is enough (Giraud, Langou & Rozložník 2005).
+        // Orthogonalising twice is enough to keep the basis orthogonal to rounding (Giraud, Langou & Rozložník 2005).
         for _ in 0..2 {
             for (entry, direction) in column.iter_mut().zip(&self.basis) {
                 let part = dot(&image, direction);
@@ -252,23 +258,26 @@ impl Krylov {
         going
     }
 
-    /// The largest real eigenvalue of the Hessenberg matrix, which tends to the radius from what E contains of its eigenvector.
+    /// Returns the largest real eigenvalue of the Hessenberg matrix, an estimate of the radius; `None` if numbers overflow or the eigenvalues do not converge.
+    /// E is positive definite, so E has a part in the direction of the leading eigenvector.
     fn largest_real(&self) -> Option<f64> {
         let size = self.columns.len();
         if self.columns.iter().flatten().any(|entry| !entry.is_finite()) {
             return None;
         }
         let values = crate::eigenvalues(&Matrix::from_fn(size, size, |row, column| self.columns[column].get(row).copied().unwrap_or(0.0)));
-        // The iteration has not converged.
+        // An eigenvalue iteration that has not converged returns NaN.
         if values.iter().any(|value| value.is_nan()) {
             return None;
         }
         let scale = values.iter().map(|value| libm::hypot(value.re, value.im)).fold(0.0, f64::max);
         let real = values.iter().filter(|value| value.im.abs() <= 1e-9 * scale).map(|value| value.re).fold(0.0, f64::max);
+        // Rounding can split a real eigenvalue into a complex pair. The largest modulus is then the better guess.
         Some(if real > 0.0 { real } else { scale })
     }
 
-    /// The tightest bounds around a guess that can be checked in this space; `None` if the watcher ends it.
+    /// Returns the tightest bounds around a guess that can be proven in this space; `None` if the watcher ends the search. Without a proof the lower bound is 0
+    /// and the upper bound infinite.
     fn bounds(&self, operator: &impl Positive, guess: f64, watch: &dyn Watch) -> Option<(f64, f64)> {
         let mut low = 0.0;
         let mut apart = NEAREST;
@@ -288,7 +297,7 @@ impl Krylov {
             if watch.stops() {
                 return None;
             }
-            // Where everything dies out within some frames, the guess is zero or rounding.
+            // If every moment becomes zero within some frames, the guess is zero or rounding, and a candidate relative to the guess stays too small.
             let candidate = (guess * (1.0 + apart)).max(apart * 1e-3);
             if self.check(operator, candidate, &is_definite) {
                 high = candidate;
@@ -298,7 +307,7 @@ impl Krylov {
         Some((low, high))
     }
 
-    /// Whether this space has a Y of that kind for which γY − L(Y) is positive definite whatever was rounded.
+    /// Returns whether the Y of this space for γ = `candidate` is of the wanted `kind`, and γY − L(Y) is shown to be positive definite.
     fn check(&self, operator: &impl Positive, candidate: f64, kind: &dyn Fn(&[Matrix]) -> bool) -> bool {
         let Some((solution, _)) = self.solve(candidate) else {
             return false;
@@ -306,7 +315,9 @@ impl Krylov {
         kind(&operator.matrices(&solution)) && leaves_less(operator, candidate, &solution)
     }
 
-    /// The combination of the basis for which γY − L(Y) − E is least, and how large that is: a least-squares problem with a Hessenberg matrix, by rotations.
+    /// Returns the combination Y of the basis for which the norm of γY − L(Y) − E is least, and that norm. `None` if the problem is singular or overflows.
+    ///
+    /// The least-squares problem has a Hessenberg matrix, which Givens rotations make triangular.
     fn solve(&self, candidate: f64) -> Option<(Vec<f64>, f64)> {
         let size = self.columns.len();
         let mut matrix = Matrix::from_fn(size + 1, size, |row, column| {
@@ -357,19 +368,19 @@ pub fn is_definite(matrices: &[Matrix]) -> bool {
     matrices.iter().all(|matrix| is_positive(matrix, &Matrix::zeros(matrix.rows(), matrix.columns())))
 }
 
-/// Whether a diagonal has an entry below zero: eᵀYe < 0.
+/// Returns whether the diagonal of any of the matrices has an entry below zero. With e the unit vector of that entry, eᵀYe < 0, so Y is not positive definite.
 pub fn is_indefinite(matrices: &[Matrix]) -> bool {
     matrices.iter().any(|matrix| (0..matrix.rows()).any(|place| matrix[(place, place)] < 0.0))
 }
 
-/// The lower half of a symmetric matrix, row by row, appended.
+/// Appends the lower half of a symmetric matrix, row by row.
 pub(crate) fn pack(matrix: &Matrix, into: &mut Vec<f64>) {
     for row in 0..matrix.rows() {
         into.extend_from_slice(&matrix.row(row)[..=row]);
     }
 }
 
-/// The symmetric matrix of a lower half, and what follows it.
+/// Returns the symmetric matrix of `size` rows whose lower half begins `from`, and the rest of `from` after that half.
 pub(crate) fn unpack(size: usize, from: &[f64]) -> (Matrix, &[f64]) {
     let mut matrix = Matrix::zeros(size, size);
     let mut rest = from;

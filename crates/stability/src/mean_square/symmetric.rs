@@ -1,23 +1,23 @@
-//! Equal peers over equal links that lose independently: the second moment of any number of them, at the same cost.
+//! Operator on the second moment of any number of equal peers over equal links with independent losses, at a cost independent of that number.
 //!
-//! Start from a second moment that no permutation of the peers changes; then none ever does. Such a moment is given by what it says about one, two,
-//! three and four peers. With a_i the state of a peer (bodies, samples on the way) and h_ij what i holds of j:
+//! A second moment that no permutation of the peers changes keeps this symmetry through every event. Such a moment is determined by its entries for one, two,
+//! three and four peers. With a_i the state of peer i (bodies, samples on the way) and h_ij the sample that peer i holds of peer j:
 //!
 //! ```text
 //! A0 = E a_i a_iᵀ    A1 = E a_i a_jᵀ    r = E a_i h_ij    s = E a_i h_ji    o = E a_i h_jk
 //! h  = E of h_ij times: [0] h_ij  [1] h_ji  [2] h_ik  [3] h_kj  [4] h_jk (and h_ki)  [5] h_kl
 //! ```
 //!
-//! Every event is a few lines in these. Let q be the probability of missing a sample u_j = cᵀa_j, and p = 1 − q. Delivering on all links at once maps
+//! Every event is a short formula in these moments. Let q be the probability of missing a sample u_j = cᵀa_j, and p = 1 − q. Delivering on all links at once maps
 //! E h_ij h_kl to q²·E h_ij h_kl + q·p·(E h_ij u_l + E u_j h_kl) + p²·E u_j u_l for two links, and E h_ij² to q·E h_ij² + p·E u_j² for one and the same.
 //!
 //! The space decomposes under the permutations into the common motion (once), the differences of peers (N − 1 copies: a_i, and the sums of h over
 //! senders and over receivers) and two kinds of h whose sums are zero, symmetric and antisymmetric. A moment is positive definite if its block of each
 //! kind is, so these blocks are the coordinates.
 //!
-//! All receivers hold much the same of a sender, so the sums of h grow with N − 1, and their unit vectors' components with its root, while a_i does not:
-//! together they would cost the more digits the more peers there are. In the blocks of the first two kinds h is therefore divided by √(N − 1), which
-//! makes of the sums the means that act on peers; then every coefficient of a frame is of size 1 for any N, and none is a difference of large numbers.
+//! All receivers hold nearly the same sample of a sender, so the sums of h grow with N − 1, and their components in an orthonormal basis with √(N − 1), while
+//! a_i does not grow. Without scaling, more peers would cost more digits. In the blocks of the first two kinds h is therefore divided by √(N − 1), which turns
+//! the sums into the means that exert forces on peers. Then every coefficient of a frame is of size 1 for any N, and none is a difference of large numbers.
 
 use super::arrivals::Hazards;
 use super::events::Signs;
@@ -30,56 +30,64 @@ use crate::rounding::real;
 
 use crate::timetable::Event;
 
-/// One frame of equal peers.
+/// Operator of one frame of equal peers.
 #[derive(Clone, Debug)]
 pub struct Symmetric {
+    /// Number of peers, as a real number.
     peers: f64,
+    /// Number of peers.
     count: usize,
+    /// Steps of the frame in order.
     steps: Vec<Step>,
-    /// The states of a peer at the beginning of a frame.
+    /// Number of states of a peer at the beginning of a frame.
     size: usize,
-    /// The translation of a peer's states and of the samples held, if the whole may be moved; positions are relative to the mean over all copies.
+    /// Displacement of a peer's states and of a held sample per unit of a common translation. Positions are then relative to the mean over all copies. `None` if
+    /// the scene is tied to the ground.
     translation: Option<(Vec<f64>, f64)>,
-    /// Where the position of the copy stands among the states.
+    /// Index of the copy's position among the states of a peer.
     position: usize,
-    /// How many roundings the maps of all steps have together.
+    /// Sum of the roundings of the maps of all steps.
     roundings: usize,
 }
 
 #[derive(Clone, Debug)]
 enum Step {
-    /// a ← map·a + held·(mean of h), with the sizes of the terms of both.
+    /// Motion of every peer: a ← own·a + held·(mean of h), with the coefficients of `map`. `sizes` bounds the terms of these coefficients.
     Move { map: Map, sizes: Map },
-    /// Each link takes in that state of its sender with that probability.
+    /// Delivery on all links at once: each link takes in the state with the index `state` of its sender, independently, with that probability.
     Deliver { state: usize, probability: f64 },
 }
 
-/// By what the states of a peer and the mean of what it holds are multiplied.
+/// Coefficients of a peer's own states and of the mean of the samples that the peer holds.
 #[derive(Clone, Debug)]
 struct Map {
     own: Matrix,
     held: Vec<f64>,
 }
 
-/// A second moment.
+/// Second moment that no permutation of the peers changes, in the notation of the module.
 #[derive(Clone, Debug)]
 struct Moment {
-    own: Matrix,
-    other: Matrix,
-    /// With the sample of a sender held by the peer, of the peer by a receiver, and of others by others.
-    with: [Vec<f64>; 3],
+/// A0, the moment of a peer's states.
+own: Matrix,
+/// A1, the moment of the states of two different peers.
+other: Matrix,
+/// Moments r, s and o of a peer's states: with a sample that the peer holds, with a sample of the peer that another peer holds, and with a sample between
+/// two other peers.
+with: [Vec<f64>; 3],
+/// Moments h of two held samples, in the order of the module.
     held: [f64; 6],
 }
 
 impl Symmetric {
-    /// The frame of this number of peers like the only node of `lifted`, whose timetable has no deliveries: those are in `hazards`.
+    /// Builds the frame of `peers` peers equal to the only node of `lifted`. The timetable of `lifted` has no deliveries; `hazards` has them.
     pub fn new(peers: usize, lifted: &Lifted<'_>, hazards: &Hazards) -> Self {
         let node = &lifted.nodes[0];
         let scale = Scale { time: lifted.time, compliance: node.compliance(lifted.time) };
         let rows = node.rows(0);
         let (states, depth, sent) = (node.states(), hazards.depth(), lifted.timetable.sent[0]);
         let (size, full) = (states + depth, states + depth + sent);
-        // A map in the making: its columns are the states it begins with and, last, the samples held.
+        // Map of the ticks since the last delivery. Its columns are the states at its beginning, followed by the mean of the held samples.
         let mut map = Tracked::new(full, size, 1);
         let mut steps = Vec::new();
         let (mut tick, mut sample, mut roundings) = (0, 0, 0);
@@ -114,7 +122,7 @@ impl Symmetric {
                 }
             }
         }
-        // What was sent in the frame is of an earlier one in the next.
+        // In the next frame the samples of this frame are samples of an earlier frame, hence the shift by `sent` rows.
         steps.push(flush(&map, &|row| if row < states { row } else { row + sent }, size));
         let translation = (!lifted.tied).then(|| {
             let moved = lifted.sampling.translation(0, lifted.time);
@@ -125,7 +133,7 @@ impl Symmetric {
         Self { peers: real(peers), count: peers, steps, size, translation, position: rows.object, roundings }
     }
 
-    /// How many operations an image is: at each step two blocks go from one side and from the other through its matrix.
+    /// Returns the number of operations of an image. At each step both blocks are multiplied by the step's matrix from the left and from the right.
     pub fn operations(&self) -> f64 {
         let of = |step: &Step| match step {
             Step::Move { map: Map { own, .. }, .. } => 4.0 * real(own.rows()) * real(own.columns()) * (real(own.rows()) + real(own.columns())),
@@ -134,6 +142,7 @@ impl Symmetric {
         self.steps.iter().map(of).sum()
     }
 
+    /// Returns the moment after a motion of every peer. With fewer than four peers the moments of more peers than there are have the factor zero.
     fn moved(&self, moment: &Moment, Map { own: map, held }: &Map) -> Moment {
         let Moment { own, other, with: [r, s, o], held: h } = moment;
         let n = self.peers;
@@ -167,6 +176,7 @@ impl Symmetric {
         }
     }
 
+    /// Returns the moment after a delivery on all links at once.
     fn delivered(moment: &Moment, state: usize, probability: f64) -> Moment {
         let (p, q) = (probability, 1.0 - probability);
         let Moment { own, other, with: [r, s, o], held: h } = moment;
@@ -188,7 +198,7 @@ impl Symmetric {
         }
     }
 
-    /// Positions relative to the mean of all copies.
+    /// Makes positions relative to the mean position of all copies, if the scene is not tied to the ground.
     fn relative(&self, moment: &mut Moment, signs: Signs) {
         let Some((states, held)) = &self.translation else {
             return;
@@ -217,12 +227,12 @@ impl Symmetric {
         }
     }
 
-    /// The blocks: of the common motion, of the differences, and of the samples held with sums of zero, symmetric and antisymmetric.
+    /// Returns the blocks of a moment: of the common motion, of the differences, and of the held samples whose sums are zero, symmetric and antisymmetric.
     fn blocks(&self, moment: &Moment, signs: Signs) -> (Matrix, Matrix, f64, f64) {
         let Moment { own, other, with: [r, s, o], held: h } = moment;
         let (n, minus) = (self.peers, signs.minus());
         let (n1, n2, n3, size) = (n - 1.0, n - 2.0, n - 3.0, self.size);
-        // For three peers this factor is below zero by itself.
+        // For three peers this factor is negative itself, so sizes need its absolute value.
         let n4 = if signs == Signs::Kept { n - 4.0 } else { (n - 4.0).abs() };
         let (even, odd) = (h[0] + h[1], h[0] + minus * h[1]);
         let (y, z) = (h[2] + h[3] + 2.0 * h[4], h[2] + h[3] + minus * 2.0 * h[4]);
@@ -249,7 +259,7 @@ impl Symmetric {
         (common, apart, even + minus * y + 2.0 * h[5], odd + minus * z)
     }
 
-    /// The moment with those blocks.
+    /// Returns the moment with these blocks, the inverse of [`blocks`](Self::blocks).
     fn moment(&self, (common, apart, symmetric, antisymmetric): &(Matrix, Matrix, f64, f64), signs: Signs) -> Moment {
         let (n, minus) = (self.peers, signs.minus());
         let (n1, n2, size) = (n - 1.0, n - 2.0, self.size);
@@ -296,7 +306,8 @@ impl Symmetric {
         Moment { own, other, with: [r, s, o], held }
     }
 
-    /// Without the position of the mean copy, which is zero, and without the kinds that so few peers do not have.
+    /// Returns the coordinates of an element from its blocks. The position of the mean copy is left out if positions are relative to that mean, since it is zero
+    /// then. Blocks that do not exist for two or three peers are left out too.
     fn packed(&self, (common, apart, symmetric, antisymmetric): (Matrix, Matrix, f64, f64)) -> Vec<f64> {
         let kept: Vec<usize> = (0..=self.size).filter(|row| self.translation.is_none() || *row != self.position).collect();
         let common = Matrix::from_fn(kept.len(), kept.len(), |row, column| common[(kept[row], kept[column])]);
@@ -308,6 +319,7 @@ impl Symmetric {
         packed
     }
 
+    /// Returns the blocks of an element from its coordinates, with zeros for the parts that [`packed`](Self::packed) leaves out.
     fn unpacked(&self, element: &[f64]) -> (Matrix, Matrix, f64, f64) {
         let skipped = if self.translation.is_some() { self.position } else { usize::MAX };
         let kept = self.size + usize::from(self.translation.is_none());
@@ -358,11 +370,11 @@ impl Positive for Symmetric {
 
     fn roundings(&self) -> usize {
         let of = |step: &Step| match step {
-            // A product from both sides, and the sums over the samples held.
+            // Products with the map from both sides, and the sums over the held samples.
             Step::Move { map, .. } => 2 * map.own.columns() + 32,
             Step::Deliver { .. } => 12,
         };
-        // From blocks to a moment and back, and to relative positions.
+        // The last 64 are for the conversion from blocks to a moment and back, and to relative positions.
         self.steps.iter().map(of).sum::<usize>() + 2 * self.roundings + 64
     }
 

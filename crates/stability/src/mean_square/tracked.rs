@@ -1,8 +1,8 @@
-//! A matrix that is made tick by tick, with a bound of its rounding errors.
+//! Product of the matrices of ticks, with a bound of the product's rounding errors.
 //!
-//! A tick adds up, for each entry of each row, terms whose sizes are together at most those of |T| + 2·I, T being the matrix of the tick: all gains are
-//! zero or more, so that forces on one state have one sign, and only "what was there" may have the other. Each term is taken to have at most [`TICK`]
-//! roundings, the coefficients of the step maps included. So if P is made of ticks and G is carried on with them by
+//! A tick adds up, for each entry of each row, terms whose sizes are together at most the entries of |T| + 2·I, with T the matrix of the tick: all gains are
+//! zero or more, so the forces on one state have one sign, and only the term of the state's previous value may have the other sign. Each term is assumed to
+//! have at most [`TICK`] roundings, the coefficients of the step maps included. Let P be the product of ticks, and G a matrix that follows P by
 //!
 //! ```text
 //! P ← T·P,    G ← |T|·G + (|T| + 2·I)·|P|,
@@ -16,29 +16,34 @@ use crate::Matrix;
 use crate::lifted::node::{External, Scale, Scratch};
 use crate::lifted::{Lifted, Node};
 
-/// The roundings of a term in a tick: a dozen of the operations, and room for coefficients that are good to some units in the last place.
+/// Number of roundings of a term in a tick: a dozen for the operations, and the rest for coefficients whose errors are some units in the last place.
 const TICK: usize = 48;
 
-/// A share of the terms as small as this does not outgrow the entries: those of a tick are at most |T| + 2·I, and the diagonal of T is near 1.
+/// Divisor of the terms in [`sizes`](Tracked::sizes). With 4 the divided terms rarely exceed the entries: the terms of a tick are at most |T| + 2·I, and the
+/// diagonal of T is near 1.
 const SHARE: usize = 4;
 
-/// The columns are the states to begin with and, last, each number of the sample held.
+/// Map from the states at its beginning, followed by each number of the held sample (columns), to the present states (rows).
 #[derive(Clone, Debug)]
 pub(crate) struct Tracked {
+    /// Computed product P.
     pub(crate) value: Matrix,
+    /// Sizes G of the terms of `value`, added up over the events.
     terms: Matrix,
+    /// Number of columns for the held sample.
     held: usize,
+    /// Number of ticks and combinations so far.
     events: usize,
 }
 
 impl Tracked {
-    /// The first rows are the states as they are; the rows below are zero.
+    /// Returns the map before any event. The first `columns` rows are the identity, the rows below are zero.
     pub(crate) fn new(rows: usize, columns: usize, held: usize) -> Self {
         let value = Matrix::from_fn(rows, columns + held, |row, column| if row == column && column < columns { 1.0 } else { 0.0 });
         Self { value, terms: Matrix::zeros(rows, columns + held), held, events: 0 }
     }
 
-    /// A tick of the node whose states are the first rows, and whose samples held are extrapolated to that tick.
+    /// Applies a tick of the node whose states are the first rows. The node's held samples must already be extrapolated to the instant of the tick.
     pub(crate) fn tick(&mut self, node: &Node, lifted: &Lifted<'_>, span: Duration, scale: Scale) {
         let states = node.states();
         let held = self.held;
@@ -51,6 +56,7 @@ impl Tracked {
             let heard = Matrix::from_fn(1 + node.law.memory.len(), columns + held, of);
             node.tick(matrix, node.rows(0), |row| heard.row(row), External::default(), span, scale, &mut scratch);
         };
+        // The matrix T of this tick alone. Its terms must be computed before `value` changes, because they need P from before the tick.
         let mut single = Self::new(states, states, held).value;
         turn(&mut single);
         let columns = self.value.columns() - held;
@@ -71,7 +77,7 @@ impl Tracked {
         self.events += 1;
     }
 
-    /// A row becomes that combination of two others.
+    /// Replaces row `row` by the linear combination `of` of two rows, given as (row, factor).
     pub(crate) fn combine(&mut self, row: usize, of: [(usize, f64); 2]) {
         for column in 0..self.value.columns() {
             let sum = |matrix: &Matrix| of.iter().map(|(from, factor)| factor * matrix[(*from, column)]).sum::<f64>();
@@ -83,14 +89,14 @@ impl Tracked {
         self.events += 1;
     }
 
-    /// At least the size of each entry, and a [`SHARE`]-th of the terms that it was added up from, on average over the events. Little more than the former:
-    /// a coefficient that is larger here grows from step to step.
+    /// Returns a matrix of bounds: for each entry the larger of its size and the size of its terms divided by [`SHARE`] and by the number of events. The bound
+    /// should exceed the size rarely, because a larger coefficient makes the sizes of later steps grow from step to step.
     pub(crate) fn sizes(&self) -> Matrix {
         let share = 1.0 / crate::rounding::real(SHARE * self.events.max(1));
         Matrix::from_fn(self.value.rows(), self.value.columns(), |row, column| self.value[(row, column)].abs().max(self.terms[(row, column)] * share))
     }
 
-    /// The number of roundings of the [`sizes`](Self::sizes) cover all errors.
+    /// Returns the number of roundings of the [`sizes`](Self::sizes) that covers all errors of `value`.
     pub(crate) const fn roundings(&self) -> usize {
         SHARE * TICK * self.events
     }

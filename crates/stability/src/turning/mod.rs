@@ -1,14 +1,14 @@
-//! The general path of objects that turn: all six components of each copy together, linearised at rest.
+//! Analysis of objects that turn, with all six components of each copy together. Linearised at rest, at rest under a load, or about a steady spin.
 //!
-//! Copies are together and at rest, in body axes, y = (δp, δθ), M = diag(m·I, J), G = \[I, −\[r\]\]:
+//! At rest without a load the copies coincide. In body axes, with y = (δp, δθ), M = diag(m·I, J), G = \[I, −\[r\]\]:
 //!
 //! ```text
 //! M·ÿ = Gᵀ·FC + (0, τC) − diag(KT·I, KR)·(y − ȳ) − diag(BT·I, BR)·(ẏ − ẏ̄) − diag(bO·I, bR)·ẏ
 //! FC = KC·(δx − G·y) + BC·(δvH − G·ẏ),   τC = KCR·(δθH − δθ) + BCR·(δωH − δω)
 //! ```
 //!
-//! The terms that a peer has beyond these are products of small ones. Frames, samples and delays are those of [`crate::full`]; each component moves by the step
-//! map of one axis. Angles are multiplied by √(tr J/3m), so that all states are lengths. Peers that are equal, in their grasps too, are taken together.
+//! The further terms of a peer's equations are products of small quantities. Frames, samples and delays are as in [`crate::full`], and each component moves by
+//! the step map of one axis. Angles are multiplied by √(tr J/3m), so that all states are lengths. Peers that are equal, their grasps included, form a class.
 
 mod algebra;
 mod displacement;
@@ -42,7 +42,7 @@ use crate::structure::Structure;
 use crate::timetable::Timetable;
 use crate::{Analysis, AnalysisError, ContactMode, Matrix, Method, Part, PartKind, Radius, UNLOADED, Unwatched, Watch};
 
-/// Analyses an object that turns. [`Method::Full`] takes each peer by itself.
+/// Analyses an object that turns. With [`Method::Full`] each peer is a class of its own.
 pub(crate) fn analyse(scene: &Scene, method: Method, watch: &dyn Watch) -> Result<Analysis, AnalysisError> {
     let network = NominalNetwork::of(scene)?;
     let mode = mode(scene, &network, method, watch)?;
@@ -53,7 +53,7 @@ pub(crate) fn analyse(scene: &Scene, method: Method, watch: &dyn Watch) -> Resul
     Ok(analysis)
 }
 
-/// Analyses an object that turns about where constant forces of the hands leave it at rest, each peer by itself.
+/// Analyses small motions of an object that turns about its rest under constant forces of the hands. Each peer is a class of its own.
 pub(crate) fn analyse_loaded(scene: &Scene, watch: &dyn Watch) -> Result<Analysis, AnalysisError> {
     let network = NominalNetwork::of(scene)?;
     let (together, poses) = loaded(scene, &network, watch)?;
@@ -73,7 +73,7 @@ pub(crate) fn analyse_loaded(scene: &Scene, watch: &dyn Watch) -> Result<Analysi
     Ok(analysis)
 }
 
-/// Analyses an object that turns about the steady spin that torques of the hands drive, each peer by itself.
+/// Analyses small motions of an object that turns about the steady spin that torques of the hands drive. Each peer is a class of its own.
 pub(crate) fn analyse_spinning(scene: &Scene, watch: &dyn Watch) -> Result<Analysis, AnalysisError> {
     let network = NominalNetwork::of(scene)?;
     let spin = Spin::of(scene, &network, watch)?;
@@ -108,7 +108,7 @@ pub(crate) fn analyse_spinning(scene: &Scene, watch: &dyn Watch) -> Result<Analy
     Ok(analysis)
 }
 
-/// The peers of a scene about the rest that hands with constant forces leave it at, and where that is.
+/// Returns the peers of a scene, linearised at the rest under constant forces of the hands, and their poses at that rest.
 fn loaded(scene: &Scene, network: &NominalNetwork, watch: &dyn Watch) -> Result<(Together, Vec<Pose>), AnalysisError> {
     let structure = Structure::of_each(scene, network, &contacts(scene)?)?;
     allowed(&structure, watch)?;
@@ -119,12 +119,13 @@ fn loaded(scene: &Scene, network: &NominalNetwork, watch: &dyn Watch) -> Result<
     let loaded = Loaded::new(scene, &together.nodes)?;
     let poses = loaded.rest()?;
     let (nodes, candidates) = (loaded.stressed(&poses), loaded.together(&poses));
+    // Which displacements are free depends on a frame of the loaded nodes, so the nodes must be in place first.
     (together.nodes, together.free) = (nodes, Vec::new());
     together.free = rigid::unmoved(&together.turning(), candidates);
     Ok((together, poses))
 }
 
-/// The largest radius of all parts, without a bound.
+/// Returns the largest radius of all parts over a frame of the scene, without a bound of its error.
 pub(crate) fn radius(together: &Together, workspace: &mut Workspace) -> Radius {
     let structure = &together.structure;
     let mut of = |turning: &Turning<'_>| {
@@ -149,7 +150,7 @@ fn mode(scene: &Scene, network: &NominalNetwork, method: Method, watch: &dyn Wat
     mode_of(&Together::new(scene, structure), method, watch)
 }
 
-/// The parts of classes.
+/// Analyses the parts of a scene: the system of the classes' averages, and the differences within each class of several peers.
 pub(crate) fn mode_of(together: &Together, method: Method, watch: &dyn Watch) -> Result<ContactMode, AnalysisError> {
     let (structure, turning) = (&together.structure, together.turning());
     let kind = if method == Method::Full { PartKind::Whole } else { PartKind::Together };
@@ -177,7 +178,7 @@ pub(crate) fn mode_of(together: &Together, method: Method, watch: &dyn Watch) ->
     })
 }
 
-/// How many frames of a class on its own the frame of all takes.
+/// Returns the number of frames of `own`, the timetable of one class, in a frame of `all`, the timetable of the scene.
 fn repeats(all: &Timetable, own: &Timetable) -> u32 {
     let nanos = |frame: Duration| frame.as_nanos().max(1);
     u32::try_from(nanos(all.frame) / nanos(own.frame)).unwrap_or(u32::MAX)
@@ -186,7 +187,7 @@ fn repeats(all: &Timetable, own: &Timetable) -> u32 {
 fn part(turning: &Turning<'_>, kind: PartKind, copies: usize, method: Method, watch: &dyn Watch) -> Result<Part, AnalysisError> {
     turning.cost().begin(watch)?;
     let (matrix, error) = turning.monodromy(watch).ok_or(AnalysisError::Stopped)?;
-    // Eigenvalues cannot ask.
+    // The computation of eigenvalues does not ask the watcher, so this is the last chance to stop.
     if watch.stops() {
         return Err(AnalysisError::Stopped);
     }
