@@ -8,8 +8,8 @@
 //! h  = E of h_ij times: [0] h_ij  [1] h_ji  [2] h_ik  [3] h_kj  [4] h_jk (and h_ki)  [5] h_kl
 //! ```
 //!
-//! Every event is a short formula in these moments. Let q be the probability of missing a sample u_j = cᵀa_j, and p = 1 − q. Delivering on all links at once maps
-//! E h_ij h_kl to q²·E h_ij h_kl + q·p·(E h_ij u_l + E u_j h_kl) + p²·E u_j u_l for two links, and E h_ij² to q·E h_ij² + p·E u_j² for one and the same.
+//! Every event is a short formula in these moments. Let q be the probability of missing a sample u_j = cᵀa_j, and p = 1 − q. Delivering on all links at once
+//! maps E h_ij h_kl to q²·E h_ij h_kl + q·p·(E h_ij u_l + E u_j h_kl) + p²·E u_j u_l for two different links, and E h_ij² to q·E h_ij² + p·E u_j².
 //!
 //! The space decomposes under the permutations into the common motion (once), the differences of peers (N − 1 copies: a_i, and the sums of h over
 //! senders and over receivers) and two kinds of h whose sums are zero, symmetric and antisymmetric. A moment is positive definite if its block of each
@@ -41,8 +41,8 @@ pub struct Symmetric {
     steps: Vec<Step>,
     /// Number of states of a peer at the beginning of a frame.
     size: usize,
-    /// Displacement of a peer's states and of a held sample per unit of a common translation. Positions are then relative to the mean over all copies. `None` if
-    /// the scene is tied to the ground.
+    /// Displacement of a peer's states and of a held sample per unit of a common translation. Positions are then relative to the mean over all copies. `None`
+    /// if the scene is tied to the ground.
     translation: Option<(Vec<f64>, f64)>,
     /// Index of the copy's position among the states of a peer.
     position: usize,
@@ -306,8 +306,8 @@ impl Symmetric {
         Moment { own, other, with: [r, s, o], held }
     }
 
-    /// Returns the coordinates of an element from its blocks. The position of the mean copy is left out if positions are relative to that mean, since it is zero
-    /// then. Blocks that do not exist for two or three peers are left out too.
+    /// Returns the coordinates of an element from its blocks. If positions are relative to the mean over all copies, the position of the mean is zero and is
+    /// left out. Blocks that do not exist for two or three peers are left out too.
     fn packed(&self, (common, apart, symmetric, antisymmetric): (Matrix, Matrix, f64, f64)) -> Vec<f64> {
         let kept: Vec<usize> = (0..=self.size).filter(|row| self.translation.is_none() || *row != self.position).collect();
         let common = Matrix::from_fn(kept.len(), kept.len(), |row, column| common[(kept[row], kept[column])]);

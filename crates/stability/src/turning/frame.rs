@@ -1,4 +1,4 @@
-//! One frame of copies that turn, unit vector by unit vector.
+//! Linear frame of copies that turn, and its matrix, computed unit vector by unit vector.
 
 use cohaptic_peer::Motion;
 
@@ -11,40 +11,41 @@ use crate::rounding::real;
 use crate::timetable::{Event, Instants, Timetable};
 use crate::{Matrix, Watch};
 
-/// The numbers of a sample: the components of the copy and their velocities.
+/// Number of states of a sample: six components of the copy and their velocities.
 pub(super) const SAMPLE: usize = 12;
 
-/// Nodes that are coupled through samples.
+/// System of nodes that are coupled through samples.
 ///
-/// The state has, for each node, its components and then their velocities, those of the device likewise, and the forces that wait; then, for each node, the samples
-/// of earlier frames, the newest first.
+/// A state has, for each node, the components of the copy, their velocities, the components of the device, their velocities, and the forces that are applied a
+/// tick late. The samples of earlier frames follow for each node, the newest sample first.
 #[derive(Clone, Debug)]
 pub(crate) struct Turning<'a> {
     pub(super) nodes: &'a [Node],
-    /// The weight of each node's samples (column) in each node's target (row).
+    /// Weight of each node's samples (column) in the target of each node (row).
     pub(super) weights: &'a Matrix,
     pub(super) timetable: &'a Timetable,
-    /// What velocities are multiplied by \[s\].
+    /// Time by which velocities are multiplied \[s\], so that all states are lengths.
     pub(super) time: f64,
-    /// The displacements that nothing resists, which are taken out.
+    /// Displacements of everything that no force resists. They are removed from the matrix.
     pub(super) free: Vec<Displacement>,
 }
 
-/// What happens at a tick: it sees the node, the instant in the frame \[ns\] and the device before it moves, and may push one of the device's components.
+/// Function called at each tick with the node, the instant in the frame \[ns\] and the device before its motion. Returns a component of the device and the
+/// force on that component, or `None`.
 pub(crate) type Hand<'h> = dyn FnMut(usize, u64, &[Motion]) -> Option<(usize, f64)> + 'h;
 
 impl Turning<'_> {
-    /// The cost of its matrix and of the eigenvalues.
+    /// Returns the cost of the matrix and of its eigenvalues.
     pub(crate) fn cost(&self) -> PartCost {
         PartCost::of_full(self.size(), self.timetable.events.len(), 6)
     }
 
-    /// The matrix of a frame, displacements of everything taken out, and a bound of the error of its entries; `None` if the watch ends it.
+    /// Returns the matrix of a frame without the free displacements, and a bound of the error of its entries; `None` if the watcher ends the computation.
     pub(super) fn monodromy(&self, watch: &dyn Watch) -> Option<(Matrix, f64)> {
         self.monodromy_under(&mut |_, _, _| None, watch)
     }
 
-    /// [`Turning::monodromy`]; the hand sees the frame of each unit vector, in the order of [`Turning::kept`].
+    /// Like [`Turning::monodromy`], with a hand that is called in the frame of each unit vector, in the order of [`Turning::kept`].
     pub(crate) fn monodromy_under(&self, hand: &mut Hand<'_>, watch: &dyn Watch) -> Option<(Matrix, f64)> {
         let (size, events) = (self.size(), self.timetable.events.len());
         let moved: Vec<Vec<f64>> = self.free.iter().map(|free| self.displaced(free)).collect();
@@ -64,19 +65,19 @@ impl Turning<'_> {
             watch.done(pushed_operations(events, 6));
         }
         let ticks = self.timetable.events.iter().filter(|event| matches!(event, Event::Tick { .. })).count();
-        // As for the general path of objects that do not turn: each tick rounds, and the rest of the frame magnifies that by at most about the growth.
+        // As for objects that do not turn: each tick rounds, and the rest of the frame magnifies the rounding by at most about the growth.
         let error = 10.0 * f64::EPSILON * real(ticks) * growth * growth * real(kept.len()).sqrt();
         Some((matrix, error))
     }
 
-    /// Where a frame leads from rest, in the numbers of [`Turning::monodromy`], under what a hand does.
+    /// Returns the state after a frame from rest under the forces of a hand, in the coordinates of [`Turning::monodromy`].
     pub(crate) fn forced(&self, hand: &mut Hand<'_>) -> Vec<f64> {
         let moved: Vec<Vec<f64>> = self.free.iter().map(|free| self.displaced(free)).collect();
         let reached = self.pushed_under(&vec![0.0; self.size()], &mut 0.0, hand);
         self.relative(&reached, &self.kept(), &moved).collect()
     }
 
-    /// The states that are kept, less the displacements of everything.
+    /// Returns the kept states of `reached`, minus the free displacements by which the references have moved. `moved` are the states of these displacements.
     fn relative<'r>(&'r self, reached: &'r [f64], kept: &'r [usize], moved: &'r [Vec<f64>]) -> impl Iterator<Item = f64> + 'r {
         kept.iter().map(move |target| {
             let along: f64 = self.free.iter().zip(moved).map(|(free, moved)| reached[free.reference] * moved[*target]).sum();
@@ -84,13 +85,13 @@ impl Turning<'_> {
         })
     }
 
-    /// Whether some displacement of everything moves that component of the device of a node.
+    /// Returns whether a free displacement moves that component of a node's device, or no force depends on its position.
     pub(crate) fn moves_freely(&self, node: usize, component: usize) -> bool {
         let displaced = self.free.iter().any(|free| free.nodes[node].1[component] != 0.0);
         displaced || self.nodes[node].loose().any(|loose| loose == component)
     }
 
-    /// The states but for the references, and but for those that nothing depends on.
+    /// Returns the indices of the kept states: all but the references of free displacements and the positions on which no force depends.
     pub(super) fn kept(&self) -> Vec<usize> {
         let firsts = self.firsts();
         let mut left_out: Vec<usize> = self.free.iter().map(|free| free.reference).collect();
@@ -100,7 +101,7 @@ impl Turning<'_> {
         (0..self.size()).filter(|state| !left_out.contains(state)).collect()
     }
 
-    /// Where the states of each node begin.
+    /// Returns the index of the first state of each node.
     fn firsts(&self) -> Vec<usize> {
         self.nodes.iter().scan(0, |next, node| Some(std::mem::replace(next, *next + node.states()))).collect()
     }
@@ -109,7 +110,7 @@ impl Turning<'_> {
         self.nodes.iter().map(Node::states).sum::<usize>() + SAMPLE * self.timetable.depth.iter().sum::<usize>()
     }
 
-    /// The state in which every copy, and what was sampled of it, is displaced so, and every device that touches it with it.
+    /// Returns the state in which copies, their samples and devices are displaced by `by`, at rest.
     pub(super) fn displaced(&self, by: &Displacement) -> Vec<f64> {
         let mut state = vec![0.0; self.size()];
         for ((copy, device), first) in by.nodes.iter().zip(self.firsts()) {
@@ -126,12 +127,12 @@ impl Turning<'_> {
         state
     }
 
-    /// Where a frame leads from the state.
+    /// Returns the state after a frame without a hand.
     pub(super) fn reached(&self, state: &[f64]) -> Vec<f64> {
         self.pushed_under(state, &mut 0.0, &mut |_, _, _| None)
     }
 
-    /// The forces that peers compute at that state and that wait, in a state of rest.
+    /// Returns a state at rest whose late forces are the forces that the peers compute at `state`.
     #[cfg(test)]
     pub(super) fn computed(&self, state: &[f64]) -> Vec<f64> {
         let mut waiting = vec![0.0; state.len()];
@@ -146,12 +147,12 @@ impl Turning<'_> {
         waiting
     }
 
-    /// Where a frame leads from the state under what a hand does; `growth` becomes the largest number on the way if that is larger.
+    /// Returns the state after a frame under the forces of a hand. Raises `growth` to the largest component of a peer on the way, velocities as lengths.
     fn pushed_under(&self, state: &[f64], growth: &mut f64, hand: &mut Hand<'_>) -> Vec<f64> {
         let nodes = self.nodes.len();
         let firsts = self.firsts();
         let mut peers: Vec<Moving> = self.nodes.iter().zip(&firsts).map(|(node, first)| Moving::read(node, &state[*first..], self.time)).collect();
-        // Oldest first.
+        // Samples of each node, the oldest first, so that samples of this frame can be appended. In the state the newest is first.
         let mut next: usize = self.nodes.iter().map(Node::states).sum();
         let mut samples: Vec<Vec<[Motion; 6]>> = Vec::with_capacity(nodes);
         for depth in &self.timetable.depth {
@@ -174,6 +175,7 @@ impl Turning<'_> {
                     for from in 0..nodes {
                         let Some(number) = held[to * nodes + from] else { continue };
                         let age = instants.age((to, from), number, at, self.timetable.frame).min(node.horizon);
+                        // Sample 0 is the first of this frame; `depth` earlier samples come before, so the index is not negative.
                         let earlier = i64::try_from(self.timetable.depth[from]).unwrap_or(0);
                         let sample = &samples[from][usize::try_from(earlier + number).unwrap_or(0)];
                         for (axis, force) in drawn.iter_mut().enumerate() {
@@ -208,12 +210,12 @@ impl Turning<'_> {
     }
 }
 
-/// A node on its way.
+/// Present state of a node during a frame.
 #[derive(Clone, Debug)]
 struct Moving {
     copy: [Motion; 6],
     device: Vec<Motion>,
-    /// The forces that act next, if they are applied a tick late.
+    /// Forces on the components of the copy that act at the next tick, if the peer applies forces a tick late.
     on_copy: [f64; 6],
     on_device: Vec<f64>,
 }
@@ -243,7 +245,7 @@ impl Moving {
         }
     }
 
-    /// One tick under the forces of samples that draw the copy, and a hand that pushes a component of the device.
+    /// Advances the node by a tick. `drawn` are the forces of the held samples on the copy; `push` is a component of the device and a hand's force on it.
     fn tick(&mut self, node: &Node, drawn: &[f64; 6], push: Option<(usize, f64)>, span: std::time::Duration) {
         let mut on_copy: [f64; 6] = std::array::from_fn(|axis| drawn[axis] - node.own[axis].force(self.copy[axis]));
         let mut on_device = vec![0.0; self.device.len()];
@@ -274,11 +276,12 @@ impl Moving {
                 }
             }
         }
+        // Now the forces of the previous tick act, and the present ones wait for the next tick.
         if node.compute_delay {
             std::mem::swap(&mut self.on_copy, &mut on_copy);
             std::mem::swap(&mut self.on_device, &mut on_device);
         }
-        // Hands are never late.
+        // The forces of hands are added after the exchange, because a compute delay does not concern hands.
         if let Some((component, force)) = push {
             on_device[component] += force;
         }
@@ -293,7 +296,7 @@ impl Moving {
         }
     }
 
-    /// The largest component, with its velocity as a length.
+    /// Returns the largest sum of a component's size and of its velocity's size as a length.
     fn largest(&self, time: f64) -> f64 {
         let size = |motion: &Motion| motion.position.abs() + time * motion.velocity.abs();
         self.copy.iter().chain(&self.device).map(size).fold(0.0, f64::max)
@@ -311,11 +314,12 @@ fn write(motions: &[Motion; 6], numbers: &mut [f64], time: f64) {
     }
 }
 
-/// The turn of a body, and its angular velocity.
+/// Returns the angles of a body, its components 3 to 5.
 fn turned(components: &[Motion]) -> [f64; 3] {
     std::array::from_fn(|axis| components[3 + axis].position)
 }
 
+/// Returns the angular velocity of a body, the velocities of its components 3 to 5.
 fn spun(components: &[Motion]) -> [f64; 3] {
     std::array::from_fn(|axis| components[3 + axis].velocity)
 }

@@ -1,9 +1,10 @@
-//! A steady spin: all copies turn at one rate about one axis of the world, driven by torques of the hands along it.
+//! Steady spin: all copies turn at one rate about one axis of the world, driven by torques of the hands along that axis.
 //!
-//! Samples are held, so the attitudes that a copy is drawn to are behind by their age: with KR the coordination brakes a spin ω by about KR·sin(ω·age), and a spin is
-//! steady only if hands make up for that and for the damping. Seen from axes that turn with it, and climb if it is a screw, the motion repeats: after a frame of T everything is
-//! as before but turned by ω·T. That motion is a zero of Φ(z) less z turned by ω·T, and small motions about it are its slope; Φ is the frame of real peers
-//! ([`super::peers`]). Displacements of everything and its turn about the axis are taken out.
+//! Samples are held, so a copy is drawn towards attitudes that are older by the age of the samples. With KR the coordination brakes a spin ω by about
+//! KR·sin(ω·age), and a spin is steady only if hands make up for that braking and for the damping. The motion repeats if seen from axes that turn with the
+//! spin, and that move along its axis if the motion is a screw: after a frame of T the state is the same but turned by ω·T. With Φ the frame of real peers
+//! ([`super::peers`]), the steady motion is a zero of Φ(z) minus z turned by ω·T, and the slope of Φ there describes small motions. Displacements of
+//! everything together and the turn of everything about the axis are removed from that slope.
 
 use cohaptic_peer::rotation::{Attitude, Triple};
 use cohaptic_peer::{Hand, Signal};
@@ -20,34 +21,38 @@ use crate::structure::Structure;
 use crate::timetable::Instants;
 use crate::{AnalysisError, Matrix, Watch};
 
-/// A steady spin.
+/// Steady spin of the peers of a scene.
 #[derive(Clone, Debug)]
 pub(super) struct Spin {
     pub(super) together: Together,
-    /// Everything at the beginning of a frame.
+    /// Poses and earlier samples at the beginning of a frame.
     bases: Bases,
+    /// State at the beginning of a frame relative to `bases`: positions and angles are zero, velocities are multiplied by the time unit \[m\].
     velocities: Vec<f64>,
-    /// A unit vector of the world.
+    /// Axis of the spin, a unit vector in world axes.
     pub(super) axis: Triple,
-    /// The angular velocity about the axis [rad/s].
+    /// Angular velocity about `axis` [rad/s].
     pub(super) rate: f64,
 }
 
-/// A spin that may be steady.
+/// Candidate for a steady spin.
 #[derive(Clone, Debug)]
 struct Motion {
-    state: Vec<f64>,
-    rate: f64,
-    /// How far it moves along the axis in a frame \[m\]: grasps off the centre can make a screw of it.
+/// State at the beginning of a frame.
+state: Vec<f64>,
+/// Angular velocity about the axis [rad/s].
+rate: f64,
+/// Displacement along the axis per frame \[m\]. Grasps off the centre can turn the spin into a screw.
     climb: f64,
 }
 
-/// What drives a spin.
+/// Torques of the hands and initial rate of a spin.
 struct Drive {
-    axis: Triple,
-    /// Of all hands along the axis \[N·m\].
-    torque: f64,
-    /// The rate at which the object begins, along the axis [rad/s].
+/// Direction of the torques, or of the initial angular velocity without torques: a unit vector in world axes.
+axis: Triple,
+/// Sum of the torques of all hands along the axis \[N·m\].
+torque: f64,
+/// Initial angular velocity of the object along the axis [rad/s].
     begun: f64,
 }
 
@@ -56,6 +61,7 @@ fn none(why: impl Into<String>) -> AnalysisError {
 }
 
 impl Drive {
+    /// Returns the drive of a scene, or [`AnalysisError::NoSpin`] if hands vary, push or tie the object, act about different axes, or drive nothing.
     fn of(scene: &Scene) -> Result<Self, AnalysisError> {
         let rotation = scene.rotation.as_ref().expect("the object turns");
         let mut torques = Vec::new();
@@ -90,7 +96,7 @@ impl Drive {
 }
 
 impl Spin {
-    /// The steady spin that the hands of a scene drive, near the attitude in which the object begins.
+    /// Finds the steady spin that the hands of a scene drive, near the initial attitude of the object.
     pub(super) fn of(scene: &Scene, network: &NominalNetwork, watch: &dyn Watch) -> Result<Self, AnalysisError> {
         let structure = Structure::of_each(scene, network, &contacts(scene)?)?;
         allowed(&structure, watch)?;
@@ -103,7 +109,7 @@ impl Spin {
         let rate = if drive.begun == 0.0 { spin.balance(scene, &drive) } else { drive.begun };
         spin.begin(scene, rate);
         if spin.settle(scene).is_err() {
-            // Devices that are held off the axis move it: a while of motion comes nearer.
+            // Devices that hold the object off the axis move that axis, so that the first guess may be too far from the steady spin. Simulated motion comes nearer.
             spin.begin(scene, rate);
             spin.relax(scene);
             spin.settle(scene)?;
@@ -111,19 +117,19 @@ impl Spin {
         Ok(spin)
     }
 
-    /// The length of a frame \[s\].
+    /// Returns the length of a frame \[s\].
     fn frame(&self) -> f64 {
         self.together.structure.timetable.frame.as_secs_f64()
     }
 
-    /// How long before the frame a peer sent its latest sample but `number` − 1 \[s\].
+    /// Returns the age at the beginning of the frame of a peer's `number`-th latest earlier sample \[s\]; `number` counts from 1.
     fn age(&self, place: usize, number: usize) -> f64 {
         let timetable = &self.together.structure.timetable;
         let sent = Instants::of(timetable).sent_at(place, -i64::try_from(number).unwrap_or(0), timetable.frame);
         -1e-9 * approximate(sent)
     }
 
-    /// The rate at which damping and small lags take up the torque [rad/s].
+    /// Returns the rate at which damping and the lag of the samples balance the torque [rad/s], for small angles of lag: a first guess of the spin.
     fn balance(&self, scene: &Scene, drive: &Drive) -> f64 {
         let structure = &self.together.structure;
         let lag = structure.timetable.depth.iter().enumerate().map(|(place, depth)| self.age(place, *depth)).fold(0.0, f64::max);
@@ -137,7 +143,7 @@ impl Spin {
         drive.torque / (0..scene.peers.len()).map(braked).sum::<f64>().max(f64::MIN_POSITIVE)
     }
 
-    /// Begins with everything together, turning at that rate since long.
+    /// Sets the state to copies that coincide and have always turned at `rate` [rad/s], the earlier samples included.
     fn begin(&mut self, scene: &Scene, rate: f64) {
         let rotation = scene.rotation.as_ref().expect("the object turns");
         let attitude = Attitude { rate: [0.0; 3], ..rotation.peers[0].attitude };
@@ -178,7 +184,7 @@ impl Spin {
         self.velocities = z;
     }
 
-    /// Lets everything move for a while.
+    /// Simulates frames until the turn per frame no longer changes, or for a limited number of frames, and takes the rate from the last frame.
     fn relax(&mut self, scene: &Scene) {
         const FRAMES: usize = 40_000;
         let turning = self.together.turning();
@@ -190,6 +196,7 @@ impl Spin {
             let reached = self.bases.reached(&mut members, &turning, &self.velocities);
             self.bases = self.bases.clone().moved_to(&turning, &reached);
             self.velocities = reached;
+            // The bases have moved to the reached positions and angles, from which these states now count.
             positions(&turning).into_iter().for_each(|state| self.velocities[state] = 0.0);
             let before = std::mem::replace(&mut turned_by, dot(self.axis, self.bases.poses[0].attitude.rotation_from(&from.orientation)));
             if (turned_by - before).abs() <= 1e-13 {
@@ -200,7 +207,7 @@ impl Spin {
         self.bases.seen_from = (turn(self.axis, turned_by), [0.0; 3]);
     }
 
-    /// Finds the steady spin near the one that has begun.
+    /// Finds the steady spin near the present state; [`AnalysisError::NoSpin`] if no zero is found.
     fn settle(&mut self, scene: &Scene) -> Result<(), AnalysisError> {
         let turning = self.together.turning();
         let kept: Vec<usize> = turning.kept();
@@ -218,7 +225,7 @@ impl Spin {
         };
         let begun = Motion { state: self.velocities.clone(), rate: self.rate, climb: 0.0 };
         let (found, left) = zero(begun, kept.len() + 2, residual, moved);
-        // A frame rounds velocities of some metres a second, over the time that makes them lengths, some hundred times.
+        // A frame rounds velocities of some metres per second, multiplied by the time unit, some hundred times. A larger residual is not rounding.
         if left.is_nan() || left > 1e-11 {
             return Err(none(format!("no steady spin near {:.3} rad/s: frames are {left:.1e} m apart", self.rate)));
         }
@@ -229,14 +236,15 @@ impl Spin {
         Ok(())
     }
 
-    /// The largest rotation vector between two copies \[rad\].
+    /// Returns the largest angle between the attitudes of two copies \[rad\].
     pub(super) fn apart(&self) -> f64 {
         let poses = &self.bases.poses;
         let angles = poses.iter().flat_map(|one| poses.iter().map(move |other| one.attitude.angle_to(&other.attitude.orientation)));
         angles.fold(0.0, f64::max)
     }
 
-    /// The slope of a frame at the steady spin, displacements and turns of everything taken out, and about by how much its entries are wrong; `None` if the watch ends it.
+    /// Returns the slope of a frame at the steady spin, without displacements of everything and the turn of everything about the axis, and an estimate of the
+    /// error of its entries; `None` if the watcher ends the computation.
     pub(super) fn monodromy(&self, scene: &Scene, watch: &dyn Watch) -> Option<(Matrix, f64)> {
         let turning = self.together.turning();
         let (symmetries, references) = self.symmetries(&turning);
@@ -260,7 +268,8 @@ impl Spin {
         Some((matrix, error))
     }
 
-    /// The directions of displacements of everything and of its turn about the axis, each 1 in its own reference and 0 in those of the others, and the references.
+    /// Returns the directions of the three displacements of everything and of its turn about the axis, and the reference state of each. A direction is 1 in its
+    /// own reference and 0 in the other references.
     fn symmetries(&self, turning: &Turning<'_>) -> (Vec<Vec<f64>>, Vec<usize>) {
         let mut symmetries: Vec<Vec<f64>> = (0..4).map(|which| self.symmetry(turning, which)).collect();
         let mut references = Vec::new();
@@ -278,12 +287,12 @@ impl Spin {
         (symmetries, references)
     }
 
-    /// A displacement along an axis, and for 3 the turn about that of the spin.
+    /// Returns the direction of the displacement of everything along the world axis `which`, or for `which` = 3 of the turn about the axis of the spin.
     fn symmetry(&self, turning: &Turning<'_>, which: usize) -> Vec<f64> {
         let mut state = Vec::new();
         let moved = |point: Triple, length: f64| if which < 3 { unit(which) } else { cross(self.axis, point).map(|way| way / length) };
         let spun = |attitude: &Attitude| if which < 3 { [0.0; 3] } else { apply(&transposed(&attitude.matrix()), self.axis) };
-        // Velocities here are lengths too.
+        // A turn of everything turns velocities too. Velocities in a state are multiplied by the time unit, as here.
         let faster = |velocity: &[f64], length: f64| {
             if which < 3 { [0.0; 3] } else { cross(self.axis, [velocity[0], velocity[1], velocity[2]]).map(|way| way / length) }
         };
@@ -310,7 +319,7 @@ impl Spin {
 
 #[cfg(test)]
 impl Spin {
-    /// A hundred frames leave it as it is, and a frame leaves each symmetry among them.
+    /// Asserts that a hundred frames leave the spin unchanged, and that a frame maps each symmetry to a combination of the symmetries.
     pub(super) fn assert_steady(&self, scene: &Scene) {
         let turning = self.together.turning();
         let kept = turning.kept();
@@ -333,18 +342,18 @@ impl Spin {
     }
 }
 
-/// The peers with the hands of the scene.
+/// Returns the peers of the scene with their hands.
 fn hands(scene: &Scene) -> Vec<super::peers::Member> {
     members(scene, |place| scene.peers[place].hand.clone())
 }
 
-/// Nanoseconds as a number.
+/// Converts nanoseconds to a real number.
 #[expect(clippy::cast_precision_loss, reason = "below 2⁵³, some hundred days")]
 const fn approximate(nanos: i64) -> f64 {
     nanos as f64
 }
 
-/// The states that say where something is, not how fast it moves.
+/// Returns the indices of the states that are positions or angles.
 fn positions(turning: &Turning<'_>) -> Vec<usize> {
     let (mut next, mut states) = (0, Vec::new());
     for node in turning.nodes {
@@ -358,7 +367,7 @@ fn positions(turning: &Turning<'_>) -> Vec<usize> {
     states
 }
 
-/// The quaternion of a turn about a unit vector.
+/// Returns the quaternion of a turn by `angle` \[rad\] about a unit vector.
 fn turn(axis: Triple, angle: f64) -> [f64; 4] {
     let (sine, cosine) = libm::sincos(0.5 * angle);
     [cosine, sine * axis[0], sine * axis[1], sine * axis[2]]
