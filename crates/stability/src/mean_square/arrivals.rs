@@ -16,10 +16,10 @@
 
 /// Law of the time from the sending of a sample to its arrival \[ns\].
 pub(crate) trait Arrival {
-/// Returns the probability that a sample has arrived `nanos` nanoseconds after its sending. Zero below the least time, and not decreasing. The limit is
-/// below 1 if samples can be lost.
-fn within(&self, nanos: i128) -> f64;
-/// Returns a lower bound of the time from sending to arrival \[ns\].
+    /// Returns the probability that a sample has arrived `nanos` nanoseconds after its sending. Zero below the least time, and not decreasing. The limit is
+    /// below 1 if samples can be lost.
+    fn within(&self, nanos: i128) -> f64;
+    /// Returns a lower bound of the time from sending to arrival \[ns\].
     fn least(&self) -> i128;
 }
 
@@ -53,13 +53,13 @@ pub struct Hazard {
 /// Range of the samples that may arrive, or may be held, around a tick.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Window {
-/// Oldest sample that may arrive at the tick or later. Place 0 at the beginning of the tick.
-pub(crate) before: i64,
-/// Oldest sample that may arrive after the tick. Place 0 at the end of the tick.
-pub(crate) after: i64,
-/// Newest sample that may have arrived by the end of the tick.
-pub(crate) newest: i64,
-/// Number of places at the beginning of the tick.
+    /// Oldest sample that may arrive at the tick or later. Place 0 at the beginning of the tick.
+    pub(crate) before: i64,
+    /// Oldest sample that may arrive after the tick. Place 0 at the end of the tick.
+    pub(crate) after: i64,
+    /// Newest sample that may have arrived by the end of the tick.
+    pub(crate) newest: i64,
+    /// Number of places at the beginning of the tick.
     pub(crate) places: usize,
 }
 

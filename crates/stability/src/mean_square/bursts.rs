@@ -26,11 +26,11 @@ pub(crate) struct Bursts<'a, G> {
 
 /// Probabilities of a sample at a tick.
 struct At {
-/// Probability of each state of the sample, given the state of the sample before: `moves[state before][state]`.
-moves: Vec<Vec<f64>>,
-/// Probability that the sample has not arrived by the tick before, indexed by the state of the sample.
-waiting: Vec<f64>,
-/// Probability that the sample arrives at the tick, indexed by the state of the sample.
+    /// Probability of each state of the sample, given the state of the sample before: `moves[state before][state]`.
+    moves: Vec<Vec<f64>>,
+    /// Probability that the sample has not arrived by the tick before, indexed by the state of the sample.
+    waiting: Vec<f64>,
+    /// Probability that the sample arrives at the tick, indexed by the state of the sample.
     arriving: Vec<f64>,
 }
 

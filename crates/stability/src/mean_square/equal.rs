@@ -58,16 +58,16 @@ pub(crate) struct Equal {
 /// Possible delivery of a sample at a tick.
 #[derive(Clone, Debug)]
 struct Delivery {
-/// Number of the tick in the frame.
-tick: usize,
-/// Number of the sample, counted from the first sample sent in the frame.
-sample: i64,
-/// Probability of the delivery.
-arrives: f64,
-/// Share still held just before this delivery of the noise that was held at the beginning of the frame, followed by the shares of the noise of each
-/// earlier delivery.
-left: Vec<f64>,
-/// Share of this delivery's noise that is still held at the end of the frame.
+    /// Number of the tick in the frame.
+    tick: usize,
+    /// Number of the sample, counted from the first sample sent in the frame.
+    sample: i64,
+    /// Probability of the delivery.
+    arrives: f64,
+    /// Share still held just before this delivery of the noise that was held at the beginning of the frame, followed by the shares of the noise of each
+    /// earlier delivery.
+    left: Vec<f64>,
+    /// Share of this delivery's noise that is still held at the end of the frame.
     at_end: f64,
 }
 
@@ -87,11 +87,11 @@ pub(crate) struct EqualScratch {
 /// Mean motion of one kind, common or difference, in the coordinates of its triangular form.
 #[derive(Debug, Default)]
 struct Block {
-/// Triangular form of the frame's matrix, with the responses u − n of the deliveries as further rows and the noises as further columns.
-schur: Schur,
-/// Number of states y at the beginning of a frame.
-size: usize,
-/// Coefficients of u − n at each delivery: of the noise held at the beginning of the frame, then of the noise of each earlier delivery.
+    /// Triangular form of the frame's matrix, with the responses u − n of the deliveries as further rows and the noises as further columns.
+    schur: Schur,
+    /// Number of states y at the beginning of a frame.
+    size: usize,
+    /// Coefficients of u − n at each delivery: of the noise held at the beginning of the frame, then of the noise of each earlier delivery.
     direct: Vec<Vec<f64>>,
     variance: Variance,
 }

@@ -33,26 +33,26 @@ impl Signs {
 /// Operator of one frame.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub(crate) struct Events {
-/// Number of rows of a moment within a frame.
-pub(crate) rows: usize,
-/// Steps of the frame in order.
-pub(crate) steps: Vec<Step>,
-/// Number of states of each link's chain, indexed by link; 1 for a link without a chain.
-pub(crate) chains: Vec<usize>,
-/// For each state between frames, its row at the end of a frame and its row at the beginning of the next frame.
-pub(crate) kept: Vec<(usize, usize)>,
-/// Row of the reference position, and the displacement of each kept state per unit of the reference, indexed as `kept`. `None` if the scene is tied to the
-/// ground.
-pub(crate) reference: Option<(usize, Vec<f64>)>,
-/// Sum of the roundings of the maps of all steps.
+    /// Number of rows of a moment within a frame.
+    pub(crate) rows: usize,
+    /// Steps of the frame in order.
+    pub(crate) steps: Vec<Step>,
+    /// Number of states of each link's chain, indexed by link; 1 for a link without a chain.
+    pub(crate) chains: Vec<usize>,
+    /// For each state between frames, its row at the end of a frame and its row at the beginning of the next frame.
+    pub(crate) kept: Vec<(usize, usize)>,
+    /// Row of the reference position, and the displacement of each kept state per unit of the reference, indexed as `kept`. `None` if the scene is tied to the
+    /// ground.
+    pub(crate) reference: Option<(usize, Vec<f64>)>,
+    /// Sum of the roundings of the maps of all steps.
     pub(crate) roundings: usize,
 }
 
 /// Step of a frame.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) enum Step {
-/// Motion of a node: the rows from `first` on become `map` times (these rows, then the weighted sum of each number of the held samples). `sizes` bounds the
-/// terms of `map`; `held` lists, for each number, the rows of the held samples with their weights.
+    /// Motion of a node: the rows from `first` on become `map` times (these rows, then the weighted sum of each number of the held samples). `sizes` bounds the
+    /// terms of `map`; `held` lists, for each number, the rows of the held samples with their weights.
     Move { first: usize, map: Matrix, sizes: Matrix, held: Vec<Vec<(usize, f64)>> },
     /// Sampling: `row` becomes the linear combination `of` of two rows, given as (row, factor).
     Sample { row: usize, of: [(usize, f64); 2] },
@@ -64,10 +64,10 @@ pub(crate) enum Step {
 /// Outcome of a delivery, with the row of the sample in place of its number.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Arrive {
-pub(crate) from: usize,
-pub(crate) to: usize,
-/// First row of the sample that is taken in; `None` if the held sample stays.
-pub(crate) take: Option<usize>,
+    pub(crate) from: usize,
+    pub(crate) to: usize,
+    /// First row of the sample that is taken in; `None` if the held sample stays.
+    pub(crate) take: Option<usize>,
     pub(crate) probability: f64,
 }
 
@@ -247,9 +247,9 @@ fn ways(outcomes: &[Arrive]) -> impl Iterator<Item = &[Arrive]> {
 
 /// Rows of a held sample after a delivery, added up outcome by outcome.
 struct Taken {
-/// Moments of each number of the held sample with all rows.
-lines: Vec<Vec<f64>>,
-/// Moments of the numbers of the held sample with one another.
+    /// Moments of each number of the held sample with all rows.
+    lines: Vec<Vec<f64>>,
+    /// Moments of the numbers of the held sample with one another.
     corner: Matrix,
 }
 

@@ -2,8 +2,8 @@
 //!
 //! With chance in the network the state of a frame is multiplied by a random matrix, z ← A·z. It is *stable in the mean square* if E z·zᵀ dies out whatever
 //! z is at the beginning, which is so if and only if the operator X ↦ E A·X·Aᵀ, or with a Markov chain V_j ↦ Σ p_ij·A_i·V_i·A_iᵀ, has a spectral radius below
-//! 1 (Costa, Fragoso & Marques 2005, Theorem 3.9). A packet carries all axes of a sample, and every axis obeys the same equations, so the operator on the moments
-//! of two axes is that of one, and the radius is that of a scene of one axis.
+//! 1 (Costa, Fragoso & Marques 2005, Theorem 3.9). A packet carries all axes of a sample, and every axis obeys the same equations, so the operator on the
+//! moments of two axes is that of one, and the radius is that of a scene of one axis.
 //!
 //! Every sample enters a receiver's force as one number only, KT·x + BT·v, so each link adds one state: that number of the sample held by the receiver. The
 //! other combination of the held position and velocity exerts no force, but is part of the state. The probability per frame that nothing arrives is its
@@ -311,10 +311,10 @@ const SILENT: Radius = Radius { value: 1.0, error: 0.0 };
 
 /// Instants at which equal peers over equal links send samples, and at which these samples may arrive.
 struct Alike {
-/// Events of one peer, without deliveries.
-timetable: Timetable,
-instants: Instants,
-/// Hazards and law of every link; `None` if nothing ever arrives.
+    /// Events of one peer, without deliveries.
+    timetable: Timetable,
+    instants: Instants,
+    /// Hazards and law of every link; `None` if nothing ever arrives.
     hazards: Option<(Hazards, LinkLaw)>,
 }
 
@@ -405,11 +405,11 @@ impl Followed {
 /// Arrivals among equal peers over equal links with independent losses, on which no sample overtakes another.
 #[derive(Clone, Debug)]
 pub struct Independent {
-/// Events of one peer, without deliveries.
-pub timetable: Timetable,
-/// Ticks at which samples of a link may arrive, with their probabilities.
-pub hazards: Hazards,
-/// Probability per frame that nothing arrives on a link.
+    /// Events of one peer, without deliveries.
+    pub timetable: Timetable,
+    /// Ticks at which samples of a link may arrive, with their probabilities.
+    pub hazards: Hazards,
+    /// Probability per frame that nothing arrives on a link.
     pub held: Radius,
 }
 

@@ -210,13 +210,13 @@ fn within_range(operator: &impl Positive, watch: &dyn Watch) -> Result<Radius, E
 
 /// Krylov space of E, L(E), L²(E), …, with an orthonormal basis in which L is an upper Hessenberg matrix.
 struct Krylov {
-/// Coordinates of E.
-base: Vec<f64>,
-/// Norm of E.
-norm: f64,
-/// Orthonormal basis; the first vector is E divided by its norm.
-basis: Vec<Vec<f64>>,
-/// Columns of the Hessenberg matrix. Each column has one entry more than the column before.
+    /// Coordinates of E.
+    base: Vec<f64>,
+    /// Norm of E.
+    norm: f64,
+    /// Orthonormal basis; the first vector is E divided by its norm.
+    basis: Vec<Vec<f64>>,
+    /// Columns of the Hessenberg matrix. Each column has one entry more than the column before.
     columns: Vec<Vec<f64>>,
 }
 

@@ -68,14 +68,14 @@ struct Map {
 /// Second moment that no permutation of the peers changes, in the notation of the module.
 #[derive(Clone, Debug)]
 struct Moment {
-/// A0, the moment of a peer's states.
-own: Matrix,
-/// A1, the moment of the states of two different peers.
-other: Matrix,
-/// Moments r, s and o of a peer's states: with a sample that the peer holds, with a sample of the peer that another peer holds, and with a sample between
-/// two other peers.
-with: [Vec<f64>; 3],
-/// Moments h of two held samples, in the order of the module.
+    /// A0, the moment of a peer's states.
+    own: Matrix,
+    /// A1, the moment of the states of two different peers.
+    other: Matrix,
+    /// Moments r, s and o of a peer's states: with a sample that the peer holds, with a sample of the peer that another peer holds, and with a sample between
+    /// two other peers.
+    with: [Vec<f64>; 3],
+    /// Moments h of two held samples, in the order of the module.
     held: [f64; 6],
 }
 

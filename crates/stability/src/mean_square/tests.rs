@@ -1,4 +1,4 @@
-//! Against matrices made in another way, and against each other.
+//! Compares the operators with matrices of another origin, and with each other.
 
 use std::time::Duration;
 
@@ -22,7 +22,7 @@ fn found(overrides: &[&str]) -> MeanSquare {
     mean_square(&scene(overrides)).unwrap()
 }
 
-/// By symmetry and one by one.
+/// Returns two radii: by symmetry, and with separate states for each peer and link.
 fn both_ways(overrides: &[&str]) -> (Radius, Radius) {
     let scene = scene(overrides);
     let network = NominalNetwork::of(&scene).unwrap();
@@ -77,7 +77,7 @@ fn by_symmetry_and_one_by_one_agree() {
     }
 }
 
-/// From the mean motion and its noise.
+/// Returns the radius from the mean motion and its noise.
 fn by_noise(overrides: &[&str]) -> f64 {
     let scene = scene(overrides);
     let network = NominalNetwork::of(&scene).unwrap();
@@ -139,7 +139,7 @@ impl Explicit {
         4 * self.peers + 2 * self.frames * self.peers + 2 * place
     }
 
-    /// Where a state leads if exactly those links (by receiver and sender) lose.
+    /// Returns the state after a frame in which exactly those links (by receiver and sender) lose.
     fn lead(&self, mut z: Vec<f64>, lost: &dyn Fn(usize, usize) -> bool) -> Vec<f64> {
         let step = Duration::from_millis(1);
         let mass = 0.45 / real(self.peers);
@@ -176,7 +176,7 @@ impl Explicit {
             }
         }
         let reference = z[2];
-        // All positions are at even places.
+        // All positions have even indices.
         z.iter_mut().step_by(2).for_each(|position| *position -= reference);
         z
     }
@@ -197,14 +197,14 @@ impl Explicit {
         matrix
     }
 
-    /// The matrices and probabilities of all combinations of lost and delivered, bit by bit (receiver by receiver, sender by sender).
+    /// Returns the matrices of all combinations of lost and delivered, one link per bit (receiver by receiver, sender by sender).
     fn all(&self) -> Vec<Matrix> {
         let links = self.peers * (self.peers - 1);
         (0..1_u32 << links).map(|bits| self.matrix(&|to, from| bits >> ((self.held(to, from) - self.held(0, 1)) / 2) & 1 == 1)).collect()
     }
 }
 
-/// The spectral radius of Σ w·A ⊗ A over blocks (row, column, w, A), all of them n² × n².
+/// Returns the spectral radius of Σ w·A ⊗ A over blocks (row, column, w, A), each of size n² × n².
 fn radius_of(blocks: usize, terms: &[(usize, usize, f64, &Matrix)]) -> f64 {
     let n = terms[0].3.rows();
     let mut whole = Matrix::zeros(blocks * n * n, blocks * n * n);
@@ -272,7 +272,8 @@ fn a_chain_without_memory_is_independent_loss() {
     }
 }
 
-/// A gamma law that is next to a constant, beside losses in bursts: the delay is on either side of no tick, so that the constant brings each sample at the same one.
+/// A gamma law that is next to a constant, beside losses in bursts: the delay is on either side of no tick, so that the constant brings each sample at the
+/// same one.
 #[test]
 fn jitter_that_changes_no_tick_changes_nothing_about_bursts() {
     for delay in ["8.5ms", "24.5ms", "28.5ms"] {
@@ -293,8 +294,8 @@ fn a_chain_that_loses_alike_in_both_states_is_independent_loss() {
     close(chain.radius, independent.radius.value);
 }
 
-/// An ordinary mobile link: gamma jitter of 8 ms, and bursts of four in which 2 % are lost. The same law of delays with a chain that forgets is that with independent losses, which
-/// no chain follows.
+/// An ordinary mobile link: gamma jitter of 8 ms, and bursts of four in which 2 % are lost. The same law of delays with a chain that forgets is that with
+/// independent losses, which no chain follows.
 #[test]
 #[ignore = ".ci/nightly runs it: it takes long"]
 fn an_ordinary_mobile_link_has_a_verdict_in_the_mean_square() {

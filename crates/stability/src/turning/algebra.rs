@@ -16,12 +16,12 @@ pub(super) fn cross(a: Triple, b: Triple) -> Triple {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// A·v.
+/// Returns A·v.
 pub(super) fn apply(matrix: &Matrix3, vector: Triple) -> Triple {
     matrix.map(|row| row[0] * vector[0] + row[1] * vector[1] + row[2] * vector[2])
 }
 
-/// \[a\], with \[a\]·b = a×b.
+/// Returns \[a\], the matrix with \[a\]·b = a×b.
 pub(super) fn skew([x, y, z]: Triple) -> Matrix3 {
     [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
 }
@@ -39,18 +39,18 @@ pub(super) fn sum(a: &Matrix3, b: &Matrix3) -> Matrix3 {
     std::array::from_fn(|row| std::array::from_fn(|column| a[row][column] + b[row][column]))
 }
 
-/// tr A·I − A.
+/// Returns tr A·I − A.
 pub(super) fn trace_less(a: &Matrix3) -> Matrix3 {
     let trace = a[0][0] + a[1][1] + a[2][2];
     std::array::from_fn(|row| std::array::from_fn(|column| if row == column { trace } else { 0.0 } - a[row][column]))
 }
 
-/// The axial vector of A − Aᵀ.
+/// Returns the axial vector of A − Aᵀ.
 pub(super) fn twice_axial(a: &Matrix3) -> Triple {
     [a[2][1] - a[1][2], a[0][2] - a[2][0], a[1][0] - a[0][1]]
 }
 
-/// The product of two quaternions: the turn by p in the body axes that q gives.
+/// Returns the product q·p of two quaternions: the orientation q, turned by p in the body axes of q.
 pub(super) fn turned([w, x, y, z]: [f64; 4], [a, b, c, d]: [f64; 4]) -> [f64; 4] {
     [w * a - x * b - y * c - z * d, w * b + x * a + y * d - z * c, w * c + y * a + z * b - x * d, w * d + z * a + x * c - y * b]
 }

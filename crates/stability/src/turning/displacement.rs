@@ -1,16 +1,18 @@
-//! A displacement or turn of everything together.
+//! Displacement or turn of everything together.
 
 use super::node::Node;
 
-/// A displacement that nothing resists: how it moves the copy and the device of each node, and which of the components of the first copy tells how far it is.
+/// Displacement of everything together that no force resists.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Displacement {
+    /// Displacement of the copy's and of the device's components, indexed by node.
     pub(super) nodes: Vec<([f64; 6], Vec<f64>)>,
+    /// Component of the first copy that measures the size of the displacement.
     pub(super) reference: usize,
 }
 
 impl Displacement {
-    /// All copies alike, and with each the device that touches it.
+    /// Returns the displacement that moves every copy by `copy`, and every touching device with its copy.
     pub(super) fn alike(nodes: &[Node], copy: [f64; 6], reference: usize) -> Self {
         let device = |node: &Node| {
             let moved = |grip: &[f64; 6]| if node.touching { grip.iter().zip(&copy).map(|(by, component)| by * component).sum() } else { 0.0 };
@@ -19,7 +21,7 @@ impl Displacement {
         Self { nodes: nodes.iter().map(|node| (copy, device(node))).collect(), reference }
     }
 
-    /// A component of the first copy.
+    /// Returns the displacement of a component of the first copy.
     pub(super) fn first(&self, component: usize) -> f64 {
         self.nodes[0].0[component]
     }

@@ -152,7 +152,7 @@ impl Turning<'_> {
         let nodes = self.nodes.len();
         let firsts = self.firsts();
         let mut peers: Vec<Moving> = self.nodes.iter().zip(&firsts).map(|(node, first)| Moving::read(node, &state[*first..], self.time)).collect();
-        // Samples of each node, the oldest first, so that samples of this frame can be appended. In the state the newest is first.
+        // `samples` has the oldest sample of each node first, so that samples of this frame can be appended. In the state the newest is first.
         let mut next: usize = self.nodes.iter().map(Node::states).sum();
         let mut samples: Vec<Vec<[Motion; 6]>> = Vec::with_capacity(nodes);
         for depth in &self.timetable.depth {

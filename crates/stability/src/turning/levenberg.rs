@@ -1,18 +1,19 @@
-//! Zeros of forces: the method of Levenberg (1944).
+//! Zeros of a vector-valued function, by the method of Levenberg (1944).
 
 use crate::Matrix;
 use crate::factorisation::Lu;
 
-/// Some ten steps lead from near a zero to it.
+/// Largest number of steps. From near a zero some ten steps suffice.
 const MOST_STEPS: usize = 200;
 
-/// A place near `start` at which no residual is left, and the size of the residual there at least. A place moves by `size` numbers.
+/// Returns a place near `start` at which the residual is small, and the norm of the residual there. The caller decides whether that norm counts as zero.
+/// `moved` moves a place by `size` coordinates.
 pub(super) fn zero<P>(start: P, size: usize, residual: impl Fn(&P) -> Vec<f64>, moved: impl Fn(&P, &[f64]) -> P) -> (P, f64) {
     let mut place = start;
     let mut left = residual(&place);
     let mut damping = 1e-6;
     for _ in 0..MOST_STEPS {
-        // Of a residual of some lengths of a metre, rounding leaves this much.
+        // The residual consists of lengths of about a metre. Below this norm only rounding is left.
         if norm(&left) <= 1e-15 * crate::rounding::real(size) {
             break;
         }
@@ -41,7 +42,7 @@ fn norm(entries: &[f64]) -> f64 {
     entries.iter().map(|entry| entry * entry).sum::<f64>().sqrt()
 }
 
-/// The slope of the residual, by central differences.
+/// Returns the slope of the residual (row: entry of the residual, column: coordinate), by central differences.
 fn slope<P>(place: &P, size: usize, rows: usize, residual: &impl Fn(&P) -> Vec<f64>, moved: &impl Fn(&P, &[f64]) -> P) -> Matrix {
     const STEP: f64 = 1e-6;
     let mut slope = Matrix::zeros(rows, size);

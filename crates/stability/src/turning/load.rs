@@ -1,7 +1,7 @@
-//! Rest under the constant forces and torques of the hands.
+//! Rest under the constant forces and torques of the hands, and the equations of small motions about that rest.
 //!
-//! Copies are at poses of their own then, p in world axes and θ in body axes, R = R₀Exp(δθ), and what a force does depends on the turn. With f₀ = R₀ᵀFC the coupling
-//! force in body axes, Q = R₀ᵀM̄₀P, S = R₀ᵀRH₀ and C = R₀\[r\], where tr A stands for tr A·I,
+//! Under a load each copy has its own pose, p in world axes and θ in body axes, R = R₀Exp(δθ), and the effect of a force depends on the turn. With
+//! f₀ = R₀ᵀFC the coupling force in body axes, Q = R₀ᵀM̄₀P, S = R₀ᵀRH₀ and C = R₀\[r\], where tr A stands for tr A·I,
 //!
 //! ```text
 //! δxg = δp − C·δθ,   δ(r×RᵀFC) = −Cᵀ·δFC + [r][f₀]·δθ,   −δτT = −(tr Q − Q)·δθ + Σ wⱼ·2·vee sk(R₀ᵀRⱼ[δθⱼ]P) − BR∘(δω − Σ wⱼ·R₀ᵀRⱼ·δωⱼ)
@@ -9,7 +9,7 @@
 //! −δ(SᵀτC) = −Sᵀ·δτC + Sᵀ[τC]·δθ − [SᵀτC]·δθH
 //! ```
 //!
-//! At rest no torque is left, so that the steps are those without a load. Copies together, S = I and no load give the equations of [`super`].
+//! At rest the sum of torques is zero, so the step maps are the same as without a load. Coinciding copies, S = I and no load give the equations of [`super`].
 
 use cohaptic_peer::rotation::{Attitude, Matrix3, Triple, aligning_torque, turning_torque};
 use cohaptic_peer::{Gains, Hand, Signal};
@@ -22,25 +22,34 @@ use super::stress::{Stress, Twist};
 use crate::AnalysisError;
 use crate::rounding::real;
 
-/// Where a copy and its device are.
+/// Pose of a copy and of its device, in world axes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Pose {
+    /// Position of the copy's centre \[m\].
     pub(super) centre: Triple,
+    /// Attitude of the copy.
     pub(super) attitude: Attitude,
+    /// Position of the device \[m\].
     pub(super) device: Triple,
+    /// Attitude of the device's handle.
     pub(super) handle: Attitude,
 }
 
-/// What a hand does: a force \[N\] and a torque \[N·m\] in world axes, and the spring of an arm [N/m] towards a point.
+/// Constant load by a hand, in world axes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Load {
+    /// Force on the device \[N\].
     force: Triple,
+    /// Torque on the device \[N·m\].
     torque: Triple,
+    /// Stiffness of the arm that holds the device [N/m]; 0 without an arm.
     spring: f64,
+    /// Point towards which the arm pulls the device \[m\].
     towards: Triple,
 }
 
 impl Load {
+    /// Returns the load of the peer with the index `place`, or [`AnalysisError::NoRest`] if its hand varies.
     fn of(scene: &Scene, place: usize) -> Result<Self, AnalysisError> {
         let spec = &scene.peers[place];
         let constant = |signal: &Signal| match signal {
@@ -58,20 +67,22 @@ impl Load {
     }
 }
 
-/// A scene in which hands exert constant forces, every peer by itself.
+/// Scene whose hands exert constant forces, with one node and one load per peer.
 pub(super) struct Loaded<'a> {
     scene: &'a Scene,
     nodes: &'a [Node],
     loads: Vec<Load>,
 }
 
-/// What the forces and torques on a peer are at a pose; none at rest.
+/// Forces and torques on a peer at a pose. The sums `on_copy` and `on_device` are zero at rest.
 struct Forces {
+    /// Force in world axes \[N\] and torque in body axes \[N·m\] on the copy.
     on_copy: [Triple; 2],
+    /// Force in world axes \[N\] and torque in the axes of the handle \[N·m\] on the device.
     on_device: [Triple; 2],
-    /// FC in body axes.
+    /// Coupling force FC in body axes \[N\].
     grip: Triple,
-    /// τC.
+    /// Coupling torque τC in body axes \[N·m\].
     twist: Triple,
 }
 
@@ -80,7 +91,7 @@ impl<'a> Loaded<'a> {
         Ok(Self { scene, nodes, loads: (0..nodes.len()).map(|place| Load::of(scene, place)).collect::<Result<_, _>>()? })
     }
 
-    /// Where the peers begin.
+    /// Returns the initial poses of the scene, each handle aligned with its copy.
     fn start(&self) -> Vec<Pose> {
         let rotation = self.scene.rotation.as_ref().expect("the object turns");
         let pose = |place: usize| {
@@ -91,7 +102,7 @@ impl<'a> Loaded<'a> {
         (0..self.nodes.len()).map(pose).collect()
     }
 
-    /// M̄ of the others.
+    /// Returns M̄, the mean of the attitude matrices of all other peers.
     fn mean(&self, poses: &[Pose], place: usize) -> Matrix3 {
         let weight = 1.0 / real(poses.len() - 1);
         let others = || poses.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, pose)| pose.attitude.matrix());
@@ -102,12 +113,13 @@ impl<'a> Loaded<'a> {
         self.scene.rotation_config(place).expect("the object turns").gains
     }
 
-    /// KCR and BCR, if the device turns and touches.
+    /// Returns the gains KCR and BCR of the coupling of turns; `None` if the device has no attitude or touches nothing.
     fn coupling(&self, place: usize) -> Option<Gains> {
         let device = self.scene.rotation_config(place).and_then(|config| config.device);
         device.filter(|_| self.nodes[place].touching).map(|device| device.coupling)
     }
 
+    /// Returns the forces and torques on a peer at rest in these poses. Dampers are left out, because all velocities are zero.
     fn forces(&self, poses: &[Pose], place: usize) -> Forces {
         let (node, load, pose) = (&self.nodes[place], &self.loads[place], &poses[place]);
         let (matrix, others) = (pose.attitude.matrix(), real(poses.len() - 1));
@@ -135,7 +147,7 @@ impl<'a> Loaded<'a> {
         }
     }
 
-    /// All forces and torques, as lengths: over the stiffest spring, torques over the length of the node too.
+    /// Returns all forces and torques as lengths \[m\]: divided by the stiffest spring, and torques also by the length of their node.
     fn residual(&self, poses: &[Pose]) -> Vec<f64> {
         let mut residual = Vec::new();
         for (place, node) in self.nodes.iter().enumerate() {
@@ -150,17 +162,19 @@ impl<'a> Loaded<'a> {
         residual
     }
 
+    /// Returns the largest stiffness of a coordination, coupling or arm [N/m].
     fn stiffest(&self) -> f64 {
         let springs = self.nodes.iter().zip(&self.loads).flat_map(|(node, load)| [node.own[0].stiffness, node.coupling[0].stiffness, load.spring]);
         springs.fold(f64::MIN_POSITIVE, f64::max)
     }
 
-    /// How many numbers of a peer's pose a load decides.
+    /// Returns the number of coordinates of a peer's pose that the rest determines. A device that touches nothing does not count.
     fn unknowns(&self, place: usize) -> usize {
         let node = &self.nodes[place];
         6 + if node.touching { node.device.len() } else { 0 }
     }
 
+    /// Returns the poses moved by the coordinates `by`, in the order of peers. Angles are multiplied by the length of the node.
     fn moved(&self, poses: &[Pose], by: &[f64]) -> Vec<Pose> {
         let mut next = 0;
         let mut take = |poses: &Pose, place: usize| {
@@ -177,22 +191,23 @@ impl<'a> Loaded<'a> {
         poses.iter().enumerate().map(|(place, pose)| take(pose, place)).collect()
     }
 
-    /// Where the peers come to rest: the pose without forces that Levenberg's (1944) method reaches from where they begin.
+    /// Returns the poses at rest that Levenberg's (1944) method reaches from the initial poses; [`AnalysisError::NoRest`] if forces are left.
     pub(super) fn rest(&self) -> Result<Vec<Pose>, AnalysisError> {
         let size: usize = (0..self.nodes.len()).map(|place| self.unknowns(place)).sum();
         let (poses, left) = zero(self.start(), size, |poses| self.residual(poses), |poses, by| self.moved(poses, by));
-        // The last digits of springs that are much softer than the stiffest.
+        // The tolerance leaves room for rounding beside the stiffest spring.
         if left <= 1e-12 {
             return Ok(poses);
         }
         Err(AnalysisError::NoRest { why: format!("forces of the hands are left over: about {:.2e} N", left * self.stiffest()) })
     }
 
-    /// The nodes of small motions about those poses.
+    /// Returns the nodes of small motions about these poses.
     pub(super) fn stressed(&self, poses: &[Pose]) -> Vec<Node> {
         (0..self.nodes.len()).map(|place| self.node(poses, place)).collect()
     }
 
+    /// Returns the node of a peer with the equations of the module, in the units of the node's states.
     fn node(&self, poses: &[Pose], place: usize) -> Node {
         let (mut node, pose, forces) = (self.nodes[place].clone(), &poses[place], self.forces(poses, place));
         let (matrix, gains, square) = (pose.attitude.matrix(), self.gains(place), node.length * node.length);
@@ -238,6 +253,7 @@ impl<'a> Loaded<'a> {
                 hand: over(skew(hand)),
             }
         });
+        // `stress` replaces the springs of turns and all effects of samples on turns. The damping of the copy's own turn stays in the node.
         let none = Gains { stiffness: 0.0, damping: 0.0 };
         for axis in 3..6 {
             (node.own[axis].stiffness, node.heard[axis]) = (0.0, none);
@@ -249,7 +265,8 @@ impl<'a> Loaded<'a> {
         node
     }
 
-    /// The displacements of everything together, each of the states of copies and devices: three along the axes, three turns about the first copy.
+    /// Returns the six displacements of everything together, as displacements of each copy and its device: three along the axes, then three turns about the
+    /// first copy.
     pub(super) fn together(&self, poses: &[Pose]) -> Vec<Vec<([f64; 6], Vec<f64>)>> {
         let motion = |axis: usize| {
             let each = self.nodes.iter().zip(poses).map(|(node, pose)| {

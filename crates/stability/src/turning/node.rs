@@ -1,4 +1,4 @@
-//! A peer whose copy turns, linearised at rest: six components of the copy, three or six of the device.
+//! Linear equations of a peer whose copy turns: six components of the copy, three or six of the device.
 
 use cohaptic_peer::rotation::{Spin, Triple};
 use cohaptic_peer::{Contact, Gains, Integrator, Plant, StepMap};
@@ -8,38 +8,43 @@ use super::stress::Stress;
 use crate::lifted::Body;
 use crate::structure::linear_law;
 
-/// A peer, or what a class of equal peers has in common. Angles are multiplied by [`Node::length`], and torques divided by it.
+/// Equations of a peer, or of any peer of a class of equal peers. Angles are multiplied by [`Node::length`], and torques divided by that length.
 #[derive(Clone, Debug)]
 pub(crate) struct Node {
-    /// p and θ.
+    /// Step maps of the copy's components, p and θ.
     pub(super) copy: Vec<Body>,
-    /// x, and θH if the device turns.
+    /// Step maps of the device's components: x, and θH if the device turns.
     pub(super) device: Vec<Body>,
-    /// For each component of the device, the gains of its coupling to the copy.
+    /// Gains of the coupling to the copy, indexed by component of the device.
     pub(super) coupling: Vec<Gains>,
-    /// For each component of the device, the row of the copy's components that it is held to.
+    /// Combination of the copy's components to which the coupling ties a component of the device, indexed by that component.
     pub(crate) grip: Vec<[f64; 6]>,
+    /// Whether the device holds the copy.
     pub(super) touching: bool,
-    /// What draws each component of the copy back by its own state, and towards that of a sample.
+    /// Gains of the restoring force by the copy's own state, indexed by component of the copy.
     pub(super) own: [Gains; 6],
+    /// Gains of the force towards a held sample, indexed by component of the copy.
     pub(super) heard: [Gains; 6],
-    /// By how much more a sample's velocity counts for each second of its age, up to the horizon.
+    /// Growth of the gain of a sample's velocity per second of the sample's age, indexed by component of the copy.
     pub(super) ahead: [f64; 6],
+    /// Age above which a sample is not extrapolated further \[s\]; 0 for a law without a horizon.
     pub(super) horizon: f64,
+    /// Whether the peer applies its forces a tick late.
     pub(super) compute_delay: bool,
     /// Whether an arm with a stiffness holds the device.
     pub(super) armed: bool,
+    /// Grasp point in body axes \[m\].
     pub(super) grasp: Triple,
-    /// What a load changes: rows of `grip` and gains of turns that it replaces are those of a node without.
+    /// Changes of the equations by a load. The gains of turns that these changes replace are zero in the node.
     pub(super) stress: Option<Box<Stress>>,
-    /// √(tr J/3m) \[m\].
+    /// Length √(tr J/3m) by which angles are multiplied \[m\].
     pub(crate) length: f64,
-    /// How far a force moves the copy within a tick, over a second [m/(N·s)].
+    /// Span of a tick divided by the mass of the copy [m/(N·s)]: the change of the copy's velocity in a tick per force.
     pub(crate) mobility: f64,
 }
 
 impl Node {
-    /// The peer in that place of a scene that turns.
+    /// Returns the node of the peer with the index `place` in a scene whose object turns, without a load.
     pub(super) fn of(scene: &Scene, place: usize) -> Self {
         let spec = &scene.peers[place];
         let config = scene.rotation_config(place).expect("the object turns");
@@ -85,25 +90,25 @@ impl Node {
         }
     }
 
-    /// How many states it has.
+    /// Returns the number of states of the node, samples not included.
     pub(super) fn states(&self) -> usize {
         let pending = if self.compute_delay { 6 + if self.touching { self.device.len() } else { 0 } } else { 0 };
         12 + 2 * self.device.len() + pending
     }
 
-    /// The components of a device that touches nothing and that nothing holds: where it is, nothing depends on.
+    /// Returns the components of the device on whose positions no force depends: those of a device that touches nothing, except translations held by an arm.
     pub(super) fn loose(&self) -> impl Iterator<Item = usize> {
         let held = if self.armed { 3 } else { 0 };
         held..if self.touching { 0 } else { self.device.len() }
     }
 }
 
-/// Gains of an angle as those of a length.
+/// Converts the gains of an angle to gains of a length; `square` is the square of the node's length.
 fn over(gains: Gains, square: f64) -> Gains {
     Gains { stiffness: gains.stiffness / square, damping: gains.damping / square }
 }
 
-/// The linear part of a turn: as that of a translation, but for Euler's method, which is explicit for turns.
+/// Returns the step map of a small turn. It is the step map of a translation except for Euler's method, which is explicit for turns.
 fn turn(plant: &Plant, integrator: Integrator, steps: u32, span: std::time::Duration) -> StepMap {
     match integrator {
         Integrator::Exact => plant.step(span, integrator),
@@ -112,7 +117,8 @@ fn turn(plant: &Plant, integrator: Integrator, steps: u32, span: std::time::Dura
             let steps = within.saturating_mul(steps);
             let h = span.as_secs_f64() / f64::from(steps);
             let (decay, push) = (h * plant.damping / plant.mass, h / plant.mass);
-            // Increments of angle and rate, by the rate and by the torque, of as many steps.
+            // Increments of angle and rate after some steps, each per initial rate and per torque. Increments keep the digits that a difference from 1 would
+            // lose.
             let (mut angle, mut rate) = ([0.0, 0.0], [0.0, 0.0]);
             for _ in 0..steps {
                 angle = [angle[0] + h * (1.0 + rate[0]), angle[1] + h * rate[1]];

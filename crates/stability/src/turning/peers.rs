@@ -1,4 +1,5 @@
-//! One frame of real peers, in the numbers of a [`Turning`] about given poses.
+//! Frame of simulated peers, in the coordinates of a [`Turning`] about given poses. The linear equations are compared with this frame, and a steady spin has
+//! its slope from this frame.
 
 use std::array::from_fn;
 
@@ -16,27 +17,29 @@ use crate::timetable::{Event, Instants};
 
 pub(super) type Member = Peer<3, SimulatedDevice<3>, BuiltInStrategy<3>>;
 
-/// The local time of every clock when a frame begins \[ns\].
+/// Local time of every clock at the beginning of a frame \[ns\]. Large, so that samples of earlier frames have positive instants.
 const EARLIER: i64 = 1 << 60;
 
-/// The poses from which the numbers of a state count.
+/// Origin of a state: the poses to which the positions and angles of a state are relative.
 #[derive(Clone, Debug)]
 pub(super) struct Bases {
+    /// Pose of each peer.
     pub(super) poses: Vec<Pose>,
-    /// Centre and attitude of the samples of earlier frames of each copy, the newest first.
+    /// Centre \[m\] and attitude of each copy's samples of earlier frames, the newest sample first.
     pub(super) samples: Vec<Vec<(Triple, Attitude)>>,
-    /// The orientation and the point \[m\] from which positions, velocities and attitudes after the frame are seen.
+    /// Orientation and origin \[m\] of the axes in which positions, velocities and attitudes after the frame are expressed.
     pub(super) seen_from: ([f64; 4], Triple),
 }
 
 impl Bases {
-    /// Copies that have been at those poses for ever.
+    /// Returns the bases of peers that have always been at these poses, their samples included.
     pub(super) fn resting(poses: Vec<Pose>, turning: &Turning<'_>) -> Self {
         let samples = poses.iter().zip(&turning.timetable.depth).map(|(pose, depth)| vec![(pose.centre, pose.attitude); *depth]);
         Self { samples: samples.collect(), poses, seen_from: (Attitude::REST.orientation, [0.0; 3]) }
     }
 
-    /// Where a frame leads these peers from the state z. Forces that wait are left out: they are those that the peers have computed, and zero at the end.
+    /// Returns the state of the peers after a frame from the state `z`. The late forces in `z` are ignored: each peer applies the forces that it computed last.
+    /// In the returned state the late forces are zero.
     pub(super) fn reached(&self, members: &mut [Member], turning: &Turning<'_>, z: &[f64]) -> Vec<f64> {
         let (nodes, time, timetable) = (turning.nodes, turning.time, turning.timetable);
         self.put(members, turning, z);
@@ -52,6 +55,7 @@ impl Bases {
             let earlier = i64::try_from(timetable.depth[from]).unwrap_or(0);
             let (state, attitude) = samples[from][usize::try_from(earlier + sample).unwrap_or(0)];
             let sent = Instant::from_nanos((EARLIER + instants.sent_at(from, sample, timetable.frame)).unsigned_abs());
+            // A peer numbers the other peers without itself.
             let other = if from < to { from } else { from - 1 };
             members[to].hold(other, sent, state);
             if let Some(rotation) = members[to].rotation_mut() {
@@ -75,7 +79,7 @@ impl Bases {
         self.write(members, turning, &samples)
     }
 
-    /// Puts the peers into the state z.
+    /// Sets positions, attitudes and velocities of the peers to the state `z`, and their clocks to the beginning of the frame.
     pub(super) fn put(&self, members: &mut [Member], turning: &Turning<'_>, z: &[f64]) {
         let mut first = 0;
         for ((member, node), base) in members.iter_mut().zip(turning.nodes).zip(&self.poses) {
@@ -94,7 +98,7 @@ impl Bases {
         }
     }
 
-    /// With the positions and angles of a state in place of those from which they count.
+    /// Returns the bases moved to the positions and angles of a state.
     pub(super) fn moved_to(mut self, turning: &Turning<'_>, z: &[f64]) -> Self {
         let time = turning.time;
         let mut next = 0;
@@ -118,6 +122,7 @@ impl Bases {
         self
     }
 
+    /// Returns the state of the peers relative to the bases, seen from `seen_from`. `samples` has the oldest sample first.
     fn write(&self, members: &[Member], turning: &Turning<'_>, samples: &[Vec<(State<3>, Attitude)>]) -> Vec<f64> {
         let (nodes, time) = (turning.nodes, turning.time);
         let (orientation, point) = self.seen_from;
@@ -155,7 +160,7 @@ impl Bases {
     }
 }
 
-/// The peers of a scene with these hands, at rest.
+/// Returns the peers of a scene at rest, with the hand of each peer given by `hand`.
 pub(super) fn members(scene: &Scene, hand: impl Fn(usize) -> Option<Hand>) -> Vec<Member> {
     let member = |place: usize| {
         let spec = &scene.peers[place];
@@ -168,7 +173,8 @@ pub(super) fn members(scene: &Scene, hand: impl Fn(usize) -> Option<Hand>) -> Ve
     (0..scene.peers.len()).map(member).collect()
 }
 
-/// Central differences over ±e and ±e/2, taken together for an error of order e⁴, and by how much that changes the finer ones at most. e is a length \[m\].
+/// Returns the slope of a function at 0, and an estimate of the slope's error. The slope combines central differences over ±e and ±e/2 for an error of order
+/// e⁴, with e = 2·10⁻⁵ m. The estimate is the largest change of an entry from the finer difference.
 pub(super) fn slope(at: impl Fn(f64) -> Vec<f64>) -> (Vec<f64>, f64) {
     let over = |size: f64| -> Vec<f64> { at(size).iter().zip(at(-size)).map(|(up, down)| (up - down) / (2.0 * size)).collect() };
     let (coarse, fine) = (over(2e-5), over(1e-5));
@@ -177,10 +183,12 @@ pub(super) fn slope(at: impl Fn(f64) -> Vec<f64>) -> (Vec<f64>, f64) {
     (slope, change)
 }
 
+/// Returns the position and velocity of a body from entries of a state.
 fn body(base: Triple, position: &[f64], velocity: &[f64], time: f64) -> State<3> {
     State { position: from_fn(|axis| base[axis] + position[axis]), velocity: from_fn(|axis| velocity[axis] / time) }
 }
 
+/// Returns the attitude and the angular velocity of a body from entries of a state, in which angles are multiplied by `length`.
 fn attitude(base: &Attitude, angle: &[f64], rate: &[f64], length: f64, time: f64) -> Attitude {
     let mut attitude = Attitude { rate: from_fn(|axis| rate[axis] / length / time), ..*base };
     attitude.turn(from_fn(|axis| angle[axis] / length));
@@ -191,6 +199,7 @@ fn copy_of(z: &[f64], (centre, base): &(Triple, Attitude), node: &Node, time: f6
     (body(*centre, z, &z[6..], time), attitude(base, &z[3..], &z[9..], node.length, time))
 }
 
+/// Writes a copy or a sample into its entries of a state, the inverse of [`copy_of`].
 fn write(z: &mut [f64], (centre, base): &(Triple, Attitude), node: &Node, time: f64, (state, attitude): (&State<3>, &Attitude)) {
     let turned = angle(base, attitude);
     for axis in 0..3 {
@@ -199,7 +208,7 @@ fn write(z: &mut [f64], (centre, base): &(Triple, Attitude), node: &Node, time: 
     }
 }
 
-/// The rotation vector from one attitude to another, in the body axes of the first.
+/// Returns the rotation vector from `base` to `attitude` \[rad\], in the body axes of `base`.
 fn angle(base: &Attitude, attitude: &Attitude) -> Triple {
     Attitude { orientation: turned(conjugate(base.orientation), attitude.orientation), rate: [0.0; 3] }.rotation_vector()
 }

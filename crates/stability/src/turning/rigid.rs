@@ -1,12 +1,12 @@
-//! Displacements and turns of everything together, which nothing resists.
+//! Displacements and turns of everything together that no force resists.
 
 use super::algebra::cross;
 use super::displacement::Displacement;
 use super::frame::Turning;
 use super::node::Node;
 
-/// All displacements (a, c) with δp = a, δθ = c that leave the grasp points at rest that an arm's spring holds: six, three about a point, one about a line, or none.
-/// Each is 1 in its own reference and 0 in those of the others.
+/// Returns the displacements (a, c) with δp = a, δθ = c that do not move any grasp point held by the spring of an arm: six without an arm, three about one
+/// held point, one about a line of held points, else none. Each displacement is 1 in its own reference and 0 in the other references.
 pub(super) fn displacements(nodes: &[Node]) -> Vec<Displacement> {
     let length = nodes[0].length;
     let mut held = nodes.iter().filter(|node| node.touching && node.armed).map(|node| node.grasp);
@@ -14,7 +14,7 @@ pub(super) fn displacements(nodes: &[Node]) -> Vec<Displacement> {
     let Some(first) = held.next() else {
         return (0..6).map(|axis| Displacement::alike(nodes, unit(axis), axis)).collect();
     };
-    // With a = r×c the point r stays: a + c×r = 0.
+    // The displacement a = r×c leaves the point r at rest, since a + c×r = 0.
     let about = |turn: [f64; 3], reference: usize| {
         let moved = cross(first, turn).map(|moved| moved / length);
         Displacement::alike(nodes, [moved[0], moved[1], moved[2], turn[0], turn[1], turn[2]], reference)
@@ -24,7 +24,7 @@ pub(super) fn displacements(nodes: &[Node]) -> Vec<Displacement> {
     let Some(line) = arms.iter().copied().max_by(|a, b| size(*a).total_cmp(&size(*b))).filter(|line| size(*line) > 0.0) else {
         return (0..3).map(|axis| about(std::array::from_fn(|other| if other == axis { 1.0 } else { 0.0 }), 3 + axis)).collect();
     };
-    // Points off the line by less than rounding are on it.
+    // A held point off the line by no more than rounding counts as on the line.
     let off = |arm: &[f64; 3]| size(cross(line, *arm)) > 8.0 * f64::EPSILON * size(line) * size(line);
     if arms.iter().any(off) {
         return Vec::new();
@@ -33,7 +33,7 @@ pub(super) fn displacements(nodes: &[Node]) -> Vec<Displacement> {
     vec![about(line.map(|component| component / line[most]), 3 + most)]
 }
 
-/// Of those displacements of everything the combinations that a frame leaves where they are, each 1 in its own reference and 0 in those of the others.
+/// Returns the combinations of the candidates that a frame maps to themselves. Each is 1 in its own reference and 0 in the other references.
 pub(super) fn unmoved(turning: &Turning<'_>, candidates: Vec<Vec<([f64; 6], Vec<f64>)>>) -> Vec<Displacement> {
     let mut candidates: Vec<Displacement> = candidates.into_iter().map(|nodes| Displacement { nodes, reference: 0 }).collect();
     let image = |by: &Displacement| {
@@ -42,12 +42,12 @@ pub(super) fn unmoved(turning: &Turning<'_>, candidates: Vec<Vec<([f64; 6], Vec<
         reached.iter().zip(&from).map(|(reached, from)| reached - from).collect::<Vec<f64>>()
     };
     let mut images: Vec<Vec<f64>> = candidates.iter().map(image).collect();
-    // Gaussian elimination by columns, the largest entry first: those without any are left.
+    // Gaussian elimination by columns, the largest entry first. The combinations that remain are those whose image under a frame is themselves.
     loop {
         let entries =
             images.iter().enumerate().flat_map(|(column, image)| image.iter().enumerate().map(move |(row, entry)| (column, row, entry.abs())));
         let Some((pivot, row, size)) = entries.max_by(|a, b| a.2.total_cmp(&b.2)) else { return Vec::new() };
-        // A frame rounds lengths of some metres some hundred times.
+        // Entries up to this size are rounding: a frame rounds lengths of some metres some hundred times.
         if size <= 1e-11 {
             break;
         }
@@ -58,7 +58,7 @@ pub(super) fn unmoved(turning: &Turning<'_>, candidates: Vec<Vec<([f64; 6], Vec<
             image.iter_mut().zip(&moved).for_each(|(entry, moved)| *entry -= factor * moved);
         }
     }
-    // Each by the component of the first copy in which it is largest.
+    // The reference of each displacement is the component of the first copy that it moves most, so that the division by that component is safe.
     for place in 0..candidates.len() {
         let reference = (0..6).max_by(|a, b| candidates[place].first(*a).abs().total_cmp(&candidates[place].first(*b).abs())).unwrap_or(0);
         let zero = Displacement { nodes: candidates[place].nodes.iter().map(|(_, device)| ([0.0; 6], vec![0.0; device.len()])).collect(), reference };

@@ -38,21 +38,21 @@ pub(super) struct Spin {
 /// Candidate for a steady spin.
 #[derive(Clone, Debug)]
 struct Motion {
-/// State at the beginning of a frame.
-state: Vec<f64>,
-/// Angular velocity about the axis [rad/s].
-rate: f64,
-/// Displacement along the axis per frame \[m\]. Grasps off the centre can turn the spin into a screw.
+    /// State at the beginning of a frame.
+    state: Vec<f64>,
+    /// Angular velocity about the axis [rad/s].
+    rate: f64,
+    /// Displacement along the axis per frame \[m\]. Grasps off the centre can turn the spin into a screw.
     climb: f64,
 }
 
 /// Torques of the hands and initial rate of a spin.
 struct Drive {
-/// Direction of the torques, or of the initial angular velocity without torques: a unit vector in world axes.
-axis: Triple,
-/// Sum of the torques of all hands along the axis \[N·m\].
-torque: f64,
-/// Initial angular velocity of the object along the axis [rad/s].
+    /// Direction of the torques, or of the initial angular velocity without torques: a unit vector in world axes.
+    axis: Triple,
+    /// Sum of the torques of all hands along the axis \[N·m\].
+    torque: f64,
+    /// Initial angular velocity of the object along the axis [rad/s].
     begun: f64,
 }
 
@@ -109,7 +109,8 @@ impl Spin {
         let rate = if drive.begun == 0.0 { spin.balance(scene, &drive) } else { drive.begun };
         spin.begin(scene, rate);
         if spin.settle(scene).is_err() {
-            // Devices that hold the object off the axis move that axis, so that the first guess may be too far from the steady spin. Simulated motion comes nearer.
+            // Devices that hold the object off the axis move that axis, so that the first guess may be too far from the steady spin. Simulated motion comes
+            // nearer.
             spin.begin(scene, rate);
             spin.relax(scene);
             spin.settle(scene)?;

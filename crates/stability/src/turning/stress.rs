@@ -2,23 +2,24 @@
 
 use cohaptic_peer::rotation::Matrix3;
 
-/// How a load changes the equations of a node, in the units of its states.
+/// Changes of a node's equations by a load, in the units of the node's states.
 #[derive(Clone, Debug)]
 pub(super) struct Stress {
-    /// The torque on the copy by its own turn, but for that of the device.
+    /// Torque on the copy per turn of the copy, without the coupling torque of the device.
     pub(super) own: Matrix3,
-    /// For each peer, the torque on the copy by the turn of its samples and by their angular velocity.
+    /// Torque on the copy per turn and per angular velocity of a held sample, indexed by the peer that sent the sample.
     pub(super) heard: Vec<[Matrix3; 2]>,
+    /// Coupling torque; `None` if the device has no attitude or touches nothing.
     pub(super) twist: Option<Twist>,
 }
 
-/// The torque τC and what becomes of it on a device that turns.
+/// Coupling torque τC between copy and device, and its reaction on a device that turns.
 #[derive(Clone, Debug)]
 pub(super) struct Twist {
-    /// δτC by the turn of the copy and of the device, by their angular velocities.
+    /// Change of τC per turn of the copy, turn of the device, angular velocity of the copy, and angular velocity of the device.
     pub(super) by: [Matrix3; 4],
-    /// The torque on the device by δτC, by the turn of the copy and by its own.
+    /// Torque on the device per change of τC, turn of the copy, and turn of the device.
     pub(super) back: [Matrix3; 3],
-    /// The torque of the hand by the turn of the device.
+    /// Torque of the hand on the device per turn of the device.
     pub(super) hand: Matrix3,
 }

@@ -1,4 +1,4 @@
-//! The linear equations against real peers that turn.
+//! Compares the linear equations with simulated peers that turn.
 
 use cohaptic_peer::rotation::Attitude;
 use cohaptic_peer::{Hand, Signal, State};
@@ -43,7 +43,8 @@ fn scene(overrides: &[&str]) -> Scene {
     Scene::parse(SCENE, "turns.toml".as_ref(), &overrides).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// The peers; arms hold their devices where they begin, but `loaded` hands do what the scene says.
+/// Returns the peers of a scene. With `loaded` the hands act as in the scene. Otherwise arms hold the devices at their grasp points, and other hands are left
+/// out.
 fn peers(scene: &Scene, loaded: bool) -> Vec<Member> {
     members(scene, |place| {
         let hand = scene.peers[place].hand.clone();
@@ -52,13 +53,14 @@ fn peers(scene: &Scene, loaded: bool) -> Vec<Member> {
     })
 }
 
-/// Where peers begin without a load: copies at the origin, devices at their grasp points.
+/// Returns the initial poses without a load: copies at the origin, devices at their grasp points.
 fn at_rest(scene: &Scene) -> Vec<Pose> {
     let grasps = scene.rotation.as_ref().unwrap().peers.iter().map(|peer| peer.grasp);
     grasps.map(|device| Pose { centre: [0.0; 3], attitude: Attitude::REST, device, handle: Attitude::REST }).collect()
 }
 
-/// Where a frame leads real peers, with the numbers of [`Turning`]. Forces that wait are those that peers compute `before`, if they do; at the end they are left at zero.
+/// Returns the state of simulated peers after a frame from the state `z`, in the coordinates of [`Turning`]. Late forces are those that the peers compute at
+/// the state `before`, if given. In the returned state the late forces are zero.
 fn pushed(members: &mut [Member], turning: &Turning<'_>, poses: &[Pose], z: &[f64], before: Option<&[f64]>) -> Vec<f64> {
     let bases = Bases::resting(poses.to_vec(), turning);
     if let Some(before) = before {
@@ -76,7 +78,7 @@ fn pushed(members: &mut [Member], turning: &Turning<'_>, poses: &[Pose], z: &[f6
     bases.reached(members, turning, z)
 }
 
-/// The states that are no forces that wait.
+/// Returns the indices of all states except the late forces.
 fn known(turning: &Turning<'_>) -> Vec<usize> {
     let waits = |state: usize| {
         let mut first = 0;
@@ -89,7 +91,7 @@ fn known(turning: &Turning<'_>) -> Vec<usize> {
     (0..turning.size()).filter(|state| !waits(*state)).collect()
 }
 
-/// Compares all columns but those of forces that wait, and gives the largest entry.
+/// Compares all columns except those of late forces, and returns the largest entry.
 fn compare(scene: &Scene, turning: &Turning<'_>, bases: &[Pose], loaded: bool) -> f64 {
     let known = known(turning);
     let mut largest = 0.0_f64;
@@ -97,7 +99,7 @@ fn compare(scene: &Scene, turning: &Turning<'_>, bases: &[Pose], loaded: bool) -
         let (found, _) = slope(|size| {
             let mut z = vec![0.0; turning.size()];
             z[*column] = size;
-            // What each computes before at rest waits as at rest.
+            // The late forces are those that the peers compute at rest, which count as zero in the linear equations.
             let rest = vec![0.0; z.len()];
             pushed(&mut peers(scene, loaded), turning, bases, &z, scene.peers[0].compute_delay.then_some(&*rest))
         });
@@ -118,8 +120,8 @@ fn each(scene: &Scene) -> Together {
     Together { time: 0.01, ..together }
 }
 
-/// Steps are the length 2·10⁻⁵ m. Angles are below 2·10⁻³ rad, whose fourth power is 1.6·10⁻¹¹; a rounding of a position of 4 cm, over e, is 10⁻¹³, and a frame has some
-/// hundred of them. Entries are up to about 3.
+/// Steps are the length 2·10⁻⁵ m. Angles are below 2·10⁻³ rad, whose fourth power is 1.6·10⁻¹¹; a rounding of a position of 4 cm, over e, is 10⁻¹³, and a
+/// frame has some hundred of them. Entries are up to about 3.
 #[test]
 fn the_equations_are_the_linear_part_of_real_peers() {
     for more in [
@@ -139,8 +141,8 @@ fn the_equations_are_the_linear_part_of_real_peers() {
     }
 }
 
-/// Forces and torques that wait are those that peers have computed where they were: there they are moved by every way at once, and what a frame makes of it at rest is
-/// compared.
+/// Forces and torques that wait are those that peers have computed where they were: there they are moved by every way at once, and what a frame makes of it at
+/// rest is compared.
 #[test]
 fn forces_that_wait_are_those_of_real_peers() {
     let scene = scene(&["peers.a.compute-delay=1", "peers.b.compute-delay=1", "peers.c.compute-delay=1"]);
@@ -255,8 +257,8 @@ fn without_rest_there_is_no_verdict() {
     }
 }
 
-/// A free body that turns about the axis of its middle moment departs as e^(λt), λ = ω·√((J₂ − J₁)(J₃ − J₂)/(J₁J₃)) (Euler 1758), and about the others it does not. Samples are
-/// of the same instant here, so that copies that are together stay so.
+/// A free body that turns about the axis of its middle moment departs as e^(λt), λ = ω·√((J₂ − J₁)(J₃ − J₂)/(J₁J₃)) (Euler 1758), and about the others it does
+/// not. Samples are of the same instant here, so that copies that are together stay so.
 #[test]
 fn about_the_middle_axis_a_spin_departs_as_that_of_a_free_body() {
     let [j1, j2, j3] = [1.2e-4, 2.0e-4, 2.6e-4_f64];
@@ -272,7 +274,7 @@ fn about_the_middle_axis_a_spin_departs_as_that_of_a_free_body() {
     }
 }
 
-/// What hands do to a spin: the torque of one turns all, and attitudes that are behind brake.
+/// The torque of one hand turns all copies, and attitudes of old samples brake the spin.
 const SPINNING: [&str; 4] = [
     "peers.b.hand={ force = [0, 0, 0], torque = [0, 0, 0.2] }",
     "peers.a.contact=none",
@@ -280,7 +282,8 @@ const SPINNING: [&str; 4] = [
     "object.rotational-damping=[1e-3, 2e-3, 1.5e-3]",
 ];
 
-/// Real peers that begin with the steady spin keep it over a hundred frames, and at the state of a frame all directions that are taken out are left as they are.
+/// Real peers that begin with the steady spin keep it over a hundred frames, and at the state of a frame all directions that are taken out are left as they
+/// are.
 #[test]
 fn a_steady_spin_is_that_of_real_peers() {
     let scene = scene(&SPINNING);

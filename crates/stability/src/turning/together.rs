@@ -1,4 +1,4 @@
-//! The classes of a scene that turns, and what of them moves.
+//! Classes of equal peers of a scene whose object turns, and the linear systems of these classes.
 
 use cohaptic_peer::Contact;
 use cohaptic_scene::Scene;
@@ -13,12 +13,16 @@ use crate::structure::{Contacts, Structure, common_time, linear_law};
 use crate::timetable::Timetable;
 use crate::{AnalysisError, Matrix, Watch};
 
-/// The classes of a scene that turns, and what of them moves.
+/// Classes of equal peers of a scene whose object turns, with a node per class.
 #[derive(Clone, Debug)]
 pub(crate) struct Together {
+    /// Classes, weights and timetables.
     pub(crate) structure: Structure,
+    /// Node of each class.
     pub(super) nodes: Vec<Node>,
+    /// Time by which velocities are multiplied \[s\].
     pub(super) time: f64,
+    /// Displacements of everything that no force resists.
     pub(super) free: Vec<Displacement>,
 }
 
@@ -31,41 +35,42 @@ impl Together {
         Self { structure, nodes, time, free }
     }
 
-    /// With one peer in a class of its own.
+    /// Returns the classes of a scene, with the peer `alone` in a class of its own even if other peers equal it.
     pub(crate) fn with_alone(scene: &Scene, network: &NominalNetwork, alone: usize, watch: &dyn Watch) -> Result<Self, AnalysisError> {
         let structure = Structure::with_alone(&[scene], network, &contacts(scene)?, Some(alone))?;
         allowed(&structure, watch)?;
         Ok(Self::new(scene, structure))
     }
 
-    /// The system of the classes' averages.
+    /// Returns the system of the classes' averages.
     pub(crate) fn turning(&self) -> Turning<'_> {
         let Self { structure, nodes, time, free } = self;
         Turning { nodes, weights: &structure.weights, timetable: &structure.timetable, time: *time, free: free.clone() }
     }
 
-    /// How the members of a class differ.
+    /// Returns the system of the differences between the members of a class.
     pub(super) fn apart<'t>(&'t self, class: usize, timetable: &'t Timetable, weight: &'t Matrix) -> Turning<'t> {
         Turning { nodes: &self.nodes[class..=class], weights: weight, timetable, time: self.time, free: Vec::new() }
     }
 
-    /// The node of a class.
+    /// Returns the node of a class.
     pub(crate) fn node(&self, class: usize) -> &Node {
         &self.nodes[class]
     }
 
-    /// What velocities are multiplied by \[s\].
+    /// Returns the time by which velocities are multiplied \[s\].
     pub(crate) const fn time(&self) -> f64 {
         self.time
     }
 }
 
-/// Refuses more samples on the way than their matrix may have, before there is room for any of them.
+/// Refuses more samples on the way than the matrix of the frame may have, before memory for them is allocated.
 pub(crate) fn allowed(structure: &Structure, watch: &dyn Watch) -> Result<(), AnalysisError> {
     PartCost::of_eigenvalues(SAMPLE * structure.timetable.depth.iter().sum::<usize>()).allowed(watch)
 }
 
-/// The peers whose devices hold the object. A finger would push along an axis of the world, and a law that looks back or remembers torques would be another state.
+/// Returns the contacts of a scene: the peers whose devices grasp the object. Refuses a one-sided contact, which pushes along one axis of the world, and a law
+/// with a lag or a memory, which would need further states.
 pub(crate) fn contacts(scene: &Scene) -> Result<Contacts, AnalysisError> {
     if linear_law(scene, 0).is_some_and(|law| law.lag > 0 || !law.memory.is_empty()) {
         let why = scene.rotation_parts().and_then(Result::err).unwrap_or("all components are taken together");
