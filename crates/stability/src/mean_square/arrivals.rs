@@ -30,7 +30,7 @@ pub struct Hazards {
     pub at: Vec<Vec<Hazard>>,
     /// Largest number of places at any tick; 1 if no sample overtakes another.
     pub(crate) places: usize,
-    /// Whether any sample has several ticks at which it may arrive.
+    /// True if any sample has several possible ticks of arrival.
     pub(crate) spread: bool,
     /// Oldest sample that may arrive at or after a tick. Indexed by tick; the last entry belongs to the first tick of the next frame.
     oldest: Vec<i64>,

@@ -25,7 +25,7 @@ pub(crate) struct LinkLaw {
     discarded: f64,
     /// Probability that a sample is duplicated.
     duplicated: f64,
-    /// Whether the link has the layout of netem, which loses original and duplicate independently.
+    /// True for the layout of netem, which loses original and duplicate independently.
     netem: bool,
     /// Constant time added to every delay \[ns\].
     extra: i128,
@@ -35,11 +35,11 @@ pub(crate) struct LinkLaw {
     law: Option<Law>,
     /// Probability that a packet is displaced, and the time by which its delay is then longer \[ns\]. `None` as time: the delay is skipped.
     displaced: Option<(f64, Option<i128>)>,
-    /// Whether the delays of successive packets depend on each other.
+    /// True if the delays of successive packets depend on each other.
     pub(crate) correlated_delays: bool,
-    /// Whether a sample waits for the samples before.
+    /// True if a sample waits for the samples before.
     pub(crate) in_order: bool,
-    /// Whether delays are cut at an end of `law`.
+    /// True if delays are cut at an end of `law`.
     pub(crate) cut: bool,
 }
 

@@ -56,7 +56,7 @@ const BREAKDOWN: f64 = 1e-14;
 /// Returns the spectral radius with its error; `None` if the watcher ends the computation. One image takes `operations` operations.
 ///
 /// If no lower bound is found, the error covers the whole interval from zero. If numbers overflow, the operator is divided by a power of two, which is exact.
-/// If numbers overflow even then, the result is [`Radius::UNKNOWN`].
+/// If numbers overflow even then, the result has an infinite error.
 pub fn radius_watched(operator: &impl Positive, operations: f64, watch: &dyn Watch) -> Option<Radius> {
     let watched = Images { operator, factor: 1.0, operations, watch };
     match within_range(&watched, watch) {

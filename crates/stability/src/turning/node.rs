@@ -19,7 +19,7 @@ pub(crate) struct Node {
     pub(super) coupling: Vec<Gains>,
     /// Combination of the copy's components to which the coupling ties a component of the device, indexed by that component.
     pub(crate) grip: Vec<[f64; 6]>,
-    /// Whether the device holds the copy.
+    /// True if the device holds the copy.
     pub(super) touching: bool,
     /// Gains of the restoring force by the copy's own state, indexed by component of the copy.
     pub(super) own: [Gains; 6],
@@ -29,9 +29,9 @@ pub(crate) struct Node {
     pub(super) ahead: [f64; 6],
     /// Age above which a sample is not extrapolated further \[s\]; 0 for a law without a horizon.
     pub(super) horizon: f64,
-    /// Whether the peer applies its forces a tick late.
+    /// True if the peer applies its forces a tick late.
     pub(super) compute_delay: bool,
-    /// Whether an arm with a stiffness holds the device.
+    /// True if an arm with a stiffness holds the device.
     pub(super) armed: bool,
     /// Grasp point in body axes \[m\].
     pub(super) grasp: Triple,
