@@ -1,19 +1,19 @@
-//! A radius of a family of scenes, which may be nominal.
+//! The radius at one point of a family of scenes, with a mark that tells whether the radius is nominal.
 
 use crate::Radius;
 
-/// A radius of a family.
+/// The radius of a family of scenes for one set of key values.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Cell<R = Radius> {
-    /// By the criterion of the family.
+    /// Radius by the criterion of the family; below 1 the scene is stable.
     pub radius: R,
-    /// Whether the links leave something to chance that the radius leaves out, because the second moment cannot be followed: it is then the square of
-    /// the nominal spectral radius, the scene with every delay its mean and nothing lost.
+    /// Whether the radius leaves out random parts of the links, because the second moment of this scene cannot be followed. A nominal radius is the square
+    /// of the spectral radius of the scene in which every delay is its mean and no packet is lost.
     pub is_nominal: bool,
 }
 
 impl<R> Cell<R> {
-    /// A radius that leaves nothing out.
+    /// Returns a cell whose radius leaves out no random part of the links.
     pub const fn certain(radius: R) -> Self {
         Self { radius, is_nominal: false }
     }

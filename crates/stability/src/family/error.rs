@@ -1,11 +1,11 @@
-//! Why there is no family of scenes, or no radius in it.
+//! Errors of a family of scenes: the family cannot be formed, or has no radius for the given values.
 
 use cohaptic_scene::SceneError;
 use cohaptic_units::print::SixDigits;
 
 use crate::AnalysisError;
 
-/// Why there is no family of scenes, or no radius in it.
+/// Reason for which a family of scenes cannot be formed, or has no radius for the given values.
 #[derive(Debug, thiserror::Error)]
 pub enum FamilyError {
     /// The scene is refused, as it is without the keys or with one of their values: an unknown key or peer, a value out of range.
@@ -14,18 +14,18 @@ pub enum FamilyError {
     /// The scene cannot be analysed.
     #[error(transparent)]
     Analysis(#[from] AnalysisError),
-    /// A key takes something else than a number.
+    /// A key of the scene does not take a number.
     #[error("{key} is no number that can be varied: {message}")]
     NoNumber {
         /// The key.
         key: String,
-        /// What the scene's reader says to a number there.
+        /// Message of the scene's reader about a number at this key.
         message: String,
     },
-    /// No key, or more than two.
+    /// A family has one or two open keys; the caller gave none or more than two.
     #[error("{keys} keys are left open: expected one or two")]
     Keys {
-        /// How many.
+        /// Number of keys given.
         keys: usize,
     },
     /// A key is named twice.
@@ -34,12 +34,12 @@ pub enum FamilyError {
         /// The key.
         key: String,
     },
-    /// Not one value for each key.
+    /// The number of values differs from the number of keys.
     #[error("{given} values for {keys} open keys: expected one for each")]
     Values {
-        /// How many values.
+        /// Number of values given.
         given: usize,
-        /// How many keys.
+        /// Number of open keys.
         keys: usize,
     },
     /// A value is not in the range of its key.
@@ -47,11 +47,11 @@ pub enum FamilyError {
     Outside {
         /// The key.
         key: String,
-        /// The value asked for.
+        /// The value given, in the unit of the key's range.
         value: f64,
-        /// The smallest one.
+        /// Smallest value of the key's range.
         low: f64,
-        /// The largest one.
+        /// Largest value of the key's range.
         high: f64,
     },
 }

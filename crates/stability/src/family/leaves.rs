@@ -1,9 +1,9 @@
-//! The numbers of a scene that its motion depends on, each with a way to read and to write it.
+//! The numbers of a scene on which the motion depends, with reading and writing of each number, and the search for the numbers that a key sets.
 
 use cohaptic_peer::Hand;
 use cohaptic_scene::{PeerSpec, Scene};
 
-/// One number of a scene.
+/// One number of a scene that a key may set.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Leaf {
     ObjectMass,
@@ -12,7 +12,7 @@ pub(super) enum Leaf {
     WallDamping,
     CoordinationStiffness,
     CoordinationDamping,
-    /// Of the peer at that place.
+    /// A number of one peer. The index is that of [`Scene::peers`].
     Peer(usize, PeerLeaf),
 }
 
@@ -50,7 +50,7 @@ impl PeerLeaf {
 }
 
 impl Leaf {
-    /// The number; `None` if the scene has none there.
+    /// Returns the place of the number in a scene, or `None` if the scene has no such number: no enclosure, no arm, or no peer with that index.
     pub(super) fn of(self, scene: &mut Scene) -> Option<&mut f64> {
         match self {
             Self::ObjectMass => Some(&mut scene.object.mass),
@@ -70,13 +70,15 @@ impl Leaf {
     }
 }
 
-/// Scenes that were read with values for some keys, one value for each key.
+/// A scene together with the values of the keys with which the scene was read, one value per key.
 pub(super) struct Probe {
     pub(super) values: Vec<f64>,
     pub(super) scene: Scene,
 }
 
-/// For each key, the numbers that take its value; `None` unless that is all that the keys do.
+/// Returns, for each key, the numbers of the scene that take the value of the key, or `None` if the keys change anything else of the scene.
+///
+/// The first probe's scene is written to during the check, and holds the first probe's values again on success.
 pub(super) fn learn(probes: &mut [Probe]) -> Option<Vec<Vec<Leaf>>> {
     let keys = probes.first()?.values.len();
     let mut learned = vec![Vec::new(); keys];
@@ -89,6 +91,8 @@ pub(super) fn learn(probes: &mut [Probe]) -> Option<Vec<Vec<Leaf>>> {
     let of_peers = (0..peers).flat_map(|place| PeerLeaf::ALL.map(|leaf| Leaf::Peer(place, leaf)));
     for leaf in whole.into_iter().chain(of_peers) {
         for (key, leaves) in learned.iter_mut().enumerate() {
+            // A number belongs to a key if it equals the key's value in every probe. Adding 0.0 turns −0.0 into 0.0, which is how the value was printed
+            // for the scene's reader.
             let holds = |probe: &mut Probe| {
                 let value = probe.values[key] + 0.0;
                 leaf.of(&mut probe.scene).is_some_and(|number| number.to_bits() == value.to_bits())
@@ -98,7 +102,7 @@ pub(super) fn learn(probes: &mut [Probe]) -> Option<Vec<Vec<Leaf>>> {
             }
         }
     }
-    // Whatever else the keys do shows as a difference that writing the numbers does not make up for.
+    // If the keys do anything besides setting these numbers, the first scene with the numbers of another probe still differs from that probe's scene.
     let (first, others) = probes.split_first_mut()?;
     for probe in others {
         for (leaves, value) in learned.iter().zip(&probe.values) {

@@ -1,8 +1,8 @@
-//! Scenes that differ in one or two numbers: a map, or a line across it.
+//! Families of scenes that differ in one or two numbers, as a stability map or a line across a map needs.
 //!
-//! Reading a scene takes far longer than analysing it. So the scene is read a few times, with different values of its open keys; where it is seen that
-//! a key does nothing but set certain numbers, the key is *learned*, and from then on only those numbers are written. A key that is not learned, such
-//! as a delay, is read anew for each value.
+//! Reading the text of a scene can cost more than analysing the scene. The scene is therefore read only a few times, with different values of its open
+//! keys. A key that does nothing but set certain numbers of the scene is *learned*: further values of the key are written straight to those numbers. A key
+//! that is not learned, such as a delay, makes the scene be read again for each new value.
 
 mod cell;
 mod error;
@@ -27,10 +27,10 @@ use crate::{Criterion, Radius, Unwatched, Watch, left_out};
 use leaves::Probe;
 use prepared::Prepared;
 
-/// The most peers kept in scenes that have been read for values of a key that is not learned.
+/// Largest total number of peers in the scenes that a family keeps, of those read for values of a key that is not learned.
 const MOST_KEPT: usize = 50_000;
 
-/// A scene with one or two keys left open.
+/// A scene with one or two keys left open, which gives a radius for any values of the keys.
 #[derive(Debug)]
 pub struct Family {
     text: String,
@@ -39,16 +39,16 @@ pub struct Family {
     keys: Vec<KeyRange>,
     learned: Vec<bool>,
     criterion: Criterion,
-    /// Random parts of the links anywhere in the family, in words.
+    /// Names of the random parts of the links that were found at either end of the ranges or inside.
     left_out: Vec<&'static str>,
-    /// Scenes by the values of the keys that are not learned.
+    /// Scenes that were read, indexed by the bits of the values of the keys that are not learned.
     prepared: Mutex<BTreeMap<Vec<u64>, Arc<Prepared>>>,
-    /// Tells this family from others, also from those that are gone.
+    /// Identity of this family. A scratch holds a clone, so that the address cannot be used again by a later family.
     identity: Arc<()>,
 }
 
-/// Room for computing radii, and what was computed last. One for each thread; it may be used with any family, and what comes out does not depend on
-/// what it was used for before.
+/// Scratch memory for computing radii, with the scene used last. Each thread needs a scratch of its own. A scratch may be used with any family, and the
+/// radii do not depend on its earlier use.
 #[derive(Debug, Default)]
 pub struct FamilyScratch {
     last: Option<Last>,
@@ -56,7 +56,7 @@ pub struct FamilyScratch {
 
 #[derive(Debug)]
 struct Last {
-    /// The values of the keys that are not learned.
+    /// Bits of the values of the keys that are not learned.
     fixed: Vec<u64>,
     prepared: Arc<Prepared>,
     scene: Scene,
@@ -65,7 +65,8 @@ struct Last {
 }
 
 impl Family {
-    /// Leaves keys of a scene open. `text`, `file` and `overrides` are those of [`Scene::parse`]; the keys are put in after the overrides.
+    /// Creates the family of a scene whose `keys` are left open. `text`, `file` and `overrides` are the arguments of [`Scene::parse`]; the values of the keys
+    /// are applied after the overrides.
     ///
     /// # Errors
     ///
@@ -90,7 +91,8 @@ impl Family {
         let at_low = family.scene(&low).map_err(|error| family.no_number(error))?;
         let at_high = family.scene(&high).map_err(|error| family.no_number(error))?;
         crate::scene_radius::scene_radii(&[&at_low])?;
-        // The chance at one end may be none at the other: no loss, no jitter. In between a key may take no value at all.
+        // A link that is random at one end of a range may be certain at the other, with a loss or jitter of zero, so that three scenes are asked. The
+        // scene inside may be refused, for example if the key takes whole numbers only; the ends must not be.
         let inside: Vec<f64> = family.keys.iter().enumerate().map(|(key, range)| range.odd(key)).collect();
         let inside = family.scene(&inside).ok();
         for name in [Some(&at_low), Some(&at_high), inside.as_ref()].into_iter().flatten().flat_map(left_out) {
@@ -104,29 +106,29 @@ impl Family {
             family.learned[key] = family.is_learned(key, &low);
         }
         if family.learned.iter().any(|learned| *learned) && family.read(&low)?.is_none() {
-            // Each key on its own sets numbers, and together they do more than that.
+            // Each key alone only sets numbers, but both keys together change more of the scene than these numbers.
             family.learned.fill(false);
         }
         Ok(family)
     }
 
-    /// The open keys.
+    /// Returns the open keys with their ranges, in the order given to [`Family::new`].
     #[must_use]
     pub fn keys(&self) -> &[KeyRange] {
         &self.keys
     }
 
-    /// For each key, whether its values are written into a scene that has been read before.
+    /// Tells for each key whether the key is learned: its values are written into a scene that has been read before.
     #[must_use]
     pub fn learned(&self) -> &[bool] {
         &self.learned
     }
 
-    /// The scene with those values of its keys.
+    /// Reads the scene with the given values of its keys, one value per key.
     ///
     /// # Errors
     ///
-    /// [`FamilyError`] if there are not as many values as keys, or the scene is refused with them.
+    /// [`FamilyError`] if the number of values differs from the number of keys, if a value is out of its range, or if the scene is refused with the values.
     pub fn scene(&self, values: &[f64]) -> Result<Scene, FamilyError> {
         self.check(values)?;
         let mut overrides = self.overrides.clone();
@@ -134,11 +136,11 @@ impl Family {
         Ok(Scene::parse(&self.text, &self.file, &overrides)?)
     }
 
-    /// The scene with those values of its keys: of equal peers the first alone has those that are learned.
+    /// Returns the scene as it is written for a radius with the given values. Of equal peers only the first has the values of the learned keys.
     ///
     /// # Errors
     ///
-    /// As for [`Family::scene`].
+    /// As for [`Family::scene`], and if the scene cannot be analysed.
     pub fn written(&self, values: &[f64]) -> Result<Scene, FamilyError> {
         let prepared = self.prepared(values)?;
         if !prepared.is_varied() {
@@ -150,7 +152,7 @@ impl Family {
         Ok(scene)
     }
 
-    /// Which radii the family has.
+    /// Returns the criterion of the family's radii: the mean square if a link of the family is random, the spectral radius otherwise.
     #[must_use]
     pub const fn criterion(&self) -> Criterion {
         self.criterion
@@ -162,7 +164,7 @@ impl Family {
         &self.left_out
     }
 
-    /// The radius with those values of the keys, by the family's criterion and without a bound of its error: below 1 the scene is stable.
+    /// Returns the radius for the given values of the keys, by the family's criterion and without a bound of its error. Below 1 the scene is stable.
     ///
     /// # Errors
     ///
@@ -171,7 +173,7 @@ impl Family {
         self.radius_watched(values, scratch, &Unwatched)
     }
 
-    /// [`Family::radius`], watched where a second moment is followed.
+    /// Like [`Family::radius`], with a watch that can stop the computation while a second moment is followed.
     ///
     /// # Errors
     ///
@@ -180,7 +182,7 @@ impl Family {
         self.evaluate::<false>(values, scratch, watch).map(|cell| Cell { radius: cell.radius.value, is_nominal: cell.is_nominal })
     }
 
-    /// The radius with those values of the keys, by the family's criterion.
+    /// Returns the radius for the given values of the keys, by the family's criterion, with a bound of its error.
     ///
     /// # Errors
     ///
@@ -189,7 +191,7 @@ impl Family {
         self.bounded_radius_watched(values, scratch, &Unwatched)
     }
 
-    /// [`Family::bounded_radius`], watched where a second moment is followed.
+    /// Like [`Family::bounded_radius`], with a watch that can stop the computation while a second moment is followed.
     ///
     /// # Errors
     ///
@@ -200,6 +202,7 @@ impl Family {
 
     fn evaluate<const BOUND: bool>(&self, values: &[f64], scratch: &mut FamilyScratch, watch: &dyn Watch) -> Result<Cell<Radius>, FamilyError> {
         self.check(values)?;
+        // Neighbouring points of a map share the values of the keys that are not learned, so the scene used last often serves again.
         let is_last = scratch
             .last
             .as_ref()
@@ -212,7 +215,7 @@ impl Family {
         let Some(Last { prepared, scene, radii, .. }) = &mut scratch.last else {
             return Ok(Cell::certain(Radius { value: f64::NAN, error: f64::INFINITY }));
         };
-        // Two keys at most.
+        // `new` admits at most two keys, so two places are enough.
         let (mut learned, mut count) = ([0.0; 2], 0);
         for (value, _) in values.iter().zip(&self.learned).filter(|(_, learned)| **learned) {
             learned[count] = *value;
@@ -225,13 +228,13 @@ impl Family {
             Criterion::MeanSquare => prepared.mean_square::<BOUND>(learned, scene, radii, watch)?,
         };
         if !prepared.is_varied() {
-            // It stands for these values only.
+            // A scene without learned keys holds for these values only.
             scratch.last = None;
         }
         Ok(cell)
     }
 
-    /// One value for each key, each in its range.
+    /// Checks that there is one value per key and that each value is in its key's range.
     fn check(&self, values: &[f64]) -> Result<(), FamilyError> {
         if values.len() != self.keys.len() {
             return Err(FamilyError::Values { given: values.len(), keys: self.keys.len() });
@@ -243,7 +246,7 @@ impl Family {
         }
     }
 
-    /// Whether a key does nothing but set numbers, the others being as given.
+    /// Tells whether a key does nothing but set numbers of the scene. `others` holds one value per key; the entry of `key` itself is not used.
     fn is_learned(&self, key: usize, others: &[f64]) -> bool {
         let range = &self.keys[key];
         let probe = |value: f64| {
@@ -252,16 +255,16 @@ impl Family {
             self.scene(&values).map(|scene| Probe { values: vec![value], scene })
         };
         let probes: Result<Vec<Probe>, FamilyError> = [range.odd(key), range.low, range.high].into_iter().map(probe).collect();
-        // A value in between may be refused where the ends are not: a number of ticks is a whole one.
+        // A value inside the range may be refused although both ends are valid: a number of ticks must be whole. Such a key counts as not learned.
         probes.is_ok_and(|mut probes| leaves::learn(&mut probes).is_some())
     }
 
-    /// The values of the keys that are not learned.
+    /// Returns the bits of the values of the keys that are not learned, in the order of the keys.
     fn fixed_bits(&self, values: &[f64]) -> impl Iterator<Item = u64> {
         values.iter().zip(&self.learned).filter(|(_, learned)| !**learned).map(|(value, _)| value.to_bits())
     }
 
-    /// The scene with those values of the keys that are not learned: one read before, or a new one.
+    /// Returns the prepared scene for the given values of the keys that are not learned: a kept scene, or one read now.
     fn prepared(&self, values: &[f64]) -> Result<Arc<Prepared>, FamilyError> {
         let fixed: Vec<u64> = self.fixed_bits(values).collect();
         let known = |prepared: &BTreeMap<Vec<u64>, Arc<Prepared>>| prepared.get(&fixed).cloned();
@@ -270,7 +273,7 @@ impl Family {
         }
         let prepared = match self.read(values)? {
             Some(prepared) => Arc::new(prepared),
-            // For these values the learned keys do something else than for others: the scene as it is.
+            // With these values the learned keys change more than their numbers, so the scene is read with all values and nothing is varied in it.
             None => Arc::new(self.as_it_is(values)?),
         };
         if prepared.is_varied() {
@@ -282,14 +285,15 @@ impl Family {
         Ok(prepared)
     }
 
-    /// The scene with all of those values, none of them to be varied.
+    /// Reads the scene with all of the given values. No key of the prepared scene can be varied afterwards.
     fn as_it_is(&self, values: &[f64]) -> Result<Prepared, FamilyError> {
         let probe = Probe { values: Vec::new(), scene: self.scene(values)? };
-        // A single scene has nothing to differ from.
+        // `learn` fails only if two probes differ, and there is a single probe here; the error is never returned.
         Prepared::new(vec![probe])?.ok_or(FamilyError::Keys { keys: 0 })
     }
 
-    /// Reads the scene with several values of the learned keys: each on its own at a value inside and at both ends, and all together at either end.
+    /// Reads the scene with several values of the learned keys: all at a value inside their ranges, each key alone at either end, and all keys together at
+    /// either end. Returns `None` if the keys do more than set numbers.
     fn read(&self, values: &[f64]) -> Result<Option<Prepared>, FamilyError> {
         let learned: Vec<usize> = (0..self.keys.len()).filter(|key| self.learned[*key]).collect();
         let mut base = values.to_vec();
@@ -315,7 +319,7 @@ impl Family {
         Ok(Prepared::new(probes)?)
     }
 
-    /// A fault in a value that the family itself has put in, because it is a number: that the key takes none.
+    /// Turns the scene reader's error about a value that the family itself inserted into [`FamilyError::NoNumber`]. Other errors are returned unchanged.
     fn no_number(&self, error: FamilyError) -> FamilyError {
         let FamilyError::Scene(error) = error else { return error };
         let fault = error.diagnostic().filter(|fault| fault.override_text().is_some());

@@ -1,4 +1,4 @@
-//! A scene that has been read once, in which the learned keys are written without reading it again.
+//! A scene that has been read, and into which values of the learned keys are written directly, without reading the scene's text again.
 
 use cohaptic_scene::Scene;
 
@@ -9,25 +9,26 @@ use crate::radius::worse;
 use crate::scene_radius::{RadiusScratch, SceneRadius, scene_radii};
 use crate::{AnalysisError, Limits, Radius, Watch, has_chance, mean_square_watched};
 
-/// A scene with learned keys.
+/// A scene with the places of its learned keys and the prepared radii of its combinations of contacts.
 #[derive(Debug)]
 pub(super) struct Prepared {
     pub(super) scene: Scene,
-    /// For each learned key, the numbers that the radius depends on: of equal peers those of the first.
+    /// Numbers on which the radius depends, indexed by learned key. Of a class of equal peers only the first member's numbers are listed.
     leaves: Vec<Vec<Leaf>>,
-    /// For each learned key, the numbers of the others, where the second moment may be followed peer by peer.
+    /// Numbers of the remaining members of each class, indexed by learned key. Empty unless the links are random: only a second moment that is followed
+    /// peer by peer reads these numbers.
     others: Vec<Vec<Leaf>>,
-    /// One for each combination of contacts.
+    /// One prepared radius per combination of contacts.
     radii: Vec<SceneRadius>,
 }
 
 impl Prepared {
-    /// From scenes read with values for the learned keys; `None` if the keys do more than to set numbers.
+    /// Prepares the scene from probes, which were read with different values of the learned keys. Returns `None` if the keys do more than set numbers.
     pub(super) fn new(mut probes: Vec<Probe>) -> Result<Option<Self>, AnalysisError> {
         let Some(mut leaves) = learn(&mut probes) else { return Ok(None) };
         let scenes: Vec<&Scene> = probes.iter().map(|probe| &probe.scene).collect();
         let radii = scene_radii(&scenes)?;
-        // Of each class only the first member is ever looked at.
+        // The radii read only the first member of each class, so the numbers of all other members need not be written for a radius.
         let mut looked_at: Vec<usize> = radii.iter().flat_map(|radius| radius.classes().iter().map(|class| class[0])).collect();
         looked_at.sort_unstable();
         looked_at.dedup();
@@ -45,24 +46,24 @@ impl Prepared {
         !self.leaves.is_empty()
     }
 
-    /// How many numbers are written for each radius.
+    /// Returns the number of scene numbers that are written for each radius.
     #[cfg(test)]
     pub(super) fn written(&self) -> usize {
         self.leaves.iter().map(Vec::len).sum()
     }
 
-    /// A scene of one's own to write in, and room for every radius.
+    /// Returns a copy of the scene for writing values into, and one scratch per radius.
     pub(super) fn scratch(&self) -> (Scene, Vec<RadiusScratch>) {
         (self.scene.clone(), self.radii.iter().map(|_| RadiusScratch::default()).collect())
     }
 
-    /// Writes those values of the learned keys into the scene.
+    /// Writes values of the learned keys, in the order of the keys, into the scene.
     pub(super) fn write(&self, values: &[f64], scene: &mut Scene) {
         set(&self.leaves, values, scene);
     }
 
-    /// The largest radius of the second moment of all combinations of contacts, with those values of the learned keys, which have been written; where it
-    /// cannot be followed, the square of the nominal one.
+    /// Returns the largest radius of the second moment over all combinations of contacts. `values` are those of the learned keys, and must already be written
+    /// into `scene`. Where the second moment cannot be followed, the result is the square of the nominal radius, marked as nominal.
     pub(super) fn mean_square<const BOUND: bool>(
         &self,
         values: &[f64],
@@ -70,6 +71,7 @@ impl Prepared {
         scratch: &mut [RadiusScratch],
         watch: &dyn Watch,
     ) -> Result<Cell, AnalysisError> {
+        // Without random links the second moment grows by the square of the spectral radius.
         let is_certain = |radius: &SceneRadius| matches!(radius.followed(), Ok(Followed::Certain));
         if self.radii.iter().all(is_certain) {
             return Ok(Cell { radius: self.radius::<BOUND>(scene, scratch).over(2), is_nominal: false });
@@ -80,6 +82,7 @@ impl Prepared {
         if !BOUND && let Some(value) = quick(scratch) {
             return Ok(Cell { radius: Radius { value, error: 0.0 }, is_nominal: false });
         }
+        // The full analysis reads every peer, not only the first member of each class.
         set(&self.others, values, scene);
         match mean_square_watched(scene, &Limits { watch, ..Limits::of_unknowns(usize::MAX) }) {
             Ok(found) => Ok(Cell { radius: found.radius, is_nominal: false }),
@@ -94,14 +97,14 @@ impl Prepared {
         }
     }
 
-    /// The largest radius of all combinations of contacts.
+    /// Returns the largest spectral radius over all combinations of contacts; 0 if there is no combination. Without `BOUND` the error is not worked out.
     pub(super) fn radius<const BOUND: bool>(&self, scene: &Scene, scratch: &mut [RadiusScratch]) -> Radius {
         let radii = self.radii.iter().zip(scratch).map(|(radius, scratch)| radius.radius::<BOUND>(scene, scratch));
         radii.reduce(worse::<BOUND>).unwrap_or(Radius { value: 0.0, error: 0.0 })
     }
 }
 
-/// Writes the value of each key into its numbers.
+/// Writes the value of each key into the numbers that the key sets.
 fn set(leaves: &[Vec<Leaf>], values: &[f64], scene: &mut Scene) {
     for (leaves, value) in leaves.iter().zip(values) {
         for leaf in leaves {

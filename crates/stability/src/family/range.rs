@@ -1,9 +1,9 @@
-//! A key of a scene that is left open, and between which values.
+//! The range of values of one open key of a family of scenes, read from a text such as `coordination.stiffness=0..6000`.
 
 use cohaptic_linkfile::{number_and_unit, text_of_quantity};
 use cohaptic_units::print::SixDigits;
 
-/// A key of a scene, and the values that it takes.
+/// A key of a scene and the interval of its values, both ends included.
 #[derive(Clone, PartialEq, Debug)]
 pub struct KeyRange {
     /// The dotted path of the key, as for an override.
@@ -12,32 +12,32 @@ pub struct KeyRange {
     pub low: f64,
     /// The largest value, in `unit`.
     pub high: f64,
-    /// What stands after the number: `ms`, `%`; empty for a plain number.
+    /// Unit of both ends as written after the number, such as `ms` or `%`. Empty for a plain number.
     pub unit: String,
 }
 
-/// Why a text is no range of a key.
+/// Reason for which a text is not a range of a key.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum KeyRangeError {
-    /// There is no `=`, or nothing before it.
+    /// The text has no `=`, or nothing before the `=`.
     #[error("no key in \"{text}\": expected KEY=LOW..HIGH such as coordination.stiffness=0..6000 or link.delay=0ms..50ms")]
     NoKey {
         /// The text as given.
         text: String,
     },
-    /// There is no `..`.
+    /// The text after the `=` has no `..`.
     #[error("no range in \"{text}\": expected KEY=LOW..HIGH with two dots between the ends, such as coordination.stiffness=0..6000")]
     NoRange {
         /// The text as given.
         text: String,
     },
-    /// An end is no number with a unit, or not finite.
+    /// An end of the range is not a number with an optional unit, or is not finite.
     #[error("\"{end}\" in \"{text}\" is no end of a range: expected a finite number, with a unit where the key takes one")]
     End {
         /// The text as given.
         text: String,
-        /// The end.
+        /// The end of the range that cannot be read, without spaces around.
         end: String,
     },
     /// The ends have different units.
@@ -45,9 +45,9 @@ pub enum KeyRangeError {
     Units {
         /// The text as given.
         text: String,
-        /// That of the lower end.
+        /// Unit of the lower end; empty for a plain number.
         low: String,
-        /// That of the upper end.
+        /// Unit of the upper end; empty for a plain number.
         high: String,
     },
     /// The lower end is not below the upper one.
@@ -63,12 +63,12 @@ pub enum KeyRangeError {
 }
 
 impl KeyRange {
-    /// Reads `KEY=LOW..HIGH`, such as `coordination.stiffness=0..6000` or `link.delay=0ms..50ms`. Both ends have one unit.
+    /// Reads `KEY=LOW..HIGH`, such as `coordination.stiffness=0..6000` or `link.delay=0ms..50ms`. Both ends must have the same unit, or none.
     ///
     /// # Errors
     ///
-    /// [`KeyRangeError`] for anything else, and if LOW is not below HIGH or one of them is not finite. Whether a scene has such a key is found out by
-    /// [`Family::new`](crate::Family::new).
+    /// [`KeyRangeError`] for any other text, if LOW is not below HIGH, or if an end or the width of the range is not finite. Whether the scene has the key is
+    /// checked later, by [`Family::new`](crate::Family::new).
     pub fn parse(text: &str) -> Result<Self, KeyRangeError> {
         let whole = || text.to_owned();
         let (key, range) = text
@@ -89,13 +89,14 @@ impl KeyRange {
         Ok(Self { key: key.to_owned(), low, high, unit: low_unit.to_owned() })
     }
 
-    /// The override that gives the key that value: `KEY=VALUE`, with as many digits as the value has.
+    /// Returns the override `KEY=VALUE` that gives the key a value. The text has as many digits as are needed to read the same value back.
     #[must_use]
     pub fn text(&self, value: f64) -> String {
         format!("{}={}", self.key, text_of_quantity(value, &self.unit))
     }
 
-    /// A value inside that is no round number and is at another place for every key, to see where values land.
+    /// Returns a value inside the range that is not a round number. `number` is the index of the key, 0 or 1: the two keys take different shares of their
+    /// ranges, so that a number of the scene that equals the value almost surely came from this key.
     pub fn odd(&self, number: usize) -> f64 {
         let share = if number == 0 { 0.618_033_988_749_894_9 } else { 0.414_213_562_373_095_1 };
         self.low + (self.high - self.low) * share
