@@ -1,9 +1,10 @@
-//! The steady state under a sine, at one frequency.
+//! The steady state of a linear scene under a sine of one frequency.
 //!
-//! A frame is a linear map from its unknowns u (states relative to the reference, samples of earlier frames) and the push e^{jωt} to the states at its end
-//! and the samples it sends. In steady state a frame later everything is e^{jωT} times as large, and a sample from q frames ago was e^{−jωqT} times
-//! as large as its like of this frame, whatever q: a long delay costs nothing. A sample relative to a reference that moved in between is corrected by how
-//! far that went, D·e^{−jωT}·Σ_{i<q} e^{−jωiT} if it goes by D in this frame. That leaves as many equations as unknowns.
+//! A frame is a linear map from the unknowns u (states relative to the reference, samples of earlier frames) and the push e^{jωt} to the states at the end
+//! of the frame and the samples that the frame sends. In steady state every state is e^{jωT} times as large one frame later. A sample from q frames ago was
+//! e^{−jωqT} times as large as the sample at the same place of this frame; the number of unknowns does not grow with q, so a long delay adds no cost. A
+//! sample is relative to the reference, which has moved since: if the reference moves by D in this frame, the correction is D·e^{−jωT}·Σ_{i<q} e^{−jωiT}.
+//! These relations are as many equations as there are unknowns.
 
 use std::f64::consts::TAU;
 
@@ -15,26 +16,27 @@ use crate::lifted::{FrameMap, Instrument, Lifted};
 use crate::matrix::ComplexMatrix;
 use crate::rounding::real;
 
-/// e^{jωt} after that number of periods, whole ones left out first.
+/// Returns e^{jωt} after the given number of periods. Whole periods are removed first, so that large numbers of periods keep their digits.
 pub(super) fn turn(periods: f64) -> Complex64 {
     let angle = TAU * (periods - periods.round());
     Complex64::new(libm::cos(angle), libm::sin(angle))
 }
 
-/// e^{jωt} at an instant \[ns\].
+/// Returns e^{jωt} for the frequency `hz` \[Hz\] at the instant `at` \[ns\].
 pub(super) fn phase(hz: f64, at: u64) -> Complex64 {
     #[expect(clippy::cast_precision_loss, reason = "a rounding of 2⁻⁵³ of the phase, as that of the product")]
     let seconds = at as f64 * 1e-9;
     turn(hz * seconds)
 }
 
-/// Pushes one device with a sine and looks at the same frequency. The inputs are the parts of the force that are a cosine and a sine.
+/// Instrument that pushes one device with a sine and sums the component of the device's velocity at the same frequency. Input 0 is the amplitude of the
+/// cosine part of the force, input 1 that of the sine part.
 struct Sine {
     node: usize,
     hz: f64,
-    /// What an input is divided by to make it a force, so that inputs are lengths as states are [m/N].
+    /// Compliance of the pushed node [m/N]. An input divided by the compliance is a force, so that inputs are lengths like the states.
     compliance: f64,
-    /// The sum of e^{−jωt}·v over the ticks, one entry for each column.
+    /// Sum of e^{−jωt}·v over the ticks so far, one entry per column of the frame's map.
     seen: Vec<Complex64>,
     ticks: usize,
 }
@@ -67,22 +69,23 @@ impl Instrument for Sine {
     }
 }
 
-/// The equations of the steady state.
+/// The linear equations of the steady state at one frequency.
 pub(super) struct Harmonic {
     hz: f64,
     map: FrameMap,
     sine: Sine,
-    /// e^{−jωT}, and the periods in a frame.
+    /// e^{−jωT} with the length T of a frame.
     back: Complex64,
+    /// Number of periods of the sine in a frame.
     periods: f64,
-    /// What the mean velocity over the push is multiplied by [1/(N·s)].
+    /// Factor from the sum over the ticks, of lengths per length of input, to the mean velocity over the force [1/(N·s)].
     unit: f64,
     matrix: ComplexMatrix,
     right: Vec<Complex64>,
 }
 
 impl Harmonic {
-    /// A sine of that frequency \[Hz\] at the device of a node.
+    /// Sets up the equations for a sine of frequency `hz` \[Hz\] that pushes the device of `node`.
     pub(super) fn new(lifted: &Lifted<'_>, node: usize, hz: f64) -> Self {
         let compliance = lifted.nodes[node].compliance(lifted.time);
         let mut sine = Sine { node, hz, compliance, seen: Vec::new(), ticks: 0 };
@@ -97,7 +100,7 @@ impl Harmonic {
         harmonic
     }
 
-    /// States: what the frame makes of them, less the way of the reference, is e^{jωT} times what they were.
+    /// Writes one equation per state: the state after the frame, minus the displacement of the reference, is e^{jωT} times the state before.
     fn write_states(&mut self) {
         let reference = self.map.reference();
         let ahead = self.back.conj();
@@ -109,12 +112,14 @@ impl Harmonic {
         }
     }
 
-    /// Samples of earlier frames: e^{−jωqT} times what this frame sends, less the way of the reference since.
+    /// Writes one equation per sample of an earlier frame: e^{−jωqT} times the sample at the same place of this frame, corrected by the displacement of the
+    /// reference since then.
     fn write_samples(&mut self) {
         let states = self.map.state_unknowns();
         for number in 0..self.map.used.len() {
             let (node, age) = self.map.used[number];
             let sent = self.map.sent_by(node);
+            // Age 1 is the newest sample at the beginning of this frame, that is the last of the frame before; `sent` has the rows of one frame.
             let frames = 1 + (age - 1) / sent.len();
             let place = states + number;
             self.matrix[(place, place)] += Complex64::ONE;
@@ -123,7 +128,7 @@ impl Harmonic {
         }
     }
 
-    /// Σ e^{−jωiT} over i below this number of frames, in a closed form that loses no digits where the turns are small or whole.
+    /// Returns Σ e^{−jωiT} over i from 0 to `frames` − 1, in a closed form that keeps its digits if ωT is near a multiple of 2π.
     fn sum_of_turns(&self, frames: usize) -> Complex64 {
         let angle = TAU * (self.periods - self.periods.round());
         let half = 0.5 * angle;
@@ -132,7 +137,7 @@ impl Harmonic {
         Complex64::new(libm::cos(middle), libm::sin(middle)) * ratio
     }
 
-    /// Takes `factor` times a row of the frame's map to the left of an equation, and its push to the right.
+    /// Subtracts `factor` times a row of the frame's map from the left side of an equation, and adds the row's part of the push to the right side.
     fn subtract(&mut self, equation: usize, source: Source, factor: Complex64) {
         let row = match source {
             Source::State(row) => self.map.states.row(row),
@@ -142,6 +147,7 @@ impl Harmonic {
         for (column, entry) in row.iter().enumerate().take(size) {
             self.matrix[(equation, column)] -= factor * entry;
         }
+        // The two columns after the unknowns belong to the inputs, the cosine part and the sine part of the push.
         self.right[equation] += factor * Complex64::new(row[size], row[size + 1]);
     }
 
@@ -151,7 +157,7 @@ impl Harmonic {
         }
     }
 
-    /// Solves them, and says how exact the answer is.
+    /// Solves the equations. Returns the admittance with a bound of its rounding error.
     pub(super) fn point(&self) -> AdmittancePoint {
         let size = self.matrix.columns();
         let seen = Seen {
@@ -164,23 +170,25 @@ impl Harmonic {
     }
 }
 
-/// What a steady state is looked at by.
+/// Coefficients that turn the solution of a steady state into the admittance.
 pub(super) struct Seen<'a> {
-    /// What each unknown, and the push by itself, adds to the sum of e^{−jωt}·v over the ticks.
+    /// Coefficient of each unknown in the sum of e^{−jωt}·v over the ticks, indexed by unknown.
     pub(super) states: &'a [Complex64],
+    /// Part of the same sum that the push causes without any unknown.
     pub(super) push: Complex64,
     pub(super) ticks: usize,
-    /// What the sum is multiplied by.
+    /// Factor from the sum to the admittance.
     pub(super) unit: f64,
 }
 
-/// Solves the equations of a steady state, of whose coefficients `error` bounds the rounding, and says how exact the answer is.
+/// Solves the equations of a steady state and returns the admittance with a bound of its rounding error, to first order. `error` bounds the rounding of the
+/// coefficients.
 pub(super) fn solved(hz: f64, matrix: &ComplexMatrix, right: &[Complex64], seen: &Seen<'_>, error: f64) -> AdmittancePoint {
     let size = matrix.columns();
     let factors = Lu::of(matrix);
     let solution = factors.solve(right);
     let of_states: Complex64 = seen.states.iter().zip(&solution).map(|(state, value)| state * value).sum();
-    // A change δM of the equations changes the answer by yᵀ·δM·u, where Mᵀ·y picks the output.
+    // A change δM of the matrix M changes the output cᵀ·u by yᵀ·δM·u to first order, where Mᵀ·y = c are the coefficients of the output.
     let weight: f64 = factors.solve_transposed(seen.states).iter().map(|entry| entry.norm()).sum();
     let largest = solution.iter().map(|value| value.norm()).fold(1.0, f64::max);
     let row_sum = |row: usize| (0..size).map(|column| matrix[(row, column)].norm()).sum::<f64>();

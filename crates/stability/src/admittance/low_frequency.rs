@@ -1,4 +1,4 @@
-//! What a device feels like when it is moved slowly: a spring, a damper and a mass.
+//! The spring, damper and mass that a hand feels in slow motion of a device, extrapolated from the impedance at falling frequencies.
 //!
 //! The impedance Z = F/v has a series around ω = 0,
 //!
@@ -6,32 +6,32 @@
 //! Re Z = b + r·ω² + …        ω·Im Z = −k + m·ω² + s·ω⁴ + …
 //! ```
 //!
-//! both parts in ω² alone. Their first coefficients are found by extrapolation to ω² = 0 (Richardson 1911): the frequency is halved again and again, a
-//! table of differences (Neville) removes one term of the series after the other, and the entry is taken that changed least (Ridders 1982) over three
-//! frequencies. That stops by itself between frequencies that are too high for the series and those so low that rounding covers the answer.
+//! both parts in ω² alone. The first coefficients are found by extrapolation to ω² = 0 (Richardson 1911). The frequency is halved repeatedly, a table of
+//! differences (Neville) removes one term of the series after the other, and the entry that changed least over three frequencies is taken (Ridders 1982).
+//! This choice lies between frequencies that are too high for the series and frequencies so low that rounding dominates.
 
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 
-/// The spring, damper and mass that a device feels like as ω → 0: force = k·x + b·v + m·a.
+/// Stiffness, viscosity and inertia of a device in the limit ω → 0, where force = k·x + b·v + m·a.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LowFrequencyFit {
     /// The rendered stiffness k [N/m]: exactly 0 where nothing ties the object to ground.
     pub stiffness: Estimate,
     /// The rendered viscosity b [N·s/m].
     pub viscosity: Estimate,
-    /// The rendered inertia m \[kg\]. Below zero where delays make the force lead.
+    /// The rendered inertia m \[kg\]. Negative if delays make the force lead.
     pub inertia: Estimate,
 }
 
-/// A limit that was extrapolated.
+/// An extrapolated limit with a bound of its error.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Estimate {
-    /// The limit.
+    /// Extrapolated value of the limit; NaN if there is no limit.
     pub value: f64,
-    /// How far the limit may be off: how far the extrapolations are apart from which it comes, and what rounding of the impedances does to it at most.
-    /// Infinite where there is no limit.
+    /// Possible error of the value: the largest distance between the extrapolations from which the value comes, plus the largest effect of the impedances'
+    /// rounding. Infinite if there is no limit.
     pub error: f64,
 }
 
@@ -39,25 +39,26 @@ impl Estimate {
     const NONE: Self = Self { value: f64::NAN, error: f64::INFINITY };
 }
 
-/// How many frequencies are tried, each half of the one before.
+/// Number of frequencies in an extrapolation, each half of the frequency before.
 const FREQUENCIES: usize = 30;
-/// How many terms of the series are removed at most: beyond that rounding grows faster than the rest shrinks.
+/// Largest number of terms of the series that are removed. With more terms, rounding grows faster than the remainder shrinks.
 const MOST_TERMS: usize = 8;
 
 impl LowFrequencyFit {
-    /// No definite size.
+    /// Fit without any limit: all values NaN, all errors infinite.
     pub(super) const NONE: Self = Self { stiffness: Estimate::NONE, viscosity: Estimate::NONE, inertia: Estimate::NONE };
 
-    /// From the impedance at any frequency up to `highest` with a bound of its rounding, and whether anything ties the device to ground.
+    /// Fits the impedance, which `impedance` gives with a bound of its rounding error for any frequency up to `highest` \[Hz\]. `tied` tells whether anything
+    /// ties the device to ground; if nothing does, the stiffness is exactly 0.
     pub(super) fn of(impedance: impl Fn(f64) -> (Complex64, f64), highest: f64, tied: bool) -> Self {
         let frequencies: Vec<f64> = std::iter::successors(Some(highest), |hz| Some(0.5 * hz)).take(FREQUENCIES).collect();
-        // A unit in the last place is for the operations on each here.
+        // Two units in the last place are added for the rounding of the operations on each impedance below.
         let point = |hz: &f64| {
             let (z, noise) = impedance(*hz);
             (TAU * hz, z, noise + 2.0 * f64::EPSILON * z.norm())
         };
         let points: Vec<(f64, Complex64, f64)> = frequencies.iter().map(point).collect();
-        // Each value with what rounding of the impedance makes of it.
+        // Each value is paired with a bound of the error that the impedance's rounding causes in the value.
         let real: Vec<(f64, f64)> = points.iter().map(|(_, z, noise)| (z.re, *noise)).collect();
         let spring: Vec<(f64, f64)> = points.iter().map(|(omega, z, noise)| (-omega * z.im, omega * noise)).collect();
         let mass: Vec<(f64, f64)> = if tied {
@@ -75,13 +76,13 @@ impl LowFrequencyFit {
     }
 }
 
-/// The limit of a sequence whose terms have a series in h, at h, h/4, h/16, …; beside each term what rounding makes of it at most.
+/// Extrapolates a sequence to h = 0. The terms, each paired with a bound of its rounding error, are the values at h, h/4, h/16, … of a series in h.
 ///
-/// An entry of the table is (4ᵏ·a − b)/(4ᵏ − 1) of two entries before it, so that what rounding makes of it is at most (4ᵏ·α + β)/(4ᵏ − 1) of theirs: that
-/// is carried along beside the entries, as it grows quickly where the terms themselves are divided by h.
+/// An entry of the table is (4ᵏ·a − b)/(4ᵏ − 1) for two earlier entries a and b. If α and β bound the rounding of a and b, the rounding of the entry is at
+/// most (4ᵏ·α + β)/(4ᵏ − 1). This bound is carried with each entry, because it grows quickly if the terms themselves are divided by h.
 ///
-/// A series may seem to converge to the impedance in some range of frequencies above the lowest ones. So each frequency has its own estimate, and the best is
-/// taken of those from the lowest frequency up to the first that contradicts them.
+/// In a range of frequencies above the lowest, the table may seem to converge to a value that is not the limit. Each frequency therefore has its own estimate.
+/// The result is the best of the estimates from the lowest frequency up to the first estimate that contradicts those below.
 fn extrapolated(sequence: &[(f64, f64)]) -> Estimate {
     let mut estimates = Vec::with_capacity(sequence.len());
     let (mut before, mut earlier) = (Vec::<(f64, f64)>::new(), Vec::<(f64, f64)>::new());

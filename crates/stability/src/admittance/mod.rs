@@ -1,9 +1,9 @@
-//! The admittance that a hand meets: how fast a device moves for the force that pushes it, frequency by frequency.
+//! The admittance of a peer's device: velocity of the device over the force of the hand that pushes the device, at each frequency.
 //!
-//! The loop has two rates, so a sine at one frequency makes velocities at many: at ω and at ω plus any multiple of the frame's frequency. The admittance
-//! is the *fundamental harmonic*, the part at ω, as if a sine were analysed that pushes with e^{jωt}, sampled and held as every hand force is. It is found
-//! without simulating (Rakhsha & Constantinescu 2015, Section 4, plot it for their controllers): in steady state one frame multiplies everything by
-//! e^{jωT}, which is one system of linear equations.
+//! The loop has two rates, so a sine of one frequency ω causes velocities at ω and at ω plus each multiple of the frame's frequency. The admittance here is
+//! the *fundamental harmonic*, the part of the velocity at ω, for a push e^{jωt} that is sampled and held as every hand force is. The steady state is solved
+//! without a simulation (Rakhsha & Constantinescu 2015, Section 4, plot the same admittance for their controllers): one frame of length T multiplies every
+//! state by e^{jωT}, which gives one system of linear equations for each frequency.
 
 mod harmonic;
 mod low_frequency;
@@ -28,18 +28,18 @@ pub use response::{AdmittancePoint, FrequencyResponse, ideal};
 use one_axis::{OneAxis, TIMELINE};
 use turned::Turned;
 
-/// How many points the threads share at a time.
+/// Number of frequencies that the threads share between two looks at the results.
 const TOGETHER: usize = 256;
 
-/// The admittance of one peer's device, with the hands of all others at rest: ready to be evaluated at any frequency.
+/// The admittance of one peer's device while the hands of all other peers are at rest, prepared for evaluation at any frequency.
 ///
-/// Peers that are equal are treated together, so that it costs the same for any number of them. Arms are part of the scene and stay, that of the peer
-/// itself too: the force is added to theirs. A peer that touches nothing has the admittance of its bare device.
+/// Equal peers are treated as one class, so the cost does not depend on the number of equal peers. The arms of the scene stay in place, also the arm of the
+/// pushed peer: the push is added to the force of the arm. A peer that touches nothing has the admittance of its bare device.
 ///
-/// Where a scene is not linear, the linear scene is analysed in which every one-sided contact is closed and no copy is at a wall: see
-/// [`Admittance::notes`]. In a scene of several axes it is the admittance along the axis that the peer pushes along, or the first.
+/// If a scene is not linear, a linear scene is analysed in its place: every one-sided contact is closed and no copy is at a wall. The changes are listed by
+/// [`Admittance::notes`]. In a scene of several axes the push is along the axis along which the peer pushes the object, or along the first axis.
 ///
-/// Of an object that turns, a push along one axis may be seen in the motion along or about another: see [`Admittance::between_watched`].
+/// If the object turns, a push along one axis can also cause motion along or about another axis: see [`Admittance::between_watched`].
 #[derive(Clone, Debug)]
 pub struct Admittance {
     system: System,
@@ -50,14 +50,14 @@ pub struct Admittance {
     axes: [PushedAxis; 2],
 }
 
-/// What moves.
+/// The linear system whose steady state gives the admittance.
 #[derive(Clone, Debug)]
 enum System {
     OneAxis(Box<OneAxis>),
     Turned(Box<Turned>),
 }
 
-/// The admittance of the peer in that place of [`Scene::peers`] at those frequencies \[Hz\].
+/// Returns the admittance of the device of `peer`, an index of [`Scene::peers`], at the given frequencies \[Hz\].
 ///
 /// # Errors
 ///
@@ -67,16 +67,16 @@ pub fn admittance(scene: &Scene, peer: usize, frequencies: &[f64]) -> Result<Fre
 }
 
 impl Admittance {
-    /// Prepares the admittance of the peer in that place of [`Scene::peers`], as the scene begins.
+    /// Prepares the admittance of the device of `peer`, an index of [`Scene::peers`], for the scene at its beginning, before any change by the timeline.
     ///
     /// # Errors
     ///
-    /// [`AdmittanceError`] if there is no such peer, or if the scene has no frame that repeats.
+    /// [`AdmittanceError`] if the scene has no peer with this index, or if the scene cannot be analysed, for example because no frame of it repeats.
     pub fn of(scene: &Scene, peer: usize) -> Result<Self, AdmittanceError> {
         Self::of_watched(scene, peer, &Unwatched)
     }
 
-    /// [`Admittance::of`], watched while it works out the verdict on the scene.
+    /// Like [`Admittance::of`], with a watch that can stop the computation of the scene's verdict.
     ///
     /// # Errors
     ///
@@ -85,8 +85,8 @@ impl Admittance {
         Self::along_watched(scene, peer, None, watch)
     }
 
-    /// [`Admittance::of_watched`] along an axis, or about one, where force over velocity means torque over angular velocity; `None`: along the axis that the peer
-    /// pushes along, or the first.
+    /// Like [`Admittance::of_watched`], for a push along or about the given axis. About an axis the push is a torque and the velocity is an angular velocity.
+    /// With `None` the push is along the axis along which the peer pushes the object, or along the first axis.
     ///
     /// # Errors
     ///
@@ -95,12 +95,13 @@ impl Admittance {
         Self::between_watched(scene, peer, axis, None, watch)
     }
 
-    /// [`Admittance::along_watched`] with the velocity of the same device along or about another axis; `None`: the same one.
+    /// Like [`Admittance::along_watched`], with the velocity of the same device along or about the axis `seen`. With `None` the velocity is taken on the axis
+    /// of the push.
     ///
     /// # Errors
     ///
-    /// As [`Admittance::of_watched`]; if the scene has no such axis or the device of the peer does not turn; if nothing couples the axes; and for a finger that
-    /// pushes an object off its centre.
+    /// As [`Admittance::of_watched`]; if the scene does not have one of the axes; if an axis is a rotation and the device of the peer does not turn; if nothing
+    /// couples the two axes; and for a finger that pushes an object off its centre.
     pub fn between_watched(
         scene: &Scene,
         peer: usize,
@@ -134,6 +135,8 @@ impl Admittance {
             let (system, radius, notes) = OneAxis::of(scene, peer, axis.place(), &network, watch)?;
             return Ok(Self::new(System::OneAxis(Box::new(system)), radius, notes, scene.object.mass, axes));
         };
+        // If the motion of the turning object splits into independent parts, the part with this axis is a scene of one axis. A push seen on another axis
+        // always needs the whole motion.
         let parts = scene.rotation_parts().and_then(Result::ok).map_or_else(Vec::new, |parts| parts.parts);
         let part = parts.iter().find(|part| !is_cross && part.components.iter().any(|component| component == axis.word()));
         let mut admittance = if let Some(part) = part {
@@ -164,11 +167,11 @@ impl Admittance {
         admittance
     }
 
-    /// The admittance at a frequency \[Hz\].
+    /// Returns the admittance at a frequency \[Hz\].
     ///
     /// # Errors
     ///
-    /// [`AdmittanceError::Frequency`] unless it is above 0 and at most [`Admittance::highest_frequency`].
+    /// [`AdmittanceError::Frequency`] unless the frequency is above 0 and at most [`Admittance::highest_frequency`].
     pub fn at(&self, hz: f64) -> Result<AdmittancePoint, AdmittanceError> {
         if !(hz > 0.0 && hz <= self.highest) {
             return Err(AdmittanceError::Frequency { hz, highest: self.highest });
@@ -176,21 +179,21 @@ impl Admittance {
         Ok(self.point(hz))
     }
 
-    /// The admittance at each of those frequencies \[Hz\], in their order.
+    /// Returns the admittance at each of the given frequencies \[Hz\], in their order.
     ///
     /// # Errors
     ///
-    /// As [`Admittance::at`], for the first frequency that is not one.
+    /// As [`Admittance::at`], for the first frequency that is out of range.
     pub fn response(&self, frequencies: &[f64]) -> Result<FrequencyResponse, AdmittanceError> {
         self.response_watched(frequencies, &Unwatched)
     }
 
-    /// [`Admittance::response`] at as many of those frequencies as there is time for: up to the first that was not looked at when the watcher ended it.
-    /// A point is [`Admittance::operations`].
+    /// Like [`Admittance::response`], with a watch. If the watch stops the computation, the points before the first missing frequency are returned. Each point
+    /// counts as [`Admittance::operations`] operations for the watch.
     ///
     /// # Errors
     ///
-    /// As [`Admittance::at`], for the first frequency that is not one.
+    /// As [`Admittance::at`], for the first frequency that is out of range.
     pub fn response_watched(&self, frequencies: &[f64], watch: &dyn Watch) -> Result<FrequencyResponse, AdmittanceError> {
         watch.expects(self.operations() * real(frequencies.len()));
         let at = |hz: &f64| {
@@ -201,7 +204,7 @@ impl Admittance {
             })
         };
         let mut points = Vec::with_capacity(frequencies.len());
-        // Threads share a few at a time, so that the points that are done at an interruption are the first ones.
+        // The threads share one chunk at a time, so that an interruption loses at most the points of one chunk and the finished points are the first.
         for some in frequencies.chunks(TOGETHER) {
             let found: Vec<Option<Result<AdmittancePoint, AdmittanceError>>> = some.par_iter().map(at).collect();
             for point in found {
@@ -214,7 +217,8 @@ impl Admittance {
         Ok(FrequencyResponse { points })
     }
 
-    /// About how many operations a point takes: each event of a frame works on all columns of its rows.
+    /// Returns the approximate number of operations for one frequency: each event of a frame works on all columns of its rows, and then a system of linear
+    /// equations is solved.
     #[must_use]
     pub fn operations(&self) -> f64 {
         match &self.system {
@@ -226,8 +230,8 @@ impl Admittance {
         }
     }
 
-    /// What the device feels like when it is moved slowly: see [`LowFrequencyFit`]. Of a motion along or about another axis than that of the push no size is
-    /// definite.
+    /// Returns the stiffness, viscosity and inertia that a hand feels in slow motion of the device: see [`LowFrequencyFit`]. If the velocity is taken on
+    /// another axis than the push, all three estimates are NaN with an infinite error.
     #[must_use]
     pub fn fit_low_frequency(&self) -> LowFrequencyFit {
         if self.axes[0] != self.axes[1] {
@@ -240,38 +244,40 @@ impl Admittance {
         LowFrequencyFit::of(|hz| self.impedance(hz), self.highest.min(0.25 / self.timetable().frame.as_secs_f64()), tied)
     }
 
-    /// The highest frequency that there is an admittance for, half the rate of the peer's ticks \[Hz\].
+    /// Returns the highest frequency that has an admittance: half the rate of the peer's ticks \[Hz\].
     #[must_use]
     pub const fn highest_frequency(&self) -> f64 {
         self.highest
     }
 
-    /// The spectral radius of the linear scene that is analysed, over one frame.
+    /// Returns the spectral radius over one frame of the linear scene that is analysed.
     #[must_use]
     pub const fn radius(&self) -> Radius {
         self.radius
     }
 
-    /// The verdict on that scene. An unstable one has no steady state: its admittance is what the formula says, and nothing that could be measured.
+    /// Returns the verdict on the linear scene that is analysed. An unstable scene has no steady state: its admittance follows from the equations, but cannot
+    /// be measured.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
         self.radius.verdict()
     }
 
-    /// What the undamped object alone would be felt as where it is held: its mass \[kg\], or its inertia about the axis [kg·m²]. Off the centre, and from one axis to
-    /// another, force over acceleration there, in the units of the axes: infinite where such a push would not move it so, and below zero for the other way.
+    /// Returns force over acceleration of the undamped object alone at the point where the peer holds the object: the object's mass \[kg\], or its inertia
+    /// about the axis [kg·m²]. For a grip off the centre or two different axes the quotient is in the units of the axes. The quotient is infinite if the push
+    /// causes no acceleration on the second axis, and negative if the acceleration has the opposite sign.
     #[must_use]
     pub const fn object_mass(&self) -> f64 {
         self.mass
     }
 
-    /// The axis of the push, and that of the motion.
+    /// Returns the axis of the push and the axis of the motion, in this order.
     #[must_use]
     pub const fn axes(&self) -> [PushedAxis; 2] {
         self.axes
     }
 
-    /// The parts left out or taken as closed, in words.
+    /// Returns sentences about the parts of the scene that are left out or simplified, such as walls left out and one-sided contacts taken as closed.
     #[must_use]
     pub fn notes(&self) -> &[String] {
         &self.notes
@@ -284,13 +290,14 @@ impl Admittance {
         }
     }
 
-    /// Whether nothing is left beyond rounding, over some octaves.
+    /// Tells whether the admittance is within its rounding error of zero at six frequencies, each a quarter of the frequency before.
     fn is_zero(&self) -> bool {
         let octaves = std::iter::successors(Some(self.highest), |hz| Some(0.25 * hz)).take(6);
         octaves.map(|hz| self.point(hz)).all(|point| point.value.norm() <= point.error)
     }
 
-    /// Force over velocity, at a frequency that is one, and how far rounding may have moved it: 1/(v + d) − 1/v is −d/(v·(v + d)).
+    /// Returns force over velocity at a valid frequency \[Hz\], and a bound of its rounding error. With admittance v and rounding d of the admittance, the
+    /// difference 1/(v + d) − 1/v is −d/(v·(v + d)). The bound is infinite if the rounding can be as large as the admittance.
     fn impedance(&self, hz: f64) -> (Complex64, f64) {
         let AdmittancePoint { value, error, .. } = self.point(hz);
         let size = value.norm();
@@ -304,7 +311,7 @@ impl Admittance {
         }
     }
 
-    /// The rate of the ticks of the pushed node, on average over a frame \[Hz\].
+    /// Returns the mean rate of the pushed node's ticks over a frame \[Hz\].
     fn tick_rate(&self) -> f64 {
         let pushed = match &self.system {
             System::OneAxis(axis) => axis.pushed,
@@ -316,7 +323,7 @@ impl Admittance {
     }
 }
 
-/// The axis along which a device is pushed, or about which it is turned.
+/// An axis of a device: along `X`, `Y` and `Z` the device is pushed, about `Rx`, `Ry` and `Rz` the device is turned.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[expect(missing_docs, reason = "x, y and z along the axes of the world, of an object that turns along its own; rx, ry and rz about those")]
 pub enum PushedAxis {
@@ -329,16 +336,16 @@ pub enum PushedAxis {
 }
 
 impl PushedAxis {
-    /// All of them, in order.
+    /// All six axes, in the order `X` to `Rz`.
     pub const ALL: [Self; 6] = [Self::X, Self::Y, Self::Z, Self::Rx, Self::Ry, Self::Rz];
 
-    /// The word in options: `x` to `rz`.
+    /// Returns the name of the axis in options of the program: `x` to `rz`.
     #[must_use]
     pub const fn word(self) -> &'static str {
         ["x", "y", "z", "rx", "ry", "rz"][self.place()]
     }
 
-    /// Whether it is about an axis.
+    /// Tells whether the axis is one of rotation: `Rx`, `Ry` or `Rz`.
     #[must_use]
     pub const fn is_turn(self) -> bool {
         self.place() > 2
@@ -349,7 +356,7 @@ impl PushedAxis {
     }
 }
 
-/// Why there is no admittance.
+/// Reason for which an admittance cannot be computed.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages describe the variants")]
 pub enum AdmittanceError {
@@ -389,7 +396,7 @@ mod tests {
         Scene::parse(ONE_TOUCHES, "many.toml".as_ref(), &["peers.peer1.contact=grasp".to_owned()]).unwrap()
     }
 
-    /// The scene of 50 peers with any number of them: more than a scene may have.
+    /// Returns the admittance of the first peer of [`fifty`] with `count` peers, which may be more peers than a scene can have.
     fn with_peers(count: usize) -> Admittance {
         let scene = fifty();
         let network = NominalNetwork::of(&scene).unwrap();
@@ -403,7 +410,8 @@ mod tests {
         Admittance::new(System::OneAxis(Box::new(axis)), radius, Vec::new(), 0.45, [PushedAxis::X; 2])
     }
 
-    /// The more peers, the less the mean of the others moves: in the limit the copy is held by a spring and a damper at rest, and is as far from that as 1/N.
+    /// The more peers, the less the mean of the other peers moves. In the limit the copy is held by a spring and a damper at rest; the distance of the
+    /// admittance from the limit is proportional to 1/N.
     #[test]
     fn a_hundred_thousand_peers_cost_two_nodes_and_are_near_the_limit() {
         let scene = fifty();
@@ -419,8 +427,8 @@ mod tests {
         }
     }
 
-    /// b = bH + N·KT·(τ + δ), δ = BT·(Tc²/m)·(M² − 1)/12: see scenarios/README.md. Met far below the frequency KT/(2πb), 0.14 mHz here.
-    /// So low, a bound of what rounding does to an impedance is some 10⁻⁴ of it.
+    /// b = bH + N·KT·(τ + δ), δ = BT·(Tc²/m)·(M² − 1)/12: see scenarios/README.md. The law holds far below the frequency KT/(2πb), which is 0.14 mHz here.
+    /// At such a frequency the bound of the impedance's rounding error is some 10⁻⁴ of the impedance.
     #[test]
     fn the_viscosity_of_a_hundred_thousand_peers_follows_the_law() {
         let fit = with_peers(100_000).fit_low_frequency();

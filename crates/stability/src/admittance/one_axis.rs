@@ -1,4 +1,4 @@
-//! The admittance along one axis, or of one part of an object that turns.
+//! The admittance along one axis of a scene that does not turn, or on the one axis of an independent part of a turning object.
 
 use cohaptic_peer::{Contact, Gains};
 use cohaptic_scene::Scene;
@@ -13,7 +13,7 @@ use crate::structure::{Contacts, Structure};
 use crate::timetable::{NodeClock, Timetable};
 use crate::{AnalysisError, Matrix, Method, Radius, Watch};
 
-/// A scene of one axis in which one device is pushed.
+/// A linear scene of one axis, reduced to one node per class of equal peers, in which the device of one node is pushed.
 #[derive(Clone, Debug)]
 pub(super) struct OneAxis {
     pub(super) nodes: Vec<Node>,
@@ -21,12 +21,13 @@ pub(super) struct OneAxis {
     pub(super) timetable: Timetable,
     pub(super) time: f64,
     pub(super) tied: bool,
-    /// Which of the nodes is pushed.
+    /// Index in `nodes` of the pushed node.
     pub(super) pushed: usize,
 }
 
 impl OneAxis {
-    /// Along that axis of a scene that does not turn; with the radius of the scene, and notes.
+    /// Prepares the push of the device of `peer` along `axis` of a scene that does not turn. Returns the system, the spectral radius of the linear scene, and
+    /// notes about the parts left out.
     pub(super) fn of(
         scene: &Scene,
         peer: usize,
@@ -38,6 +39,7 @@ impl OneAxis {
         let (contacts, notes) = closed_contacts(scene, axis);
         let structure = Structure::with_alone(&[scene], network, &contacts, Some(peer))?;
         let (mut found, radius) = Self::of_classes(scene, structure, peer, watch)?;
+        // A device that touches nothing is coupled to no copy, so that only its own plant moves. The radius stays that of the scene.
         if !contacts.touching[peer] {
             let device = scene.device_plant(peer);
             let body = Some(Body::new(device, scene.integrator, &spec.clock));
@@ -46,7 +48,7 @@ impl OneAxis {
         Ok((found, radius, network.notes.iter().cloned().chain(notes).collect()))
     }
 
-    /// From classes of which the pushed peer is one by itself.
+    /// Prepares the push from classes of equal peers, in which `peer` is alone in its class. Returns the system with the spectral radius of the scene.
     pub(super) fn of_classes(scene: &Scene, structure: Structure, peer: usize, watch: &dyn Watch) -> Result<(Self, Radius), AnalysisError> {
         let radius = radius_of(&reduced(&structure, scene, 1, Method::Reduced, watch)?.parts);
         let nodes = structure.nodes(scene);
@@ -56,20 +58,20 @@ impl OneAxis {
         Ok((Self { nodes, weights, timetable, time, tied, pushed }, radius))
     }
 
-    /// The admittance at a frequency that is one \[Hz\].
+    /// Returns the admittance at a valid frequency `hz` \[Hz\].
     pub(super) fn point(&self, hz: f64) -> AdmittancePoint {
         let Self { nodes, weights, timetable, time, tied, pushed } = self;
         let lifted = Lifted { nodes, weights, timetable, sampling: Sampling::of(nodes), time: *time, tied: *tied };
         Harmonic::new(&lifted, *pushed, hz).point()
     }
 
-    /// Leaves nothing but the device of the pushed peer. A node has a copy, which then rests.
+    /// Reduces the system to the device of the pushed peer. The node keeps a copy of the object, as every node has one; without a coupling the copy rests.
     fn leave_bare(&mut self, device: Option<Body>, clock: NodeClock, tied: bool) -> Result<(), AnalysisError> {
         let none = Gains { stiffness: 0.0, damping: 0.0 };
         let bare = self.nodes[self.pushed].clone();
         self.nodes = vec![Node { device, coupling: none, law: LinearLaw::none(), wall: None, compute_delay: false, ..bare }];
         self.weights = Matrix::zeros(1, 1);
-        // It sends nothing, so that everything repeats with every tick.
+        // The device sends and receives no samples, so the frame is a single tick.
         self.timetable = Timetable::new(&[NodeClock { phase: 0, every: 1, ..clock }], &[])?;
         self.tied = tied;
         self.pushed = 0;
@@ -77,10 +79,10 @@ impl OneAxis {
     }
 }
 
-/// The timeline is left out.
+/// Note for a scene with a timeline: the scene is analysed as it is before the first change.
 pub(super) const TIMELINE: &str = "the timeline is left out: the scene is analysed as it begins";
 
-/// All one-sided contacts along an axis closed, no copy at a wall; and that in words.
+/// Returns contacts in which every one-sided contact along `axis` is closed and no copy is at a wall, and notes that tell the user about each change.
 pub(super) fn closed_contacts(scene: &Scene, axis: usize) -> (Contacts, Vec<String>) {
     let pushes = |peer: usize| match scene.peers[peer].contact {
         Contact::Push(direction) => Some(direction.axis),

@@ -1,4 +1,4 @@
-//! Points of a frequency response, as they are plotted.
+//! Points of a frequency response, with the magnitude and the phase of a Bode plot.
 
 use std::f64::consts::TAU;
 
@@ -11,40 +11,40 @@ pub struct AdmittancePoint {
     pub hz: f64,
     /// Velocity over force [m/(N·s)]; infinite or NaN at a pole.
     pub value: Complex64,
-    /// How far rounding may have moved it at most, to first order [m/(N·s)].
+    /// Bound of the value's rounding error, to first order [m/(N·s)].
     pub error: f64,
 }
 
 impl AdmittancePoint {
-    /// 20·log10 |v/F|, relative to 1 m/(N·s) \[dB\].
+    /// Returns the magnitude 20·log10 |v/F|, relative to 1 m/(N·s) \[dB\].
     #[must_use]
     pub fn magnitude_db(&self) -> f64 {
         20.0 * libm::log10(self.value.norm())
     }
 
-    /// The principal phase, above −180 and up to 180: negative where the velocity lags behind the force \[degrees\].
+    /// Returns the principal phase, above −180 and at most 180 \[degrees\]. Negative if the velocity lags the force.
     #[must_use]
     pub fn phase_deg(&self) -> f64 {
         self.value.arg().to_degrees()
     }
 }
 
-/// An admittance at several frequencies, in the order in which they were asked for.
+/// An admittance at several frequencies, in the order in which the frequencies were given.
 #[derive(Clone, PartialEq, Debug)]
 pub struct FrequencyResponse {
-    /// The points.
+    /// One point per frequency.
     pub points: Vec<AdmittancePoint>,
 }
 
 impl FrequencyResponse {
-    /// The magnitude of each point: see [`AdmittancePoint::magnitude_db`].
+    /// Returns the magnitude of each point \[dB\]: see [`AdmittancePoint::magnitude_db`].
     #[must_use]
     pub fn magnitudes_db(&self) -> Vec<f64> {
         self.points.iter().map(AdmittancePoint::magnitude_db).collect()
     }
 
-    /// The phase of each point, without jumps: the first is principal, and each one after it is moved by whole turns to within half a turn of the one
-    /// before. So it is that of a curve if the points are dense enough and in order \[degrees\].
+    /// Returns the phase of each point without jumps \[degrees\]. The first phase is principal; each later phase is moved by whole turns to within half a turn
+    /// of the last finite phase before. If the points are in order and dense enough, the phases are those of a continuous curve.
     #[must_use]
     pub fn phases_deg(&self) -> Vec<f64> {
         let mut before: Option<f64> = None;
@@ -60,7 +60,7 @@ impl FrequencyResponse {
     }
 }
 
-/// The admittance of a free mass \[kg\] at a frequency \[Hz\], 1/(jωm): what an ideal network would render of an undamped object.
+/// Returns the admittance 1/(jωm) of a free mass \[kg\] at a frequency \[Hz\]. An ideal network would render an undamped object with this admittance.
 #[must_use]
 pub fn ideal(mass: f64, hz: f64) -> Complex64 {
     Complex64::new(0.0, -1.0 / (TAU * hz * mass))

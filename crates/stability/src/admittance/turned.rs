@@ -1,7 +1,8 @@
-//! The admittance of an object that turns and whose motion does not split: a push of one component of a device, seen in the motion of another.
+//! The admittance for an object that turns and whose motion does not split into independent parts: one component of a device is pushed, and the velocity of
+//! the same or another component is measured.
 //!
-//! A frame takes the states z to A·z + B·u, where the push is Re and Im of u·e^{jωt}, and in steady state a frame later everything is e^{jωT} times as large:
-//! (e^{jωT}·I − A)·z = B·u. A, and the velocity of the device at each tick as a function of z, are the same at every frequency.
+//! A frame maps the states z to A·z + B·u, where the push has the parts Re and Im of u·e^{jωt}. In steady state every state is e^{jωT} times as large one
+//! frame later, so (e^{jωT}·I − A)·z = B·u. The matrix A, and the device's velocity at each tick as a function of z, do not depend on the frequency.
 
 use std::collections::VecDeque;
 
@@ -22,20 +23,20 @@ use crate::{AnalysisError, Matrix, Method, Radius, Watch};
 #[derive(Clone, Debug)]
 pub(super) struct Turned {
     together: Together,
-    /// Which of the classes is pushed.
+    /// Index of the pushed peer's class.
     pushed: usize,
-    /// The component that is pushed, and the one that is looked at.
+    /// Component that is pushed and component whose velocity is measured; 0 to 2 are along the axes, 3 to 5 about them.
     components: [usize; 2],
     /// The instants of the ticks of the pushed class \[ns\].
     ticks: Vec<u64>,
     frame: Matrix,
     error: f64,
-    /// For each state of the frame (row) the velocity seen at each tick, multiplied by the common time.
+    /// Velocity of the measured component for a unit of each state (row) at each tick of a frame (column), multiplied by the common time.
     velocities: Matrix,
 }
 
 impl Turned {
-    /// With the radius of the scene.
+    /// Prepares the push of the device of `peer`. `components` are the pushed and the measured component. Returns the system with the scene's spectral radius.
     pub(super) fn of(
         scene: &Scene,
         peer: usize,
@@ -57,15 +58,16 @@ impl Turned {
         };
         together.turning().cost().begin(watch)?;
         let (frame, error) = together.turning().monodromy_under(&mut looks, watch).ok_or(AnalysisError::Stopped)?;
+        // The frame runs once per state, and each run looks at all ticks, so the velocities come in the order of the matrix's rows.
         let velocities = Matrix::from_fn(frame.rows(), ticks.len(), |_, _| seen.pop_front().unwrap_or(0.0));
         Ok((Self { pushed, components, ticks, frame, error, velocities, together }, radius))
     }
 
-    /// The admittance at a frequency that is one \[Hz\].
+    /// Returns the admittance at a valid frequency `hz` \[Hz\].
     pub(super) fn point(&self, hz: f64) -> AdmittancePoint {
         let Self { together, components, ticks, frame, velocities, .. } = self;
         let (turning, time, node) = (together.turning(), together.time(), together.node(self.pushed));
-        // Inputs are lengths as states are.
+        // An input divided by the compliance is a force, so that inputs are lengths like the states.
         let compliance = node.mobility * time;
         let mut push = Complex64::ZERO;
         let mut under = |part: fn(Complex64) -> f64, factor: Complex64| {
@@ -89,7 +91,7 @@ impl Turned {
         solved(hz, &matrix, &right, &Seen { states: &states, push, ticks: ticks.len(), unit }, self.error)
     }
 
-    /// Force over acceleration where the whole object alone is held: 1/Wᵢⱼ, W = G·M⁻¹·Gᵀ.
+    /// Returns force over acceleration of the object alone at the grip: 1/Wᵢⱼ with W = G·M⁻¹·Gᵀ, grip matrix G and the object's masses and inertias M.
     pub(super) fn mass(&self, scene: &Scene) -> f64 {
         let node = self.together.node(self.pushed);
         let [from, to] = self.components.map(|component| &node.grip[component]);
@@ -99,7 +101,7 @@ impl Turned {
         lengths / (0..6).map(|axis| from[axis] * to[axis] / mass(axis)).sum::<f64>()
     }
 
-    /// Whether something ties the component that is pushed to ground.
+    /// Tells whether something ties the pushed component to ground.
     pub(super) fn tied(&self) -> bool {
         !self.together.turning().moves_freely(self.pushed, self.components[0])
     }
@@ -112,7 +114,7 @@ impl Turned {
         self.pushed
     }
 
-    /// See [`super::Admittance::operations`].
+    /// Returns the approximate number of operations for one frequency: see [`super::Admittance::operations`].
     pub(super) fn operations(&self) -> f64 {
         40.0 * real(self.timetable().events.len()) + 4.0 * real(self.frame.rows()).powi(3)
     }
