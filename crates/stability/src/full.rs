@@ -1,7 +1,7 @@
-//! The general path: unit vectors pushed through the code that simulates.
+//! The general path of the analysis: unit vectors of the state are pushed through the code that also simulates.
 //!
-//! Real [`Peer`]s with real strategies are put into a state, stepped through one frame of the timetable, and looked at. Whatever strategy they run is
-//! analysed so, as long as it is linear; one that is not, or that depends on more than it shows, is found out and refused.
+//! Real [`Peer`]s with real strategies are set to a state, stepped through one frame of the timetable, and read again. Any strategy can be analysed in this
+//! way as long as the strategy is linear. A strategy that is not linear, or that depends on more than the state it shows, is detected and refused.
 
 mod layout;
 mod rigid;
@@ -25,26 +25,26 @@ use crate::timetable::{Event, Instants, NodeClock, Timetable, UseOfHeld};
 use crate::unseen::felt;
 use crate::{AnalysisError, Matrix, StateName, Watch};
 
-/// What the general path finds: the matrix of one frame in relative coordinates.
+/// Result of the general path: the matrix of one frame in relative coordinates.
 #[derive(Clone, PartialEq, Debug)]
 pub struct FullMap {
     pub(crate) monodromy: Matrix,
-    /// A bound of the error of its entries, in the largest sum of sizes of a row.
+    /// Bound of the error of `monodromy` in the norm of the largest row sum of absolute values.
     pub(crate) error: f64,
     pub(crate) rigid_modes: usize,
     pub(crate) frame: Duration,
-    /// What the rows and columns are.
+    /// Names of the states, indexed by row or column of `monodromy`.
     pub(crate) states: Vec<StateName>,
-    /// What velocities are multiplied by \[s\].
+    /// Common time by which velocities are multiplied \[s\], so that all states are lengths.
     pub(crate) time: f64,
-    /// For each peer and axis, whose copy positions are relative to.
+    /// Peer to whose copy positions are relative, indexed by peer and axis. `None` for absolute positions.
     pub(crate) relative: Vec<Vec<Option<usize>>>,
-    /// What the states add to the forces that strategies command in the frame, a row for each of them; `None` where samples carry no waves.
+    /// Contribution of each state (column) to the forces that strategies command in the frame, one row per force. `None` if samples carry no waves.
     pub(crate) forces: Option<Matrix>,
 }
 
 impl FullMap {
-    /// The part of the matrix that bodies feel, and the bound of the error of its entries.
+    /// Returns the part of the matrix that bodies can feel, and a bound of its error. Without waves that is the whole matrix.
     pub fn felt(self) -> (Matrix, f64) {
         let Some(forces) = &self.forces else { return (self.monodromy, self.error) };
         let (felt, rounded) = felt(&self.monodromy, forces, &self.states);
@@ -52,16 +52,16 @@ impl FullMap {
     }
 }
 
-/// The facts about a strategy that are known before anything is pushed.
+/// The knowledge about a strategy before any vector is pushed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Trust {
-    /// One of this workspace: linear by its tests. Looking again would push a quarter as many vectors more.
+    /// A strategy of this workspace, whose tests show that the strategy is linear. The check is left out.
     Linear,
-    /// Nothing: it is looked at.
+    /// A strategy about which nothing is known. Linearity is checked before the matrix is built.
     Nothing,
 }
 
-/// Pushes every unit vector of a scene through a frame, along this number of axes.
+/// Pushes every unit vector of a scene's state through a frame, with the motion along `axes` axes (1 to 3).
 ///
 /// # Errors
 ///
@@ -82,7 +82,7 @@ pub fn full_along(
     }
 }
 
-/// Pushes every unit vector through a frame of the scene, along A axes.
+/// Pushes every unit vector of a scene's state through a frame, with the motion along `A` axes.
 fn full<const A: usize, S: Strategy<A>>(
     scene: &Scene,
     network: &NominalNetwork,
@@ -96,6 +96,7 @@ fn full<const A: usize, S: Strategy<A>>(
     if trust == Trust::Nothing {
         pusher.check()?;
     }
+    // `map` bounds the error by the growth of the vectors. The numbers of a known law give a second bound; the closer one is kept.
     let mut map = pusher.map(watch)?;
     if trust == Trust::Linear && linear_law(scene, 0).is_some_and(|law| law.pull().is_some()) {
         let nodes = Structure::of_each(scene, network, contacts)?;
@@ -104,12 +105,13 @@ fn full<const A: usize, S: Strategy<A>>(
     Ok(map)
 }
 
-/// A bound of the errors of what real peers made of unit vectors, for a strategy whose numbers are known: each peer does what its node would.
+/// Returns a bound of the matrix's error for a strategy whose law is known. Each real peer computes the same as its node of the lifted system, so the bound
+/// of the lifted system holds.
 fn error_of_known(scene: &Scene, structure: &Structure, time: f64) -> f64 {
     let node = |peer: usize| {
         let mut node = structure.node(scene, peer);
         if node.device.is_none() {
-            // A device that touches nothing moves on its own, and is pushed with the others.
+            // The structure leaves out a device that touches nothing, but the general path pushes its states too. The node gets the device without a coupling.
             let spec = &scene.peers[peer];
             node.device = Some(Body::new(scene.device_plant(peer), scene.integrator, &spec.clock));
             node.coupling = Gains { stiffness: 0.0, damping: 0.0 };
@@ -121,34 +123,37 @@ fn error_of_known(scene: &Scene, structure: &Structure, time: f64) -> f64 {
     error_of(&lifted, |peer| compliance(scene, peer, time))
 }
 
-/// What the forces of a peer are multiplied by to be lengths [m/N].
+/// Returns the factor that turns forces of a peer into lengths [m/N].
 fn compliance(scene: &Scene, peer: usize, time: f64) -> f64 {
     time * scene.peers[peer].clock.tick.as_secs_f64() / scene.copy_mass()
 }
 
-/// Time that a clock without an offset shows when a frame begins, so that samples of the frames before were sent at instants too.
+/// Local time of a clock without offset at the beginning of a frame. Large, so that samples of earlier frames have instants of sending above zero.
 const EARLIER: Instant = Instant::from_nanos(1 << 60);
 
-/// The peers, and where their states stand in a vector.
+/// The simulated peers of a scene with the layout of their states in a vector, for pushing vectors through a frame.
 struct Pusher<const A: usize, S> {
     members: Vec<Member<A, S>>,
     names: Vec<String>,
     timetable: Timetable,
     instants: Instants,
     layout: Layout,
-    /// What velocities \[s\] and forces [m/N] are multiplied by; and the extra numbers of samples, and what strategies remember.
+    /// Factor of velocities in the vector \[s\].
     time: f64,
+    /// Factor of forces in the vector [m/N], indexed by peer.
     compliance: Vec<f64>,
+    /// Factor of the extra numbers of samples, indexed by the sending peer.
     extra: Vec<f64>,
+    /// Factor of the numbers that strategies remember.
     remembered: f64,
-    /// The samples of each peer: those of earlier frames, oldest first, then those of this one.
+    /// Samples indexed by sending peer: first the samples of earlier frames, oldest first, then the samples of this frame.
     samples: Vec<Vec<State<A>>>,
-    /// The extra numbers of each of them, for each other peer; none where samples are states alone.
+    /// Extra numbers of the samples, indexed by sending peer, then by sample and receiver. Empty if samples carry states only.
     extras: Vec<Vec<[f64; A]>>,
     kind: SampleKind,
-    /// The forces that strategies command in the frame, tick by tick, where samples carry waves.
+    /// Forces that strategies commanded in the frame pushed last, by tick and axis. Empty unless samples carry waves.
     commanded: Vec<f64>,
-    /// The largest number seen on the way of the unit vectors, for the bound of errors.
+    /// Largest position plus scaled velocity of a body in any frame so far, for the bound of errors.
     growth: f64,
 }
 
@@ -166,14 +171,14 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         let links: Vec<(usize, usize, LinkTiming)> = pairs.map(|(from, to)| (from, to, network.timing(from, to).clone())).collect();
         let uses = if scene.sample_kind() == SampleKind::State { UseOfHeld::Ticks } else { UseOfHeld::SamplesAndTicks };
         let timetable = Timetable::with_use_of_held(&clocks, &links, uses)?;
-        // A position and a velocity of each sample on the way, along each axis: known before there is room for any.
+        // The states include a position and a velocity per axis of each sample in flight. The limit is checked before memory for them is allocated.
         PartCost::of_eigenvalues(2 * A * timetable.depth.iter().sum::<usize>()).allowed(watch)?;
         let member = |place: usize| {
             let spec = &scene.peers[place];
             let mut config = scene.peer_config(place);
             config.contact = if contacts.touching[place] { Contact::Grasp } else { Contact::None };
             config.enclosure = None;
-            // The hand's force moves the device about and has no part in how it moves on its own; the arm has.
+            // Stability does not depend on the force that a hand applies from outside, so that force is zero here. The arm's impedance remains.
             let hand = spec.hand.as_ref().and_then(Hand::arm).map(|arm| Hand::Arm { arm, follows: Signal::Constant([0.0; 3]) });
             let device = SimulatedDevice::new(spec.device, hand.as_ref(), State::REST, scene.integrator, &spec.clock);
             let object = ObjectCopy::new(scene.copy_config(place), State::REST, scene.integrator, &spec.clock);
@@ -189,14 +194,14 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         }
         let silent = links.iter().any(|(_, _, timing)| matches!(timing, LinkTiming::Pattern(pattern) if pattern.iter().all(Option::is_none)));
         let arm = |place: usize| contacts.touching[place] && scene.device_plant(place).stiffness > 0.0;
-        // Waves carry no position: each copy may be anywhere, but for what holds its own device.
+        // Waves carry no position, so only a peer's own arm ties its copy. With other samples one arm ties all copies.
         let tied = |place: usize| if kind == SampleKind::Wave { arm(place) } else { silent || (0..peers).any(arm) };
         let tied = (0..peers).map(tied).collect();
         let layout = Layout::new(scene, contacts, &members, &timetable, tied);
         let touching = contacts.touching.iter().copied().enumerate();
         let time = common_time(scene, timetable.frame, linear_law(scene, 0).map_or(scene.coordination.gains, |law| law.held_by()), touching, false);
         let compliance: Vec<f64> = (0..peers).map(|peer| compliance(scene, peer, time)).collect();
-        // A wave of 1 √W against a line of 1 N·s/m gives √2 N: what that moves a copy by from one sample to the next, at a velocity of a wave.
+        // Length for a wave of 1 √W, which against a line of 1 N·s/m gives √2 N: the motion of a copy from one sample to the next under such a wave.
         let wave = scene.coordination.update.as_secs_f64() * (time / scene.copy_mass()).sqrt();
         let (extra, remembered) = if kind == SampleKind::Wave { (vec![wave; peers], wave) } else { (compliance.clone(), 1.0) };
         let names = scene.peers.iter().map(|peer| peer.name.clone()).collect();
@@ -219,17 +224,18 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         })
     }
 
-    /// The matrix, vector by vector.
+    /// Builds the matrix of a frame column by column, by pushing one unit vector for each kept state.
     fn map(mut self, watch: &dyn Watch) -> Result<FullMap, AnalysisError> {
         let size = self.layout.size;
         let events = self.timetable.events.len();
         PartCost::of_full(size, events, A).begin(watch)?;
         let rest = self.pushed(&vec![0.0; size], Instant::ZERO);
         let free = self.free_translations(&rest);
-        // Relative to the copies of reference, and without what nothing depends on.
+        // Positions are relative to the reference copies, whose own positions are therefore dropped; so are loose positions, on which nothing depends.
         let kept: Vec<usize> =
             (0..size).filter(|state| free.iter().all(|free| free.reference != *state) && !self.layout.loose.contains(state)).collect();
         let mut monodromy = Matrix::zeros(kept.len(), kept.len());
+        // The pushes before were of rest and displacements. Only the growth of unit vectors enters the bound of the error.
         self.growth = 1.0;
         let mut commanded = Vec::new();
         let (mut unit, mut reached) = (vec![0.0; size], vec![0.0; size]);
@@ -240,6 +246,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             unit[*state] = 1.0;
             self.push(&unit, Instant::ZERO, &mut reached);
             unit[*state] = 0.0;
+            // A constant force moves even the zero vector; the difference is the linear part.
             for (entry, rest) in reached.iter_mut().zip(&rest) {
                 *entry -= rest;
             }
@@ -251,7 +258,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             watch.done(pushed_operations(events, A));
         }
         let ticks = self.timetable.events.iter().filter(|event| matches!(event, Event::Tick { .. })).count();
-        // As for the lifted system: each tick rounds, and the rest of the frame magnifies that by at most about the growth.
+        // As for the lifted system: each tick rounds, and the rest of the frame magnifies the rounding by at most about the growth.
         let error = 10.0 * f64::EPSILON * real(ticks) * self.growth * self.growth * real(kept.len()).sqrt();
         let names = self.layout.names::<A>(&self.timetable.depth);
         Ok(FullMap {
@@ -266,7 +273,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         })
     }
 
-    /// The places of the commanded forces, in the order of peers, axes and ticks.
+    /// Returns indices into `commanded`, ordered by peer, then axis, then tick.
     fn order_of_forces(&self) -> Vec<usize> {
         let ticks = self.timetable.events.iter().filter_map(|event| if let Event::Tick { node, .. } = event { Some(*node) } else { None });
         let mut order: Vec<(usize, usize, usize)> =
@@ -282,12 +289,13 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         self.growth = 0.0;
         let later = Instant::ZERO.saturating_add(self.timetable.frame).saturating_add(self.timetable.frame);
         let relative = |reached: Vec<f64>| -> Vec<f64> { reached.iter().zip(&rest).map(|(reached, rest)| reached - rest).collect() };
-        // Small, middling and large, and each against the others, so that a dead band and a limit are both seen.
+        // Amplitudes of three sizes are compared with one another: a dead band shows at the small amplitude, a saturation at the large one.
         let mut small: Option<Vec<f64>> = None;
         for amplitude in [1e-6, 1e-2, 10.0] {
             let (one, other) = (noise(size, 1, amplitude), noise(size, 2, amplitude));
             let both: Vec<f64> = one.iter().zip(&other).map(|(one, other)| one - 2.0 * other).collect();
             let reached_one = self.pushed(&one, Instant::ZERO);
+            // The same state must lead to the same result at a later time. Otherwise the strategy remembers more than it shows, or uses the time.
             if self.pushed(&one, later) != reached_one {
                 return Err(AnalysisError::Remembers);
             }
@@ -296,7 +304,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             let scale = [&reached_one, &reached_other, &rest].into_iter().flatten().fold(amplitude, |largest: f64, entry| largest.max(entry.abs()));
             let unit: Vec<f64> = reached_one.iter().map(|entry| entry / amplitude).collect();
             let small = small.get_or_insert_with(|| unit.clone());
-            // Of the small one, few digits may be left next to a constant force.
+            // Next to a constant force the small amplitude may have few exact digits, so this difference counts by a thousandth.
             let homogeneous = |place: usize| (unit[place] - small[place]).abs() * amplitude * 1e-3;
             let apart = |place: usize| (reached_one[place] - 2.0 * reached_other[place] - reached_both[place]).abs().max(homogeneous(place));
             let limit = 1e-9 * scale.max(self.growth);
@@ -307,14 +315,14 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         Ok(())
     }
 
-    /// Where one frame from the state `z` leads, beginning at `begin`.
+    /// Returns the state after one frame that begins at `begin` with the state `z`.
     fn pushed(&mut self, z: &[f64], begin: Instant) -> Vec<f64> {
         let mut reached = vec![0.0; z.len()];
         self.push(z, begin, &mut reached);
         reached
     }
 
-    /// The same, written over `reached`.
+    /// Like [`pushed`](Self::pushed), with the state after the frame written to `reached`.
     fn push(&mut self, z: &[f64], begin: Instant, reached: &mut [f64]) {
         let begin_local = EARLIER.saturating_add(begin - Instant::ZERO);
         self.restore(z, begin_local);
@@ -347,7 +355,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         }
     }
 
-    /// A peer samples.
+    /// Takes a sample of a peer at the current event, with the extra numbers for each receiver.
     fn sample_now(&mut self, node: usize) {
         let member = &mut self.members[node];
         let state = match member.role() {
@@ -361,7 +369,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         }
     }
 
-    /// A peer holds a sample of another; whether its strategy is handed what the sample carries beyond the state.
+    /// Lets peer `to` hold a sample of peer `from`. If `accepts` is true, the strategy of `to` also receives the sample's extra numbers.
     fn hold(&mut self, (to, from, sample): (usize, usize, i64), begin_local: Instant, accepts: bool) {
         let state = *self.sample(from, sample);
         let after = self.instants.local(from, self.instants.sent_at(from, sample, self.timetable.frame));
@@ -374,12 +382,12 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         }
     }
 
-    /// The sample with that number: from 0 if it is of this frame.
+    /// Returns a sample of a peer. Samples of this frame have the numbers 0, 1, …; earlier samples have negative numbers.
     fn sample(&self, from: usize, number: i64) -> &State<A> {
         &self.samples[from][self.sample_place(from, number)]
     }
 
-    /// Where that sample is kept.
+    /// Returns the index in `samples[from]` of a sample: the samples of earlier frames stand first, and number 0 follows them.
     fn sample_place(&self, from: usize, number: i64) -> usize {
         usize::try_from(i64::try_from(self.timetable.depth[from]).unwrap_or(0) + number).unwrap_or(0)
     }
@@ -401,7 +409,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             }
             let memory: Vec<f64> = z[next..next + layout.memory[place]].iter().map(|number| number / self.remembered).collect();
             member.strategy_mut().set_memory(&memory);
-            // Kept with the oldest first, so that a sample's place follows from its number.
+            // The vector has the newest sample first, `samples` the oldest, so that a sample's index there grows with its number.
             let depth = self.timetable.depth[place];
             let begin = |age: usize| layout.samples[place] + age * layout.sample_len::<A>();
             let samples = (0..depth).rev().map(|age| state(&z[begin(age)..], self.time));
@@ -414,7 +422,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         }
         for held in 0..self.timetable.held.len() {
             let (to, from, sample) = self.timetable.held[held];
-            // A strategy that shows what it remembers has it back already.
+            // A strategy with memory got the effect of earlier samples back with that memory, and must not accept their extra numbers again.
             self.hold((to, from, sample), begin_local, self.layout.memory[to] == 0);
         }
     }
@@ -448,7 +456,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
     }
 }
 
-/// A row for each of the forces, in that order, with a column for each state; of equal ones in a row the first.
+/// Returns the matrix of commanded forces: one row per force in the given order, one column per state. Of equal consecutive rows only the first is kept.
 fn forces_of(commanded: &[Vec<f64>], order: &[usize]) -> Matrix {
     let mut rows: Vec<Vec<f64>> = order.iter().map(|place| commanded.iter().map(|forces| forces[*place]).collect()).collect();
     rows.dedup();
@@ -466,7 +474,7 @@ fn write<const A: usize>(state: &State<A>, z: &mut [f64], time: f64) {
     }
 }
 
-/// Numbers of either sign up to `amplitude` in size, always the same ones: multiples of an irrational number, which spread evenly.
+/// Returns numbers of both signs of at most `amplitude` in size, the same at every call. Multiples of an irrational number modulo 1 spread evenly.
 fn noise(size: usize, seed: u32, amplitude: f64) -> Vec<f64> {
     const GOLDEN_RATIO: f64 = 0.618_033_988_749_894_9;
     let place = |number: usize| (real(number) + 0.5) * GOLDEN_RATIO * f64::from(seed);

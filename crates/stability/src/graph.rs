@@ -1,9 +1,9 @@
-//! Equal peers on a graph: which peer hears which.
+//! Analysis of equal peers on a graph, whose edges tell which peer hears which.
 //!
-//! A scene without a topology lets everybody hear everybody. Where each of N equal peers hears only its neighbours, with weights that are mutual, the averaging matrix
-//! D⁻¹W has a full set of eigenvectors and real eigenvalues λ from −1 to 1 (D^½·D⁻¹W·D^−½ is symmetric). Along each eigenvector every peer does the same thing,
-//! scaled, and hears λ times its own samples: the scene is as many systems of one node. λ = 1 is there once for each connected part, which can be
-//! displaced as a whole.
+//! In a scene without a topology every peer hears all other peers. If each of N equal peers hears only its neighbours, with mutual weights W and row sums D,
+//! then the averaging matrix D⁻¹W has a full set of eigenvectors and real eigenvalues λ from −1 to 1, because D^½·D⁻¹W·D^−½ is symmetric. Along an
+//! eigenvector all peers make the same motion, each scaled by its entry, and each hears λ times its own samples. The scene therefore splits into N systems of
+//! one node each. The eigenvalue 1 occurs once for each connected part of the graph, and each part can be displaced as a whole.
 
 pub(crate) mod enclosed;
 
@@ -20,23 +20,23 @@ use crate::rounding::real;
 use crate::structure::Structure;
 use crate::{Analysis, AnalysisError, ContactMode, Matrix, Method, PartKind, Unwatched, Watch};
 
-/// Which peer hears which.
+/// A graph of equal peers, whose edges tell which peer hears which.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Graph {
-    /// Everybody hears everybody, as in a scene: λ = 1 and N−1 times −1/(N−1).
+    /// Every peer hears all others, as in a scene without a topology. Eigenvalues: λ = 1 once and λ = −1/(N−1), N−1 times.
     Complete,
-    /// Each hears as many before it as behind it, n in all: λ = (2/n)·Σ cos(2πkm/N) over m from 1 to n/2.
+    /// Each peer hears n neighbours, n/2 before it and n/2 after it. Eigenvalues: λ = (2/n)·Σ cos(2πkm/N) over m from 1 to n/2, for k from 0 to N−1.
     Ring {
-        /// How many it hears, n: an even number below N; among two peers each hears the other whatever it is.
+        /// Number n of neighbours that a peer hears: even, above 0 and below N. Ignored for two peers, who hear each other.
         neighbours: usize,
     },
-    /// The first hears all others, who hear the first alone: λ = 1, N−2 times 0, and −1.
+    /// The first peer hears all others, and each other peer hears only the first. Eigenvalues: λ = 1, λ = 0 (N−2 times), and λ = −1.
     Star,
-    /// Each hears the others with mutual weights: a symmetric matrix of N rows.
+    /// Each peer hears the others with mutual weights, given as a symmetric matrix of N rows with a zero diagonal.
     Weighted(Matrix),
 }
 
-/// Why peers cannot be analysed on a graph.
+/// Reason for which peers cannot be analysed on a graph.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GraphError {
@@ -46,46 +46,46 @@ pub enum GraphError {
     /// The peers or their links differ.
     #[error("peer {peer} or a link of it is not like the others: expected equal peers and equal links on a graph")]
     Unequal {
-        /// The first peer that differs from the first one.
+        /// Name of the first peer that differs from peer 0 of the scene.
         peer: String,
     },
-    /// The matrix of weights is none.
+    /// A weight is negative, not finite or not mutual, the diagonal is not zero, or the matrix has the wrong size.
     #[error("weight {row},{column} is {found}: expected a symmetric matrix of {peers} rows of numbers that are not negative, zero on the diagonal")]
     Weight {
-        /// The row, from 0.
+        /// Row of the weight, from 0.
         row: usize,
-        /// The column, from 0.
+        /// Column of the weight, from 0.
         column: usize,
-        /// The weight found; NaN where there is none.
+        /// The weight found; NaN if the matrix has the wrong size.
         found: f64,
         /// The number of peers.
         peers: usize,
     },
-    /// Somebody hears nobody.
+    /// A peer hears no other peer.
     #[error("peer {peer} hears nobody: expected a weight above zero for each peer")]
     Alone {
-        /// Its name.
+        /// Name of the peer.
         peer: String,
     },
-    /// There are fewer peers than a ring needs.
+    /// The number of neighbours on a ring is zero or odd, or not below the number of peers.
     #[error("{peers} peers on a ring with {neighbours} neighbours each: expected an even number of neighbours, fewer than there are peers")]
     Neighbours {
         /// The number of peers.
         peers: usize,
-        /// The number of neighbours.
+        /// The number of neighbours of each peer.
         neighbours: usize,
     },
-    /// The stiffness of a peer would depend on how many it hears.
+    /// The strategy's force is a sum over the heard peers, and not all peers hear equally many, so that their stiffnesses differ.
     #[error(
         "proportional-derivative coordination is stiffer the more a peer hears, so these peers are not equal: expected average-position, or a graph in which all hear as much"
     )]
     Irregular,
-    /// One-sided contacts or walls.
+    /// The scene has one-sided contacts or walls, and is not linear.
     #[error("a scene that is not linear cannot be analysed on a graph: expected contact = \"grasp\" or \"none\" and no enclosure")]
     NotLinear,
 }
 
-/// Why a scene with a topology is refused.
+/// Turns the error of an analysis on a graph into the error for a scene whose topology is that graph.
 pub fn on_this_topology(error: GraphError) -> AnalysisError {
     match error {
         GraphError::Analysis(error) => error,
@@ -98,16 +98,16 @@ pub fn on_this_topology(error: GraphError) -> AnalysisError {
     }
 }
 
-/// Analyses the scene's equal peers as if each heard only its neighbours on that graph.
+/// Analyses the scene's equal peers as if each heard only its neighbours on `graph`.
 ///
 /// # Errors
 ///
-/// [`GraphError`] if the peers are not equal, the scene is not linear, or the weights make no sense.
+/// [`GraphError`] if the peers or links are not equal, if the scene is not linear, or if the graph does not fit the number of peers.
 pub fn analyse_on(scene: &Scene, graph: &Graph) -> Result<Analysis, GraphError> {
     analyse_on_watched(scene, graph, &Unwatched)
 }
 
-/// [`analyse_on`], watched.
+/// Like [`analyse_on`], with a watch that can stop the analysis.
 ///
 /// # Errors
 ///
@@ -121,7 +121,7 @@ pub fn analyse_on_watched(scene: &Scene, graph: &Graph, watch: &dyn Watch) -> Re
     Ok(combine(modes, Method::Reduced, &network, scene))
 }
 
-/// The modes of a scene that moves apart from all others.
+/// Analyses one piece of the scene, whose motion is independent of all other pieces.
 fn of_piece(piece: &Piece<'_>, graph: &Graph, network: &NominalNetwork, watch: &dyn Watch) -> Result<ContactMode, GraphError> {
     let scene = &*piece.scene;
     let combinations = combinations(piece).map_err(GraphError::Analysis)?;
@@ -129,6 +129,7 @@ fn of_piece(piece: &Piece<'_>, graph: &Graph, network: &NominalNetwork, watch: &
         return Err(GraphError::NotLinear);
     };
     let structure = Structure::of(&[scene], network, &combination.contacts)?;
+    // Equal peers over equal links form a single class, which has a timetable of its own if it has more than one member.
     let (Some(timetable), None) = (&structure.apart[0], structure.classes.get(1)) else {
         let peer = structure.classes.get(1).map_or(0, |class| class[0]);
         return Err(GraphError::Unequal { peer: scene.peers[peer].name.clone() });
@@ -142,6 +143,7 @@ fn of_piece(piece: &Piece<'_>, graph: &Graph, network: &NominalNetwork, watch: &
     for (eigenvalue, copies) in spectrum {
         let together = eigenvalue == Eigenvalue::One;
         let weight = Matrix::from_fn(1, 1, |_, _| eigenvalue.value());
+        // Only a motion of a whole connected part, λ = 1, can be displaced without a force.
         let tied = structure.tied || !together;
         if !tied {
             rigid_modes += copies;
@@ -161,23 +163,24 @@ fn of_piece(piece: &Piece<'_>, graph: &Graph, network: &NominalNetwork, watch: &
     Ok(ContactMode { motion: piece.motion.clone(), contacts: String::new(), radius, parts, rigid_modes, dimension, frame: timetable.frame })
 }
 
-/// The node that stands for equal peers of which each hears that number or weight of others, if all hear as much.
+/// Returns the node that stands for each of the equal peers. `degree` is the number or total weight of the peers that each peer hears, or `None` if not all
+/// peers hear equally much.
 ///
 /// # Errors
 ///
-/// [`GraphError::Irregular`] for a law whose force is a sum over those that a peer hears, if not all hear as much.
+/// [`GraphError::Irregular`] for a law whose force is a sum over the heard peers, if `degree` is `None`.
 pub fn node_on(scene: &Scene, structure: &Structure, degree: Option<f64>) -> Result<Node, GraphError> {
     let mut node = structure.node(scene, 0);
     let pulls = [scene.coordination.strategy.pull(), scene.coordination.pull];
     for _ in pulls.into_iter().filter(|pull| *pull == Pull::Sum) {
-        // The sum over as many as are heard, in place of that over all others.
+        // The structure's law sums over all N−1 other peers; on the graph the sum is over `degree` peers.
         let degree = degree.ok_or(GraphError::Irregular)?;
         node.law = node.law.scaled(degree / real(scene.peers.len() - 1));
     }
     Ok(node)
 }
 
-/// An eigenvalue of an averaging matrix; 1 is known exactly.
+/// An eigenvalue of an averaging matrix. The eigenvalue 1 is known without rounding and is told apart, since only its motions may drift.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Eigenvalue {
     One,
@@ -203,7 +206,7 @@ impl From<&Topology> for Graph {
     }
 }
 
-/// The weights between peers, a row a peer.
+/// Returns the weights between peers: row and column are the `from` and `to` of a pair of the topology, and pairs without a link have weight 0.
 pub fn weights_of(topology: &Topology) -> Matrix {
     let mut weights = Matrix::zeros(topology.peers(), topology.peers());
     for (from, to) in topology.pairs() {
@@ -213,14 +216,15 @@ pub fn weights_of(topology: &Topology) -> Matrix {
 }
 
 impl Graph {
-    /// The different eigenvalues of the averaging matrix with their multiplicities; and how many (or how much weight) each peer hears, if all hear as much.
+    /// Returns the eigenvalues of the averaging matrix with their multiplicities, and the number or total weight of the peers that each peer hears, or `None`
+    /// if not all peers hear equally much. An eigenvalue of weights may be listed more than once.
     #[expect(clippy::type_complexity, reason = "used once, above")]
     fn spectrum(&self, scene: &Scene) -> Result<(Vec<(Eigenvalue, usize)>, Option<f64>), GraphError> {
         let peers = scene.peers.len();
         let n = real(peers);
         Ok(match self {
             Self::Complete => (vec![(Eigenvalue::One, 1), (Eigenvalue::Other(-1.0 / (n - 1.0)), peers - 1)], Some(n - 1.0)),
-            // Two peers hear each other, whatever the graph is called.
+            // Two peers hear each other on every graph; the number of neighbours is not checked.
             Self::Ring { .. } | Self::Star if peers == 2 => (vec![(Eigenvalue::One, 1), (Eigenvalue::Other(-1.0), 1)], Some(1.0)),
             Self::Ring { neighbours } if *neighbours == 0 || neighbours % 2 != 0 || *neighbours >= peers => {
                 return Err(GraphError::Neighbours { peers, neighbours: *neighbours });
@@ -229,6 +233,7 @@ impl Graph {
                 let angle = |k: usize, m: usize| 2.0 * std::f64::consts::PI * real(k * m % peers) / n;
                 let half = neighbours / 2;
                 let eigenvalue = |k: usize| (1..=half).map(|m| libm::cos(angle(k, m))).sum::<f64>() / real(half);
+                // k and N − k have the same eigenvalue; k = N/2 is its own partner.
                 let pair = |k: usize| (Eigenvalue::Other(eigenvalue(k)), if 2 * k == peers { 1 } else { 2 });
                 (std::iter::once((Eigenvalue::One, 1)).chain((1..=peers / 2).map(pair)).collect(), Some(real(*neighbours)))
             }
@@ -238,7 +243,7 @@ impl Graph {
     }
 }
 
-/// The spectrum of D⁻¹W, from that of the symmetric D^−½·W·D^−½.
+/// Returns the spectrum of D⁻¹W, computed from the symmetric matrix D^−½·W·D^−½ with the same eigenvalues, and the common row sum as in `Graph::spectrum`.
 #[expect(clippy::type_complexity, reason = "as for the other graphs")]
 fn weighted(weights: &Matrix, scene: &Scene) -> Result<(Vec<(Eigenvalue, usize)>, Option<f64>), GraphError> {
     let peers = scene.peers.len();
@@ -248,6 +253,7 @@ fn weighted(weights: &Matrix, scene: &Scene) -> Result<(Vec<(Eigenvalue, usize)>
     for row in 0..peers {
         for column in 0..peers {
             let (found, mutual) = (at(row, column), at(column, row));
+            // The bits are compared because D^−½·W·D^−½ has real eigenvalues only if the weights are exactly mutual.
             let fits = found.is_finite() && found >= 0.0 && found.to_bits() == mutual.to_bits() && (row != column || found == 0.0);
             if !fits {
                 return Err(GraphError::Weight { row, column, found, peers });
@@ -258,11 +264,11 @@ fn weighted(weights: &Matrix, scene: &Scene) -> Result<(Vec<(Eigenvalue, usize)>
     if let Some(peer) = degrees.iter().position(|degree| *degree <= 0.0) {
         return Err(GraphError::Alone { peer: scene.peers[peer].name.clone() });
     }
-    // Unknown where a sum of weights is beyond all numbers.
+    // If a sum of weights overflows, the eigenvalues are unknown, and NaN stands for each of them.
     let found = symmetric(weights).map(|(symmetric, _)| crate::eigenvalues(&symmetric));
     let mut eigenvalues = found.map_or_else(|| vec![f64::NAN; peers], |found| found.iter().map(|value| value.re).collect());
     eigenvalues.sort_by(f64::total_cmp);
-    // As many of them are 1 as there are connected parts: these are the largest.
+    // Each connected part has the eigenvalue 1 once. These are the largest eigenvalues, so the end of the sorted list is cut off.
     let ones = components(weights);
     eigenvalues.truncate(peers - ones);
     let mut spectrum = vec![(Eigenvalue::One, ones)];
@@ -271,19 +277,19 @@ fn weighted(weights: &Matrix, scene: &Scene) -> Result<(Vec<(Eigenvalue, usize)>
     Ok((spectrum, regular.then_some(degrees[0])))
 }
 
-/// D^−½·W·D^−½ and the row sums D; `None` if a sum is beyond all numbers.
+/// Returns D^−½·W·D^−½ and the row sums D, or `None` if a sum is not finite.
 fn symmetric(weights: &Matrix) -> Option<(Matrix, Vec<f64>)> {
     let size = weights.rows();
     let degrees: Vec<f64> = (0..size).map(|row| weights.row(row).iter().sum()).collect();
     if degrees.iter().any(|degree| !degree.is_finite()) {
         return None;
     }
-    // Divided one by one, nothing leaves the range of numbers: no weight is above its degree.
+    // The two roots divide one after the other: their product could overflow or underflow, while no weight exceeds its row sum.
     let entry = |row: usize, column: usize| weights[(row, column)] / degrees[row].sqrt() / degrees[column].sqrt();
     Some((Matrix::from_fn(size, size, entry), degrees))
 }
 
-/// How many parts of the graph are not connected with one another.
+/// Returns the number of connected parts of the graph.
 fn components(weights: &Matrix) -> usize {
     let mut seen = vec![false; weights.rows()];
     let mut parts = 0;

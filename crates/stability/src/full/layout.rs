@@ -1,4 +1,4 @@
-//! Where the states of all peers stand in a vector.
+//! The layout of all peers' states in a vector: device, copy, pending forces and memory of each peer, then the samples of earlier frames.
 
 use cohaptic_peer::wire::SampleKind;
 use cohaptic_peer::{Peer, SimulatedDevice, Strategy};
@@ -11,21 +11,25 @@ use crate::{StateKind, StateName};
 /// A peer whose device is simulated.
 pub(super) type Member<const A: usize, S> = Peer<A, SimulatedDevice<A>, S>;
 
-/// Where the states of each peer begin, and what they are.
+/// Offsets and numbers of the states of each peer. Every `Vec` but `loose` is indexed by peer.
 pub(super) struct Layout {
+    /// Index of the first state of each peer.
     pub(super) first: Vec<usize>,
     pub(super) touching: Vec<bool>,
+    /// Number of numbers that the strategy of each peer remembers.
     pub(super) memory: Vec<usize>,
+    /// Whether each peer has computed forces that wait to be applied, as with a compute delay.
     pub(super) pending: Vec<bool>,
-    /// Where the samples of earlier frames of each peer begin, the newest first.
+    /// Index of the newest sample of earlier frames of each peer; older samples follow.
     pub(super) samples: Vec<usize>,
-    /// How many receivers have extra numbers in a sample, and whether those are waves.
+    /// Number of receivers for which a sample carries extra numbers.
     pub(super) receivers: usize,
+    /// Whether the extra numbers are waves.
     pub(super) has_waves: bool,
     pub(super) size: usize,
-    /// States that nothing depends on and that drift with everything else: positions of devices that touch nothing.
+    /// Indices of states on which nothing depends: positions of devices that touch nothing and have no arm.
     pub(super) loose: Vec<usize>,
-    /// For each peer, whether something ties its copy to ground.
+    /// Whether something ties the copy of each peer to ground.
     pub(super) tied: Vec<bool>,
 }
 
@@ -66,18 +70,18 @@ impl Layout {
         layout
     }
 
-    /// Where the numbers stand that the strategy of a peer remembers.
+    /// Returns the range of states that hold the memory of a peer's strategy.
     pub(super) fn memory_of<const A: usize>(&self, place: usize) -> std::ops::Range<usize> {
         let first = self.first[place] + 4 * A + if self.pending[place] { 2 * A } else { 0 };
         first..first + self.memory[place]
     }
 
-    /// How many numbers a sample has.
+    /// Returns the number of states of a sample: position, velocity, and extra numbers for each receiver, along each axis.
     pub(super) const fn sample_len<const A: usize>(&self) -> usize {
         (2 + self.receivers) * A
     }
 
-    /// What every state is, in order.
+    /// Returns the name of every state, in the order of the vector. `depth` is the number of samples of earlier frames, indexed by peer.
     pub(super) fn names<const A: usize>(&self, depth: &[usize]) -> Vec<StateName> {
         let mut names = Vec::with_capacity(self.size);
         for peer in 0..self.first.len() {
@@ -107,7 +111,7 @@ impl Layout {
         names
     }
 
-    /// The peer to which a state belongs.
+    /// Returns the peer to which the state at index `place` belongs.
     pub(super) fn owner(&self, place: usize) -> usize {
         let firsts = if self.samples.first().is_some_and(|first| place >= *first) { &self.samples } else { &self.first };
         firsts.partition_point(|first| *first <= place).saturating_sub(1)

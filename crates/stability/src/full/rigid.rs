@@ -1,4 +1,4 @@
-//! What may be moved without a force: everything together, or with waves, which carry no position, each peer by itself.
+//! Displacements that no force resists: of all peers together, or of each peer alone if samples are waves, which carry no position.
 
 use cohaptic_peer::coordination::Role;
 use cohaptic_peer::wire::SampleKind;
@@ -7,18 +7,20 @@ use cohaptic_units::Instant;
 
 use super::{EARLIER, Pusher, state};
 
-/// A displacement by 1 m that a frame leaves as it is.
+/// A displacement by 1 m that a frame leaves unchanged.
 pub(super) struct Translation {
-    /// The peers that are moved, and along which axis.
+    /// Indices of the displaced peers.
     peers: Vec<usize>,
+    /// Axis of the displacement.
     axis: usize,
-    /// The position that others are relative to: that of the first copy of them.
+    /// Index of the state to which the other positions are relative: the position of the copy of the first displaced peer.
     pub(super) reference: usize,
+    /// The displacement as a vector of states.
     pub(super) moved: Vec<f64>,
 }
 
 impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
-    /// All displacements that nothing resists; an arm does, or a strategy of somebody's own that knows where the origin is.
+    /// Returns all displacements that nothing resists. An arm resists, and so may a caller's own strategy that depends on absolute positions.
     pub(super) fn free_translations(&mut self, rest: &[f64]) -> Vec<Translation> {
         let all: Vec<usize> = (0..self.members.len()).collect();
         let groups = if self.kind == SampleKind::Wave { all.iter().map(|peer| vec![*peer]).collect() } else { vec![all] };
@@ -26,6 +28,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         for axis in 0..A {
             for peers in groups.iter().filter(|peers| !peers.iter().any(|peer| self.layout.tied[*peer])).collect::<Vec<_>>() {
                 let moved = self.translation(peers, axis);
+                // The displacement is free if the frame, apart from its motion from rest, returns the vector itself.
                 let reached = self.pushed(&moved, Instant::ZERO);
                 if moved.iter().zip(reached.iter().zip(rest)).all(|(moved, (reached, rest))| (reached - rest - moved).abs() <= 1e-9) {
                     free.push(Translation { peers: peers.clone(), axis, reference: self.layout.first[peers[0]] + 2 * A + axis, moved });
@@ -35,7 +38,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         free
     }
 
-    /// For each peer and axis, whose copy positions are relative to.
+    /// Returns the peer to whose copy positions are relative, indexed by peer and axis; `None` for absolute positions.
     pub(super) fn relative_to(&self, free: &[Translation]) -> Vec<Vec<Option<usize>>> {
         let reference = |peer: usize, axis: usize| {
             let found = free.iter().find(|free| free.axis == axis && free.peers.contains(&peer));
@@ -44,7 +47,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         (0..self.members.len()).map(|peer| (0..A).map(|axis| reference(peer, axis)).collect()).collect()
     }
 
-    /// These peers moved by 1 m along an axis, but for devices that touch nothing.
+    /// Returns the state in which the given peers are moved by 1 m along an axis. Devices that touch nothing stay where they are.
     fn translation(&mut self, peers: &[usize], axis: usize) -> Vec<f64> {
         let mut moved = vec![0.0; self.layout.size];
         for place in peers.iter().copied() {
@@ -53,13 +56,13 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
                 moved[first + axis] = 1.0;
             }
             moved[first + 2 * A + axis] = 1.0;
-            // Samples of a client are of its device.
+            // The samples of a client are positions of its device, which moves only if the client touches the object.
             let is_sample_moved = self.layout.touching[place] || matches!(self.members[place].strategy().role(), Role::Copy);
             for age in (0..self.timetable.depth[place]).filter(|_| is_sample_moved) {
                 moved[self.layout.samples[place] + age * self.layout.sample_len::<A>() + axis] = 1.0;
             }
         }
-        // Strategies may remember positions: after a tick for each number of the memory those have moved as well.
+        // Strategies may remember positions. After as many ticks as the memory has numbers, the remembered positions have moved too.
         if self.layout.memory.iter().any(|numbers| *numbers > 0) {
             let (at_rest, displaced) = (self.remembered(&vec![0.0; moved.len()]), self.remembered(&moved));
             for place in 0..self.members.len() {
@@ -72,10 +75,10 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         moved
     }
 
-    /// The state `z` with what strategies remember where nothing has moved for as many ticks and samples as they remember numbers.
+    /// Returns the state `z` with the memory of each strategy replaced by its memory after as many ticks and samples at rest as the memory has numbers.
     fn remembered(&mut self, z: &[f64]) -> Vec<f64> {
         self.restore(z, EARLIER);
-        // A frame may begin with nothing held that is used in it; here a sample from every peer is in use.
+        // `restore` holds only samples that the frame uses. The strategies compute here outside a frame, so each holds a sample of every other peer.
         let copies: Vec<State<A>> = self.layout.first.iter().map(|first| state(&z[first + 2 * A..], self.time)).collect();
         for (place, member) in self.members.iter_mut().enumerate() {
             let others = copies.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, state)| *state);
@@ -100,8 +103,8 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         z
     }
 
-    /// Goes through a frame at rest, so that what strategies count in ticks stands as it does whenever a frame begins: a wave that is in use then has come
-    /// in the frame before, which is not shorter than the wave.
+    /// Runs a frame at rest, so that the strategies' counters of ticks have the values of the beginning of any later frame. A wave in use at that instant
+    /// arrived in the frame before, because a frame is not shorter than a wave.
     pub(super) fn settle(&mut self) {
         if self.kind != SampleKind::State {
             let rest = vec![0.0; self.layout.size];

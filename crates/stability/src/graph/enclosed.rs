@@ -1,4 +1,4 @@
-//! Eigenvalues of averaging matrices with bounds of all rounding, for proofs.
+//! Intervals that enclose the eigenvalues of an averaging matrix with all rounding, for proofs.
 
 use cohaptic_scene::Scene;
 
@@ -7,21 +7,21 @@ use crate::Matrix;
 use crate::factorisation::eigen;
 use crate::rounding::real;
 
-/// The eigenvalues of an averaging matrix but for 1, which each connected part has once.
+/// The eigenvalues of an averaging matrix, without the eigenvalue 1 that each connected part of the graph has once.
 #[derive(Clone, PartialEq, Debug)]
 pub struct EnclosedSpectrum {
-    /// Intervals in rising order, each with one eigenvalue or several.
+    /// Intervals in rising order that do not overlap, each with at least one eigenvalue.
     pub others: Vec<[f64; 2]>,
-    /// How many, or how much weight, each peer hears, if all hear exactly as much.
+    /// Number or total weight of the peers that each peer hears; `None` unless it is exactly the same for all peers.
     pub degree: Option<f64>,
 }
 
 impl Graph {
-    /// The eigenvalues of the averaging matrix of the peers of a scene.
+    /// Returns enclosures of the eigenvalues of the averaging matrix for the peers of a scene.
     ///
     /// # Errors
     ///
-    /// [`GraphError`] if the graph makes no sense for that number of peers.
+    /// [`GraphError`] if the graph does not fit the scene's number of peers.
     pub fn enclosed_spectrum(&self, scene: &Scene) -> Result<EnclosedSpectrum, GraphError> {
         let (spectrum, degree) = self.spectrum(scene)?;
         let is_pair = scene.peers.len() == 2;
@@ -31,7 +31,7 @@ impl Graph {
                 let degree = degree.filter(|_| has_equal_sums(weights));
                 return Ok(EnclosedSpectrum { others: merged(of_weights(weights, ones)), degree });
             }
-            // 0 and −1.
+            // The other eigenvalues of a star are 0 and −1, which are exact numbers.
             Self::Star => 0.0,
             Self::Ring { .. } if is_pair => 0.0,
             // −1/(N − 1) is rounded once.
@@ -45,12 +45,12 @@ impl Graph {
     }
 }
 
-/// That far around a value, and from −1 to 1, where the eigenvalues of all averaging matrices of mutual weights are.
+/// Returns the interval of half width `error` around a value, cut to [−1, 1]. All eigenvalues of averaging matrices with mutual weights lie there.
 fn within_unit(value: f64, error: f64) -> [f64; 2] {
     [(value - error).max(-1.0), (value + error).min(1.0)]
 }
 
-/// Intervals in rising order, of which no two overlap, with all points of those given.
+/// Returns the union of intervals as intervals in rising order that do not overlap.
 fn merged(mut intervals: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     intervals.sort_by(|one, other| one[0].total_cmp(&other[0]));
     let mut apart: Vec<[f64; 2]> = Vec::new();
@@ -63,10 +63,12 @@ fn merged(mut intervals: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     apart
 }
 
-/// All eigenvalues of D⁻¹W but for `ones` that are 1, the largest: those of A = D^−½·W·D^−½, which is symmetric with norm 1.
+/// Returns an interval for each eigenvalue of D⁻¹W except the largest `ones` eigenvalues, which are 1. The matrix A = D^−½·W·D^−½ has the same eigenvalues,
+/// is symmetric and has norm 1. If the computation fails, the single interval [−1, 1] stands for all eigenvalues.
 ///
-/// Let U and the diagonal Λ be what was computed for its eigenvectors and eigenvalues, ε = ‖UᵀU − 1‖ < 1 and U = Q·H with Q orthogonal. Then ‖U − Q‖ = ‖H − 1‖ ≤ ε, since each singular value σ has |σ − 1| ≤ |σ² − 1|. So
-/// ‖QᵀAQ − Λ‖ = ‖AQ − QΛ‖ ≤ ‖AU − UΛ‖ + ε·(1 + ‖Λ‖), and the eigenvalues of A, counted in order, are so near to those of Λ (Weyl 1912).
+/// Let U and the diagonal Λ be the computed eigenvectors and eigenvalues of A, let ε = ‖UᵀU − 1‖ < 1, and let U = Q·H with Q orthogonal. Then
+/// ‖U − Q‖ = ‖H − 1‖ ≤ ε, since each singular value σ of U has |σ − 1| ≤ |σ² − 1|. So ‖QᵀAQ − Λ‖ = ‖AQ − QΛ‖ ≤ ‖AU − UΛ‖ + ε·(1 + ‖Λ‖), and each
+/// eigenvalue of A differs by at most this bound from the eigenvalue of Λ at the same place in rising order (Weyl 1912).
 fn of_weights(weights: &Matrix, ones: usize) -> Vec<[f64; 2]> {
     let size = weights.rows();
     let unknown = || vec![[-1.0, 1.0]; usize::from(size > ones)];
@@ -81,8 +83,9 @@ fn of_weights(weights: &Matrix, ones: usize) -> Vec<[f64; 2]> {
     if !(skew < 0.1 && largest < 1.1 && residual < 1.0) {
         return unknown();
     }
-    // An entry of A is within (n + 4)·u of itself, for the sums D and five operations, which A takes over, since it has no negative ones and norm 1. Those of A·U − U·Λ and of UᵀU are sums of n terms: in the
-    // Frobenius norm within 4·(n + 2)·√n·u·(1 + ε) and n²·u·(1 + ε)². All together is less than half of this, which has room for the sums of squares.
+    // Each entry of A has a relative error of at most (n + 4)·u, from the sums D and five operations. The matrix A has no negative entries and norm 1, so its
+    // error in norm has the same bound. The entries of A·U − U·Λ and of UᵀU are sums of n terms; their errors in the Frobenius norm are at most
+    // 4·(n + 2)·√n·u·(1 + ε) and n²·u·(1 + ε)². The sum of these errors is less than half of `rounding`; the other half covers the sums of squares.
     let rounding = 8.0 * (real(size) + 8.0).powi(2) * f64::EPSILON;
     let error = residual + skew * (1.0 + largest) + rounding;
     let mut sorted = values;
@@ -91,13 +94,14 @@ fn of_weights(weights: &Matrix, ones: usize) -> Vec<[f64; 2]> {
     sorted.into_iter().map(|value| within_unit(value, error)).collect()
 }
 
-/// The eigenvectors of D⁻¹W, nearly: columns x with xᵀDx = 1 for a connected graph, but for that of the eigenvalue 1. `None` if they were not found.
+/// Returns approximate eigenvectors of D⁻¹W for a connected graph as columns x with xᵀDx = 1, without the eigenvector of the eigenvalue 1. Returns `None` if
+/// the eigenvectors are not finite numbers.
 pub fn eigenvectors(weights: &Matrix) -> Option<Matrix> {
     let (a, degrees) = symmetric(weights)?;
     let (values, rows) = eigen(&a);
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|one, other| values[*one].total_cmp(&values[*other]));
-    // The largest is 1.
+    // The last eigenvalue in rising order is 1.
     order.pop();
     let vectors = Matrix::from_fn(degrees.len(), order.len(), |row, column| rows[(order[column], row)] / degrees[row].sqrt());
     vectors.is_finite().then_some(vectors)
@@ -107,12 +111,13 @@ fn frobenius(matrix: &Matrix) -> f64 {
     matrix.entries().iter().map(|entry| entry * entry).sum::<f64>().sqrt()
 }
 
-/// Whether all rows add up to exactly the same number.
+/// Tells whether all rows have exactly the same sum, compared without rounding.
 fn has_equal_sums(weights: &Matrix) -> bool {
     (1..weights.rows()).all(|row| is_zero(weights.row(0).iter().copied().chain(weights.row(row).iter().map(|weight| -weight))))
 }
 
-/// Whether the exact sum of numbers is zero: it is kept in parts that do not overlap (Shewchuk 1997, Grow-Expansion).
+/// Tells whether the exact sum of numbers is zero. The sum is kept in parts that do not overlap (Shewchuk 1997, Grow-Expansion), so the sum is zero only if
+/// all parts are zero.
 fn is_zero(numbers: impl Iterator<Item = f64>) -> bool {
     let mut parts: Vec<f64> = Vec::new();
     for number in numbers {
@@ -133,12 +138,13 @@ fn is_zero(numbers: impl Iterator<Item = f64>) -> bool {
 mod tests {
     use super::*;
 
-    /// Weights of neighbours, and of the others none.
+    /// Returns a symmetric matrix with zero diagonal, whose other entries are `weight` of the smaller and the larger index.
     fn weights(peers: usize, weight: impl Fn(usize, usize) -> f64) -> Matrix {
         Matrix::from_fn(peers, peers, |one, other| if one == other { 0.0 } else { weight(one.min(other), one.max(other)) })
     }
 
-    /// Spectra in closed form, some of whose eigenvalues are repeated: each of them is enclosed, by an interval not much wider than rounding, and nothing else is.
+    /// Spectra in closed form, some with repeated eigenvalues. Each eigenvalue is enclosed by an interval not much wider than rounding, and no further
+    /// interval is found.
     #[test]
     fn eigenvalues_in_closed_form_are_enclosed() {
         let cos = |k: usize, of: usize| libm::cos(std::f64::consts::PI * real(k) / real(of));
@@ -151,7 +157,7 @@ mod tests {
             ("ring", weights(8, |one, other| is(other == one + 1 || other == one + 7) * 2.5), (1..=4).map(|k| cos(k, 4)).collect()),
             ("hypercube", weights(16, |one, other| is((one ^ other).is_power_of_two()) / 3.0), (1..=4).map(|k| 1.0 - real(k) / 2.0).collect()),
             ("complete bipartite", weights(7, |one, other| is(one < 3 && other >= 3) * 1e-3), vec![-1.0, 0.0]),
-            // −1/2 of the two that are alike; of the others, with 1, 6·λ³ − 3·λ² − 4·λ + 1 = (λ − 1)·(6·λ² + 3·λ − 1).
+            // The two equal peers have λ = −1/2. The other eigenvalues are the zeros of 6·λ³ − 3·λ² − 4·λ + 1 = (λ − 1)·(6·λ² + 3·λ − 1).
             ("triangle with a tail", weights(4, |one, other| is(other < 3 || one == 2)), vec![-0.5, -0.25 + root, -0.25 - root]),
         ];
         for (name, weights, mut expected) in cases {
@@ -164,7 +170,7 @@ mod tests {
         }
     }
 
-    /// Weights of any size, in parts of a graph that are not connected: as many ones as there are parts, and nothing out of range.
+    /// Very small and very large weights in three unconnected parts of a graph: the three eigenvalues besides 1 are −1. Row sums that overflow leave [−1, 1].
     #[test]
     fn weights_out_of_the_ordinary_leave_bounds_that_hold() {
         let pairs = weights(6, |one, other| if one / 2 == other / 2 { [1e-300, 1.0, 1e300][one / 2] } else { 0.0 });
