@@ -1,4 +1,4 @@
-//! The analysis of a scene as it stands, by the way that the scene and the method ask for.
+//! The analysis of a scene: chooses the method of computation that the scene and the caller's [`Method`] require, and combines the results.
 
 use cohaptic_scene::{FromScene, Scene, Strategies, Topology};
 
@@ -14,20 +14,21 @@ use crate::spectrum::bounded_radius;
 use crate::structure::{Structure, linear_law};
 use crate::{Analysis, AnalysisError, ContactMode, Graph, Method, Unwatched, Watch, analyse_on_watched, turning};
 
-/// Analyses the scene as it begins, with the strategy that it names; its timeline is left out.
+/// Analyses the scene at its beginning, with the strategy that the scene names. The timeline is left out.
 ///
 /// # Errors
 ///
-/// [`AnalysisError`] if the scene has no frame that repeats, or cannot be taken apart into linear scenes.
+/// [`AnalysisError`] if the scene has no frame that repeats, or does not split into linear scenes.
 pub fn analyse(scene: &Scene, method: Method) -> Result<Analysis, AnalysisError> {
     analyse_watched(scene, method, &Unwatched)
 }
 
-/// [`analyse`], watched: it is asked between the parts of the scene, within frames and determinants, and between the vectors of [`Method::Full`].
+/// Like [`analyse`], with a watch that can stop the analysis. The watch is asked between the parts of the scene, within frames and determinants, and between
+/// the vectors of [`Method::Full`].
 ///
 /// # Errors
 ///
-/// As for [`analyse`], and [`AnalysisError::Stopped`] if the watcher ends it.
+/// As for [`analyse`], and [`AnalysisError::Stopped`] if the watch stops the analysis.
 pub fn analyse_watched(scene: &Scene, method: Method, watch: &dyn Watch) -> Result<Analysis, AnalysisError> {
     if let Some(topology) = &scene.topology {
         return on_topology(scene, topology, method, watch);
@@ -38,7 +39,7 @@ pub fn analyse_watched(scene: &Scene, method: Method, watch: &dyn Watch) -> Resu
         _ => return turning::analyse(scene, method, watch),
     };
     match method {
-        // A strategy that cannot be taken apart goes the way of a user's own.
+        // A strategy without a linear law takes the general path, like a caller's own strategy, and is checked there.
         _ if !equivalent => push_through(scene, Trust::Nothing, &FromScene, watch),
         Method::Full => push_through(scene, Trust::Linear, &FromScene, watch),
         Method::Reduced | Method::Determinant => {
@@ -56,7 +57,7 @@ pub fn analyse_watched(scene: &Scene, method: Method, watch: &dyn Watch) -> Resu
     }
 }
 
-/// The analysis of a scene with a topology: that of its peers on a graph.
+/// Analyses a scene with a topology as equal peers on a graph. Only [`Method::Reduced`] is possible.
 fn on_topology(scene: &Scene, topology: &Topology, method: Method, watch: &dyn Watch) -> Result<Analysis, AnalysisError> {
     match method {
         Method::Reduced => analyse_on_watched(&scene.without_topology(), &Graph::from(topology), watch).map_err(on_this_topology),
@@ -89,7 +90,7 @@ pub fn analyse_spinning(scene: &Scene, watch: &dyn Watch) -> Result<Analysis, An
     turning::analyse_spinning(scene, watch)
 }
 
-/// Analyses the scene by the general path, with strategies of the caller's own.
+/// Analyses the scene by the general path, with the caller's own strategies.
 ///
 /// # Errors
 ///
@@ -168,10 +169,10 @@ pub fn analyse_with(scene: &Scene, strategies: &impl Strategies) -> Result<Analy
 
 fn push_through(scene: &Scene, trust: Trust, strategies: &impl Strategies, watch: &dyn Watch) -> Result<Analysis, AnalysisError> {
     let network = NominalNetwork::of(scene)?;
-    // The walls of the simulator push and do not pull, so there is nothing linear to push through them.
+    // The walls of the simulator push and do not pull. Such a force is not linear, so combinations at a wall are left out.
     let modes = whole(scene)?.into_iter().filter(|combination| !combination.contacts.at_wall).map(|combination| {
         let contacts = &combination.contacts;
-        // With one-sided contacts every axis has combinations of its own.
+        // With one-sided contacts each axis has separate combinations, so `axes` may be below the scene's number of axes.
         let map = full_along(combination.axes, scene, &network, contacts, trust, watch, strategies)?;
         let (rigid_modes, frame) = (map.rigid_modes, map.frame);
         let (matrix, error) = map.felt();

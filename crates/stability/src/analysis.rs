@@ -1,4 +1,4 @@
-//! The verdict on a scene as it stands, and what it says of itself.
+//! The result of an analysis: the verdict on a scene, with the modes of contact that it covers and notes about the parts that it leaves out.
 
 use std::time::Duration;
 
@@ -8,62 +8,63 @@ use crate::network::NominalNetwork;
 use crate::parts::Part;
 use crate::{Method, Radius, Verdict};
 
-/// The stability of a scene, as far as it is known.
+/// Result of the analysis of a scene, with all modes of contact.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Analysis {
-    /// The largest radius of all modes of contact, the rigid-body modes left out.
+    /// Largest radius of all modes of contact, without the rigid-body modes.
     pub radius: Radius,
-    /// How many rigid-body modes were removed: displacements of everything together (with waves of each copy by itself), and of each device that touches nothing, per axis. Of the mode of
-    /// contact with the largest radius; of an object that turns, of all its motions.
+    /// Number of rigid-body modes that were removed: along each axis, displacements of all bodies together (with waves, of each copy alone) and of each device
+    /// that touches nothing. Counted in the mode of contact with the largest radius; if the object turns, added over all its motions.
     pub rigid_modes: usize,
-    /// How many states are left: of bodies, of forces that wait to be applied, and of samples that are held or in flight.
+    /// Number of remaining states: of bodies, of forces that wait to be applied, and of samples that are held or in flight.
     pub dimension: usize,
-    /// How it was reached.
+    /// Method by which the radius was found.
     pub method: Method,
-    /// The span that the radius is over: after it everything repeats.
+    /// Length of the frame over which the radius is taken. All events repeat after a frame.
     pub frame: Duration,
-    /// One entry for a linear scene; one for each combination of open and closed contacts otherwise; and all this for each motion of an object that turns.
+    /// Modes of contact: one for a linear scene, otherwise one per combination of open and closed contacts. If the object turns, each of its motions has
+    /// modes of its own.
     pub modes: Vec<ContactMode>,
-    /// What the verdict leaves out, in words.
+    /// Sentences about the parts of the scene that the verdict leaves out.
     pub notes: Vec<String>,
 }
 
 impl Analysis {
-    /// What the radius says.
+    /// Returns the verdict that follows from the radius.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
         self.radius.verdict()
     }
 
-    /// Whether the verdict is that of the worst of several combinations of contacts.
+    /// Tells whether the verdict is that of the worst of several combinations of contacts.
     #[must_use]
     pub fn combines_contacts(&self) -> bool {
         combines(&self.modes)
     }
 }
 
-/// Whether any motion has several modes of contact.
+/// Tells whether any motion has several modes of contact. The modes of a motion stand next to one another in `modes`.
 fn combines(modes: &[ContactMode]) -> bool {
     modes.windows(2).any(|pair| pair[0].motion == pair[1].motion)
 }
 
-/// A combination of contacts in which the scene is linear.
+/// Result for one combination of contacts, in which the scene is linear.
 #[derive(Clone, PartialEq, Debug)]
 pub struct ContactMode {
-    /// Of an object that turns: the components of its motion that move so, apart from all others, in words; otherwise empty.
+    /// Names of the components of a turning object's motion that this mode is about. Empty if the object does not turn.
     pub motion: String,
-    /// Which contacts are closed, in words; empty for a linear scene.
+    /// Description of the closed contacts. Empty for a linear scene.
     pub contacts: String,
-    /// The largest radius of its parts.
+    /// Largest radius of the parts.
     pub radius: Radius,
-    /// The parts that do not mix.
+    /// Parts of the mode that move independently of one another.
     pub parts: Vec<Part>,
     pub(crate) rigid_modes: usize,
     pub(crate) dimension: usize,
     pub(crate) frame: Duration,
 }
 
-/// The mode with the largest radius.
+/// Returns the mode with the largest radius, or `None` if there is no mode.
 fn largest<'a>(modes: impl Iterator<Item = &'a ContactMode>) -> Option<&'a ContactMode> {
     modes.max_by(|one, other| one.radius.value.total_cmp(&other.radius.value))
 }
@@ -92,10 +93,10 @@ pub(crate) fn combine(modes: Vec<ContactMode>, method: Method, network: &Nominal
     Analysis { radius, rigid_modes, dimension, method, frame, modes, notes }
 }
 
-/// What a verdict says of contacts that open and close, of which each combination is analysed as if it lasted.
+/// End of the note about contacts that open and close: each combination is analysed as if it lasted.
 pub const CHANGES_LEFT_OUT: &str = "changing between them is not covered";
 
-/// What a verdict leaves out, in addition to the notes so far.
+/// Returns the notes in `said`, followed by notes about the parts of the scene that a verdict leaves out.
 pub fn notes(said: &[String], combines: bool, scene: &Scene) -> Vec<String> {
     let mut notes = said.to_vec();
     if combines {
@@ -112,5 +113,5 @@ pub fn notes(said: &[String], combines: bool, scene: &Scene) -> Vec<String> {
     notes
 }
 
-/// The note on an object that turns, whose equations are those of small motions.
+/// Note for an object that turns: its equations are linearised for small motions.
 pub const UNLOADED: &str = "the object turns: the verdict is about small motions near rest, all copies together, with no hand pushing";

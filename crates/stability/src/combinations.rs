@@ -1,4 +1,4 @@
-//! The combinations of open and closed contacts, in each of which a scene is linear.
+//! Enumeration of the combinations of open and closed contacts. In each combination the scene is linear.
 
 use cohaptic_peer::Contact;
 use cohaptic_scene::Scene;
@@ -7,10 +7,10 @@ use crate::AnalysisError;
 use crate::pieces::{self, Piece};
 use crate::structure::Contacts;
 
-/// Contacts that are closed together, and for how many axes they stand.
+/// One combination of open and closed contacts, and the number of equal axes that it describes.
 #[derive(Clone, Debug)]
 pub struct Combination {
-    /// Which contacts are closed.
+    /// The contacts that are closed.
     pub contacts: Contacts,
     pub(crate) axes: usize,
     /// See [`ContactMode::motion`](crate::ContactMode::motion).
@@ -27,10 +27,14 @@ impl Combination {
     }
 }
 
-/// More combinations than this are refused.
+/// Largest number of combinations of one piece; a piece with more is refused.
 const MOST: u128 = 4096;
 
-/// Every combination of contacts in which the scene is linear.
+/// Returns every combination of contacts of a piece.
+///
+/// # Errors
+///
+/// [`AnalysisError::TooManyModes`] for more than [`MOST`] combinations.
 pub(crate) fn combinations(piece: &Piece<'_>) -> Result<Vec<Combination>, AnalysisError> {
     let Piece { scene, axes: copies, motion, absent } = piece;
     let grasping = |peer: usize| scene.peers[peer].contact == Contact::Grasp;
@@ -40,6 +44,7 @@ pub(crate) fn combinations(piece: &Piece<'_>) -> Result<Vec<Combination>, Analys
     };
     let axes = scene.axes.count();
     let walls = if scene.object.enclosure.is_some() { vec![false, true] } else { vec![false] };
+    // The exponent is limited so that the shift stays within 128 bits; 2^100 combinations are refused anyway.
     let count = (0..axes).map(|axis| pushing_along(axis).len()).fold(0_u128, |sum, pushing| sum.saturating_add(1_u128 << pushing.min(100)));
     if count.saturating_mul(walls.len() as u128) > MOST {
         return Err(AnalysisError::TooManyModes { modes: count.saturating_mul(walls.len() as u128), most: MOST });
@@ -67,7 +72,7 @@ pub(crate) fn combinations(piece: &Piece<'_>) -> Result<Vec<Combination>, Analys
                     words.push_str("; every copy at a wall");
                 }
                 let contacts = Contacts { touching, at_wall, absent: absent.clone() };
-                // Of a scene of several axes, each has combinations of its own.
+                // In a scene of several axes each axis has separate combinations, so a combination stands for its own axis only.
                 all.push(Combination { contacts, axes: copies / axes, motion: motion.clone(), words });
             }
         }
@@ -75,11 +80,11 @@ pub(crate) fn combinations(piece: &Piece<'_>) -> Result<Vec<Combination>, Analys
     Ok(all)
 }
 
-/// Returns the pieces, each with its combinations of contacts; `combines` becomes true if any has several.
+/// Returns each piece with each of its combinations of contacts. `combines` becomes true if a piece has several combinations.
 ///
 /// # Errors
 ///
-/// [`AnalysisError::TooManyModes`] for more combinations than are looked at.
+/// [`AnalysisError::TooManyModes`] if a piece has too many combinations.
 pub fn pairs<'p, 's>(pieces: &'p [Piece<'s>], combines: &mut bool) -> Result<Vec<(&'p Piece<'s>, Combination)>, AnalysisError> {
     let mut pairs = Vec::new();
     for piece in pieces {
@@ -90,7 +95,7 @@ pub fn pairs<'p, 's>(pieces: &'p [Piece<'s>], combines: &mut bool) -> Result<Vec
     Ok(pairs)
 }
 
-/// The combinations of contacts of an object that does not turn.
+/// Returns the combinations of contacts of all pieces of a scene, for the general path.
 pub(crate) fn whole(scene: &Scene) -> Result<Vec<Combination>, AnalysisError> {
     let mut all = Vec::new();
     for piece in pieces::pieces(scene, "the matrix")? {

@@ -1,24 +1,25 @@
-//! How much work an analysis is, told beforehand from its sizes.
+//! Estimates of the memory and the operations of an analysis, computed from sizes before the analysis begins.
 //!
-//! An operation is a multiplication with an addition on one number. Estimates count what the innermost loops do and leave out the rest; they are good to a
-//! factor of about three, which is enough to tell seconds from hours. What an operation takes in time is the machine's affair, not this crate's.
+//! An operation is a multiplication with an addition on one number. The estimates count the innermost loops only and are good to a factor of about three,
+//! which is enough to tell seconds from hours. The time of an operation depends on the machine and is not estimated here.
 
 use crate::rounding::real;
 
-/// The most memory that the matrices of a part may take if nobody says otherwise, 8 GiB: those of 8192 states.
+/// Default limit of the memory for the matrices of a part, 8 GiB \[bytes\]. The matrices of 8192 states need this much.
 pub const MOST_MEMORY: u64 = 8 << 30;
 
-/// How many matrices of its size the eigenvalues of a part take at once, with the enclosure of their errors; measured, of 759 and of 1509 states.
+/// Number of matrices of a part's size that are in memory at once while its eigenvalues and the bounds of their errors are computed. Measured with 759 and
+/// with 1509 states.
 const MATRICES: f64 = 16.0;
 
 /// Estimated cost of the analysis of a part, told before the analysis begins.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct PartCost {
-    /// How many states the part has: of bodies, of forces that wait to be applied, and of samples that are held or on the way.
+    /// Number of states of the part: of bodies, of forces that wait to be applied, and of samples that are held or in flight.
     pub states: usize,
-    /// The memory of its matrices \[bytes\].
+    /// Memory of the part's matrices \[bytes\].
     pub bytes: f64,
-    /// How many operations it takes.
+    /// Number of operations of the analysis of the part.
     pub operations: f64,
 }
 
@@ -31,7 +32,7 @@ impl std::fmt::Display for PartCost {
 
 const MEBIBYTE: f64 = 1_048_576.0;
 
-/// A number of bytes in words.
+/// A number of bytes, displayed with a binary unit such as GiB.
 pub(crate) struct Memory(pub(crate) f64);
 
 impl Memory {
@@ -53,74 +54,74 @@ impl std::fmt::Display for Memory {
 }
 
 impl PartCost {
-    /// The eigenvalues of a part.
+    /// Returns the cost of the eigenvalues of a part.
     #[must_use]
     pub(crate) fn of_eigenvalues(states: usize) -> Self {
         let bytes = 8.0 * MATRICES * real(states).powi(2);
         Self { states, bytes, operations: eigenvalue_operations(states) }
     }
 
-    /// The same of a part whose unit vectors are pushed, one by one, through that number of events along all axes.
+    /// Returns the cost of a part on the general path: each unit vector is pushed through `events` events along `axes` axes, then eigenvalues are found.
     pub(crate) fn of_full(states: usize, events: usize, axes: usize) -> Self {
         Self { operations: full_operations(states, events, axes), ..Self::of_eigenvalues(states) }
     }
 }
 
-/// The sizes of a frame in which a second moment is followed event by event.
+/// Sizes of a frame through which a second moment is followed event by event.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct FrameCost {
-    /// Samplings, arrivals and ticks of a frame.
+    /// Number of samplings, arrivals and ticks of a frame.
     pub(crate) events: usize,
-    /// The numbers that describe the scene at an instant of it: states, samples of the frame and of earlier ones, samples held.
+    /// Number of numbers that describe the scene at an instant of the frame: states, samples of this and of earlier frames, held samples.
     pub(crate) rows: usize,
-    /// The joint states of the chains of all links; at least 1.
+    /// Number of joint states of the chains of all links; at least 1.
     pub(crate) joint: usize,
-    /// Moments that deliveries on links that remember add up in a frame, each from one joint state to another.
+    /// Number of additions of a moment in a frame, from one joint state to another, by deliveries on links whose chance has a memory.
     pub(crate) sums: usize,
 }
 
-/// How often a frame is gone through: by the iteration, and for the bounds that are tried.
+/// Number of passes through a frame, by the iteration and for the bounds that are tried.
 pub(crate) const PASSES: f64 = 60.0;
-/// The work for each number between two passes: it is made orthogonal, twice, to those of all passes before.
+/// Operations for each number between two passes: the vector is made orthogonal, twice, to the vectors of all passes before.
 const BETWEEN: f64 = 4.0 * 0.5 * PASSES;
-/// What an event does to each of the columns of its rows.
+/// Operations of an event for each column of its rows.
 const OF_AN_EVENT: f64 = 8.0;
-/// What it takes to work out an event beforehand, the matrix of a tick above all.
+/// Operations for the preparation of an event, most of them for the matrix of a tick.
 const TO_PREPARE: f64 = 2e3;
 
 impl FrameCost {
-    /// How many operations the spectral radius takes.
+    /// Returns the number of operations for the spectral radius of the second moment.
     #[must_use]
     pub(crate) fn operations(&self) -> f64 {
         TO_PREPARE * real(self.events) + PASSES * self.of_a_pass()
     }
 
-    /// One way through the frame, and the work for all numbers at its end.
+    /// Returns the number of operations of one pass through the frame, with the work for all numbers at its end.
     pub(crate) fn of_a_pass(&self) -> f64 {
-        // Half of a symmetric moment is added up.
+        // A moment is symmetric, so that only half of its entries are added.
         let sums = 0.5 * real(self.sums) * real(self.rows).powi(2);
         OF_AN_EVENT * real(self.joint) * real(self.rows) * real(self.events) + sums + BETWEEN * self.numbers()
     }
 
-    /// How many numbers are kept at once within the frame.
+    /// Returns the number of numbers that are kept at once within the frame.
     #[must_use]
     pub(crate) fn numbers(&self) -> f64 {
         real(self.joint) * real(self.rows) * real(self.rows)
     }
 }
 
-/// The operations that it takes to push unit vectors through the events of a frame along all axes, and then to find the eigenvalues.
+/// Returns the number of operations for pushing all unit vectors through the events of a frame along all axes and finding the eigenvalues.
 #[must_use]
 pub(crate) fn full_operations(states: usize, events: usize, axes: usize) -> f64 {
     pushed_operations(events, axes) * real(states) + eigenvalue_operations(states)
 }
 
-/// Those of one of the vectors: a tick of a peer is some sixty operations an axis.
+/// Returns the number of operations for pushing one vector through a frame. A tick of a peer takes about sixty operations per axis.
 pub(crate) fn pushed_operations(events: usize, axes: usize) -> f64 {
     60.0 * real(events) * real(axes)
 }
 
-/// How many operations the eigenvalues of a matrix of that size take: 10·n³ (Golub & Van Loan 2013, Section 7.5.6).
+/// Returns the number of operations for the eigenvalues of a matrix of n rows: 10·n³ (Golub & Van Loan 2013, Section 7.5.6).
 #[must_use]
 pub(crate) fn eigenvalue_operations(size: usize) -> f64 {
     10.0 * real(size).powi(3)

@@ -10,7 +10,8 @@ use crate::Matrix;
 use crate::factorisation::cholesky;
 use crate::rounding::{UNDERFLOW, UNIT, gamma, outward, real};
 
-/// Whether every symmetric matrix within `error`, entry by entry, of this one is positive definite.
+/// Tells whether every symmetric matrix that differs from `symmetric` by at most `error`, entry by entry, is positive definite. `false` may also mean that
+/// the check could not decide.
 pub fn is_positive(symmetric: &Matrix, error: &Matrix) -> bool {
     let size = symmetric.rows();
     let diagonal: Vec<f64> = (0..size).map(|place| symmetric[(place, place)]).collect();
@@ -18,7 +19,7 @@ pub fn is_positive(symmetric: &Matrix, error: &Matrix) -> bool {
     if !(diagonal.iter().all(|entry| *entry > 0.0 && entry.is_finite()) && error.is_finite()) {
         return false;
     }
-    // D M D with D powers of two, so that the diagonal is between 1/2 and 2.
+    // The diagonal matrix D of powers of two scales M to D·M·D, whose diagonal is between 1/2 and 2.
     let halves: Vec<f64> = diagonal.iter().map(|entry| libm::ldexp(1.0, -libm::frexp(*entry).1.div_euclid(2))).collect();
     let scaled = |of: &Matrix| Matrix::from_fn(size, size, |i, j| of[(i, j)] * halves[i] * halves[j]);
     let (mut matrix, error) = (scaled(symmetric), scaled(error));

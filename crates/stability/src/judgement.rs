@@ -1,20 +1,20 @@
-//! The verdict on a scene, as the project means the word stable.
+//! The verdict on a scene, by the criterion that fits its links: the second moment if links are random, the spectral radius otherwise.
 
 use cohaptic_scene::Scene;
 
 use crate::network::chance_of;
 use crate::{Analysis, AnalysisError, Limits, MeanSquare, Method, Verdict, VerdictKind, analyse_watched, mean_square_watched};
 
-/// A verdict, and what it rests on.
+/// A verdict together with the analyses on which it rests.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Judgement {
-    /// That of the second moment where the network leaves something to chance and its moments can be followed; that of the spectral radius otherwise.
+    /// Verdict of the second moment if the network is random and its moments can be followed; verdict of the spectral radius otherwise.
     pub verdict: Verdict,
-    /// The scene with nothing left to chance. Its notes say which part of the verdict is nominal.
+    /// Analysis of the scene with nothing left to chance. If the verdict is nominal, a note of the analysis says why.
     pub analysis: Analysis,
-    /// `None` where nothing is left to chance, or where the second moment cannot be followed; then a note says why.
+    /// Result for the second moment. `None` if nothing is left to chance, or if the second moment cannot be followed; in the second case a note says why.
     pub mean_square: Option<MeanSquare>,
-    /// Random parts of the links that the verdict leaves out, in words; empty of a verdict that leaves none out.
+    /// Names of the random parts of the links that the verdict leaves out. Empty if it leaves none out.
     pub left_out: Vec<&'static str>,
 }
 
@@ -36,10 +36,10 @@ impl Judgement {
     }
 }
 
-/// How the note begins that says why a second moment is not followed.
+/// Beginning of the note that says why a second moment is not followed.
 pub const NOMINAL: &str = "the verdict is nominal: ";
 
-/// Whether a scene is stable: with links that leave something to chance, in the mean square, as long as that takes no more than `most` unknowns (see
+/// Judges whether a scene is stable. If links are random, the verdict is on the mean square, as long as the second moment has at most `most` unknowns (see
 /// [`Limits::unknowns`]).
 ///
 /// # Errors
@@ -49,17 +49,18 @@ pub fn judge(scene: &Scene, method: Method, most: usize) -> Result<Judgement, An
     judge_watched(scene, method, &Limits::of_unknowns(most))
 }
 
-/// [`judge`] within limits, watched.
+/// Like [`judge`], within limits and with a watch that can stop the computation.
 ///
 /// # Errors
 ///
-/// As for [`judge`], and [`AnalysisError::Stopped`] if the watcher ends it.
+/// As for [`judge`], and [`AnalysisError::Stopped`] if the watch stops the computation.
 pub fn judge_watched(scene: &Scene, method: Method, limits: &Limits<'_>) -> Result<Judgement, AnalysisError> {
     let mut analysis = analyse_watched(scene, method, limits.watch)?;
     if !has_chance(scene) {
         return Ok(Judgement::nominal(scene, analysis));
     }
     match mean_square_watched(scene, limits) {
+        // Any other error only means that the second moment cannot be followed; the nominal verdict remains.
         Err(AnalysisError::Stopped) => Err(AnalysisError::Stopped),
         Ok(mean_square) => Ok(Judgement { verdict: mean_square.verdict(), analysis, mean_square: Some(mean_square), left_out: Vec::new() }),
         Err(error) => {
@@ -80,7 +81,7 @@ pub fn left_out(scene: &Scene) -> Vec<&'static str> {
     if named.is_empty() { vec!["chance"] } else { named }
 }
 
-/// Whether the network of a scene leaves anything to chance.
+/// Tells whether the network of a scene leaves anything to chance: a used link or an access line of a peer.
 #[must_use]
 pub fn has_chance(scene: &Scene) -> bool {
     let lines = scene.peers.iter().flat_map(|peer| peer.uplink.iter().chain(&peer.downlink));

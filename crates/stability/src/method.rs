@@ -1,6 +1,6 @@
-//! The ways to a verdict.
+//! The methods by which a verdict can be reached.
 
-/// How a verdict is reached.
+/// Method by which a verdict is reached.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Method {
     /// Peers that are equal are treated together: see [`Part`](crate::Part). For scenes with the strategies of this workspace.
@@ -14,7 +14,7 @@ pub enum Method {
 }
 
 impl Method {
-    /// The word in JSON.
+    /// Returns the name of the method in JSON.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {

@@ -10,27 +10,27 @@ use crate::network::NominalNetwork;
 use crate::pieces::refuse_turns;
 use crate::{AnalysisError, Matrix, StateName, Unwatched};
 
-/// What one frame multiplies the relative state of a linear scene by.
+/// Matrix by which one frame multiplies the relative state of a linear scene.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Monodromy {
-    /// One row and one column for each state.
+    /// The matrix, with one row and one column per state.
     pub matrix: Matrix,
-    /// What the states are.
+    /// Names of the states, in the order of the rows and columns.
     pub states: Vec<StateName>,
-    /// How long a frame is. Frames begin at its multiples, before anything happens at that instant.
+    /// Length of a frame. Frames begin at multiples of the length, before the events of that instant.
     pub frame: Duration,
-    /// What velocities are multiplied by to be lengths \[s\].
+    /// Factor that turns velocities into lengths \[s\].
     pub time: f64,
-    /// How many rigid-body modes were left out.
+    /// Number of rigid-body modes that were left out.
     pub rigid_modes: usize,
-    /// A bound of the errors of the entries, as the largest sum over a row.
+    /// Bound of the errors of the entries, as the largest sum over a row.
     pub error: f64,
-    /// For each peer and axis, whose copy positions are relative to: the first peer's, or with waves, which carry no position, its own. `None` where the origin
-    /// is known.
+    /// Peer to whose copy positions are relative, indexed by peer and axis: the first peer, or with waves, which carry no position, the peer itself. `None`
+    /// where the origin is known.
     pub relative: Vec<Vec<Option<usize>>>,
 }
 
-/// The monodromy matrix of a scene as it begins, by the general path.
+/// Returns the monodromy matrix of a scene at its beginning, computed by the general path.
 ///
 /// # Errors
 ///
@@ -39,7 +39,7 @@ pub fn monodromy(scene: &Scene) -> Result<Monodromy, AnalysisError> {
     pushed(scene, Trust::Linear, &FromScene)
 }
 
-/// [`monodromy`] with strategies of the caller's own.
+/// Like [`monodromy`], with the caller's own strategies.
 ///
 /// # Errors
 ///

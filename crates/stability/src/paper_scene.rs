@@ -1,4 +1,4 @@
-//! The scene of most unit tests.
+//! The scene that most unit tests use.
 
 /// The paper's parameters (Rakhsha & Constantinescu 2015, Section 3): three users who all hold the object.
 pub(crate) const PAPER: &str = r#"

@@ -1,4 +1,4 @@
-//! The scenes as which a scene is analysed: itself, or the one-axis scenes into which an object that turns splits.
+//! Splits a scene into pieces that are analysed separately: the scene itself, or the scenes of one axis into which the motion of a turning object splits.
 
 use std::borrow::Cow;
 
@@ -6,20 +6,20 @@ use cohaptic_scene::{RotationPart, RotationParts, Scene};
 
 use crate::AnalysisError;
 
-/// A scene that moves apart from all others.
+/// A scene whose motion is independent of all other pieces.
 #[derive(Clone, Debug)]
 pub struct Piece<'a> {
-    /// The scene.
+    /// The scene of the piece.
     pub scene: Cow<'a, Scene>,
-    /// Along how many equal axes it moves.
+    /// Number of equal axes for which the piece stands.
     pub axes: usize,
-    /// Of an object that turns, the components of its motion; otherwise empty.
+    /// Names of the components of a turning object's motion. Empty if the object does not turn.
     pub motion: String,
-    /// The peers that have no device in it.
+    /// Whether each peer has no device in this piece, indexed by peer.
     pub absent: Vec<bool>,
 }
 
-/// The pieces of a scene; what does not split has none, and the error says why.
+/// Returns the pieces of a scene, or the reason for which the motion of its turning object does not split.
 pub(crate) fn split(scene: &Scene) -> Result<Vec<Piece<'_>>, &'static str> {
     let Some(parts) = scene.rotation_parts() else {
         let (axes, absent) = (scene.axes.count(), vec![false; scene.peers.len()]);
@@ -34,7 +34,7 @@ pub(crate) fn split(scene: &Scene) -> Result<Vec<Piece<'_>>, &'static str> {
     Ok(parts.into_iter().map(piece).collect())
 }
 
-/// Returns the pieces of a scene, for an analysis of pieces alone.
+/// Returns the pieces of a scene, for an analysis that works on pieces only. `what` names the analysis in errors.
 ///
 /// # Errors
 ///
@@ -44,16 +44,16 @@ pub fn pieces<'a>(scene: &'a Scene, what: &'static str) -> Result<Vec<Piece<'a>>
     split(scene).map_err(|why| AnalysisError::Unsplit { what, why })
 }
 
-/// Refuses a topology, for an analysis that does not follow it.
+/// Refuses a scene with a topology, for an analysis that does not follow topologies. `what` names the analysis in errors.
 ///
 /// # Errors
 ///
-/// [`AnalysisError::Topology`].
+/// [`AnalysisError::Topology`] if the scene has a topology.
 pub fn refuse_topology(scene: &Scene, what: &'static str) -> Result<(), AnalysisError> {
     if scene.topology.is_some() { Err(AnalysisError::Topology { what }) } else { Ok(()) }
 }
 
-/// Refuses an object that turns, for an analysis that does not follow it at all.
+/// Refuses a scene whose object turns, for an analysis that does not follow rotation at all.
 pub(crate) fn refuse_turns(scene: &Scene, what: &'static str) -> Result<(), AnalysisError> {
     if scene.rotation.is_some() { Err(AnalysisError::NoTurns { what }) } else { Ok(()) }
 }

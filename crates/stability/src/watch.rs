@@ -3,29 +3,29 @@
 use crate::AnalysisError;
 use crate::cost::{MOST_MEMORY, Memory, PartCost};
 
-/// Sees how far a computation is, and may end it.
+/// Observer of a computation, which learns its progress and can stop it.
 pub trait Watch: Sync {
-    /// The most memory that the matrices of a part of a scene may take \[bytes\]; what takes more is refused before it is begun.
+    /// Returns the largest memory that the matrices of a part of a scene may take \[bytes\]. A part that takes more is refused before its analysis begins.
     fn most_memory(&self) -> u64 {
         MOST_MEMORY
     }
 
-    /// A part of that cost is about to be begun.
+    /// Called before the analysis of a part of the given cost begins.
     fn begins(&self, _cost: &PartCost) {}
 
-    /// Operations that are still to be done, by an estimate that is good to a factor of about three; called before they are begun.
+    /// Called before work begins, with the estimated number of its operations. The estimate is good to a factor of about three.
     fn expects(&self, _operations: f64) {}
 
-    /// The operations that are done.
+    /// Called after work, with the number of operations of that work.
     fn done(&self, _operations: f64) {}
 
-    /// Whether the computation is to be given up; asked every few milliseconds where the computation is a loop.
+    /// Tells whether the computation must stop. Asked every few milliseconds where the computation is a loop.
     fn stops(&self) -> bool {
         false
     }
 }
 
-/// Nobody watches.
+/// A watch that ignores the progress and never stops a computation.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Unwatched;
 
@@ -34,16 +34,16 @@ impl Watch for Unwatched {}
 /// The limits of an analysis, and the watch over it.
 #[derive(Clone, Copy)]
 pub struct Limits<'a> {
-    /// More numbers of the second moment than this are refused: of many joint states, 2^17 take seconds and 2^20 minutes.
+    /// Largest number of unknowns of a second moment. With many joint states, 2^17 unknowns take seconds and 2^20 take minutes.
     pub unknowns: usize,
-    /// A second moment that takes more operations than this, by the estimate, is refused.
+    /// Largest estimated number of operations of a second moment; a second moment with more is refused.
     pub operations: f64,
-    /// Sees the progress, and may end it.
+    /// Observer of the progress, which can stop the analysis.
     pub watch: &'a dyn Watch,
 }
 
 impl Limits<'static> {
-    /// Whatever it takes, but for the unknowns; nobody watches.
+    /// Returns limits on the number of unknowns only, without a watch.
     #[must_use]
     pub const fn of_unknowns(unknowns: usize) -> Self {
         Self { unknowns, operations: f64::INFINITY, watch: &Unwatched }
@@ -57,7 +57,7 @@ impl std::fmt::Debug for Limits<'_> {
     }
 }
 
-/// A watch that does nothing but ask.
+/// A watch that asks a closure whether to stop, and ignores the progress.
 pub(crate) struct Asks<F>(pub(crate) F);
 
 impl<F: Fn() -> bool + Sync> Watch for Asks<F> {
@@ -67,11 +67,11 @@ impl<F: Fn() -> bool + Sync> Watch for Asks<F> {
 }
 
 impl PartCost {
-    /// Tells the watch of the cost before anything of that size is made.
+    /// Tells the watch the cost before memory of that size is allocated.
     ///
     /// # Errors
     ///
-    /// [`AnalysisError::TooMuchMemory`] beyond what the watch allows; [`AnalysisError::Stopped`] if it ends the analysis.
+    /// [`AnalysisError::TooMuchMemory`] beyond what the watch allows; [`AnalysisError::Stopped`] if the watch stops the analysis.
     pub(crate) fn begin(self, watch: &dyn Watch) -> Result<(), AnalysisError> {
         self.allowed(watch)?;
         watch.begins(&self);
@@ -79,7 +79,7 @@ impl PartCost {
         if watch.stops() { Err(AnalysisError::Stopped) } else { Ok(()) }
     }
 
-    /// [`PartCost::begin`] without telling the watch.
+    /// Checks the memory against the watch's limit like [`PartCost::begin`], without telling the watch the cost.
     ///
     /// # Errors
     ///
