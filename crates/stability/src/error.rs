@@ -1,4 +1,4 @@
-//! Why a scene cannot be analysed.
+//! The error of an analysis: the reasons for which a scene cannot be analysed.
 
 use std::time::Duration;
 
@@ -6,35 +6,35 @@ use cohaptic_units::print::{SixDigits, Span};
 
 use crate::cost::Memory;
 
-/// Why a scene cannot be analysed.
+/// Reason for which a scene cannot be analysed.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum AnalysisError {
-    /// Its clocks never come back to where they were.
+    /// The clocks of the scene have no common period.
     #[error("the clocks of this scene have no common period: expected ticks, updates and drifts whose multiples meet within 584 years")]
     NoFrame,
-    /// Its clocks come back to where they were, and too late.
+    /// The common period of the clocks is too long.
     #[error("everything repeats only after {}: expected clocks that meet sooner; set the drift of the clocks to 0 to analyse the scene without it", Span(*.frame))]
     FrameTooLong {
-        /// After how long.
+        /// Length of the common period.
         frame: Duration,
     },
     /// A strategy is not linear.
     #[error("the strategy of peer {peer} is not linear: twice the disturbance does not lead twice as far; simulate the scene instead")]
     NotLinear {
-        /// The first peer whose motion shows it.
+        /// Name of the first peer whose motion is not linear.
         peer: String,
     },
-    /// A strategy depends on the time, or on more than it shows.
+    /// A strategy depends on the time, or on memory that it does not show.
     #[error("from one state a strategy leads to two: expected one that shows all that it remembers (Strategy::memory) and does not look at the time")]
     Remembers,
     /// A scene of several axes has both a one-sided contact and a strategy of its own.
     #[error("a one-sided contact with a strategy that may mix axes cannot be analysed axis by axis: expected contact = \"grasp\" or \"none\"")]
     MixedAxes,
-    /// Too many combinations of contacts.
+    /// The scene has too many combinations of open and closed contacts.
     #[error("{modes} combinations of open and closed contacts: expected at most {most}")]
     TooManyModes {
-        /// How many there are.
+        /// Number of combinations.
         modes: u128,
         /// How many are looked at at most.
         most: u128,
@@ -65,19 +65,19 @@ pub enum AnalysisError {
         /// Why it does not split.
         why: &'static str,
     },
-    /// Nothing rests under what the hands do.
+    /// The object has no rest under the forces and torques of the hands.
     #[error("there is no rest under the forces of the hands: {why}; expected constant forces and torques that cancel, or arms")]
     NoRest {
         /// Why.
         why: String,
     },
-    /// No steady spin.
+    /// The object has no steady spin.
     #[error("there is no steady spin: {why}; expected hands with constant torques about one axis and without forces")]
     NoSpin {
         /// Why.
         why: String,
     },
-    /// The object turns, its motion does not split into scenes of one axis, and this analysis is of such alone.
+    /// The object turns, its motion does not split into scenes of one axis, and this analysis needs such scenes.
     #[error(
         "{what} of an object that turns is there only where its motion splits into scenes of one axis, and here it does not: {why}; \
          `cohaptic stability point`, `map` and `boundary` take all components together where nothing else is asked for"
@@ -88,13 +88,13 @@ pub enum AnalysisError {
         /// Why it does not split.
         why: &'static str,
     },
-    /// The object turns, and this analysis does not follow that.
+    /// The object turns, and this analysis does not follow rotation.
     #[error("{what} does not follow an object that turns: expected a scene without object.inertia")]
     NoTurns {
         /// The analysis.
         what: &'static str,
     },
-    /// The scene has a topology, and this analysis does not follow it.
+    /// The scene has a topology, and this analysis does not follow topologies.
     #[error(
         "{what} has every peer hear every other, and this scene has a [topology]: expected kind = \"full\"; \
          `cohaptic stability point`, `map` and `boundary` follow a topology where nothing but --prove is asked for"
@@ -109,32 +109,32 @@ pub enum AnalysisError {
         /// Why.
         why: String,
     },
-    /// Not all samples are sent.
+    /// The scene sends a sample only if the motion since the last sent sample is large enough.
     #[error(
         "with coordination.send-when a sample depends on how far things have moved, which is not linear: simulations tell whether the scene is stable, as in \
          `cohaptic check`; or expected a scene without it"
     )]
     DeadBands,
-    /// Ages of samples between clocks that drift apart.
+    /// The strategy uses the ages of samples, and the clocks drift apart.
     #[error("{strategy} coordination uses the ages of samples, which do not repeat where clocks drift apart: expected one drift for all peers")]
     AgesByClocks {
         /// Its name.
         strategy: &'static str,
     },
-    /// There is no one matrix.
+    /// The scene has several combinations of contacts, and so no single matrix.
     #[error("the scene is not linear: there is one matrix for each combination of contacts; expected contact = \"grasp\" or \"none\"")]
     SeveralModes,
-    /// More is offered to a line than it carries.
+    /// The load offered to a line exceeds its rate.
     #[error("{line} is offered {} bit/s and carries {}: its queue never settles; expected a higher rate, or fewer or rarer samples", SixDigits(*load), SixDigits(*rate))]
     Overloaded {
-        /// Which line.
+        /// Name of the line.
         line: String,
         /// The rate offered [bit/s].
         load: f64,
-        /// What it carries [bit/s].
+        /// The rate of the line [bit/s].
         rate: f64,
     },
-    /// What becomes of samples does not repeat soon enough.
+    /// The pattern of delays and losses of a link does not repeat soon enough.
     #[error(
         "what becomes of samples from {from} to {to} does not repeat within {most} of them: expected a link of constant delay, or periods that meet sooner"
     )]
@@ -146,7 +146,7 @@ pub enum AnalysisError {
         /// Within how many it should, with all other links.
         most: usize,
     },
-    /// Too many peers with access lines that do more than delay.
+    /// Too many peers have access lines that do more than delay.
     #[error("{peers} peers whose samples share access lines: expected at most {most}, or access lines that only delay")]
     TooManyShare {
         /// How many.
@@ -154,7 +154,7 @@ pub enum AnalysisError {
         /// How many are looked at at most.
         most: usize,
     },
-    /// A link does at random what has no second moment here.
+    /// A link has a random part whose second moment cannot be followed.
     #[error("the mean square of link {link} cannot be followed: {why}; simulate the scene with several seeds instead")]
     ChanceWithoutMoments {
         /// Which link, or whose access line.
@@ -173,7 +173,7 @@ pub enum AnalysisError {
         /// How many are allowed.
         most: f64,
     },
-    /// The matrices of a part take more memory than they may.
+    /// The matrices of a part take more memory than the watch allows.
     #[error(
         "a part of this scene has {states} states, most of them samples on the way, and its eigenvalues take {}: expected at most {}; a shorter delay, or a longer \
          coordination.update, has fewer states, --memory of `cohaptic stability point` and `cohaptic admittance` allows more, \
@@ -181,17 +181,17 @@ pub enum AnalysisError {
         Memory(*.bytes), Memory::of(*.most)
     )]
     TooMuchMemory {
-        /// How many states it has.
+        /// Number of states of the part.
         states: usize,
-        /// The memory of its matrices \[bytes\].
+        /// Memory of the part's matrices \[bytes\].
         bytes: f64,
         /// How much is allowed \[bytes\]: see [`Watch::most_memory`](crate::Watch::most_memory).
         most: u64,
     },
-    /// The watcher ended it.
+    /// The watch stopped the analysis.
     #[error("the analysis was stopped before its end")]
     Stopped,
-    /// The second moment takes too many numbers.
+    /// The second moment has too many unknowns.
     #[error(
         "the second moment of this scene needs {} numbers, {} joint states of its links: expected at most {most}; simulate the scene with several seeds instead",
         Many(*.unknowns), Many(*.joint)
@@ -201,12 +201,12 @@ pub enum AnalysisError {
         joint: Option<usize>,
         /// How many numbers; `None` beyond measure.
         unknowns: Option<usize>,
-        /// How many are possible.
+        /// Largest number of unknowns allowed.
         most: usize,
     },
 }
 
-/// A number that may be beyond measure, as messages say numbers.
+/// A number for messages; `None` is a number too large to be computed.
 struct Many(Option<usize>);
 
 impl std::fmt::Display for Many {

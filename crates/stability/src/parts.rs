@@ -1,4 +1,4 @@
-//! The parts of a scene that do not mix, and the spectral radius of each.
+//! Splits a linear scene into parts that move independently of one another, and computes the spectral radius of each part.
 
 use std::time::Duration;
 
@@ -11,36 +11,36 @@ use crate::spectrum::bounded_radius;
 use crate::structure::Structure;
 use crate::{AnalysisError, Matrix, Method, Radius, Watch};
 
-/// A part of a scene that moves on its own.
+/// A part of a scene that moves independently of the other parts.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Part {
-    /// What moves.
+    /// Motion that the part describes.
     pub kind: PartKind,
-    /// How many states it has.
+    /// Number of states of the part.
     pub size: usize,
-    /// How many equal ones there are, of all axes.
+    /// Number of equal parts for which this part stands, counted over all axes.
     pub copies: usize,
-    /// Its spectral radius over one frame.
+    /// Spectral radius of the part over one frame.
     pub radius: Radius,
-    /// How it was found.
+    /// Method by which the radius was found.
     pub method: Method,
 }
 
-/// What moves in a part of a scene.
+/// Motion that a part of a scene describes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum PartKind {
     /// The whole scene, by the general path.
     Whole,
-    /// What the peers of each class do on average.
+    /// The averages of the peers of each class.
     Together,
-    /// How equal peers differ from their average.
+    /// The differences of equal peers from their average.
     Apart {
         /// The first peer of the class, by its place in [`Scene::peers`].
         peer: usize,
     },
-    /// Equal peers on a graph, along one eigenvector of its averaging matrix.
+    /// The motion of equal peers on a graph along one eigenvector of the graph's averaging matrix.
     Mode {
-        /// The eigenvalue.
+        /// Eigenvalue of the averaging matrix.
         weight: f64,
     },
     /// A device that touches nothing.
@@ -51,7 +51,7 @@ pub enum PartKind {
 }
 
 impl PartKind {
-    /// The word in JSON.
+    /// Returns the name of the kind in JSON.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
@@ -63,7 +63,7 @@ impl PartKind {
         }
     }
 
-    /// The first peer that the part is about, by its place in [`Scene::peers`]; `None` where it is about all of them.
+    /// Returns the first peer that the part is about, as an index of [`Scene::peers`], or `None` if the part is about all peers.
     #[must_use]
     pub const fn peer(self) -> Option<usize> {
         match self {
@@ -79,22 +79,22 @@ impl Part {
     }
 }
 
-/// All parts of a scene.
+/// All parts of a linear scene.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Reduced {
     pub(crate) parts: Vec<Part>,
     pub(crate) rigid_modes: usize,
-    /// The states of the whole scene, rigid-body modes left out.
+    /// Number of states of the whole scene, without the rigid-body modes.
     pub(crate) dimension: usize,
     pub(crate) frame: Duration,
 }
 
-/// The largest radius of several parts.
+/// Returns the largest radius of several parts; 0 if there is no part.
 pub(crate) fn radius_of(parts: &[Part]) -> Radius {
     parts.iter().map(|part| part.radius).reduce(Radius::or).unwrap_or(Radius { value: 0.0, error: 0.0 })
 }
 
-/// Takes a scene apart along its equal axes; the watch is asked before each part and within it.
+/// Splits a scene, which stands for `axes` equal axes, into parts and computes their radii. The watch is asked before and within each part.
 pub(crate) fn reduced(structure: &Structure, scene: &Scene, axes: usize, method: Method, watch: &dyn Watch) -> Result<Reduced, AnalysisError> {
     let nodes = structure.nodes(scene);
     let quotient = structure.quotient(scene, &nodes);
@@ -123,26 +123,26 @@ pub(crate) fn reduced(structure: &Structure, scene: &Scene, axes: usize, method:
     Ok(Reduced { parts, rigid_modes: rigid_modes * axes, dimension: (dimension - rigid_modes) * axes, frame: structure.timetable.frame })
 }
 
-/// From how many rows on a matrix is replaced by the determinant, whose cost grows with the number of signals and little with their delay: between
-/// 300 and 1000, by docs/measured-stability.md.
+/// Number of rows above which a matrix is replaced by the determinant. The cost of the determinant grows with the number of signals and little with their
+/// delay. The number at which both cost the same is between 300 and 1000, by docs/measured-stability.md.
 const LARGE: usize = 500;
-/// Up to how many signals the determinant is small.
+/// Largest number of signals for which the determinant is small enough to be chosen without being asked for.
 const FEW: usize = 32;
 
-/// More signals than this have no determinant even if it is asked for: its matrix has their number of rows and columns. Clocks that drift have a frame of minutes
-/// and 50,000 signals, whose matrix would take 40 GB.
+/// Largest number of signals for which the determinant is used even if it is asked for. The determinant's matrix has a row and a column per signal. Clocks
+/// that drift can have a frame of minutes with 50,000 signals, whose matrix would take 40 GB.
 const MOST_SIGNALS: usize = 1024;
 
-/// The part of a scene that a lifted system is.
+/// Computes the radius of a lifted system and returns the part of the scene that the system describes.
 ///
 /// # Errors
 ///
-/// [`AnalysisError::TooMuchMemory`] beyond what the watch allows; [`AnalysisError::Stopped`] if it ends the analysis.
+/// [`AnalysisError::TooMuchMemory`] beyond what the watch allows; [`AnalysisError::Stopped`] if the watch stops the analysis.
 pub fn lifted_part(lifted: &Lifted<'_>, kind: PartKind, copies: usize, method: Method, watch: &dyn Watch) -> Result<Part, AnalysisError> {
     let Sizes { states: size, history, signals } = lifted.sizes();
     let asked = method == Method::Determinant && history > 0 && signals <= MOST_SIGNALS;
     let long = asked || size > LARGE && signals <= FEW;
-    // Eigenvalues cannot ask, and the frame itself may be too large a matrix.
+    // The watch cannot stop the computation of eigenvalues, and the frame itself may be too large a matrix, so the cost is checked before.
     let cost = PartCost::of_eigenvalues(size);
     if !long {
         cost.begin(watch)?;
@@ -151,7 +151,7 @@ pub fn lifted_part(lifted: &Lifted<'_>, kind: PartKind, copies: usize, method: M
     debug_assert_eq!((size, history, signals), (frame.size(), frame.history(), frame.signals()));
     let delayed = if long { frame.delayed_loop().ok() } else { None };
     if let Some(delayed) = delayed {
-        // A few rows and columns, whatever the number of states: no memory to speak of.
+        // The determinant has few rows and columns for any number of states, so its memory is negligible.
         let operations = delayed.operations();
         PartCost { states: size, bytes: 0.0, operations }.begin(watch)?;
         let radius = delayed.bounded_radius_watched(frame.error, watch).ok_or(AnalysisError::Stopped)?;
@@ -165,7 +165,8 @@ pub fn lifted_part(lifted: &Lifted<'_>, kind: PartKind, copies: usize, method: M
     Ok(Part { kind, size, copies, radius, method: Method::Reduced })
 }
 
-/// The devices of a class if there are any that touch nothing, and how many rigid-body modes they have along one axis.
+/// Returns the part of the devices of a class that touch nothing, and the number of their rigid-body modes along one axis. `None` if the class has no such
+/// devices.
 pub fn alone(structure: &Structure, scene: &Scene, class: usize, axes: usize) -> Option<(Part, usize)> {
     let members = &structure.classes[class];
     structure.has_loose_devices(class).then(|| {
@@ -177,12 +178,14 @@ pub fn alone(structure: &Structure, scene: &Scene, class: usize, axes: usize) ->
     })
 }
 
-/// A device that touches nothing: its velocity and, if an arm ties it to ground, its position.
+/// Returns the radius and the number of states of a device that touches nothing. The states are the velocity and, if an arm ties the device to ground, the
+/// position.
 pub(crate) fn loose_device(structure: &Structure, scene: &Scene, class: usize) -> (Radius, usize) {
     let place = structure.classes[class][0];
     let (short, long) = scene.peers[place].clock.spans();
     let plant = scene.device_plant(place);
-    // A frame is a number of ticks; of a clock that drifts, some are longer by a nanosecond. Their steps have the same eigenvectors.
+    // A frame is a whole number of ticks. If the clock drifts, some ticks are longer by a nanosecond; the steps of both lengths have the same eigenvectors,
+    // so that the radii are multiplied.
     let frame = structure.timetable.frame.as_nanos();
     let ticks = frame / short.as_nanos().max(1);
     let longer = if long == short { 0 } else { frame - ticks * short.as_nanos() };
@@ -195,7 +198,7 @@ pub(crate) fn loose_device(structure: &Structure, scene: &Scene, class: usize) -
     (radius, if plant.stiffness > 0.0 { 2 } else { 1 })
 }
 
-/// The spectral radius of one step of a body: of its velocity alone if nothing ties it to ground.
+/// Returns the spectral radius of one step of a body. If nothing ties the body to ground, only the velocity counts.
 fn step_radius(map: &StepMap, plant: &Plant, span: Duration) -> Radius {
     let ([[e00, e01], [e10, e11]], _) = map.coefficients();
     let rounding = 32.0 * f64::EPSILON * plant.rounding_factor(span);

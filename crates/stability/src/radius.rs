@@ -1,21 +1,21 @@
-//! A spectral radius that says how sure it is, and the verdict that follows from it.
+//! A spectral radius with a bound of its error, and the verdict that follows from the radius.
 
-/// A spectral radius with a bound of its error: the true one lies within `value ± error`.
+/// A spectral radius with a bound of its error: the true radius lies within `value ± error`.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Radius {
     /// The largest modulus of an eigenvalue, as computed; infinite where the numbers overflowed.
     pub value: f64,
-    /// How far the true radius may be from it; zero or more. Infinite where nothing is known of the radius; of an infinite value a finite error says that
-    /// the radius is above 1, however large it is.
+    /// Largest distance of the true radius from the value, zero or more. Infinite if nothing is known of the radius. An infinite value with a finite error means
+    /// that the radius is above 1 and has no known upper bound.
     pub error: f64,
 }
 
-/// What a spectral radius says.
+/// Verdict that follows from a spectral radius.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Verdict {
     /// The radius is below 1: every disturbance of the relative motion dies out.
     Stable,
-    /// The radius cannot be told from 1 within its error.
+    /// The radius cannot be distinguished from 1 within its error.
     Marginal,
     /// Nothing is known of the radius: numbers overflowed, or their errors grew so large that 1 is lost in them.
     Overflow,
@@ -24,15 +24,15 @@ pub enum Verdict {
 }
 
 impl Radius {
-    /// Nothing is known of it.
+    /// A radius of which nothing is known.
     pub(crate) const UNKNOWN: Self = Self { value: f64::INFINITY, error: f64::INFINITY };
 
-    /// A radius that is at least `low` and has no bound from above.
+    /// Returns a radius that is at least `low` and has no upper bound.
     pub(crate) fn at_least(low: f64) -> Self {
         if low > 1.0 { Self { value: f64::INFINITY, error: 0.0 } } else { Self::UNKNOWN }
     }
 
-    /// The verdict: [`Verdict::Marginal`] where the error reaches 1, [`Verdict::Overflow`] where it reaches farther than 2^52, compared with which 1 is rounding.
+    /// Returns the verdict: [`Verdict::Marginal`] if the interval includes 1, [`Verdict::Overflow`] if it also reaches 2^52, compared with which 1 is rounding.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
         let (low, high) = self.bounds();
@@ -47,21 +47,21 @@ impl Radius {
         }
     }
 
-    /// Between which numbers the radius is: from 0 to infinity where nothing is known of it.
+    /// Returns the interval in which the radius lies: from 0 to infinity if nothing is known of the radius.
     #[must_use]
     pub fn bounds(&self) -> (f64, f64) {
         let (low, high) = (self.value - self.error, self.value + self.error);
-        // A comparison with NaN is false.
+        // A comparison with NaN is false, so NaN gives the whole interval.
         (if low > 0.0 { low } else { 0.0 }, if high >= 0.0 { high } else { f64::INFINITY })
     }
 
-    /// The radius of a multiple of the matrix, for a power of two above 1.
+    /// Returns the radius of the matrix times `factor`, a power of two above 1.
     pub(crate) fn scaled(self, factor: f64) -> Self {
         let (low, high) = self.bounds();
         if (factor * high).is_finite() { Self { value: factor * self.value, error: factor * self.error } } else { Self::at_least(factor * low) }
     }
 
-    /// The radius over this number of frames: the power, with the error that follows.
+    /// Returns the radius over a number of frames: the power of this radius, with the error that follows from its interval.
     #[must_use]
     pub fn over(self, frames: u32) -> Self {
         if frames == 1 {
@@ -78,7 +78,7 @@ impl Radius {
         }
     }
 
-    /// The radius of two systems side by side: the larger, with an error that covers both.
+    /// Returns the radius of two independent systems together: the larger radius, with an error that covers both intervals.
     #[must_use]
     pub fn or(self, other: Self) -> Self {
         let ((one_low, one_high), (other_low, other_high)) = (self.bounds(), other.bounds());
@@ -92,7 +92,7 @@ impl Radius {
     }
 }
 
-/// The larger of two radii, or what both may be; without `BOUND` their errors mean nothing.
+/// Returns the larger of two radii, with `BOUND` with an error that covers both. Without `BOUND` the errors are ignored, and NaN counts as the largest.
 pub(crate) fn worse<const BOUND: bool>(one: Radius, other: Radius) -> Radius {
     if BOUND {
         one.or(other)
@@ -104,7 +104,7 @@ pub(crate) fn worse<const BOUND: bool>(one: Radius, other: Radius) -> Radius {
 }
 
 impl Verdict {
-    /// The word in JSON and CSV: `stable`, `marginal`, `overflow` or `unstable`.
+    /// Returns the name of the verdict in JSON and CSV: `stable`, `marginal`, `overflow` or `unstable`.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {

@@ -6,23 +6,23 @@ use std::fmt;
 /// a common time, forces by a compliance, waves by the root of a time over a mass, times the time between samples.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct StateName {
-    /// Whose it is, by its place in [`Scene::peers`](cohaptic_scene::Scene::peers).
+    /// Peer to which the state belongs, as an index of [`Scene::peers`](cohaptic_scene::Scene::peers).
     pub peer: usize,
-    /// What it is.
+    /// Quantity that the state is.
     pub kind: StateKind,
 }
 
-/// What a state is. `axis` is 0 for x, 1 for y, 2 for z.
+/// Quantity that a state is. `axis` is 0 for x, 1 for y, 2 for z.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[expect(missing_docs, reason = "axis is said above")]
 pub enum StateKind {
-    /// Where the device is.
+    /// Position of the device.
     DevicePosition { axis: usize },
-    /// How fast the device is.
+    /// Velocity of the device.
     DeviceVelocity { axis: usize },
-    /// Where the copy is.
+    /// Position of the copy.
     ObjectPosition { axis: usize },
-    /// How fast the copy is.
+    /// Velocity of the copy.
     ObjectVelocity { axis: usize },
     /// The coupling force that acts next, if forces are applied a tick late.
     PendingCoupling { axis: usize },
@@ -30,13 +30,13 @@ pub enum StateKind {
     PendingForce { axis: usize },
     /// A number that the strategy remembers.
     Memory { number: usize },
-    /// Where the copy was at an earlier sampling.
+    /// Position of the copy at an earlier sampling.
     SamplePosition {
         axis: usize,
-        /// 1 for the last sample before the frame, 2 for the one before.
+        /// 1 for the last sample before the frame, 2 for the sample before that.
         age: usize,
     },
-    /// How fast the copy was at an earlier sampling.
+    /// Velocity of the copy at an earlier sampling.
     SampleVelocity {
         axis: usize,
         /// See above.

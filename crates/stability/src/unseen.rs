@@ -11,8 +11,8 @@ use crate::{Matrix, StateKind, StateName};
 /// one tick in a wave. The error covers such parts.
 const NOTHING: f64 = 1e-9;
 
-/// The part of a matrix in which every state is felt by a body, and what this adds to the error of its entries. `forces`: what the states add to the
-/// forces of the frame.
+/// Returns the part of a matrix in which a body feels every state, and the error that the reduction adds to the entries. `forces` has the contribution of each
+/// state (column) to each force of the frame (row).
 pub(crate) fn felt(matrix: &Matrix, forces: &Matrix, states: &[StateName]) -> (Matrix, f64) {
     let size = matrix.rows();
     let hidden: Vec<usize> = (0..size).filter(|state| is_hidden(states[*state].kind)).collect();
@@ -21,7 +21,8 @@ pub(crate) fn felt(matrix: &Matrix, forces: &Matrix, states: &[StateName]) -> (M
     }
     let chosen = |of: &Matrix| Matrix::from_fn(of.rows(), hidden.len(), |row, column| of[(row, hidden[column])]);
     let scale = chosen(matrix).largest();
-    // The largest subspace without a force that a frame leads into itself (Wonham 1985, Section 4.3), smaller and smaller.
+    // Each round shrinks a subspace whose states cause no force, until a frame maps the subspace into itself. The result is the largest such subspace
+    // (Wonham 1985, Section 4.3).
     let forces = chosen(forces);
     let silent = null_space(&forces, forces.largest());
     let mut unfelt = Matrix::from_fn(size, hidden.len(), |row, column| if hidden[column] == row { 1.0 } else { 0.0 }).times(&silent);
@@ -36,7 +37,7 @@ pub(crate) fn felt(matrix: &Matrix, forces: &Matrix, states: &[StateName]) -> (M
         if inside.columns() == unfelt.columns() {
             let other = null_space(&unfelt.transposed(), 1.0);
             let quotient = other.transposed().times(&matrix.times(&other));
-            // The rounding of the products, and the part of the subspace that a frame leads out of it.
+            // The error has two parts: the rounding of the products, and the small part of the subspace that a frame maps out of the subspace.
             let error = f64::EPSILON * crate::rounding::real(size) * matrix.frobenius_norm() + outside.frobenius_norm();
             return (quotient, error);
         }
@@ -44,7 +45,7 @@ pub(crate) fn felt(matrix: &Matrix, forces: &Matrix, states: &[StateName]) -> (M
     }
 }
 
-/// Whether a state is felt only by what it does later.
+/// Tells whether bodies feel a state only through later forces: memory and samples, not positions, velocities or pending forces.
 const fn is_hidden(kind: StateKind) -> bool {
     match kind {
         StateKind::DevicePosition { .. }
@@ -61,7 +62,7 @@ const fn is_hidden(kind: StateKind) -> bool {
     }
 }
 
-/// An orthonormal basis, as columns, of the vectors of which a matrix makes nothing: those orthogonal to its rows.
+/// Returns an orthonormal basis, as columns, of the null space of a matrix: the vectors orthogonal to its rows.
 fn null_space(matrix: &Matrix, scale: f64) -> Matrix {
     let rows = (0..matrix.rows()).map(|row| matrix.row(row).to_vec()).collect();
     orthogonal_complement(rows, matrix.columns(), NOTHING * scale)
