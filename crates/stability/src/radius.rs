@@ -5,8 +5,8 @@
 pub struct Radius {
     /// The largest modulus of an eigenvalue, as computed; infinite where the numbers overflowed.
     pub value: f64,
-    /// Largest distance of the true radius from the value, zero or more. Infinite if nothing is known of the radius. An infinite value with a finite error means
-    /// that the radius is above 1 and has no known upper bound.
+    /// Largest distance of the true radius from the value, zero or more. Infinite if nothing is known of the radius. An infinite value with a finite error
+    /// means that the radius is above 1 and has no known upper bound.
     pub error: f64,
 }
 

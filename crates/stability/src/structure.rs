@@ -1,9 +1,9 @@
-//! A linear scene on one axis, sorted into classes of equal peers.
+//! Sorts the peers of a linear scene on one axis into classes of equal peers.
 //!
-//! Peers that are equal, over links that are equal, move in two ways that do not mix: what a class does on average, and how its members differ. The
-//! averages of all classes form one system with a node a class, the *quotient*; member i hears the others' differences as −d_i/(N−1), because the
-//! differences of a class add up to nothing, so each class of n > 1 members has n − 1 copies of one system of a single node with the weight −1/(N−1).
-//! The spectrum of the whole is that of these blocks, exactly.
+//! The motion of equal peers over equal links has two parts that do not mix: the average of the class, and the differences of the members from the average.
+//! The averages of all classes form one system with one node per class, the *quotient*. The differences of a class add up to zero, so member i hears the
+//! differences of the other members as −d_i/(N−1). Each class of n > 1 members therefore has n − 1 copies of one system of a single node with the weight
+//! −1/(N−1). The spectrum of the scene is exactly the union of the spectra of these blocks.
 
 use std::time::Duration;
 
@@ -18,43 +18,43 @@ use crate::rounding::real;
 use crate::timetable::{NodeClock, Timetable};
 use crate::{AnalysisError, Matrix};
 
-/// Which parts of a scene that is not linear are in force: one linear scene.
+/// The contacts of a scene that are closed, which make a scene with one-sided contacts linear.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Contacts {
-    /// For each peer, whether its device and its copy are coupled.
+    /// Whether the device and the copy of each peer are coupled, indexed by peer.
     pub touching: Vec<bool>,
     /// Whether every copy is at a wall of the enclosure.
     pub at_wall: bool,
-    /// For each peer, whether it has no device at all.
+    /// Whether each peer has no device at all, indexed by peer.
     pub absent: Vec<bool>,
 }
 
-/// The classes of a scene and what happens among them in a frame.
+/// The classes of equal peers of a scene, with the events and the weights between classes in a frame.
 #[derive(Clone, Debug)]
 pub struct Structure {
-    /// The members of each class, in order; classes in the order of their first members.
+    /// Members of each class in rising order, as indices of [`Scene::peers`]. The classes are in the order of their first members.
     pub classes: Vec<Vec<usize>>,
-    /// For each class, whether its members touch the object.
+    /// Whether the members of each class touch the object, indexed by class.
     pub touching: Vec<bool>,
-    /// For each class, whether its members have no device.
+    /// Whether the members of each class have no device, indexed by class.
     pub(crate) absent: Vec<bool>,
     pub(crate) at_wall: bool,
-    /// A frame of the classes' averages.
+    /// Timetable of a frame of the classes' averages, with one node per class.
     pub timetable: Timetable,
-    /// For each class of more than one member, a frame of a single node that hears itself.
+    /// Timetable of a frame of a single node that hears itself, indexed by class. `None` for a class of one member.
     pub apart: Vec<Option<Timetable>>,
     /// The weight of each class's average (column) in the target of each class (row).
     pub weights: Matrix,
-    /// Whether something ties the object to ground: an arm's stiffness, a wall, or a peer that holds forever what it began with.
+    /// Whether something ties the object to ground: an arm's stiffness, a wall, or a peer that holds its initial samples forever.
     pub tied: bool,
-    /// Whether some peer holds forever what it began with.
+    /// Whether some peer never receives a sample over a link and holds its initial sample forever.
     pub silent: bool,
-    /// How many peers there are.
+    /// Number of peers of the scene.
     pub peers: usize,
 }
 
 impl Structure {
-    /// The classes of peers that are equal in every one of the scenes, which differ in numbers only.
+    /// Sorts the peers into classes whose members are equal in each of the scenes. The scenes may differ in numbers only.
     ///
     /// # Errors
     ///
@@ -63,12 +63,13 @@ impl Structure {
         Self::with_apart(scenes, network, contacts, |_, _| false)
     }
 
-    /// The same with one peer in a class of its own, also if others are equal to it: that which is pushed moves unlike those that are not.
+    /// Like [`of`](Self::of), but puts the peer `alone` into a class of its own even if other peers equal it: a peer that is pushed does not move like its
+    /// equals.
     pub(crate) fn with_alone(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts, alone: Option<usize>) -> Result<Self, AnalysisError> {
         Self::with_apart(scenes, network, contacts, |one, other| Some(one) == alone || Some(other) == alone)
     }
 
-    /// Like [`Structure::of`], where some pairs of peers are in one class in no case.
+    /// Like [`Structure::of`], but a pair of peers for which `apart` returns true is never in one class.
     ///
     /// # Errors
     ///
@@ -85,7 +86,7 @@ impl Structure {
         Self::of_any_law(scenes, network, contacts, apart)
     }
 
-    /// Like [`Structure::with_apart`], for laws of any kind, whose nodes are the caller's.
+    /// Like [`Structure::with_apart`], for laws of any kind. The laws are not checked; the caller supplies the nodes.
     ///
     /// # Errors
     ///
@@ -99,7 +100,7 @@ impl Structure {
         Self::of_classes(scenes[0], classes(scenes, network, contacts, apart), network, contacts)
     }
 
-    /// Every peer by itself, whether or not it is like another.
+    /// Puts each peer into a class of its own, even if peers are equal.
     ///
     /// # Errors
     ///
@@ -132,33 +133,33 @@ impl Structure {
         Ok(Self { classes, touching, absent, at_wall: contacts.at_wall, timetable, apart, weights, tied, silent, peers })
     }
 
-    /// The linear form of the law of a class.
+    /// Returns the linear form of the law of a class.
     pub(crate) fn law(&self, scene: &Scene, class: usize) -> LinearLaw {
         linear_law(scene, self.classes[class][0]).expect("a structure is made only of scenes whose laws have one")
     }
 
-    /// The nodes of all classes.
+    /// Returns the nodes of all classes, indexed by class.
     pub fn nodes(&self, scene: &Scene) -> Vec<Node> {
         (0..self.classes.len()).map(|class| self.node(scene, class)).collect()
     }
 
-    /// Which numbers of a sample the laws of all classes use.
+    /// Returns the numbers of a sample that the laws of the classes use.
     pub(crate) fn sampling(&self, scene: &Scene) -> Sampling {
         Sampling::of(&self.nodes(scene))
     }
 
-    /// Whether the laws of all classes hear nothing.
+    /// Tells whether no class's law uses a sample.
     pub(crate) fn is_silent(&self, scene: &Scene) -> bool {
         let nodes = self.nodes(scene);
         Sampling::of(&nodes).is_silent(self.time(scene, &nodes))
     }
 
-    /// The node that stands for a class.
+    /// Returns the node that stands for a class.
     pub fn node(&self, scene: &Scene, class: usize) -> Node {
         self.node_with(scene, class, self.law(scene, class))
     }
 
-    /// The node that stands for a class, with a law in place of its own.
+    /// Returns the node that stands for a class, with `law` in place of the class's own law.
     pub fn node_with(&self, scene: &Scene, class: usize, law: LinearLaw) -> Node {
         let place = self.classes[class][0];
         let spec = &scene.peers[place];
@@ -173,28 +174,28 @@ impl Structure {
         }
     }
 
-    /// The largest class with more members than one, the last of those that are as large.
+    /// Returns the largest class of more than one member, the last of several equally large classes, or `None` if every class has one member.
     pub fn largest_equal(&self) -> Option<usize> {
         (0..self.classes.len()).filter(|class| self.apart[*class].is_some()).max_by_key(|class| self.classes[*class].len())
     }
 
-    /// Whether the members of a class have devices that touch nothing.
+    /// Tells whether the members of a class have devices that touch nothing.
     pub(crate) fn has_loose_devices(&self, class: usize) -> bool {
         !self.touching[class] && !self.absent[class]
     }
 
-    /// The weight with which a difference within a class comes back: −1/(N−1).
+    /// Returns the weight −1/(N−1) with which a member hears its own difference from the average through the other members.
     pub fn difference_weight(&self) -> f64 {
         -1.0 / real(self.peers - 1)
     }
 
-    /// The common time of the classes, of which those are the nodes \[s\].
+    /// Returns the common time of the classes, whose nodes are `nodes` \[s\]. Velocities times the common time are lengths.
     pub fn time(&self, scene: &Scene, nodes: &[Node]) -> f64 {
         let peers = self.classes.iter().zip(&self.touching).map(|(class, touching)| (class[0], *touching));
         common_time(scene, self.timetable.frame, nodes[0].law.held_by(), peers, self.at_wall)
     }
 
-    /// The system of the classes' averages.
+    /// Returns the system of the classes' averages.
     pub fn quotient<'a>(&'a self, scene: &Scene, nodes: &'a [Node]) -> Lifted<'a> {
         Lifted {
             nodes,
@@ -207,12 +208,12 @@ impl Structure {
     }
 }
 
-/// The linear form of the law of a peer; `None` if it has none.
+/// Returns the linear form of the law of a peer, or `None` if the law has no linear form.
 pub(crate) fn linear_law(scene: &Scene, peer: usize) -> Option<LinearLaw> {
     LinearLaw::of(&scene.law(peer)?)
 }
 
-/// Whether all peers have the same tick, offset and drift.
+/// Tells whether all peers have the same tick, offset and drift.
 pub fn has_equal_clocks(scene: &Scene) -> bool {
     scene.peers.iter().all(|spec| spec.clock == scene.peers[0].clock)
 }
@@ -230,10 +231,10 @@ pub(crate) fn has_one_drift(scene: &Scene) -> bool {
 pub fn check_laws(scene: &Scene) -> Result<(), AnalysisError> {
     let strategy = scene.coordination.strategy.name();
     let (first, peers) = (&scene.peers[0], scene.peers.len());
-    // Of equal ticks the laws are equal.
+    // Laws differ between peers only through the tick, so only peers with another tick need a check of their own.
     let other = (1..peers).filter(|peer| scene.peers[*peer].clock.tick != first.clock.tick);
     for peer in std::iter::once(0).chain(other) {
-        // What samples of energies are for is not linear.
+        // Strategies whose samples carry energies are not linear, so that no analysis follows them.
         let none = || {
             if scene.sample_kind() == SampleKind::Energy { AnalysisError::NoAnalysis { strategy } } else { AnalysisError::OtherStrategy { strategy } }
         };
@@ -245,8 +246,8 @@ pub fn check_laws(scene: &Scene) -> Result<(), AnalysisError> {
     Ok(())
 }
 
-/// What velocities are multiplied by to be lengths like positions \[s\]: the time in which the stiffest of the bodies swings by a radian, from a tick to
-/// a frame. Positions and velocities then grow into each other by about 1, and errors in either weigh the same.
+/// Returns the common time that turns velocities into lengths \[s\]: the time in which the stiffest body swings by a radian, at least a tick and at most a
+/// frame. Positions and velocities then change into each other with factors of about 1, so that errors of both have the same weight.
 pub(crate) fn common_time(scene: &Scene, frame: Duration, coordination: Gains, peers: impl Iterator<Item = (usize, bool)>, at_wall: bool) -> f64 {
     let wall = scene.object.enclosure.filter(|_| at_wall).map_or(0.0, |wall| wall.stiffness);
     let (mut fastest, mut tick) = (0.0_f64, frame);
@@ -262,7 +263,7 @@ pub(crate) fn common_time(scene: &Scene, frame: Duration, coordination: Gains, p
     (1.0 / fastest.sqrt()).clamp(tick.as_secs_f64(), frame.as_secs_f64())
 }
 
-/// The classes of peers that are equal in every one of the scenes, but for pairs that are in one class in no case.
+/// Returns the classes of peers that are equal in each of the scenes. A pair of peers for which `apart` returns true is never in one class.
 pub fn classes(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts, apart: impl Fn(usize, usize) -> bool) -> Vec<Vec<usize>> {
     let mut classes: Vec<Vec<usize>> = Vec::new();
     for place in 0..scenes[0].peers.len() {
@@ -286,12 +287,12 @@ pub fn classes(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts,
     classes
 }
 
-/// The clock of each class.
+/// Returns the clock of each class, which all members share.
 pub fn clocks(classes: &[Vec<usize>], scene: &Scene) -> Vec<NodeClock> {
     classes.iter().map(|class| NodeClock::of(scene, class[0])).collect()
 }
 
-/// How samples of each class (first) get to each class (second), but for those of a class of one to itself.
+/// Returns the links between classes as (sender, receiver, timing). A class of one member has no link to itself.
 pub fn links(classes: &[Vec<usize>], network: &NominalNetwork) -> Vec<(usize, usize, LinkTiming)> {
     let mut links = Vec::new();
     for (to, receivers) in classes.iter().enumerate() {
@@ -305,7 +306,7 @@ pub fn links(classes: &[Vec<usize>], network: &NominalNetwork) -> Vec<(usize, us
     links
 }
 
-/// Whether two peers move by the same equations.
+/// Tells whether two peers move by the same equations. The coupling is compared only if the peers touch the object.
 fn alike(one: &PeerSpec, other: &PeerSpec, touching: bool) -> bool {
     let same_clock = (one.clock, one.phase, one.compute_delay) == (other.clock, other.phase, other.compute_delay);
     let plant = |spec: &PeerSpec| spec.device.plant(spec.hand.as_ref());
@@ -314,7 +315,7 @@ fn alike(one: &PeerSpec, other: &PeerSpec, touching: bool) -> bool {
     same_clock && same_device() && (!touching || same_coupling())
 }
 
-/// Whether two copies turn by the same equations, if the object turns.
+/// Tells whether two peers turn by the same equations. True if the object does not turn.
 fn turn_alike(scene: &Scene, one: usize, other: usize, touching: bool) -> bool {
     scene.rotation.as_ref().is_none_or(|rotation| {
         let (one, other) = (&rotation.peers[one], &rotation.peers[other]);
@@ -323,7 +324,7 @@ fn turn_alike(scene: &Scene, one: usize, other: usize, touching: bool) -> bool {
     })
 }
 
-/// Splits classes until every link between two classes is the same.
+/// Splits classes into single peers until all links from one class to another have the same timing.
 fn split_by_links(mut classes: Vec<Vec<usize>>, network: &NominalNetwork) -> Vec<Vec<usize>> {
     loop {
         let uneven =
@@ -344,7 +345,7 @@ fn split_by_links(mut classes: Vec<Vec<usize>>, network: &NominalNetwork) -> Vec
     }
 }
 
-/// Whether all links from one class to another are the same.
+/// Tells whether all links from one class to another have the same timing.
 fn even(senders: &[usize], receivers: &[usize], network: &NominalNetwork) -> bool {
     let mut first: Option<&LinkTiming> = None;
     for from in senders {

@@ -1,8 +1,8 @@
-//! What happens in one frame, in which order: sampling, deliveries and ticks of every node.
+//! The events of one frame in their order: samplings, deliveries and ticks of all nodes.
 //!
-//! A frame is the span after which everything repeats: the least common multiple of all periods of sending, of drifting clocks and of the patterns of
-//! links. The order within it is that of a simulation: at one instant first samples, then deliveries, then ticks, each by place. It begins at an
-//! instant late enough that every peer has begun and everything in flight belongs to the pattern.
+//! A frame is the span after which all events repeat: the least common multiple of all periods of sending, of drifting clocks and of the patterns of links.
+//! The order of events within a frame is that of a simulation: at one instant first samplings, then deliveries, then ticks, each in the order of nodes. The
+//! frame begins so late that all peers have started and all samples in flight belong to the pattern.
 
 use std::time::Duration;
 
@@ -12,22 +12,22 @@ use cohaptic_scene::Scene;
 use crate::AnalysisError;
 use crate::network::LinkTiming;
 
-/// More events than this in a frame are refused.
+/// Largest number of ticks in a frame; a longer frame is refused.
 const MOST_EVENTS: u128 = 20_000_000;
 
-/// When a node ticks and samples.
+/// Clock of a node, with the ticks at which the node samples.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct NodeClock {
-    /// When the node ticks.
+    /// Clock of the node's ticks.
     pub clock: Clock,
-    /// It samples at ticks k with (k − phase) a multiple of `every`.
+    /// Offset of the samplings in ticks: the node samples at each tick k with (k − phase) a multiple of `every`.
     pub(crate) phase: u64,
-    /// How many ticks there are from one sample to the next.
+    /// Number of ticks from one sampling to the next.
     pub every: u64,
 }
 
 impl NodeClock {
-    /// Returns the clock of the peer in that place of a scene.
+    /// Returns the clock of a peer, whose index in the scene's peers is `place`.
     #[must_use]
     pub fn of(scene: &Scene, place: usize) -> Self {
         let spec = &scene.peers[place];
@@ -35,8 +35,8 @@ impl NodeClock {
         Self { clock: spec.clock, phase: spec.phase, every: u64::try_from(every).unwrap_or(u64::MAX) }
     }
 
-    /// At which tick of `to`, counted from its first one in the frame, the first sample of the frame is there if it takes `delay`; and the longest
-    /// delay for which it is there at that tick.
+    /// Returns the tick of `to`, counted from its first tick in the frame, at which the first sample of the frame is there after `delay`. Also returns the
+    /// longest delay with which the sample is there at the same tick.
     pub fn arrival(&self, to: &Self, delay: Duration) -> (usize, Duration) {
         let (phase, every) = (i128::from(self.phase), i128::from(self.every));
         let sent = self.instant(phase + self.first_number() * every);
@@ -45,7 +45,7 @@ impl NodeClock {
         (usize::try_from(tick - to.first_tick(0)).unwrap_or(usize::MAX), longest)
     }
 
-    /// The number of the first sample of the frame, counted from the clock's own beginning.
+    /// Returns the number of the first sample of the frame, counted from the start of the clock.
     fn first_number(&self) -> i128 {
         let (first, every) = (self.first_tick(0) - i128::from(self.phase), i128::from(self.every));
         first.div_euclid(every) + i128::from(first.rem_euclid(every) != 0)
@@ -56,14 +56,14 @@ impl NodeClock {
         u128::from(1_000_000_000_u64.saturating_add_signed(self.clock.drift.parts_per_billion()))
     }
 
-    /// The shortest whole number of periods of sending that takes a whole number of nanoseconds: how long \[ns\] and how many; `None` beyond measure.
+    /// Returns the smallest number of periods of sending that takes a whole number of nanoseconds, as (span \[ns\], number). `None` if the numbers overflow.
     fn repeats(&self) -> Option<(u128, u128)> {
         let sending = self.clock.tick.as_nanos().checked_mul(u128::from(self.every))?.checked_mul(1_000_000_000)?;
         let common = gcd(sending, self.speed());
         Some((sending / common, self.speed() / common))
     }
 
-    /// The instant of tick k \[ns\], for negative k too, as if the clock had always run.
+    /// Returns the instant of tick k \[ns\]. Negative k are allowed, as if the clock had always run.
     fn instant(&self, tick: i128) -> i128 {
         let local = i128::try_from(self.clock.tick.as_nanos()).unwrap_or(i128::MAX) * tick;
         let offset = i128::try_from(self.clock.offset.as_nanos()).unwrap_or(i128::MAX);
@@ -85,7 +85,7 @@ impl NodeClock {
         let span = i128::try_from(self.clock.tick.as_nanos()).unwrap_or(i128::MAX) * 1_000_000_000;
         let speed = i128::try_from(self.speed()).unwrap_or(i128::MAX);
         let offset = i128::try_from(self.clock.offset.as_nanos()).unwrap_or(i128::MAX);
-        // Within one tick of the answer; the rounding of instants decides.
+        // The quotient is within one tick of the answer. The loop decides by instants, which are rounded to nanoseconds.
         let mut tick = ((at - offset) * speed).div_euclid(span) - 1;
         while self.instant(tick) < at {
             tick += 1;
@@ -94,7 +94,7 @@ impl NodeClock {
     }
 }
 
-/// Something that happens.
+/// An event of a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Event {
     /// The node samples its copy and sends. Samples of this frame are numbered from 0.
@@ -102,7 +102,7 @@ pub enum Event {
         /// The node.
         node: usize,
     },
-    /// From now on `to` holds that sample of `from`: from 0 if it is of this frame, −1 is the last one of the frame before.
+    /// From now on `to` holds a sample of `from`. Samples of this frame have the numbers 0, 1, …; −1 is the last sample of the frame before.
     Deliver {
         /// The sender.
         from: usize,
@@ -117,39 +117,39 @@ pub enum Event {
         node: usize,
         /// The instant after the frame's beginning \[ns\].
         at: u64,
-        /// How long until the next tick.
+        /// Span until the node's next tick.
         span: Duration,
     },
 }
 
-/// One frame.
+/// The events of one frame, with the samples of earlier frames that the frame needs.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Timetable {
-    /// How long the frame is.
+    /// Length of the frame.
     pub frame: Duration,
-    /// What happens in it, in order.
+    /// Events of the frame, in order.
     pub events: Vec<Event>,
-    /// How many samples each node sends in a frame.
+    /// Number of samples that each node sends in a frame, indexed by node.
     pub sent: Vec<usize>,
-    /// How many samples of the frames before are still needed of each node.
+    /// Number of samples of earlier frames that are still needed, indexed by sending node.
     pub depth: Vec<usize>,
-    /// What each node holds of each other at the beginning of the frame, if it is used before the first delivery: (to, from, sample).
+    /// Samples held at the beginning of the frame and used before the first delivery, as (receiver, sender, number of the sample).
     pub held: Vec<(usize, usize, i64)>,
-    /// The clocks of the nodes.
+    /// Clocks of the nodes, indexed by node.
     pub clocks: Vec<NodeClock>,
 }
 
-/// At which events nodes use the samples that they hold.
+/// Events at which nodes use the samples that they hold.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum UseOfHeld {
-    /// When they compute forces.
+    /// Nodes use held samples when they compute forces.
     Ticks,
-    /// Also when they sample, before the deliveries of the same instant.
+    /// Nodes use held samples also when they sample, before the deliveries of the same instant.
     SamplesAndTicks,
 }
 
 impl Timetable {
-    /// No sample that is used in the frame is older \[s\].
+    /// Returns an upper bound of the age of the samples used in the frame \[s\].
     pub(crate) fn oldest(&self) -> f64 {
         let frames = self.depth.iter().zip(&self.sent).map(|(depth, sent)| depth.div_ceil((*sent).max(1)) + 1).max().unwrap_or(1);
         self.frame.as_secs_f64() * crate::rounding::real(frames)
@@ -164,7 +164,7 @@ impl Timetable {
         Self::with_use_of_held(clocks, links, UseOfHeld::Ticks)
     }
 
-    /// [`Timetable::new`] for nodes that use what they hold at those events.
+    /// Like [`Timetable::new`], for nodes that use held samples at the events `uses`.
     ///
     /// # Errors
     ///
@@ -232,7 +232,7 @@ impl Timetable {
     }
 }
 
-/// When each node samples and ticks in a frame \[ns\].
+/// Instants of the samplings and ticks of each node in a frame \[ns\].
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Instants {
     pub(crate) sends: Vec<Vec<u64>>,
@@ -286,11 +286,11 @@ impl Instants {
     }
 }
 
-/// What arrives on one link.
+/// Samples that arrive on one link in a frame.
 struct Arrivals {
-    /// The newest sample that has arrived before the frame; `None` if none ever does.
+    /// Newest sample that arrived before the frame, or `None` if no sample arrived before.
     before: Option<i64>,
-    /// What replaces it, at the receiver's ticks at or after the arrivals.
+    /// Newer samples as (instant \[ns\], number), each at the receiver's first tick at or after its arrival.
     new: Vec<(i128, i64)>,
 }
 
@@ -312,7 +312,7 @@ fn arrivals(from: &NodeClock, to: &NodeClock, timing: &LinkTiming, first: i128, 
             (delays().min().unwrap_or(0), delays().max().unwrap_or(0), pattern.len())
         }
     };
-    // Far enough back that whatever is older has been replaced by the time the frame begins.
+    // The search begins so early that all older samples have been replaced when the frame begins.
     let period = sent_at(1) - sent_at(0);
     let back = i128::try_from(longest).unwrap_or(0) / period.max(1) + 2 * i128::try_from(pattern).unwrap_or(1) + 3;
     let mut arriving: Vec<(i128, i128)> = Vec::new();
@@ -339,7 +339,7 @@ fn arrivals(from: &NodeClock, to: &NodeClock, timing: &LinkTiming, first: i128, 
             new.push((at, relative(number)));
         }
     }
-    // Of several that arrive at one tick only the newest is ever used.
+    // If several samples arrive at one tick, only the newest is used.
     let mut used: Vec<(i128, i64)> = Vec::with_capacity(new.len());
     for (at, sample) in new {
         match used.last_mut() {
@@ -350,7 +350,7 @@ fn arrivals(from: &NodeClock, to: &NodeClock, timing: &LinkTiming, first: i128, 
     Arrivals { before, new: used }
 }
 
-/// The length of the frame \[ns\].
+/// Returns the length of the frame \[ns\].
 fn frame(clocks: &[NodeClock], links: &[(usize, usize, LinkTiming)]) -> Result<u128, AnalysisError> {
     let mut frame = 1_u128;
     for clock in clocks {
