@@ -1,4 +1,4 @@
-//! Radii of one linear scene again and again, while its numbers change: nothing is kept but the radius, and nothing is computed twice.
+//! Repeated computation of the radius of one scene while its numbers change. The parts that do not depend on the numbers are prepared once.
 
 use std::borrow::Cow;
 
@@ -22,27 +22,27 @@ use crate::structure::{Contacts, Structure, linear_law};
 use crate::turning::{self, Together, mode_of};
 use crate::{AnalysisError, Matrix, Method, Radius, Unwatched};
 
-/// What about a linear scene does not change with its numbers.
+/// The parts of a linear scene that do not change with the scene's numbers, prepared for computing radii.
 #[derive(Debug)]
 pub(crate) struct SceneRadius {
-    /// Of an object that turns, the first of the components that it is about.
+    /// Name of the first component of motion, for a piece of a turning object's motion. `None` if the object does not turn or its motion does not split.
     component: Option<String>,
     kind: Kind,
 }
 
 #[derive(Debug)]
 enum Kind {
-    /// Its strategy is a law.
+    /// A scene whose strategy is a linear law.
     Parts(Box<PartsRadius>),
-    /// Only the general path follows it.
+    /// A scene that only the general path can analyse.
     Whole(Box<WholeRadius>),
-    /// Of an object that turns, whose motion does not split.
+    /// A scene with a turning object whose motion does not split.
     Turning(Box<TurningRadius>),
-    /// Of a topology.
+    /// A scene with a topology.
     Graph(Box<GraphRadius>),
 }
 
-/// A scene with a topology: its modes anew for each of its numbers.
+/// A scene with a topology. The modes are computed again for each set of numbers.
 #[derive(Debug)]
 struct GraphRadius {
     /// Every peer by itself.
@@ -59,15 +59,15 @@ impl GraphRadius {
     }
 }
 
-/// The radius of a scene with a topology.
+/// Returns the radius of a scene with a topology, unknown if the scene cannot be analysed.
 fn radius_on_topology(scene: &Scene) -> Radius {
     analyse(scene, Method::Reduced).map_or(Radius::UNKNOWN, |analysis| analysis.radius)
 }
 
-/// An object that turns.
+/// A scene with a turning object whose motion does not split.
 #[derive(Debug)]
 struct TurningRadius {
-    /// The classes of peers that are equal whatever the numbers.
+    /// Classes of peers that are equal for all numbers.
     structure: Structure,
     /// Every peer by itself.
     classes: Vec<Vec<usize>>,
@@ -93,7 +93,7 @@ impl TurningRadius {
 }
 
 impl SceneRadius {
-    /// For scenes that differ in numbers only. Whether an arm ties the object to ground may differ too.
+    /// Prepares the radius for scenes that differ only in numbers, and possibly in whether an arm ties the object to ground.
     fn new(scenes: &[&Scene], network: &NominalNetwork, combination: &Combination) -> Result<Self, AnalysisError> {
         let component = combination.motion.split(", ").next().filter(|name| !name.is_empty()).map(str::to_owned);
         let views: Vec<Cow<'_, Scene>> = scenes.iter().filter_map(|scene| view(scene, component.as_deref())).collect();
@@ -106,7 +106,7 @@ impl SceneRadius {
         Ok(Self { component, kind })
     }
 
-    /// How the second moment is followed; an error says why it is not.
+    /// Returns the way in which the second moment is followed, or an error that says why the second moment is not followed.
     pub(crate) const fn followed(&self) -> Result<&Followed, &AnalysisError> {
         match &self.kind {
             Kind::Parts(parts) => parts.followed.as_ref(),
@@ -116,7 +116,7 @@ impl SceneRadius {
         }
     }
 
-    /// The classes, by their members.
+    /// Returns the members of each class of equal peers.
     pub(crate) fn classes(&self) -> &[Vec<usize>] {
         match &self.kind {
             Kind::Parts(parts) => &parts.structure.classes,
@@ -126,7 +126,7 @@ impl SceneRadius {
         }
     }
 
-    /// The largest radius of all parts. Without `BOUND` its error is zero and means nothing.
+    /// Returns the largest radius of all parts. Without `BOUND` the error is not computed.
     pub(crate) fn radius<const BOUND: bool>(&self, scene: &Scene, scratch: &mut RadiusScratch) -> Radius {
         let Some(scene) = view(scene, self.component.as_deref()) else { return Radius::UNKNOWN };
         match &self.kind {
@@ -137,7 +137,8 @@ impl SceneRadius {
         }
     }
 
-    /// The radius of the second moment over a frame, without a bound of its error; `None` if it is not followed here, or the numbers leave their range.
+    /// Returns the radius of the second moment over a frame, without a bound of its error. Returns `None` if the second moment is not followed here, or if
+    /// numbers leave their range.
     pub(crate) fn mean_square(&self, scene: &Scene, scratch: &mut RadiusScratch) -> Option<f64> {
         match &self.kind {
             Kind::Parts(parts) => {
@@ -149,7 +150,7 @@ impl SceneRadius {
     }
 }
 
-/// The scene, or its part with that component.
+/// Returns the scene itself, or with a component the part of a turning object's motion that has the component. `None` if no part has it.
 fn view<'a>(scene: &'a Scene, component: Option<&str>) -> Option<Cow<'a, Scene>> {
     let Some(component) = component else { return Some(Cow::Borrowed(scene)) };
     let parts = scene.rotation_parts()?.ok()?.parts;
@@ -157,7 +158,7 @@ fn view<'a>(scene: &'a Scene, component: Option<&str>) -> Option<Cow<'a, Scene>>
     Some(Cow::Owned(part.scene))
 }
 
-/// A scene that the general path follows, for each of its numbers anew.
+/// A scene that the general path analyses again for each set of numbers.
 #[derive(Debug)]
 pub(crate) struct WholeRadius {
     network: NominalNetwork,
@@ -193,30 +194,30 @@ impl WholeRadius {
     }
 }
 
-/// What about a scene that is taken apart does not change with its numbers.
+/// The parts of a scene with a linear law that do not change with the scene's numbers.
 #[derive(Clone, Debug)]
 pub(crate) struct PartsRadius {
     structure: Structure,
     /// Whether something other than an arm ties the object to ground.
     tied: bool,
-    /// The frame of the averages, if it fits on the stack.
+    /// Frame of the averages, if the frame fits on the stack.
     together: Option<StackFrame>,
     apart: Vec<Option<Apart>>,
     /// −1/(N−1).
     difference: Matrix,
-    /// How the second moment is followed; an error says why it is not.
+    /// Way in which the second moment is followed, or the error that says why it is not followed.
     followed: Result<Followed, AnalysisError>,
 }
 
-/// How the members of a class differ.
+/// The system of the differences between the members of a class.
 #[derive(Clone, Debug)]
 struct Apart {
     stack: Option<StackFrame>,
-    /// How many of its frames the whole scene's takes.
+    /// Number of this system's frames in a frame of the whole scene.
     frames: u32,
 }
 
-/// Room for the computation, and the step maps of the bodies seen last.
+/// Scratch memory for computing radii, with the nodes and the step maps of the bodies of the last computation.
 #[derive(Debug, Default)]
 pub(crate) struct RadiusScratch {
     nodes: Vec<Node>,
@@ -227,18 +228,18 @@ pub(crate) struct RadiusScratch {
     equal: EqualScratch,
 }
 
-/// What the step maps and the linear form of the law of a class were computed from.
+/// Inputs from which the step maps and the linear law of a class were computed, for detecting a change.
 #[derive(Clone, Debug)]
 struct Bodies {
     object: Plant,
     device: Plant,
     law: Option<BuiltIn>,
-    /// Of a device that touches nothing.
+    /// Radius of the device, if the device touches nothing.
     loose: Option<Radius>,
 }
 
 impl RadiusScratch {
-    /// The matrix of the averages that was computed last.
+    /// Returns the matrix of the averages that was computed last.
     #[cfg(test)]
     pub(crate) fn together(&self) -> &Matrix {
         &self.together
@@ -247,7 +248,7 @@ impl RadiusScratch {
 
 impl PartsRadius {
     fn new(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts) -> Result<Self, AnalysisError> {
-        // Without arms, to see what else ties.
+        // A scene without arms is added, so that `structure.tied` tells whether something other than an arm ties the object.
         let mut armless = scenes[0].clone();
         for spec in &mut armless.peers {
             spec.hand = None;
@@ -263,7 +264,7 @@ impl PartsRadius {
         });
         let apart = apart.collect();
         let difference = Matrix::from_fn(1, 1, |_, _| structure.difference_weight());
-        // Each radius is that of a matrix: its size is the same for all numbers.
+        // Each radius needs a matrix whose size is the same for all numbers, so the memory is checked once.
         let nodes = structure.nodes(scenes[0]);
         PartCost::of_eigenvalues(structure.quotient(scenes[0], &nodes).sizes().states).allowed(&Unwatched)?;
         let followed = Followed::of(scenes[0], network, &structure);
@@ -298,14 +299,14 @@ impl PartsRadius {
         let RadiusScratch { nodes, bodies, equal, .. } = &mut *scratch;
         let quotient = self.quotient(scene, nodes);
         if quotient.sampling.is_silent(quotient.time) {
-            // Nothing is done with what arrives.
+            // The laws use no arriving sample, so random links have no effect on the bodies.
             return Some(square(self, scratch).max(*held));
         }
         let found = frame.radius(&quotient, equal)?.max(*held);
         Some(bodies.iter().filter_map(|bodies| bodies.loose).fold(found, |found, loose| found.max(loose.value.powi(2))))
     }
 
-    /// The system of the classes' averages with the numbers of that scene.
+    /// Returns the system of the classes' averages with the numbers of `scene`.
     fn quotient<'a>(&'a self, scene: &Scene, nodes: &'a [Node]) -> Lifted<'a> {
         let structure = &self.structure;
         let armed = |class: usize| structure.touching[class] && scene.device_plant(self.representative(class)).stiffness > 0.0;
@@ -313,12 +314,12 @@ impl PartsRadius {
         Lifted { tied, ..structure.quotient(scene, nodes) }
     }
 
-    /// The peer that stands for a class.
+    /// Returns the peer that stands for a class: its first member.
     fn representative(&self, class: usize) -> usize {
         self.structure.classes[class][0]
     }
 
-    /// Brings the nodes up to date; step maps only where a body has changed.
+    /// Updates the nodes in `scratch` to the numbers of `scene`. Step maps are computed again only for bodies that changed.
     fn refresh(&self, scene: &Scene, scratch: &mut RadiusScratch) {
         let classes = self.structure.classes.len();
         let loose = |class: usize| self.structure.has_loose_devices(class).then(|| loose_device(&self.structure, scene, class).0);
@@ -359,7 +360,7 @@ impl PartsRadius {
     }
 }
 
-/// The radius of a lifted system.
+/// Returns the radius of a lifted system, whose monodromy matrix is written to `matrix`.
 fn part<const BOUND: bool>(stack: Option<&StackFrame>, lifted: &Lifted<'_>, matrix: &mut Matrix, workspace: &mut Workspace) -> Radius {
     let error = match (stack, StackNode::of(lifted)) {
         (Some(stack), Some(node)) => stack.monodromy::<BOUND>(node, matrix, || lifted.error()),
@@ -372,7 +373,7 @@ fn part<const BOUND: bool>(stack: Option<&StackFrame>, lifted: &Lifted<'_>, matr
     if BOUND { workspace.bounded_radius(matrix, error) } else { Radius { value: workspace.radius(matrix), error: 0.0 } }
 }
 
-/// The linear scenes that a scene falls into, one for each combination of contacts.
+/// Prepares the radii of a scene: one per combination of contacts and piece. `scenes` are the same scene with different numbers.
 pub(crate) fn scene_radii(scenes: &[&Scene]) -> Result<Vec<SceneRadius>, AnalysisError> {
     if scenes[0].topology.is_some() {
         return Ok(vec![SceneRadius { component: None, kind: Kind::Graph(Box::new(GraphRadius::new(scenes[0])?)) }]);
@@ -385,7 +386,7 @@ pub(crate) fn scene_radii(scenes: &[&Scene]) -> Result<Vec<SceneRadius>, Analysi
             return Ok(vec![SceneRadius { component: None, kind: Kind::Turning(Box::new(turning)) }]);
         }
     };
-    // The general path leaves walls out.
+    // The general path cannot follow walls, so without a law the combinations at a wall are left out.
     let is_law = linear_law(scenes[0], 0).is_some();
     let combinations = pairs(&pieces, &mut false)?.into_iter().map(|(_, combination)| combination);
     let followed = combinations.filter(|combination| is_law || !combination.contacts.at_wall);
