@@ -1,6 +1,6 @@
 //! The question that a verdict answers: one place words it, so that no answer calls a verdict by another name.
 
-/// By which radius the scenes of a family are judged: one for all of them, so that their radii can be compared and drawn as one map.
+/// Radius by which the scenes of a family are judged. All scenes of a family have the same criterion, so that their radii can be compared in one map.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Criterion {
     /// The spectral radius over a frame, of scenes that leave nothing to chance.
@@ -11,7 +11,7 @@ pub enum Criterion {
 }
 
 impl Criterion {
-    /// The word in JSON and CSV: `spectral-radius` or `mean-square`.
+    /// Returns the name of the criterion in JSON and CSV: `spectral-radius` or `mean-square`.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
@@ -87,7 +87,7 @@ impl VerdictKind {
     }
 }
 
-/// The numbers of things that were judged, by kind.
+/// Numbers of judged scenes, indexed by kind of verdict.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Kinds([usize; 3]);
 
