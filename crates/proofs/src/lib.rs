@@ -1,8 +1,9 @@
-//! Proofs about the stability of scenes: verdicts that hold for sets of scenes, and whatever the network or the contacts do.
+//! Proofs about the stability of scenes: verdicts that hold for whole sets of scenes, and for every behaviour of the network and of the contacts.
 //!
-//! Use this crate if you ask from Rust for more than the verdict on one scene, which [`cohaptic_stability`] gives: whether every scene of a box of gains and delays is
-//! stable, or of every number of peers; how fast a disturbance can grow under any losses in a row; whether contacts that open and close do harm. Each finding is
-//! checked with bounds of all rounding errors, and certificates hold the numbers by which a reader can check it too.
+//! Use this crate if you ask from Rust for more than the verdict on one scene, which [`cohaptic_stability`] gives: whether every scene of a box of gains and
+//! delays is stable, or the scene with every number of peers; how fast a disturbance can grow under any losses in a row; whether contacts that open and close
+//! make a stable scene unstable. Each finding is checked with bounds of all rounding errors. Certificates hold the numbers by which a reader can repeat the
+//! check.
 //!
 //! ```
 //! use cohaptic_proofs::{Guarantee, prove_every_number};

@@ -1,12 +1,13 @@
-//! The search for shapes and multipliers by the method of barriers. Nothing here has to be right: what it finds is checked ([`super::verified`]).
+//! The search for shapes and multipliers by the method of barriers. No proof depends on the search, because [`super::verified`] checks each solution.
 //!
-//! The margin t of −M(V, m) >= t·I is made as large as it goes, with V > 0, m > 0 and a bound of the sum of all, from the minimum of
+//! The search maximises the margin t of −M(V, m) >= t·I, with V > 0, m > 0 and a bound R of the sum of all traces and multipliers, by minimising
 //!
 //! ```text
 //! −η·t − Σ ln det(−M − t·I) − Σ ln det V − Σ ln m − ln(R − Σ tr V − Σ m)
 //! ```
 //!
-//! for a growing η (Nesterov & Nemirovskii 1994). With W = S⁻¹, the derivatives of −ln det S along sums of (u·vᵀ + v·uᵀ)/2 take nothing but the numbers uᵀWv.
+//! for a growing η (Nesterov & Nemirovskii 1994). With W = S⁻¹, the derivatives of −ln det S along sums of (u·vᵀ + v·uᵀ)/2 are sums of products of the numbers
+//! uᵀWv. Multipliers of any sign (`free`) enter M alone.
 
 use cohaptic_stability::numerics::{cholesky, real, triangle_inverse};
 use cohaptic_stability::{Matrix, Watch};
@@ -14,23 +15,25 @@ use cohaptic_stability::{Matrix, Watch};
 use super::parts::{Inequality, Measured, Part, Solution};
 use crate::newton::{Barrier, Shortest, Steps, centre, log_determinant, upper};
 
-/// By how much η grows from one centre to the next.
+/// Factor by which η grows from one centre to the next.
 const STEP: f64 = 4.0;
 const STEPS: Steps = Steps { most: 40, centred: 0.2, shortest: Shortest::Share(1e-6) };
-/// Once the margin can be no more than this, for shapes of about 1, there is none.
+/// Upper bound of the margin below which the search ends, for shapes with entries of about 1.
 const NOTHING: f64 = 1e-7;
 
-/// Searches until `checked` accepts; `None` if the watch ends it or nothing is left to find.
+/// Searches until `checked` accepts a solution, and returns the solution with the result of `checked`; `None` if the watch ends the search or no margin above
+/// zero can be expected.
 pub(crate) fn search<T>(inequality: &Inequality, watch: &dyn Watch, checked: impl Fn(&Solution) -> Option<T>) -> Option<(Solution, T)> {
     let mut barrier = Margin::new(inequality);
     let mut point = barrier.start();
     while barrier.parameter / barrier.pull > NOTHING {
-        // Rounding may get the better of a centre; the next is looked for from where that left it.
+        // Rounding may stop the steps before the centre (`is_stuck`). The next centre is then searched from the last point, which lies within the domain.
         point = centre(&barrier, point, STEPS, watch)?.point;
         if point.margin > 0.0 {
             if let Some(found) = checked(&point.solution) {
                 return Some((point.solution, found));
             }
+        // The largest margin is at most `parameter / pull` above the margin of a centre.
         } else if point.margin + barrier.parameter / barrier.pull < NOTHING {
             return None;
         }
@@ -39,28 +42,30 @@ pub(crate) fn search<T>(inequality: &Inequality, watch: &dyn Watch, checked: imp
     None
 }
 
-/// Where the search is.
+/// A point of the search: values of all unknowns.
 #[derive(Clone, Debug)]
 struct Point {
     solution: Solution,
     margin: f64,
 }
 
-/// A symmetric matrix as a sum of products of rows, which an unknown multiplies: weight, and the two rows.
+/// The derivative of M with respect to one unknown: a sum of weight·(u·vᵀ + v·uᵀ)/2. Each entry holds the weight and the indices of the rows u and v.
 type Slope = Vec<(f64, usize, usize)>;
 
-/// The margin, with a barrier for all that must not be below zero.
+/// The margin times −η, with a barrier for each matrix and number that must be above zero.
 struct Margin<'a> {
     inequality: &'a Inequality,
-    /// For each part its unknowns: their number among all, and how M depends on them.
+    /// Indexed by part: each unknown on which the part's M depends, by the index of the unknown, with the derivative of M.
     slopes: Vec<Vec<(usize, Slope)>>,
-    /// The number of the first unknown of each shape; of the first multiplier; and of all, the margin last.
+    /// Index of the first unknown of each shape.
     first: Vec<usize>,
+    /// Index of the unknown of the first multiplier.
     multipliers: usize,
+    /// Number of unknowns; the margin is the last unknown.
     unknowns: usize,
     /// R.
     bound: f64,
-    /// By how much the optimum may be better than a centre, times η.
+    /// Upper bound of η times the amount by which the largest margin exceeds the margin of a centre.
     parameter: f64,
     /// η.
     pull: f64,
@@ -77,6 +82,7 @@ impl<'a> Margin<'a> {
         let multipliers = next;
         let slopes = inequality.parts.iter().map(|part| {
             let mut all: Vec<(usize, Slope)> = Vec::new();
+            // An unknown can occur in the form before the step, in the form after it and in products; M has one slope per unknown.
             let mut add = |number: usize, term: (f64, usize, usize)| match all.iter_mut().find(|(own, _)| *own == number) {
                 Some((_, slope)) => slope.push(term),
                 None => all.push((number, vec![term])),
@@ -100,6 +106,8 @@ impl<'a> Margin<'a> {
         Self { inequality, slopes, first, multipliers, unknowns, bound: 2.0 * real(shapes + signed), parameter: real(sizes + signed + 1), pull: 1.0 }
     }
 
+    /// Returns a point of the domain: identities as shapes, signed multipliers of one and free multipliers of zero, whose sum is half of R, with a margin below
+    /// every eigenvalue of −M.
     fn start(&self) -> Point {
         let shapes = self.inequality.shapes.iter().map(|size| Matrix::identity(*size)).collect();
         let multipliers = self.inequality.free.iter().map(|free| f64::from(u8::from(!free))).collect();
@@ -108,7 +116,7 @@ impl<'a> Margin<'a> {
         Point { solution, margin: -1.0 - largest }
     }
 
-    /// M of a part.
+    /// Returns M of the part with that index.
     fn middle(&self, number: usize, solution: &Solution) -> Matrix {
         let part = &self.inequality.parts[number];
         let measured = |of: &Measured| {
@@ -129,21 +137,21 @@ impl<'a> Margin<'a> {
         middle
     }
 
-    /// The triangle R of −M − t·I = RᵀR.
+    /// Returns the triangle R of −M − t·I = RᵀR, or `None` if the matrix is not positive definite.
     fn slack(&self, part: usize, point: &Point) -> Option<Matrix> {
         let mut slack = self.middle(part, &point.solution).scaled(-1.0);
         (0..slack.rows()).for_each(|place| slack[(place, place)] -= point.margin);
         cholesky(&slack)
     }
 
-    /// R less the sum of all.
+    /// Returns the bound R less the sum of all traces and of all multipliers that must not be below zero.
     fn left(&self, solution: &Solution) -> f64 {
         let trace = |shape: &Matrix| (0..shape.rows()).map(|place| shape[(place, place)]).sum::<f64>();
         let signed = self.inequality.free.iter().zip(&solution.multipliers).filter(|(free, _)| !**free).map(|(_, multiplier)| multiplier);
         self.bound - solution.shapes.iter().map(trace).sum::<f64>() - signed.sum::<f64>()
     }
 
-    /// Adds what −ln det(−M − t·I) of a part has, with the inverse of its triangle.
+    /// Adds the derivatives of −ln det(−M − t·I) of a part to `gradient` and `hessian`; `inverse` is the inverse of the triangle of −M − t·I.
     fn of_slack(&self, number: usize, part: &Part, inverse: &Matrix, gradient: &mut [f64], hessian: &mut Matrix) {
         let last = self.unknowns - 1;
         // With R⁻¹ = Z, uᵀWv is the product of Zᵀu and Zᵀv.
@@ -186,6 +194,7 @@ impl Barrier for Margin<'_> {
             value -= log_determinant(&cholesky(shape)?);
         }
         let signed = self.inequality.free.iter().zip(&point.solution.multipliers).filter(|(free, _)| !**free).map(|(_, multiplier)| *multiplier);
+        // A sum of traces and multipliers without a bound would let the margin grow for ever, because M is linear in all of them.
         for positive in signed.chain([self.left(&point.solution)]) {
             // Written so that NaN fails.
             if !(positive > 0.0 && positive.is_finite()) {
@@ -219,6 +228,7 @@ impl Barrier for Margin<'_> {
             }
         }
         let left = self.left(&point.solution);
+        // The unknowns on which `left` depends: the diagonals of shapes and the multipliers that must not be below zero.
         let mut summed: Vec<usize> = Vec::new();
         for (shape, first) in point.solution.shapes.iter().zip(&self.first) {
             summed.extend(upper(shape.rows()).enumerate().filter(|(_, (i, j))| i == j).map(|(number, _)| first + number));
@@ -238,7 +248,7 @@ impl Barrier for Margin<'_> {
                 hessian[(*one, *other)] += 1.0 / (left * left);
             }
         }
-        // A multiplier that nothing depends on has no second derivative.
+        // A multiplier on which no part depends has no second derivative, and the Hessian would not be positive definite.
         for place in 0..self.unknowns {
             hessian[(place, place)] += 1e-13 * (1.0 + hessian[(place, place)]);
         }

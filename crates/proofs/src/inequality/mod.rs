@@ -1,12 +1,14 @@
-//! Matrix inequalities: shapes of quadratic forms, and multipliers of products, which are searched and then checked with bounds of all rounding errors.
+//! Matrix inequalities whose unknowns are shapes of quadratic forms and multipliers of products. One module searches a solution, another checks the solution
+//! with bounds of all rounding errors.
 //!
-//! Each part asks for shapes V and multipliers m with
+//! Each part of an inequality asks for shapes V and multipliers m with
 //!
 //! ```text
 //! M(V, m) = Z₁ᵀ·V_after·Z₁ − Z₀ᵀ·V_before·Z₀ + Σ m·w·(u·vᵀ + v·uᵀ)/2  < 0
 //! ```
 //!
-//! in which Z₀ and Z₁ give what shapes measure before and after a step, as rows over the same unknowns, and u and v the factors of a product.
+//! in which the rows of Z₀ and Z₁ give the states that the shapes measure before and after a step, over the same unknowns. The rows u and v are the factors of
+//! a product, and w is the weight of the product.
 
 mod barrier;
 mod parts;

@@ -1,4 +1,4 @@
-//! The parts of matrix inequalities.
+//! The data of matrix inequalities: rows, products, parts and solutions.
 
 use cohaptic_stability::Matrix;
 
@@ -6,14 +6,16 @@ use cohaptic_stability::Matrix;
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Row {
     pub(crate) entries: Vec<f64>,
-    /// A bound of the sum of the sizes of its entries' errors.
+    /// Upper bound of the sum of the absolute errors of the row's entries.
     pub(crate) error: f64,
 }
 
-/// A product of two rows, of which a multiplier is taken times a weight.
+/// A product of two rows, which enters the inequality with the factor multiplier·weight.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Product {
+    /// Indices of the two rows in [`Part::rows`].
     pub(crate) factors: [usize; 2],
+    /// Index of the multiplier in [`Solution::multipliers`].
     pub(crate) multiplier: usize,
     pub(crate) weight: f64,
 }
@@ -21,47 +23,49 @@ pub(crate) struct Product {
 /// The rows that a shape measures.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Measured {
+    /// Index of the shape in [`Solution::shapes`].
     pub(crate) shape: usize,
+    /// Indices of the rows in [`Part::rows`], one per row of the shape.
     pub(crate) rows: Vec<usize>,
 }
 
-/// One inequality.
+/// One matrix inequality M < 0.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Part {
     pub(crate) rows: Vec<Row>,
     pub(crate) before: Measured,
     pub(crate) after: Measured,
     pub(crate) products: Vec<Product>,
-    /// The number of unknowns.
+    /// Number of entries of every row.
     pub(crate) unknowns: usize,
 }
 
 impl Part {
-    /// Nothing yet, from one shape to another.
+    /// Returns a part without rows and products, with the indices of the shapes before and after the step.
     pub(crate) const fn empty(before: usize, after: usize) -> Self {
         let before = Measured { shape: before, rows: Vec::new() };
         let after = Measured { shape: after, rows: Vec::new() };
         Self { rows: Vec::new(), before, after, products: Vec::new(), unknowns: 0 }
     }
 
-    /// Adds a row; answers its number.
+    /// Adds a row and returns the index of the row.
     pub(crate) fn put(&mut self, row: Row) -> usize {
         self.rows.push(row);
         self.rows.len() - 1
     }
 }
 
-/// All parts, which share shapes and multipliers.
+/// All parts of an inequality, with common shapes and multipliers.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Inequality {
-    /// The number of rows of each shape.
+    /// Number of rows of each shape.
     pub(crate) shapes: Vec<usize>,
     pub(crate) parts: Vec<Part>,
-    /// For each multiplier, whether it may be below zero.
+    /// Whether a multiplier may be below zero, indexed by multiplier.
     pub(crate) free: Vec<bool>,
 }
 
-/// Shapes and multipliers.
+/// Values of all shapes and multipliers.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Solution {
     pub(crate) shapes: Vec<Matrix>,

@@ -1,19 +1,20 @@
 //! The check of shapes and multipliers, which does not depend on how they were found.
 //!
-//! M is computed again with a bound of every entry's error: of rounding, and of the errors that rows of a frame have. It is shown below zero, and shapes above, by a
-//! factorisation that accounts for its own rounding ([`is_positive`]).
+//! The check computes M again with a bound of the error of every entry. The bound covers the rounding of the computation and the errors of the rows. A
+//! factorisation that accounts for its own rounding ([`is_positive`]) then shows M below zero and the shapes above zero.
 
 use cohaptic_stability::Matrix;
 use cohaptic_stability::numerics::{UNDERFLOW, gamma, is_positive, outward, real};
 
 use super::parts::{Inequality, Measured, Part, Row, Solution};
 
-/// The least factor, of those looked at, by which the shapes are shown to shrink in a step; `None` if they are not shown to shrink at all.
+/// Returns a factor, at most 1, by which the norms of the shapes are shown to shrink in each step, found by halving; `None` if the inequality is not shown to
+/// hold.
 pub(crate) fn rate(inequality: &Inequality, solution: &Solution) -> Option<f64> {
     if !holds(inequality, solution) {
         return None;
     }
-    // Halving: `square` shrinks, `less` is not shown to.
+    // Halving: the inequality is shown to hold with `square`, and is not shown to hold with `less`.
     let (mut less, mut square) = (0.0, 1.0);
     for _ in 0..30 {
         let middle = 0.5 * (less + square);
@@ -23,18 +24,18 @@ pub(crate) fn rate(inequality: &Inequality, solution: &Solution) -> Option<f64> 
             less = middle;
         }
     }
-    // At least the root, rounded up.
+    // The forms shrink by `square`, hence the norms by the root, which is rounded up.
     Some(outward(f64::sqrt(square)).min(1.0))
 }
 
-/// Whether every part is shown to hold, with shapes that are positive definite and multipliers of the sign that they must have.
+/// Whether every part is shown to hold, with positive definite shapes, and with multipliers of at least zero except where `free` allows any sign.
 pub(crate) fn holds(inequality: &Inequality, solution: &Solution) -> bool {
     let signs = inequality.free.iter().zip(&solution.multipliers).all(|(free, multiplier)| *free || *multiplier >= 0.0);
     let is_shape = |shape: &Matrix| *shape == shape.transposed() && is_positive(shape, &Matrix::zeros(shape.rows(), shape.columns()));
     signs && solution.shapes.iter().all(is_shape) && shrinks(inequality, solution, 1.0)
 }
 
-/// Whether every part is shown to hold with the forms before a step multiplied by `square`.
+/// Whether every part is shown to hold with the quadratic forms before a step multiplied by `square`.
 fn shrinks(inequality: &Inequality, solution: &Solution, square: f64) -> bool {
     inequality.parts.iter().all(|part| {
         let (difference, error) = difference(part, solution, square);
@@ -42,7 +43,7 @@ fn shrinks(inequality: &Inequality, solution: &Solution, square: f64) -> bool {
     })
 }
 
-/// square·Z₀ᵀVZ₀ − Z₁ᵀVZ₁ − Σ m·w·(u·vᵀ + v·uᵀ)/2, and a bound of the error of each entry.
+/// Returns square·Z₀ᵀVZ₀ − Z₁ᵀVZ₁ − Σ m·w·(u·vᵀ + v·uᵀ)/2, and a bound of the error of each entry.
 fn difference(part: &Part, solution: &Solution, square: f64) -> (Matrix, Matrix) {
     let size = part.unknowns;
     let stacked = |of: &Measured, entry: fn(f64, f64) -> f64| {
@@ -55,7 +56,7 @@ fn difference(part: &Part, solution: &Solution, square: f64) -> (Matrix, Matrix)
         let rows = stacked(of, |entry, _| entry);
         rows.transposed().times(&solution.shapes[of.shape].times(&rows))
     };
-    // What the sizes of the terms are at most, and by how much of that the errors of rows may change them.
+    // Returns by how much the errors of rows may change a form, and an upper bound of the sizes of the form's terms.
     let reach = |of: &Measured| {
         let shape = &solution.shapes[of.shape];
         let sizes = Matrix::from_fn(shape.rows(), shape.columns(), |i, j| shape[(i, j)].abs());
@@ -84,13 +85,14 @@ fn difference(part: &Part, solution: &Solution, square: f64) -> (Matrix, Matrix)
             }
         }
     }
-    // Two sums of `rows` products each, the sum over products, and what the subtractions of `shift` lose.
+    // γ counts the operations of one entry: two sums of `rows` products each, the sum over products, and the subtractions of `shift`, which cancel.
     let share = gamma(2 * part.after.rows.len().max(part.before.rows.len()) + part.products.len() + 16);
     let error = Matrix::from_fn(size, size, |i, j| {
         let rounded = 4.0 * share * all[(i.min(j), i.max(j))].max(all[(i.max(j), i.min(j))]);
         let moved = shift[(i, j)].max(shift[(j, i)]);
         outward(2.0 * moved + rounded) + real(size * part.rows.len()) * UNDERFLOW
     });
+    // The two triangles of `sum` round differently. The upper triangle is mirrored; `error` has the larger bound of both triangles.
     let symmetric = Matrix::from_fn(size, size, |i, j| sum[(i.min(j), i.max(j))]);
     (symmetric, error)
 }
