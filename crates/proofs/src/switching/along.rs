@@ -11,6 +11,7 @@ use super::error::SwitchingError;
 pub(super) struct Along<'a> {
     pub(super) scene: &'a Scene,
     axis: usize,
+    /// Contacts that hold whatever opens and closes, and the pushes along the axis; walls are left open.
     pub(super) contacts: Contacts,
 }
 
@@ -26,7 +27,7 @@ impl<'a> Along<'a> {
         Self { scene, axis, contacts: Contacts { touching, at_wall: false, absent: piece.absent.clone() } }
     }
 
-    /// The direction in which a peer pushes.
+    /// Whether a peer pushes along the axis to larger positions (`true`) or to smaller positions (`false`); `None` if the peer does not push along the axis.
     pub(super) fn pushes(&self, peer: usize) -> Option<bool> {
         match self.scene.peers[peer].contact {
             ContactKind::Push(direction) if direction.axis == self.axis => Some(direction.positive),
@@ -34,7 +35,8 @@ impl<'a> Along<'a> {
         }
     }
 
-    /// Ties the structure by the arms alone that hold on to the object whatever happens.
+    /// Sets whether the structure is tied to ground: if the structure is silent, or if a peer whose arm has a stiffness grasps the object. The arm of a peer
+    /// that pushes does not tie the object, because that contact can open.
     pub(super) fn tied(&self, mut structure: Structure) -> Structure {
         let holds = |class: &Vec<usize>| {
             self.contacts.touching[class[0]] && self.pushes(class[0]).is_none() && self.scene.device_plant(class[0]).stiffness > 0.0
@@ -43,7 +45,11 @@ impl<'a> Along<'a> {
         structure
     }
 
-    /// The contacts of a class, which is that node.
+    /// Returns the contacts of one member of a class, at the node with the index `node`: the push, and the walls if `walls`.
+    ///
+    /// # Errors
+    ///
+    /// [`SwitchingError::NoSpring`] if the stiffness of a contact is not above zero.
     pub(super) fn of_class(&self, structure: &Structure, class: usize, node: usize, walls: bool) -> Result<Vec<Contact>, SwitchingError> {
         let peer = structure.classes[class][0];
         let mut all = Vec::new();

@@ -1,4 +1,4 @@
-//! The part of a scene along an axis that is looked at.
+//! The frames, groups of contacts and stable parts of a scene along one axis, from which the inequality and the certificate are made.
 
 use cohaptic_stability::frames::{Lifted, Node, Sampling, Structure, Timetable, lifted_part};
 use cohaptic_stability::numerics::real;
@@ -11,22 +11,25 @@ use super::products::{Group, PartFrame, inequality};
 use crate::boxes::{PartCertificate, stable_difference};
 use crate::inequality::Inequality;
 
-/// The most rows of an inequality, which takes some ten seconds.
+/// Largest number of rows of an inequality. The search for an inequality of this size takes some ten seconds.
 const MOST_ROWS: usize = 150;
 
-/// The part of a scene along an axis that is looked at.
+/// All parts of a scene along one axis.
 pub(super) struct Asked {
     groups: Vec<Group>,
-    /// The frames of the parts that have contacts, the groups of these, and whether it is about differences.
+    /// Parts with contacts: the frame, the group of each contact of the frame, and whether the part is about differences of equal peers.
     pub(super) frames: Vec<(ContactFrame, Vec<usize>, bool)>,
-    /// Of each of these parts, which class its differences are of, and of each of its classes how many numbers of samples of earlier frames it has.
+    /// Indexed as `frames`: the class whose differences the part is about (`None`: the averages), and the number of sample values of earlier frames in the
+    /// states, indexed by class of the part.
     pub(super) parts: Vec<(Option<usize>, Vec<usize>)>,
     pub(super) sampling: Sampling,
+    /// Factor of velocities in the states \[s\].
     pub(super) time: f64,
+    /// Whether positions are absolute, not relative to a reference copy.
     pub(super) tied: bool,
     /// Whether every part without contacts is stable.
     rest_is_stable: bool,
-    /// The certificates of these parts, of those that have one.
+    /// Certificates of the parts without contacts, where a certificate exists.
     pub(super) rest: Vec<PartCertificate>,
 }
 
@@ -85,12 +88,12 @@ impl Asked {
         Ok(asked)
     }
 
-    /// Whether contacts are taken to be open at rest.
+    /// Whether the inequality takes some contact to be open at rest.
     pub(super) fn takes_rest(&self) -> bool {
         self.groups.iter().any(|group| group.has_rest)
     }
 
-    /// The inequality of all parts that have contacts; `None` if another is not stable.
+    /// Returns the inequality of all parts with contacts, or `None` if a part without contacts is not stable or the inequality cannot be written down.
     pub(super) fn inequality(&self) -> Option<Inequality> {
         let parts: Vec<PartFrame<'_>> =
             self.frames.iter().map(|(frame, groups, is_apart)| PartFrame { frame, groups, is_apart: *is_apart }).collect();

@@ -1,6 +1,7 @@
-//! Certificates: the numbers by which anybody can check that contacts which open and close do no harm, without the program that found them.
+//! Certificates: the numbers by which a reader can check, without this program, that a scene is stable however its contacts open and close.
 //!
-//! A reader with the scene can write down the frame, and see with V and the multipliers that the quadratic form of [`super`] is below zero; `crates/stability/tests/reference/check_certificate.py` does.
+//! A reader with the scene can write down the frame, and verify with V and the multipliers that the quadratic form of [`super`] is below zero.
+//! `crates/stability/tests/reference/check_certificate.py` does so.
 
 use cohaptic_peer::Gains;
 use cohaptic_stability::frames::{Node, Sampling, Structure};
@@ -10,40 +11,42 @@ use crate::boxes::digits;
 use crate::boxes::{FrameState, PartCertificate};
 use crate::inequality::Solution;
 
-/// The numbers by which a motion along an axis can be checked.
+/// The numbers by which a reader can check the proof of a motion along an axis.
 #[derive(Clone, PartialEq, Debug)]
 pub struct SwitchingCertificate {
-    /// Which axis, counted from 0.
+    /// Number of the axis, counted from 0.
     pub axis: usize,
-    /// By this factor a frame or a smaller one V shrinks.
+    /// Factor by which the norm that V defines shrinks in each frame at least, below 1.
     pub factor: f64,
-    /// What velocities are multiplied by \\[s\\].
+    /// Factor of velocities in the states \[s\].
     pub time: f64,
-    /// The gains K and B by which a sample is the one number (K·x + B·v)/(K + B/time); `None`: its position and its velocity.
+    /// Gains K and B by which a sample is the single number (K·x + B·v)/(K + B/time). `None`: a sample is a position and a velocity.
     pub heard: Option<Gains>,
-    /// The averages of classes, and the differences within each that pushes.
+    /// Certificates of the averages of classes, and of the differences within each class with contacts.
     pub parts: Vec<PushCertificate>,
-    /// Of classes without contacts, how their members differ.
+    /// Certificates of the differences within classes without contacts.
     pub rest: Vec<PartCertificate>,
-    /// Seven for each tick of each class that pushes: of f·(f − p − τ·δ'), p·(f − p − τ·δ'), f·Δb, p·Δb, −p⁺·Δb, p·(δ − p) and f·(δ − p), in digits as those of V. Those of two classes at walls follow.
+    /// Multipliers, in digits as in [`PushCertificate::shape`]. Each tick of each group of equal contacts has seven: of f·(f − p − τ·δ'), p·(f − p − τ·δ'),
+    /// f·Δb, p·Δb, −p⁺·Δb, p·(δ − p) and f·(δ − p), with p⁺ the p of the next tick. The multipliers of pairs of classes at walls follow.
     pub multipliers: String,
 }
 
-/// A part of a motion with contacts.
+/// The certificate of a part of a motion with contacts.
 #[derive(Clone, PartialEq, Debug)]
 pub struct PushCertificate {
-    /// The members of each class, by their places in the scene.
+    /// Members of each class, as indices of peers of the scene.
     pub members: Vec<Vec<usize>>,
-    /// Whether it is how the members of a class differ.
+    /// Whether the part is about the differences between members of a class. Otherwise the part is about the averages of classes.
     pub is_difference: bool,
-    /// What V measures: these states, and then the depth p of each contact before the frame. Positions are counted from the first copy where nothing ties the scene to ground.
+    /// States that V measures. The depth p of each contact before the frame follows these states in V. Positions are measured from the first copy if nothing
+    /// ties the scene to ground.
     pub states: Vec<FrameState>,
-    /// V, row by row, each entry as sixteen hexadecimal digits of its IEEE 754 representation.
+    /// Matrix of V, row by row, each entry as the sixteen hexadecimal digits of its IEEE 754 representation.
     pub shape: String,
 }
 
 impl Asked {
-    /// The certificate of a solution that was checked.
+    /// Returns the certificate of a checked solution with the rate that the check found.
     pub(super) fn certificate(&self, axis: usize, structure: &Structure, nodes: &[Node], solution: &Solution, rate: f64) -> SwitchingCertificate {
         let channels = self.sampling.channels();
         let parts = self.frames.iter().zip(&self.parts).zip(&solution.shapes).map(|(((frame, ..), (apart, history)), shape)| {
@@ -71,7 +74,7 @@ impl Asked {
         });
         SwitchingCertificate {
             axis,
-            // A reader with wider bounds shall be able to follow.
+            // Halfway between the rate and 1, so that a check with wider bounds of rounding errors succeeds as well.
             factor: 0.5 * (1.0 + rate),
             time: self.time,
             heard: match self.sampling {

@@ -1,16 +1,17 @@
 //! One frame of a part of a scene in which the forces of its contacts are inputs.
 //!
-//! A contact that is open at a tick has the force zero, one that is closed that of its spring and damper: which of them is left open here. Rows say where the frame
-//! leads, and how deep every contact is at each of its ticks, as linear functions of the states at the beginning and of the forces.
+//! At a tick the force of a contact is zero if the contact is open, and the force of its spring and damper if the contact is closed. This module does not
+//! decide between the two. The rows of a frame give the states after the frame, and the depth of every contact at each of its ticks, as linear functions of the
+//! states at the beginning and of the forces.
 
 use cohaptic_peer::Gains;
 use cohaptic_stability::Matrix;
 use cohaptic_stability::frames::{Instrument, Lifted, Rows};
 
-/// What a contact is between.
+/// The two bodies of a contact.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Kind {
-    /// A device that pushes the copy to larger positions, or to smaller ones.
+    /// A device that pushes the copy to larger positions if `positive`, otherwise to smaller positions.
     Push { positive: bool },
     /// A copy and the walls at both ends of an axis.
     Wall,
@@ -19,6 +20,7 @@ pub(super) enum Kind {
 /// A contact of a node.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Contact {
+    /// Index of the node in the frame.
     pub(super) node: usize,
     pub(super) kind: Kind,
     pub(super) gains: Gains,
@@ -27,7 +29,7 @@ pub(super) struct Contact {
 }
 
 impl Contact {
-    /// 1 where a larger position of the first body is deeper; −1 otherwise.
+    /// Returns 1 if the depth grows with the position of the first body (the device of a push, the copy of a wall), and −1 otherwise.
     pub(super) const fn sign(&self) -> f64 {
         match self.kind {
             Kind::Push { positive: false } => -1.0,
@@ -36,49 +38,53 @@ impl Contact {
     }
 }
 
-/// The rows of a contact, over the states at the beginning of a frame and then all inputs. Lengths \[m\].
+/// The rows of a contact. The entries are coefficients of the states at the beginning of a frame, then of all inputs. Values of rows are lengths \[m\].
 #[derive(Clone, PartialEq, Debug)]
 pub(super) struct ContactRows {
     pub(super) contact: Contact,
-    /// The first of its inputs, one a tick: its force divided by its stiffness.
+    /// Column of the contact's first input. The contact has one input per tick: the force divided by the stiffness.
     pub(super) first: usize,
-    /// The position of the device relative to the copy in the direction of the push, or that of the copy of a wall, at each tick and the first of the next frame.
+    /// Depth at each tick of the frame, then at the first tick of the next frame. The depth of a push is the position of the device relative to the copy in the
+    /// direction of the push, the depth of a wall is the position of the copy.
     pub(super) depths: Vec<Vec<f64>>,
-    /// The velocity of the same, times B/K, at each tick.
+    /// Velocity of the depth, times B/K, at each tick of the frame.
     pub(super) rates: Vec<Vec<f64>>,
 }
 
 /// A frame with the forces of contacts as inputs.
 #[derive(Clone, PartialEq, Debug)]
 pub(super) struct ContactFrame {
-    /// The states after the frame, a row each, over the states before it and then the inputs.
+    /// States after the frame, one row per state. The columns are the states before the frame, then the inputs.
     pub(super) next: Matrix,
-    /// The states that nothing but their own contact depends on, through its depth alone: positions of devices that no arm holds.
+    /// Rows of the states on which only the depth of their own contact depends: the positions of devices that push and that no arm holds.
     pub(super) loose: Vec<usize>,
     pub(super) contacts: Vec<ContactRows>,
-    /// The contacts in the order in which their ticks come, one entry a tick.
+    /// Indices of contacts in the order of time, one entry per tick of a contact.
     pub(super) order: Vec<usize>,
-    /// How far the position moves that all others are relative to, if there is one.
+    /// Row of the displacement in this frame of the reference, the position from which all other positions are measured; `None` if the scene is tied to ground.
     pub(super) reference: Option<Vec<f64>>,
-    /// A bound of the error of every row, as the sum of the sizes of its entries' errors.
+    /// Upper bound of the error of every row: the sum of the absolute errors of the row's entries.
     pub(super) error: f64,
 }
 
-/// Sets the forces of contacts, and notes where they are.
+/// The instrument that makes the forces of contacts inputs of the frame, and records the depths of the contacts.
 struct Touching {
     contacts: Vec<Contact>,
-    /// The first input of each, and their number.
+    /// Index of the first input of each contact.
     first: Vec<usize>,
+    /// Number of inputs of all contacts.
     inputs: usize,
+    /// Factor of velocities in the states \[s\].
     time: f64,
-    /// By contact and tick, over the unknowns of the frame.
+    /// Rows of the depths, indexed by contact, then by tick, over the unknowns of the frame.
     depths: Vec<Vec<Vec<f64>>>,
+    /// Rows of the velocities of the depths, times B/K, with the indices of `depths`.
     rates: Vec<Vec<Vec<f64>>>,
     order: Vec<usize>,
 }
 
 impl Touching {
-    /// The depth of a contact, or the velocity of that if `of` is 1.
+    /// Returns the row of the depth of a contact if `of` is 0, and of the velocity of the depth if `of` is 1.
     fn row(contact: &Contact, z: &Matrix, rows: Rows, of: usize) -> Vec<f64> {
         let copy = z.row(rows.object + of);
         match (contact.kind, rows.device) {
@@ -98,6 +104,7 @@ impl Instrument for Touching {
         wall.fill(0.0);
         let mut acts = [false; 2];
         for (place, contact) in self.contacts.iter().enumerate().filter(|(_, contact)| contact.node == node) {
+            // One depth per tick was recorded so far, so their number is the number of this tick.
             let input = self.first[place] + self.depths[place].len();
             match contact.kind {
                 Kind::Push { .. } => {
@@ -110,6 +117,7 @@ impl Instrument for Touching {
                 }
             }
             self.order.push(place);
+            // The states hold velocities times `time`, the rates are velocities times B/K.
             let share = contact.gains.damping / contact.gains.stiffness / self.time;
             self.depths[place].push(Self::row(contact, z, rows, 0));
             self.rates[place].push(Self::row(contact, z, rows, 1).iter().map(|entry| share * entry).collect());
@@ -119,7 +127,7 @@ impl Instrument for Touching {
 }
 
 impl ContactFrame {
-    /// A frame with those contacts.
+    /// Returns the frame of `lifted` with the forces of `contacts` as inputs.
     pub(super) fn new(lifted: &Lifted<'_>, contacts: Vec<Contact>) -> Self {
         let ticks = lifted.ticks();
         let mut inputs = 0;
@@ -132,7 +140,7 @@ impl ContactFrame {
         let mut touching = Touching { contacts, first, inputs, time: lifted.time, depths: none.clone(), rates: none, order: Vec::new() };
         let mut map = lifted.frame(&mut touching);
         let rows = lifted.rows();
-        // A device that an arm holds stands relative to that, not to the copy that all others are relative to.
+        // The position of a device with an arm is measured from the arm's rest, not from the reference copy.
         for contact in touching.contacts.iter().filter(|contact| contact.armed) {
             rows[contact.node].device.iter().for_each(|device| map.tie(*device));
         }
@@ -153,7 +161,7 @@ impl ContactFrame {
                 rates: rates.iter().map(|row| placed(row)).collect(),
             }
         });
-        // Rows after the one that is left out stand one before.
+        // The row of the reference is left out of `next`, so the rows after the reference move up by one.
         let state = |row: usize| row - usize::from(map.reference().is_some_and(|reference| reference < row));
         let free = contacts.iter().filter(|contact| !contact.armed && contact.kind != Kind::Wall);
         let loose = free.filter_map(|contact| rows[contact.node].device.map(state)).collect();

@@ -1,41 +1,41 @@
-//! Reasons why nothing can be said of contacts that switch.
+//! Errors of the proof of contacts that switch.
 
 use cohaptic_stability::AnalysisError;
 
-/// Why nothing can be said of contacts that switch.
+/// Reasons why [`prove_switching`](super::prove_switching) has no verdict.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 pub enum SwitchingError {
     /// The scene cannot be analysed.
     #[error(transparent)]
     Analysis(#[from] AnalysisError),
-    /// Nothing opens or closes.
+    /// No contact of the scene opens or closes.
     #[error(
         "no contact of this scene opens or closes: expected contact = {{ push = … }} or an enclosure; the verdict without this option is all there is to say"
     )]
     NoContact,
-    /// Something is left to chance.
+    /// A link has jitter or random loss.
     #[error(
         "links leave something to chance, and a guarantee is about one sequence of events: expected links without jitter and loss, such as --set link.loss=0 --set link.jitter=0s"
     )]
     Chance,
-    /// A spring of a contact is none.
+    /// The stiffness of a contact is not above zero.
     #[error("the contact of {what} has no stiffness: expected one above 0")]
     NoSpring {
-        /// Whose.
+        /// Name of the peer.
         what: String,
     },
-    /// The inequality is too large.
+    /// The inequality would have too many rows.
     #[error(
         "a frame of {ticks} ticks of contacts and {states} states makes an inequality of {rows} rows: expected at most {most}; take a shorter update, slower clocks or more peers that are equal"
     )]
     TooLarge {
-        /// The ticks of all contacts in a frame.
+        /// Number of ticks of all contacts in a frame.
         ticks: usize,
-        /// The states of a frame.
+        /// Number of states of a frame.
         states: usize,
-        /// The rows.
+        /// Number of rows of the inequality.
         rows: usize,
-        /// The most.
+        /// Largest number of rows that is allowed.
         most: usize,
     },
 }

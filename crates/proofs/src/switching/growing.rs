@@ -1,7 +1,8 @@
 //! The search for a motion that grows while contacts open and close.
 //!
-//! Away from walls a motion that is a times as large is a motion too, for any a > 0. So a motion is followed frame by frame, each time brought back to the same
-//! size, from several beginnings. One that grows by much over many frames, whatever its first frames do, has no bound.
+//! Away from walls a motion times a is a motion too, for any a > 0. So the search follows a motion frame by frame and scales the motion back to the same size
+//! after each frame, from several beginnings. A motion that grows by a large factor over many frames, the first frames not counted, is taken to grow without
+//! bound.
 
 use cohaptic_stability::Watch;
 use cohaptic_stability::numerics::real;
@@ -11,40 +12,43 @@ use super::contact_frame::ContactFrame;
 /// A motion that grows.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct GrowingMotion {
-    /// By what factor a frame.
+    /// Mean factor of growth per frame.
     pub growth: f64,
-    /// Over how many frames this was seen, after as many in which the motion settled.
+    /// Number of frames over which the growth was measured. As many frames before them let the motion settle.
     pub frames: usize,
-    /// How often a contact opened or closed in them.
+    /// Number of times that a contact opened or closed in the measured frames.
     pub changes: usize,
 }
 
-/// How many beginnings are tried, and how many frames of each are followed.
+/// Number of beginnings that the search tries.
 pub(super) const BEGINNINGS: usize = 8;
+/// Number of frames that the search follows from each beginning.
 pub(super) const FRAMES: usize = 4000;
-/// A motion is taken to grow if half of its frames magnify it by this at least.
+/// Factor by which the second half of the frames must magnify a motion that is taken to grow.
 const MUCH: f64 = 1e4;
 
-/// The fastest motion of those followed, if it grows.
+/// Returns the fastest of the motions that grow, or `None` if none of the beginnings leads to growth.
 pub(super) fn search(frame: &ContactFrame, watch: &dyn Watch) -> Option<GrowingMotion> {
     let found = (0..BEGINNINGS).map_while(|beginning| (!watch.stops()).then(|| follow(frame, beginning)));
     found.flatten().max_by(|one, other| one.growth.total_cmp(&other.growth))
 }
 
-/// A motion.
+/// The state of a motion between two frames.
 struct Motion<'a> {
     frame: &'a ContactFrame,
-    /// The states and then the inputs of a frame.
+    /// States of the frame, then the inputs of the frame.
     values: Vec<f64>,
-    /// Where the position is that others are relative to.
+    /// Absolute position of the reference, from which all other positions are measured.
     reference: f64,
+    /// Whether a contact was closed at its last tick, indexed by contact.
     closed: Vec<bool>,
     changes: usize,
 }
 
+/// Follows the motion from one beginning. `None` if the motion does not grow enough, dies out entirely or overflows.
 fn follow(frame: &ContactFrame, beginning: usize) -> Option<GrowingMotion> {
     let states = frame.next.rows();
-    // Nothing special, and different for each beginning.
+    // A beginning without symmetry, different for each number, so that motions of every kind take part.
     let some = |place: usize| libm::sin(1.0 + 7.3 * real(place) + 2.9 * real(beginning) * (1.0 + real(place % 5)));
     let mut values: Vec<f64> = (0..states).map(some).collect();
     values.resize(frame.next.columns(), 0.0);
@@ -55,6 +59,7 @@ fn follow(frame: &ContactFrame, beginning: usize) -> Option<GrowingMotion> {
         if !(size > 0.0 && size.is_finite()) {
             return None;
         }
+        // The first half lets slower motions die out relative to the fastest motion; only the second half is measured.
         if number == FRAMES / 2 {
             (logarithm, motion.changes) = (0.0, 0);
         }
@@ -66,16 +71,17 @@ fn follow(frame: &ContactFrame, beginning: usize) -> Option<GrowingMotion> {
 }
 
 impl Motion<'_> {
-    /// Goes a frame further; answers the size of the states that take part in the motion.
+    /// Advances the motion by one frame, and returns the size of the states, loose states not counted.
     fn step(&mut self) -> f64 {
         let frame = self.frame;
         let dot = |row: &[f64], values: &[f64]| row.iter().zip(values).map(|(by, value)| by * value).sum::<f64>();
         let mut ticks = vec![0; frame.contacts.len()];
+        // In the order of time, because the depth at a tick depends on the forces of earlier ticks of all contacts.
         for place in &frame.order {
             let contact = &frame.contacts[*place];
             let tick = ticks[*place];
             ticks[*place] += 1;
-            // An arm is tied to ground, and what it pushes is not.
+            // The position of a device with an arm is absolute, the position of its copy is relative to the reference.
             let apart = if contact.contact.armed && frame.reference.is_some() { -contact.contact.sign() * self.reference } else { 0.0 };
             let depth = dot(&contact.depths[tick], &self.values) + apart;
             let force = if depth > 0.0 { (depth + dot(&contact.rates[tick], &self.values)).max(0.0) } else { 0.0 };
@@ -87,6 +93,7 @@ impl Motion<'_> {
         self.reference += frame.reference.as_ref().map_or(0.0, |row| dot(row, &self.values));
         self.values[..next.len()].copy_from_slice(&next);
         self.values[next.len()..].fill(0.0);
+        // A loose device may lie anywhere, so its position says nothing about growth.
         next.iter().enumerate().filter(|(row, _)| !frame.loose.contains(row)).map(|(_, value)| value * value).sum::<f64>().sqrt()
     }
 

@@ -1,14 +1,14 @@
 //! Contacts that switch: whether a scene is stable however its one-sided contacts and walls open and close.
 //!
-//! Each combination of open and closed contacts may be stable and changing between them not ([`analyse`](cohaptic_stability::analyse) says nothing of it). Here the force of a contact is an
-//! unknown of which only this is used, at each tick: with δ the depth of the contact (of a push, the device's position relative to its copy in the direction of
-//! the push), δ' its velocity, τ = B/K and
+//! A scene can be unstable although every fixed combination of open and closed contacts is stable, and [`analyse`](cohaptic_stability::analyse) looks at fixed
+//! combinations only. The proof of this module treats the force of a contact as an unknown, and uses only the following properties of the force at each tick.
+//! Let δ be the depth of the contact (of a push: the device's position relative to its copy in the direction of the push), δ' the velocity of δ, τ = B/K and
 //!
 //! ```text
 //! p = max(0, δ)      f = max(0, δ + τ·δ') while δ > 0, otherwise 0      b = p − δ >= 0
 //! ```
 //!
-//! (K·f is the force), for all ticks k and l
+//! (K·f is the force). Then for all ticks k and l
 //!
 //! ```text
 //! (a)  f·(f − p − τ·δ') = 0              closed: f = p + τ·δ'; open: f = 0
@@ -17,23 +17,24 @@
 //! (d)  p_k·(b_l − b_k) >= 0              p_k·b_k = 0
 //! ```
 //!
-//! Of b only differences occur, in which a position that all have, or that of a device that lies somewhere, cancels: it does not matter where things rest. With
-//! the forces as inputs a frame is linear. Take V > 0 and multipliers, those of (a) of any sign, others not negative. Let the quadratic form
-//! V(after) − V(before) + Σ multiplier·product be below zero for all values of states y, forces and depths. The products are not below zero, so
-//! V(after) < V(before): V(y, p₀), a norm of motion and springs, shrinks in every frame by a factor below 1, whatever opens and closes. Motion and
-//! forces then die out, and devices come to lie somewhere. Forces of hands that stay bounded move a scene by a bounded amount: with an input
-//! more the form is below −ε·(all squares) + C·(input)².
+//! Only differences of b occur. A displacement of all bodies, or of a device that rests apart from its copy, cancels in these differences, so the place of rest
+//! does not matter. With the forces as inputs a frame is linear. Take V > 0 and multipliers: the multipliers of (a) have any sign, all other multipliers are
+//! not negative. Let the quadratic form V(after) − V(before) + Σ multiplier·product be below zero for all values of states y, forces and depths. The products
+//! are not below zero, so V(after) < V(before): V(y, p₀), a norm of motion and springs, shrinks in every frame by a factor below 1, whichever contacts open and
+//! close. Motion and forces then die out, and the devices come to rest. Bounded forces of hands move a scene by a bounded amount, because with one more input
+//! the form is below −ε·(all squares) + C·(input)².
 //!
 //! (a) to (d) hold at walls on both sides of an axis too, with δ the position of the copy, b = p − δ + (the place of the wall), and f and p below zero at the
 //! lower end: −b is the position, cut off at the ends, which is largest or smallest where f and p are not zero. Copies i and j have the same walls, so
 //! p_i·(b_j − b_i) >= 0 too, and f_i·(b_j − b_i) >= 0.
 //! Where an arm ties the scene, depths are measured from its rest, and if no contact presses there, p·(δ − p) >= 0 and f·(δ − p) >= 0.
 //!
-//! *Equal peers.* All this is the same for equal peers, and sums over them of products u_i·v_i are n·ū·v̄ plus those of the differences from the average. So the
-//! inequality splits as a frame does ([`Structure`]), into one for the averages and one for differences, with common multipliers; its size
-//! does not depend on N. Nothing is lost: an inequality with equal peers that has a solution has the average of all its permutations as one.
+//! *Equal peers.* Rows and contacts are the same for n equal peers, and the sum over the peers of products u_i·v_i is n·ū·v̄ plus the sum of the products of
+//! the differences from the average. So the inequality splits as a frame does ([`Structure`]), into one for the averages and one for the differences, with
+//! common multipliers; the size of the two does not depend on n. The split loses no proof: if an inequality with equal peers has a solution, the average of all
+//! permutations of the solution is a solution too.
 //!
-//! V and the multipliers are checked with bounds of all rounding errors. Where there are none a motion that grows is looked for.
+//! V and the multipliers are checked with bounds of all rounding errors. Where no V and multipliers are found, the module searches a motion that grows.
 
 mod along;
 mod asked;
@@ -66,34 +67,34 @@ use crate::inequality::{rate, search};
 /// The answer of [`prove_switching`].
 #[derive(Clone, PartialEq, Debug)]
 pub struct Switching {
-    /// One for each motion along an axis that has contacts, apart from all others.
+    /// The verdict on each motion along an axis with contacts that open and close. The motions do not depend on each other.
     pub motions: Vec<SwitchingMotion>,
-    /// What the verdict takes for granted, in words.
+    /// Assumptions of the verdict, in words.
     pub notes: Vec<String>,
 }
 
-/// The answer about the contacts along one axis.
+/// The verdict on the contacts along one axis.
 #[derive(Clone, PartialEq, Debug)]
 pub struct SwitchingMotion {
-    /// Which motion, in words; empty if there is but one.
+    /// Name of the motion, in words; empty if the scene has only one motion.
     pub name: String,
-    /// Stable is proven; unstable means that a motion that grows was found.
+    /// Stable means proven; unstable means that the search found a motion that grows.
     pub guarantee: Guarantee,
-    /// The factor by which a quadratic norm of relative motion and contact forces is proven to shrink in a frame at least.
+    /// Factor, at most 1, by which a quadratic norm of relative motion and contact forces is proven to shrink in each frame; `None` without a proof.
     pub rate: Option<f64>,
-    /// The motion that grows.
+    /// The motion that grows, if the search found such a motion.
     pub growing: Option<GrowingMotion>,
-    /// How long a frame is.
+    /// Duration of a frame.
     pub frame: Duration,
-    /// Of a motion that is proven stable, the numbers by which that can be checked.
+    /// Numbers by which a reader can check the proof; `None` if the motion is not proven stable.
     pub certificate: Option<SwitchingCertificate>,
 }
 
-/// The most states of a frame, each peer by itself, of which motions are followed.
+/// Largest number of states of a frame, with each peer counted by itself, up to which the search follows motions.
 const MOST_FOLLOWED: usize = 400;
 
 impl Switching {
-    /// The worst verdict of all motions.
+    /// Returns the worst verdict of all motions: unstable before undecided before stable.
     #[must_use]
     pub fn guarantee(&self) -> Guarantee {
         let any = |guarantee: Guarantee| self.motions.iter().any(|motion| motion.guarantee == guarantee);
@@ -107,18 +108,19 @@ impl Switching {
     }
 }
 
-/// Looks whether the scene, as it begins, is stable however its one-sided contacts and walls open and close: proves it, or else looks for a motion that grows.
+/// Proves that the scene, with its settings at the start, is stable however its one-sided contacts and walls open and close. Without a proof, searches a motion
+/// that grows.
 ///
 /// # Errors
 ///
-/// [`SwitchingError`] if nothing opens or closes, if links leave something to chance, and for what has no frame of equal axes.
+/// [`SwitchingError`] if no contact of the scene opens or closes, if links have jitter or random loss, or if the scene cannot be analysed.
 pub fn prove_switching(scene: &Scene, watch: &dyn Watch) -> Result<Switching, SwitchingError> {
     if has_chance(scene) {
         return Err(SwitchingError::Chance);
     }
     let pieces = pieces(scene, "the proof of contacts that switch")?;
     let network = NominalNetwork::of(scene)?;
-    // A law without a verdict is refused before contacts are asked for.
+    // A control law that the analysis does not know is refused first: this error says more than the error of a scene without contacts.
     check_laws(scene)?;
     let axes: Vec<(&Piece<'_>, usize, String)> = pieces.iter().flat_map(axes).collect();
     if axes.is_empty() {
@@ -132,10 +134,11 @@ pub fn prove_switching(scene: &Scene, watch: &dyn Watch) -> Result<Switching, Sw
     Ok(Switching { motions: motions.into_iter().map(|(motion, _)| motion).collect(), notes })
 }
 
-/// The axes of a piece that have contacts.
+/// Returns the axes of a piece that have contacts, with the name of each motion.
 fn axes<'p, 's>(piece: &'p Piece<'s>) -> Vec<(&'p Piece<'s>, usize, String)> {
     let count = piece.scene.axes.count();
     let pushes = |axis: usize| piece.scene.peers.iter().any(|spec| matches!(spec.contact, ContactKind::Push(direction) if direction.axis == axis));
+    // Without pushes all axes have equal equations, and axis 0 stands for all of them.
     let differ = (0..count).any(pushes);
     let axes = if differ { (0..count).filter(|axis| pushes(*axis) || piece.scene.object.enclosure.is_some()).collect() } else { vec![0] };
     let has_contacts = differ || piece.scene.object.enclosure.is_some();
@@ -146,7 +149,7 @@ fn axes<'p, 's>(piece: &'p Piece<'s>) -> Vec<(&'p Piece<'s>, usize, String)> {
     axes.into_iter().filter(|_| has_contacts).map(|axis| (piece, axis, name(axis))).collect()
 }
 
-/// The verdict along an axis, and whether it takes contacts to be open at rest.
+/// Returns the verdict along an axis, and whether the proof takes contacts to be open at rest.
 fn of_axis(
     piece: &Piece<'_>,
     axis: usize,
@@ -170,18 +173,19 @@ fn of_axis(
         let certificate = asked.certificate(axis, &structure, &nodes, &solution, rate);
         return Ok((SwitchingMotion { certificate: Some(certificate), ..motion(Guarantee::Stable, Some(rate), None) }, takes_rest));
     }
+    // The search comes after the proof: no motion of a scene that is proven stable can grow.
     let growing = grows(&along, network, watch)?;
     let guarantee = if growing.is_some() { Guarantee::Unstable } else { Guarantee::Undecided };
     Ok((motion(guarantee, None, growing), false))
 }
 
-/// Nodes with the gains of their walls, which the bound of rounding errors counts.
+/// Adds the gains of the walls to the nodes. The bound of rounding errors counts these gains.
 fn walled(along: &Along<'_>, nodes: Vec<Node>) -> Vec<Node> {
     let wall = along.scene.object.enclosure.map(|wall| Gains { stiffness: wall.stiffness, damping: wall.damping });
     nodes.into_iter().map(|node| Node { wall, ..node }).collect()
 }
 
-/// A motion that grows, each peer by itself and away from walls.
+/// Searches a motion that grows, with each peer by itself and away from walls.
 fn grows(along: &Along<'_>, network: &NominalNetwork, watch: &dyn Watch) -> Result<Option<GrowingMotion>, SwitchingError> {
     let structure = along.tied(Structure::of_each(along.scene, network, &along.contacts)?);
     let nodes = structure.nodes(along.scene);

@@ -1,15 +1,17 @@
-//! The inequality of contacts: its norm is one of states and depths, and the products are those of [`super`], with multipliers that equal contacts share.
+//! The inequality of contacts. The norm measures states and depths. The products are (a) to (d) of [`super`], and equal contacts share their multipliers.
 
 use super::contact_frame::ContactFrame;
 use crate::inequality::{Inequality, Measured, Part, Product, Row};
 
-/// Contacts that are equal.
+/// A group of equal contacts, one per member of a class of equal peers.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Group {
+    /// Number of ticks in a frame.
     pub(super) ticks: usize,
+    /// Number of peers of the class.
     pub(super) members: f64,
     pub(super) is_wall: bool,
-    /// Whether depths are measured from a rest in which the contact is not pressed.
+    /// Whether depths are measured from a rest in which the contact is open.
     pub(super) has_rest: bool,
 }
 
@@ -17,28 +19,33 @@ pub(super) struct Group {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PartFrame<'a> {
     pub(super) frame: &'a ContactFrame,
+    /// Index of the group of each contact of the frame.
     pub(super) groups: &'a [usize],
-    /// Whether it is about the differences of equal peers.
+    /// Whether the part is about the differences of equal peers.
     pub(super) is_apart: bool,
 }
 
-/// How many products a tick of a contact has.
+/// Number of products, and so of multipliers, of one tick of a contact.
 const PRODUCTS: usize = 7;
 
-/// The rows of a contact at one tick. With f the force, p the depth where it is above zero, v the velocity of the depth times B/K, and b = p − depth.
+/// The rows of a contact at one tick, as indices among the rows of the part. Let f be the force divided by the stiffness, p = max(0, depth), v the velocity of
+/// the depth times B/K, and b = p − depth.
 struct Tick {
+    /// f.
     force: usize,
+    /// p.
     pressed: usize,
+    /// p of the next tick.
     pressed_next: usize,
     /// f − p − v.
     rest: usize,
-    /// b of the next tick less b of this.
+    /// b of the next tick less b of this tick.
     opening: usize,
-    /// depth − p.
+    /// depth − p. Held as a row, because only some products need it.
     inside: Row,
 }
 
-/// The inequality of those parts; `None` if a position that must not matter does.
+/// Returns the inequality of the parts, or `None` if a row of a part depends on the position of a loose device.
 pub(super) fn inequality(parts: &[PartFrame<'_>], groups: &[Group]) -> Option<Inequality> {
     let mut multipliers = Multipliers { first: Vec::new(), shared: Vec::new(), free: Vec::new(), groups };
     for group in groups {
@@ -46,6 +53,7 @@ pub(super) fn inequality(parts: &[PartFrame<'_>], groups: &[Group]) -> Option<In
         let free = (0..group.ticks * PRODUCTS).map(|number| number % PRODUCTS == 0);
         multipliers.free.extend(free);
     }
+    // Copies with common walls have products with each other. A group of one copy has none with itself; a group with a rest has products with the rest instead.
     for (one, first) in groups.iter().enumerate() {
         for (other, second) in groups.iter().enumerate() {
             if first.is_wall && second.is_wall && !first.has_rest && (one != other || first.members > 1.0) {
@@ -59,21 +67,26 @@ pub(super) fn inequality(parts: &[PartFrame<'_>], groups: &[Group]) -> Option<In
     Some(Inequality { shapes, parts, free: multipliers.free })
 }
 
-/// Where the multipliers of groups stand.
+/// The places of the multipliers of groups.
 struct Multipliers<'a> {
     groups: &'a [Group],
+    /// Index of the first multiplier of each group.
     first: Vec<usize>,
-    /// Those of two groups of walls: of a copy of the first, and one of the second.
+    /// Pairs of groups of walls: the group of copy i, the group of copy j, and the index of the pair's first multiplier.
     shared: Vec<(usize, usize, usize)>,
+    /// Whether a multiplier may be below zero, indexed by multiplier: true only for those of (a).
     free: Vec<bool>,
 }
 
+/// Returns the inequality of one part. The unknowns are the states that are not loose, the forces, and the p of each contact at each tick and at the next
+/// frame's first tick. `None` if a row depends on a loose state.
 fn part_of(part: &PartFrame<'_>, shape: usize, multipliers: &Multipliers<'_>) -> Option<Part> {
     let frame = part.frame;
     let states: Vec<usize> = (0..frame.next.rows()).filter(|row| !frame.loose.contains(row)).collect();
     let columns: Vec<usize> = states.iter().copied().chain(frame.next.rows()..frame.next.columns()).collect();
     let unknowns = columns.len() + frame.contacts.iter().map(|contact| contact.depths.len()).sum::<usize>();
     let unit = |place: usize| Row { entries: (0..unknowns).map(|other| f64::from(u8::from(other == place))).collect(), error: 0.0 };
+    // Leaves the loose states out of a row, which is exact only if their coefficients are zero.
     let taken = |row: &[f64], error: f64| -> Option<Row> {
         let entries = columns.iter().map(|column| row[*column]).chain(std::iter::repeat_n(0.0, unknowns - columns.len())).collect();
         frame.loose.iter().all(|loose| row[*loose] == 0.0).then_some(Row { entries, error })
@@ -101,10 +114,12 @@ fn part_of(part: &PartFrame<'_>, shape: usize, multipliers: &Multipliers<'_>) ->
             let mut rest = taken(&contact.rates[tick].iter().map(|rate| -rate).collect::<Vec<_>>(), frame.error)?;
             rest.entries[force] += 1.0;
             rest.entries[first + tick] -= 1.0;
+            // The position of a loose device cancels in the difference of two depths.
             let deeper: Vec<f64> = contact.depths[tick].iter().zip(&contact.depths[tick + 1]).map(|(depth, next)| depth - next).collect();
             let mut opening = taken(&deeper, 4.0 * frame.error)?;
             opening.entries[first + tick] -= 1.0;
             opening.entries[first + tick + 1] += 1.0;
+            // Without the check for loose states: groups with a rest and walls, the only users of this row, have no loose state.
             let mut inside = Row { entries: columns.iter().map(|column| contact.depths[tick][*column]).collect(), error: 2.0 * frame.error };
             inside.entries.resize(unknowns, 0.0);
             inside.entries[first + tick] -= 1.0;
@@ -116,6 +131,7 @@ fn part_of(part: &PartFrame<'_>, shape: usize, multipliers: &Multipliers<'_>) ->
     }
     let mut products = Vec::new();
     for (own, group) in ticks.iter().zip(part.groups) {
+        // A sum over n equal peers is n times the product of the averages, plus the products of the differences, which have the weight 1.
         let weight = if part.is_apart { 1.0 } else { multipliers.groups[*group].members };
         for (number, tick) in own.iter().enumerate() {
             let multiplier = multipliers.first[*group] + number * PRODUCTS;
@@ -137,6 +153,7 @@ fn part_of(part: &PartFrame<'_>, shape: usize, multipliers: &Multipliers<'_>) ->
     for (one, other, start) in &multipliers.shared {
         let Some(first) = place(*one) else { continue };
         let (weight, second) = if part.is_apart { (1.0, None) } else { (multipliers.groups[*one].members, place(*other)) };
+        // Within one group the averages cancel in b_j − b_i; only the differences have this product.
         if !part.is_apart && one == other {
             continue;
         }
