@@ -7,9 +7,9 @@
 //! φ(P) = Σ_v c_v·tr P_v − Σ_e ln det S_e          S_e = λP_from − XᵀP_to X
 //! ```
 //!
-//! whose linear term replaces a constraint on the size of the shapes, which means nothing. The centre's own λ is smaller, and the next stage's goes most of
-//! the way towards it. Every stage takes coordinates in which the shapes are round, so that nothing depends on the units of the state, and c_v is the
-//! number of edges from v, which is where they would stay if λ were large.
+//! The linear term replaces a constraint on the size of the shapes, on which no rate depends. The λ of the centre is smaller than the λ of the stage, and the
+//! next stage's λ lies most of the way towards the centre's. Every stage takes coordinates in which the present shapes are identities, so that the result does
+//! not depend on the units of the state. The weight c_v is the number of edges from v: with this weight the identities would be the centre if λ were large.
 //!
 //! With D a change of the shapes, dS = λD_from − XᵀD_to X, W = S⁻¹, V = XW and Z = XWXᵀ, the second derivative of −ln det S is tr(W dS W dS) =
 //! λ²tr(D_from W D_from W) − 2λtr(D_from VᵀD_to V) + tr(D_to Z D_to Z).
@@ -21,18 +21,20 @@ use super::component::{Component, Factors, largest_square};
 use super::norm::mirror;
 use crate::newton::{Barrier, Shortest, Steps, centre, log_determinant, upper};
 
-/// How much of the distance between λ and the centre's own is kept.
+/// Share of the distance between λ and the centre's λ that the next stage keeps.
 const KEPT: f64 = 0.15;
-/// Centres, each of which takes a handful of Newton's steps.
+/// Largest number of centres. Each centre takes a few Newton steps.
 const STAGES: u32 = 60;
 const STEPS: Steps = Steps { most: 30, centred: 0.3, shortest: Shortest::Damped };
-/// Squares of rates below this, for matrices with entries near 1, are as good as zero.
+/// Square of a rate, for matrices with entries near 1, that counts as zero.
 const NOTHING: f64 = 1e-14;
 
-/// Shapes with a smaller rate than those given, until a stage lowers it by less than the relative `accuracy`; `None` if the watch ends it.
+/// Improves the shapes `start` until a stage lowers the square of the rate by less than the relative `accuracy`. Returns `start` if no stage succeeds; `None`
+/// if the watch ends the search.
 pub(super) fn improve(component: &Component<'_>, start: Factors, accuracy: f64, watch: &dyn Watch) -> Option<Factors> {
     let mut best = start;
     let Some(mut images) = component.images(&best.factors) else { return Some(best) };
+    // The barrier is finite only at a λ above the λ of the present shapes.
     let mut square = 1.3 * best.square;
     for _ in 0..STAGES {
         if !(best.square > NOTHING && best.square.is_finite()) {
@@ -43,7 +45,7 @@ pub(super) fn improve(component: &Component<'_>, start: Factors, accuracy: f64, 
         let Some(centre) = reached else { break };
         let changes: Option<Vec<Matrix>> = centre.point.iter().map(cholesky).collect();
         let Some(changes) = changes else { break };
-        // One common size, which no rate depends on, so that hundreds of stages would not overflow.
+        // All factors are divided by one number, on which no rate depends, so that their sizes do not overflow over many stages.
         let factors: Vec<Matrix> = changes.iter().zip(&best.factors).map(|(change, factor)| change.times(factor)).collect();
         let largest = factors.iter().map(Matrix::largest).fold(0.0, f64::max);
         let factors: Vec<Matrix> = factors.iter().map(|factor| factor.scaled(1.0 / largest)).collect();
@@ -64,14 +66,16 @@ pub(super) fn improve(component: &Component<'_>, start: Factors, accuracy: f64, 
     if watch.stops() { None } else { Some(best) }
 }
 
-/// φ at one λ.
+/// The barrier φ at one λ.
 struct Rate<'a> {
     component: &'a Component<'a>,
+    /// Matrices X, indexed by edge of the component.
     images: &'a [Matrix],
+    /// λ, the square of a rate.
     square: f64,
-    /// c_v.
+    /// Weights c_v, indexed by node of the component.
     weights: Vec<f64>,
-    /// The places (i, j), i <= j, of a symmetric matrix, with the weight that makes the basis orthonormal for the trace's inner product.
+    /// Places (i, j), i <= j, of a symmetric matrix, each with the weight that makes the basis orthonormal for the inner product tr(A·B).
     places: Vec<(usize, usize, f64)>,
 }
 
@@ -88,7 +92,7 @@ impl<'a> Rate<'a> {
         }
     }
 
-    /// S of an edge, factorised; `None` if it is not positive definite.
+    /// Returns the triangle of the factorised S of an edge, or `None` if S is not positive definite.
     fn slack(&self, shapes: &[Matrix], edge: usize) -> Option<Matrix> {
         let (step, image) = (&self.component.edges[edge], &self.images[edge]);
         let reached = image.transposed().times(&shapes[step.to].times(image));
@@ -96,7 +100,8 @@ impl<'a> Rate<'a> {
         cholesky(&Matrix::from_fn(from.rows(), from.columns(), |i, j| self.square * from[(i, j)] - reached[(i, j)]))
     }
 
-    /// Adds `factor`·tr(B_kl MᵀB_ij M) to the block's entry of row ij and column kl. With the unit matrices E_ij that is M_il·M_jk, here made symmetric.
+    /// Adds `factor`·tr(B_kl MᵀB_ij M) to the entry of row ij and column kl of the block that begins at `row` and `column`. For the unit matrices E_ij the
+    /// trace is M_il·M_jk, and the symmetric B_ij take the mean over both orders of k and l.
     fn add(&self, hessian: &mut Matrix, row: usize, column: usize, m: &Matrix, factor: f64) {
         for (place, (i, j, weight)) in self.places.iter().enumerate() {
             let share = 0.5 * factor * weight;
@@ -110,7 +115,7 @@ impl<'a> Rate<'a> {
 }
 
 impl Barrier for Rate<'_> {
-    /// Shapes.
+    /// Shapes, indexed by node of the component.
     type Point = Vec<Matrix>;
 
     fn value(&self, shapes: &Self::Point) -> Option<f64> {
@@ -143,7 +148,8 @@ impl Barrier for Rate<'_> {
             }
             self.add(&mut hessian, from, from, &w, self.square * self.square);
             self.add(&mut hessian, to, to, &z, 1.0);
-            // Rows by what D_to has, columns by D_from, and its mirror image; only what falls on the upper triangle is read.
+            // The mixed term has its rows at D_to and its columns at D_from, and a mirror image. Only blocks on or above the diagonal are read; of an edge from
+            // a node to itself both halves fall on the diagonal block.
             if to <= from {
                 self.add(&mut hessian, to, from, &v, -self.square);
             }
@@ -158,7 +164,7 @@ impl Barrier for Rate<'_> {
         let mut moved = shapes.clone();
         for (shape, part) in moved.iter_mut().zip(direction.chunks(self.places.len())) {
             for ((i, j, weight), entry) in self.places.iter().zip(part) {
-                // B_ij has ones, or 1/√2 off the diagonal, twice.
+                // B_ij has the entry 1 on the diagonal, or 1/√2 in two places off the diagonal: 1/weight in both cases.
                 shape[(*i, *j)] += length * entry / weight;
             }
             mirror(shape);

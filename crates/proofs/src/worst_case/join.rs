@@ -1,9 +1,10 @@
 //! Shapes by an iteration of first order, for states of any size.
 //!
 //! An ideal shape of a node is an upper bound, in the order of symmetric matrices, of AᵀP_to A/ρ² over all edges from it. Two symmetric matrices have no
-//! least upper bound, but a smallest in volume: in coordinates where one of them is I and the other diagonal, the larger of both in every place. Taking
-//! bounds like this over and over is a power iteration (Gaubert & Stott 2020, "Tropical Kraus maps for optimal control of switched systems"); going half
-//! the way in every round keeps it from cycling. Of all rounds the shapes with the smallest rate are kept.
+//! least upper bound, but an upper bound of smallest volume: in coordinates where one matrix is I and the other is diagonal, the larger of both entries in
+//! every place of the diagonal. Taking this bound in every round is a power iteration (Gaubert & Stott 2020, "Tropical Kraus maps for optimal control of
+//! switched systems"). Each round goes half the way to the bound, so that the iteration does not cycle. The result is the shapes of the round with the smallest
+//! rate.
 
 use cohaptic_stability::numerics::{cholesky, eigen, triangle_inverse};
 use cohaptic_stability::{Matrix, Watch};
@@ -11,10 +12,10 @@ use cohaptic_stability::{Matrix, Watch};
 use super::component::{Component, Factors, largest_square};
 use super::norm::gram;
 
-/// What a round keeps at least of a shape in directions in which nothing asks for it, so that shapes stay positive definite.
+/// Lower limit of the bound in a round, in directions in which no edge needs a larger bound. Shapes stay positive definite by this limit.
 const FLOOR: f64 = 0.25;
 
-/// The best shapes of a number of rounds, from balanced ones on; `None` if the watch ends it.
+/// Returns the shapes with the smallest rate of all rounds, beginning with balanced shapes; `None` if the watch ends the iteration.
 pub(super) fn iterate(component: &Component<'_>, rounds: usize, watch: &dyn Watch) -> Option<Factors> {
     let identity = Matrix::identity(component.size);
     let mut factors = vec![balance(component); component.nodes.len()];
@@ -28,6 +29,7 @@ pub(super) fn iterate(component: &Component<'_>, rounds: usize, watch: &dyn Watc
         if square < best.square {
             best = Factors { square, factors: factors.clone() };
         }
+        // The bounds below are divided by `square`. Written so that NaN ends the iteration too.
         if !(square > f64::MIN_POSITIVE && square.is_finite()) {
             break;
         }
@@ -35,6 +37,7 @@ pub(super) fn iterate(component: &Component<'_>, rounds: usize, watch: &dyn Watc
         for (step, image) in component.edges.iter().zip(&images) {
             bounds[step.from] = bounds[step.from].as_ref().and_then(|bound| join(bound, &gram(image).scaled(1.0 / square)));
         }
+        // In the coordinates of the present shapes each shape is I, so the mean of I and the bound is half the way.
         for (factor, bound) in factors.iter_mut().zip(&bounds) {
             let half = bound.as_ref().map(|bound| Matrix::from_fn(component.size, component.size, |i, j| 0.5 * (identity[(i, j)] + bound[(i, j)])));
             let Some(change) = half.as_ref().and_then(cholesky) else { return Some(best) };
@@ -44,7 +47,9 @@ pub(super) fn iterate(component: &Component<'_>, rounds: usize, watch: &dyn Watc
     Some(best)
 }
 
-/// Units for the state's entries, powers of two on the diagonal, in which the rows and columns of all matrices together are of similar size (Osborne 1960).
+/// Returns units of the state's entries, powers of two on a diagonal matrix, in which the rows and columns of all matrices together are of similar size
+/// (Osborne
+/// 1960). Powers of two change no digit of the matrices.
 fn balance(component: &Component<'_>) -> Matrix {
     const SWEEPS: u32 = 40;
     let size = component.size;
@@ -57,13 +62,13 @@ fn balance(component: &Component<'_>) -> Matrix {
             let row: f64 = others().map(|other| together[(place, other)] * units[place] / units[other]).sum();
             let column: f64 = others().map(|other| together[(other, place)] * units[other] / units[place]).sum();
             let ratio = column / row;
-            // A row or a column of zeros has no balance; written so that NaN has none either.
+            // A row or a column of zeros cannot be balanced. Written so that NaN is skipped too.
             if !(ratio > 0.0 && ratio.is_finite()) {
                 continue;
             }
             let halvings = libm::frexp(ratio.sqrt() * std::f64::consts::FRAC_1_SQRT_2).1;
             let unit: f64 = units[place] * libm::ldexp(1.0, halvings);
-            // Within the range in which the shapes, which are squares, are ordinary numbers.
+            // The shapes are squares of the units and must neither overflow nor underflow.
             if halvings != 0 && (1e-100..1e100).contains(&unit) {
                 units[place] = unit;
                 changed = true;
@@ -76,7 +81,8 @@ fn balance(component: &Component<'_>) -> Matrix {
     Matrix::from_fn(size, size, |i, j| if i == j { units[i] } else { 0.0 })
 }
 
-/// The upper bound of two symmetric matrices that is smallest in volume, the first positive definite. `None` if rounding made it indefinite.
+/// Returns the upper bound of smallest volume of two symmetric matrices, the first of which is positive definite. `None` if `first` is not positive definite,
+/// by rounding.
 fn join(first: &Matrix, second: &Matrix) -> Option<Matrix> {
     let factor = cholesky(first)?;
     let inverse = triangle_inverse(&factor);

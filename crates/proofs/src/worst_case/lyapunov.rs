@@ -1,11 +1,11 @@
-//! The search for a quadratic certificate. Nothing here has to be right: what it finds is checked by [`Certificate`](super::Certificate).
+//! The search for a quadratic certificate. No proof depends on the search, because [`Certificate`](super::Certificate) checks the shapes that the search finds.
 //!
-//! The nodes of one strongly connected component have to agree on how large their shapes are relative to each other; components have nothing to do with
-//! each other. A shape is kept as an upper triangle R with P = RᵀR; in the coordinates z = R·x of its ends an edge is the matrix X = R_to A R_from⁻¹, and
-//! the smallest rate of the shapes is the largest ‖X‖₂.
+//! The shapes of one strongly connected component are searched together, because edges in both directions fix their relative sizes. Different components are
+//! searched one by one. A shape P is kept as an upper triangle R with P = RᵀR. In the coordinates z = R·x of its ends an edge is the matrix X = R_to A
+//! R_from⁻¹, and the smallest rate of the shapes is the largest ‖X‖₂.
 //!
-//! The first shapes come from an iteration that costs a few factorisations a round whatever the size ([`join`](super::join)); as long as the number of
-//! unknowns allows, Newton's method on a barrier goes on from there ([`barrier`](super::barrier)).
+//! The first shapes come from an iteration that costs a few factorisations a round, whatever the size ([`join`](super::join)). If the number of unknowns
+//! allows, Newton's method on a barrier improves these shapes ([`barrier`](super::barrier)).
 
 use cohaptic_stability::{Matrix, Watch};
 
@@ -14,20 +14,21 @@ use super::component::{Component, Step};
 use super::norm::gram;
 use super::{barrier, join};
 
-/// The most unknowns for which a barrier's Hessian, whose factorisation costs their third power, is worth it.
+/// Largest number of unknowns for which the barrier is used. The factorisation of the barrier's Hessian costs the third power of this number.
 const MOST_UNKNOWNS: usize = 1300;
-/// Rounds of the first iteration, whose shapes hardly change after that.
+/// Number of rounds of the first iteration. The shapes hardly change after so many rounds.
 const ROUNDS: usize = 24;
-/// What a search ends with: believed, not proved.
+/// The result of a search: shapes and their computed rate, not yet checked.
 #[derive(Clone, Debug)]
 pub(super) struct Found {
-    /// The rate that the shapes have.
+    /// Computed rate of the shapes.
     pub rate: f64,
-    /// Per node of the pattern.
+    /// Shapes, indexed by node of the pattern.
     pub shapes: Vec<Matrix>,
 }
 
-/// The best shapes that were found, for matrices whose entries are near 1; `None` if the watch ends it.
+/// Returns the best shapes that the search finds, for matrices with entries near 1; `None` if the watch ends the search. Nodes without an edge on a cycle keep
+/// the identity, which no edge constrains.
 pub(super) fn search(automaton: &Automaton, accuracy: f64, watch: &dyn Watch) -> Option<Found> {
     let mut found = Found { rate: 0.0, shapes: vec![Matrix::identity(automaton.size()); automaton.pattern().nodes()] };
     for component in components(automaton) {
@@ -44,11 +45,12 @@ pub(super) fn search(automaton: &Automaton, accuracy: f64, watch: &dyn Watch) ->
     Some(found)
 }
 
-/// The components that have an edge, by their first edge.
+/// Returns the components that have an edge, in the order of their first edges.
 fn components(automaton: &Automaton) -> Vec<Component<'_>> {
     let pattern = automaton.pattern();
     let mut components: Vec<Component<'_>> = Vec::new();
-    // Which component, and which node of it, a node of the pattern is; the component's own name comes first.
+    // `named`: index in `components`, indexed by the pattern's number of a component. `place`: index of a node within its component, indexed by node of the
+    // pattern.
     let mut named = vec![None; pattern.nodes()];
     let mut place = vec![None; pattern.nodes()];
     for edge in automaton.recurrent() {

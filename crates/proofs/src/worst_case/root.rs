@@ -2,18 +2,19 @@
 
 use cohaptic_stability::numerics::UNIT;
 
-/// At least (x·2^`exponent`)^(1/k): for a bound from above. `x` is not negative.
+/// Returns an upper bound of (x·2^`exponent`)^(1/k), for `x` of at least zero.
 pub(crate) fn root_above(x: f64, exponent: f64, k: f64) -> f64 {
     root(x, exponent, k, 1.0)
 }
 
-/// At most (x·2^`exponent`)^(1/k): for a bound from below. `x` is not negative.
+/// Returns a lower bound of (x·2^`exponent`)^(1/k), for `x` of at least zero.
 pub(crate) fn root_below(x: f64, exponent: f64, k: f64) -> f64 {
     root(x, exponent, k, -1.0)
 }
 
-/// 2^((log₂ x + exponent)/k). The logarithm is good to one unit in the last place of at most 1100, the sum and quotient round once each, and an error d of
-/// the argument of 2^ is a relative error below d of the result.
+/// Returns 2^((log₂ x + exponent)/k), moved by the bound of its error: up if `side` is 1, down if `side` is −1. The logarithm, at most 1100 in size, is
+/// accurate to one unit in the last place, the sum and the quotient round once each, and an error d of the argument of 2^ is a relative error below d of the
+/// result.
 fn root(x: f64, exponent: f64, k: f64, side: f64) -> f64 {
     if x <= 0.0 {
         return 0.0;
@@ -21,7 +22,7 @@ fn root(x: f64, exponent: f64, k: f64, side: f64) -> f64 {
     let logarithm = libm::log2(x);
     let slack = 4.0 * UNIT * (2.0 + (logarithm.abs() + exponent.abs()) / k);
     let root = libm::exp2((logarithm + exponent) / k) * (1.0 + side * slack);
-    // A root that underflowed is bounded by the smallest ordinary number.
+    // A root that underflowed is at most the smallest normal number; zero would be no upper bound.
     if side > 0.0 { root.max(f64::MIN_POSITIVE) } else { root }
 }
 

@@ -1,9 +1,10 @@
-//! A quadratic certificate, and a check that does not depend on how it was found.
+//! Quadratic certificates, and their check, which does not depend on the search.
 //!
-//! Shapes P_v > 0, one per node, with AₑᵀP_to Aₑ <= ρ²·P_from for every edge that lies on a cycle, make V(x) = xᵀP_v x shrink by ρ² or more in every
-//! step: no allowed product grows faster than ρ (Philippe, Essick, Dullerud & Jungers 2016).
+//! Let P_v > 0 be shapes, one per node, with AₑᵀP_to Aₑ <= ρ²·P_from for every edge that lies on a cycle. Then V(x) = xᵀP_v x grows by at most ρ² in every
+//! step, and no allowed product grows faster than ρ per step (Philippe, Essick, Dullerud & Jungers 2016).
 //!
-//! Every entry of M = ρ²P_from − AᵀP_to A is within γ₍₂ₙ₊₄₎·(ρ²|P_from| + |A|ᵀ|P_to||A|) of the exact one, and M > 0 is checked with that error ([`is_positive`]).
+//! Every entry of M = ρ²P_from − AᵀP_to A is within γ₍₂ₙ₊₄₎·(ρ²|P_from| + |A|ᵀ|P_to||A|) of the exact one, and M > 0 is checked with that error
+//! ([`is_positive`]).
 
 use cohaptic_stability::numerics::{UNDERFLOW, UNIT, gamma, is_positive, outward, real};
 use cohaptic_stability::{Matrix, Watch};
@@ -13,14 +14,14 @@ use super::automaton::Automaton;
 use super::lyapunov;
 use super::norm::mirror;
 
-/// A proof that no allowed product grows faster than a rate. It exists only if it was checked.
+/// A proof that no allowed product grows faster than a rate. A value of this type was always checked.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Certificate {
     rate: f64,
     shapes: Vec<Matrix>,
 }
 
-/// Why shapes and a rate are no certificate.
+/// Reasons why shapes and a rate are not a certificate.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
 pub(crate) enum CertificateError {
     /// The rate is negative, infinite or not a number.
@@ -29,30 +30,30 @@ pub(crate) enum CertificateError {
         /// The rate given.
         rate: f64,
     },
-    /// There is not one shape per node.
+    /// The number of shapes differs from the number of nodes.
     #[error("there are {shapes} shapes for {nodes} nodes")]
     Count {
-        /// The shapes given.
+        /// Number of shapes given.
         shapes: usize,
-        /// The nodes of the pattern.
+        /// Number of nodes of the pattern.
         nodes: usize,
     },
-    /// A shape has not the size of the matrices or is not symmetric to the bit.
+    /// A shape does not have the size of the matrices or is not symmetric to the bit.
     #[error("the shape of node {node} is not a symmetric matrix of the size of the state")]
     NotSymmetric {
-        /// Which node, from 0.
+        /// Number of the node, from 0.
         node: usize,
     },
     /// A shape could not be shown to be positive definite.
     #[error("the shape of node {node} cannot be shown to be positive definite")]
     NotPositive {
-        /// Which node, from 0.
+        /// Number of the node, from 0.
         node: usize,
     },
-    /// An edge could not be shown to keep to the rate.
+    /// The matrix of an edge could not be shown to grow by at most the rate.
     #[error("edge {edge} cannot be shown to grow by at most {rate}")]
     TooFast {
-        /// Which edge of the pattern, from 0.
+        /// Number of the edge of the pattern, from 0.
         edge: usize,
         /// The rate given.
         rate: f64,
@@ -62,11 +63,11 @@ pub(crate) enum CertificateError {
 impl Certificate {
     /// Checks shapes, one per node, against a rate.
     ///
-    /// A certificate within rounding of failing fails: the margin is about n²·10⁻¹⁶, relative to the terms that cancel.
+    /// The check refuses a true certificate whose margin is smaller than the rounding errors, about n²·10⁻¹⁶ relative to the terms that cancel.
     ///
     /// # Errors
     ///
-    /// A [`CertificateError`] says what could not be shown.
+    /// [`CertificateError`] for the first condition that could not be shown.
     pub(crate) fn new(automaton: &Automaton, rate: f64, shapes: Vec<Matrix>) -> Result<Self, CertificateError> {
         if !(rate >= 0.0 && rate.is_finite()) {
             return Err(CertificateError::Rate { rate });
@@ -84,7 +85,7 @@ impl Certificate {
                 return Err(CertificateError::NotPositive { node });
             }
         }
-        // Entries near 1, so that no square underflows.
+        // Matrices are scaled to entries near 1, so that no square underflows; the scale is a power of two and exact.
         let exponent = automaton.exponent();
         let (scaled, scaled_rate) = (automaton.scaled(exponent), libm::ldexp(rate, exponent));
         for (edge, step) in pattern.edges().iter().enumerate() {
@@ -97,26 +98,26 @@ impl Certificate {
     }
 
     #[cfg(test)]
-    /// Searches for the smallest rate and checks what it found.
+    /// Searches shapes with a small rate and checks them.
     ///
-    /// The search stops when a step of it improves the rate by less than the relative `accuracy`; it does not promise the smallest rate that a
-    /// quadratic certificate can have, which itself is up to √n times the true one (Ando & Shih 1998).
+    /// The search stops when a stage improves the rate by less than the relative `accuracy`. The rate need not be the smallest rate of a quadratic certificate,
+    /// and that smallest rate is up to √n times the joint spectral radius (Ando & Shih 1998).
     ///
     /// # Errors
     ///
-    /// If nothing that was found could be checked, since numbers overflow.
+    /// [`CertificateError`] if no shapes can be checked, because numbers overflow.
     pub(crate) fn find(automaton: &Automaton, accuracy: f64) -> Result<Self, CertificateError> {
         Self::find_watched(automaton, accuracy, &cohaptic_stability::Unwatched).expect("without a watch nothing ends it")
     }
 
-    /// [`Certificate::find`], watched; `None` if the watch ends it.
+    /// Searches shapes with a small rate and checks them; `None` if the watch ends the search. The error is that of the last shapes tried.
     pub(super) fn find_watched(automaton: &Automaton, accuracy: f64, watch: &dyn Watch) -> Option<Result<Self, CertificateError>> {
-        // Everything near 1 while it is searched; a power of two changes no digit.
+        // The search works on entries near 1. The scale is a power of two, so it changes no digit of the shapes.
         let exponent = automaton.exponent();
         let scaled = automaton.scaled(exponent);
         let unscaled = |rate: f64| libm::ldexp(rate, -exponent);
         let found = lyapunov::search(&scaled, accuracy, watch)?;
-        // From the rate that the search believes in, outward until the check agrees: rounding costs a little where shapes are far from round.
+        // The check needs a rate slightly above the computed rate; how much more depends on how far the shapes are from round.
         let mut excess = 4.0 * UNIT;
         while excess < 1.0 {
             if watch.stops() {
@@ -127,39 +128,40 @@ impl Certificate {
             }
             excess *= 4.0;
         }
-        // Round shapes always do, with any bound of the 2-norms.
+        // The identity as every shape proves any upper bound of the 2-norms, such as the Frobenius norm.
         let frobenius = scaled.recurrent().map(|edge| scaled.matrices()[edge.symbol].frobenius_norm()).fold(0.0, f64::max);
         let rate = unscaled(frobenius * (1.0 + 1e-6) + 1e-100);
         Some(Self::new(automaton, rate, vec![Matrix::identity(automaton.size()); automaton.pattern().nodes()]))
     }
 
-    /// The rate ρ: the joint spectral radius is at most this.
+    /// Returns the rate ρ, an upper bound of the joint spectral radius.
     #[must_use]
     pub(crate) const fn rate(&self) -> f64 {
         self.rate
     }
 
-    /// The shapes P, by node.
+    /// Returns the shapes P, indexed by node of the pattern.
     #[must_use]
     pub(crate) fn shapes(&self) -> &[Matrix] {
         &self.shapes
     }
 }
 
-/// Whether ρ²P_from − AᵀP_to A > 0 can be shown, or the difference is zero because all is.
+/// Whether ρ²P_from − AᵀP_to A > 0 can be shown, or A is zero, which contracts at any rate.
 fn contracts(matrix: &Matrix, from: &Matrix, to: &Matrix, rate: f64) -> bool {
     if matrix.largest() == 0.0 {
         return true;
     }
     let size = matrix.rows();
-    // At most ρ²: two roundings are taken off.
+    // A lower bound of ρ²: the two roundings are taken off.
     let square = rate * rate * (1.0 - 4.0 * UNIT);
     let image = matrix.transposed().times(&to.times(matrix));
     let absolute = |of: &Matrix| Matrix::from_fn(size, size, |i, j| of[(i, j)].abs());
     let image_size = absolute(matrix).transposed().times(&absolute(to).times(&absolute(matrix)));
     let mut difference = Matrix::from_fn(size, size, |i, j| square * from[(i, j)] - image[(i, j)]);
     mirror(&mut difference);
-    // The two sums of n products, the product with ρ², and the difference; the terms' sizes were computed with the same roundings.
+    // γ counts the operations of one entry: the two sums of n products, the product with ρ², and the difference. The sizes of the terms were computed with the
+    // same roundings, hence the second factor.
     let share = gamma(2 * size + 4) * (1.0 + gamma(2 * size + 4));
     let underflow = 4.0 * real(size) * (1.0 + real(size) * matrix.largest()) * (1.0 + to.largest()) * UNDERFLOW;
     let error = Matrix::from_fn(size, size, |i, j| outward(share * (square * from[(i, j)].abs() + image_size[(i, j)])) + underflow);
@@ -174,7 +176,7 @@ mod tests {
         Automaton::free(vec![matrix]).unwrap()
     }
 
-    /// In one dimension the smallest rate is |a|, whatever the shape, and the check is sharp to a few roundings.
+    /// In one dimension the smallest rate is |a| for every shape, and the check is sharp to a few roundings.
     #[test]
     fn a_rate_too_small_by_one_part_in_a_million_million_is_refused() {
         let automaton = single(Matrix::identity(1).scaled(0.9));
@@ -186,7 +188,7 @@ mod tests {
                 Err(CertificateError::TooFast { edge: 0, rate: 0.9 * (1.0 - 1e-12) })
             );
         }
-        // Three dimensions, each a rotation and a scaling of the others: any shape but a round one is refused, and round ones by 1e-12 too small.
+        // A scaled permutation of three axes: the check accepts the identity, and refuses any other shape and a rate that is too small by 1e-12.
         let turn = single(Matrix::from_fn(3, 3, |i, j| if (i + 1) % 3 == j { 0.5 } else { 0.0 }));
         assert!(Certificate::new(&turn, 0.5 * (1.0 + 1e-12), vec![Matrix::identity(3)]).is_ok());
         assert!(Certificate::new(&turn, 0.5 * (1.0 - 1e-12), vec![Matrix::identity(3)]).is_err());
