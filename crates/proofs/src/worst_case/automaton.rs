@@ -1,4 +1,4 @@
-//! A pattern together with the matrices that its symbols stand for.
+//! Automata: a pattern with one matrix per symbol of the pattern.
 
 use cohaptic_stability::Matrix;
 use thiserror::Error;
@@ -15,47 +15,48 @@ pub(crate) struct Automaton {
     size: usize,
 }
 
-/// Why a pattern and matrices are no automaton.
+/// Reasons why a pattern and matrices are not an automaton.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
 #[non_exhaustive]
 pub enum AutomatonError {
-    /// The graph is no pattern.
+    /// The graph is not a pattern.
     #[error(transparent)]
     Pattern(#[from] PatternError),
-    /// There are not as many matrices as symbols.
+    /// The number of matrices differs from the number of symbols.
     #[error("the pattern has {symbols} symbols, but there are {matrices} matrices")]
     Count {
-        /// The symbols of the pattern.
+        /// Number of symbols of the pattern.
         symbols: usize,
-        /// The matrices given.
+        /// Number of matrices given.
         matrices: usize,
     },
-    /// A matrix has not the size of the first, is not square, or is empty.
+    /// A matrix does not have the size of the first matrix, is not square, or is empty.
     #[error("matrix {matrix} is {rows} by {columns}, not {size} by {size}")]
     Shape {
-        /// Which matrix, from 0.
+        /// Number of the matrix, from 0.
         matrix: usize,
-        /// Its rows.
+        /// Number of rows of the matrix.
         rows: usize,
-        /// Its columns.
+        /// Number of columns of the matrix.
         columns: usize,
-        /// The size expected, at least 1.
+        /// Number of rows and columns expected, at least 1.
         size: usize,
     },
     /// A matrix has an entry that is infinite or not a number.
     #[error("matrix {matrix} has an entry that is not a finite number")]
     NotFinite {
-        /// Which matrix, from 0.
+        /// Number of the matrix, from 0.
         matrix: usize,
     },
 }
 
 impl Automaton {
-    /// A pattern whose symbol s stands for `matrices[s]`.
+    /// Returns the automaton of a pattern whose symbol s stands for `matrices[s]`.
     ///
     /// # Errors
     ///
-    /// If there are not as many matrices as symbols, if they are not square and of one size, or if one has an entry that is not finite.
+    /// [`AutomatonError`] if the number of matrices differs from the number of symbols, if the matrices are not square and of one size, or if an entry is not
+    /// finite.
     pub(crate) fn new(pattern: Pattern, matrices: Vec<Matrix>) -> Result<Self, AutomatonError> {
         if pattern.symbols() != matrices.len() {
             return Err(AutomatonError::Count { symbols: pattern.symbols(), matrices: matrices.len() });
@@ -74,79 +75,79 @@ impl Automaton {
     }
 
     #[cfg(test)]
-    /// A graph with its matrices: [`Pattern::of`] and [`Automaton::new`].
+    /// Returns the automaton of a graph with its matrices: [`Pattern::of`], then [`Automaton::new`].
     ///
     /// # Errors
     ///
-    /// Those of both.
+    /// The errors of both functions.
     pub(crate) fn of(nodes: usize, edges: Vec<Edge>, matrices: Vec<Matrix>) -> Result<Self, AutomatonError> {
         Self::new(Pattern::of(nodes, edges, matrices.len())?, matrices)
     }
 
     #[cfg(test)]
-    /// Every matrix at every time: [`Pattern::free`].
+    /// Returns the automaton in which every matrix can occur at every time: [`Pattern::free`].
     ///
     /// # Errors
     ///
-    /// Those of [`Pattern::free`] and [`Automaton::new`].
+    /// The errors of [`Pattern::free`] and [`Automaton::new`].
     pub(crate) fn free(matrices: Vec<Matrix>) -> Result<Self, AutomatonError> {
         Self::new(Pattern::free(matrices.len())?, matrices)
     }
 
     #[cfg(test)]
-    /// Every matrix at every time, but number `hit` at most `most` times in a row: [`Pattern::runs`].
+    /// Returns the automaton in which matrix number `hit` occurs at most `most` times in a row, and every other matrix at every time: [`Pattern::runs`].
     ///
     /// # Errors
     ///
-    /// Those of [`Pattern::runs`] and [`Automaton::new`].
+    /// The errors of [`Pattern::runs`] and [`Automaton::new`].
     pub(crate) fn runs(matrices: Vec<Matrix>, hit: usize, most: u32) -> Result<Self, AutomatonError> {
         Self::new(Pattern::runs(matrices.len(), hit, most)?, matrices)
     }
 
     #[cfg(test)]
-    /// Several links, none of which knows of the others, acting on one state: [`Pattern::product`], with one matrix for every joint symbol.
+    /// Returns the automaton of several independent links that act on one state: [`Pattern::product`], with one matrix for every joint symbol.
     ///
     /// # Errors
     ///
-    /// Those of [`Pattern::product`] and [`Automaton::new`].
+    /// The errors of [`Pattern::product`] and [`Automaton::new`].
     pub(crate) fn product(links: &[Pattern], matrices: Vec<Matrix>) -> Result<Self, AutomatonError> {
         Self::new(Pattern::product(links)?, matrices)
     }
 
-    /// Which sequences are allowed.
+    /// Returns the pattern, which says what sequences are allowed.
     #[must_use]
     pub(crate) const fn pattern(&self) -> &Pattern {
         &self.pattern
     }
 
-    /// The matrices, by symbol.
+    /// Returns the matrices, indexed by symbol.
     #[must_use]
     pub(crate) fn matrices(&self) -> &[Matrix] {
         &self.matrices
     }
 
-    /// The number of rows of every matrix.
+    /// Returns the number of rows of every matrix.
     #[must_use]
     pub(crate) const fn size(&self) -> usize {
         self.size
     }
 
-    /// The edges on cycles, which alone decide how fast products grow.
+    /// Returns the edges on cycles. Only these edges decide how fast products grow, because a path takes every other edge at most once.
     pub(super) fn recurrent(&self) -> impl Iterator<Item = &Edge> {
         self.pattern.edges().iter().filter(|edge| self.pattern.recurs(edge))
     }
 
-    /// The same automaton with every matrix times 2^`exponent`, which is exact as long as nothing underflows.
+    /// Returns the automaton with every matrix times 2^`exponent`. The scaling is exact unless an entry underflows or overflows.
     pub(super) fn scaled(&self, exponent: i32) -> Self {
         let factor = libm::ldexp(1.0, exponent);
         let matrices = self.matrices.iter().map(|matrix| matrix.scaled(factor)).collect();
         Self { pattern: self.pattern.clone(), matrices, size: self.size }
     }
 
-    /// The power of two that brings the largest entry of a matrix on a cycle to between a half and 1; 0 if they are all zero.
+    /// Returns the exponent of the power of two that brings the largest entry of all matrices on cycles to between a half and 1; 0 if all entries are zero.
     pub(super) fn exponent(&self) -> i32 {
         let largest = self.recurrent().map(|edge| self.matrices[edge.symbol].largest()).fold(0.0, f64::max);
-        // Kept where both the factor and its inverse are ordinary numbers.
+        // Within ±1000 both the factor and its inverse are normal numbers.
         if largest > 0.0 { (-libm::frexp(largest).1).clamp(-1000, 1000) } else { 0 }
     }
 }

@@ -3,22 +3,22 @@
 //! *From below.* A path that ends where it began may be repeated for ever: the joint spectral radius ρ is at least the spectral radius of its product, to the
 //! power of one over its length.
 //!
-//! *From above.* Give every node v a norm |·|_v, and a product along a path from v to w the norm it has from |·|_v to |·|_w. Along paths that join, norms
-//! multiply or do better, and this is all that is needed. Let every node have a finite tree of paths, complete in that every path from the node either
-//! ends within the tree or runs through one of its leaves; let a path p have σ(p) = the least ‖A_q‖^(1/|q|) over its prefixes q that are not empty, p
-//! among them; and let U be the largest σ of a leaf. Then ρ <= U: cut an infinite path where a prefix q of its leaf attains σ, which gives
-//! ‖A_q‖ <= U^|q|; go on in the same way in the tree of the node where q ended. The cuts come at distances that the depth of the trees bounds, and so the
+//! *From above.* Give every node v a norm |·|_v, and a product along a path from v to w the operator norm from |·|_v to |·|_w. The norm of a joined path is at
+//! most the product of the norms of its pieces. The proof needs no other property of the norms. Let every node have a finite tree of paths, complete in that
+//! every path from the node either ends within the tree or runs through one of its leaves; let a path p have σ(p) = the least ‖A_q‖^(1/|q|) over its prefixes q
+//! that are not empty, p among them; and let U be the largest σ of a leaf. Then ρ <= U: cut an infinite path where a prefix q of its leaf attains σ, which
+//! gives ‖A_q‖ <= U^|q|; go on in the same way in the tree of the node where q ended. The cuts come at distances that the depth of the trees bounds, and so the
 //! product of the first N steps has norm <= C·U^N, with C for the piece after the last cut. The same family of norms is used in all trees: where one path's
-//! piece ends, the next begins in the norm in which the first was measured. Any family will do; this one is |x|_v = √(xᵀP_v x) with the shapes that a
-//! quadratic certificate has ([`Certificate::find`]), in which single steps already grow little.
+//! piece ends, the next begins in the norm in which the first was measured. Any family will do; this one is |x|_v = √(xᵀP_v x) with the shapes that a quadratic
+//! certificate has ([`Certificate::find`]), in which single steps already grow little.
 //!
-//! A leaf with σ <= lower + accuracy is never looked at again. The leaf with the largest σ is branched next: as long as it is there, U is no smaller. Whether
-//! another order would raise the lower bound sooner, and so have fewer leaves to branch, nobody knows beforehand.
+//! A leaf with σ <= lower + accuracy is settled and never branched. The leaf with the largest σ is branched next, because U cannot fall while that leaf exists.
+//! Another order might raise the lower bound sooner, and so need fewer branches, but no rule for such an order is known.
 //!
 //! *Rounding.* Products are computed in coordinates in which the norms are 2-norms: X = R_to A Z for a shape P = RᵀR and a computed Z near R⁻¹. With
-//! G = I − RZ, the exact R_to A R⁻¹ is (R_to A Z)(I − G)⁻¹, within ‖R_to A Z‖·g/(1 − g) of R_to A Z for ‖G‖₂ <= g < 1, and X is within γ₍₂ₙ₎|R_to||A||Z| of that,
-//! entry by entry. From there errors are carried along with every product ([`Approximate`]). Any invertible R may be used, whatever its origin: it need not
-//! factorise a shape exactly.
+//! G = I − RZ, the exact R_to A R⁻¹ is (R_to A Z)(I − G)⁻¹, within ‖R_to A Z‖·g/(1 − g) of R_to A Z for ‖G‖₂ <= g < 1, and X is within γ₍₂ₙ₎|R_to||A||Z| of
+//! that, entry by entry. From there errors are carried along with every product ([`Approximate`]). Any invertible R may be used, whatever its origin: it need
+//! not factorise a shape exactly.
 
 use std::cmp::Ordering;
 use std::collections::{BTreeSet, BinaryHeap};
@@ -33,125 +33,136 @@ use super::pattern::Edge;
 use super::verified::Certificate;
 use crate::worst_case::root::root_above;
 
-/// How long to search.
+/// The limits of a search.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Effort {
-    /// The distance of the bounds at which the search ends; the joint spectral radius of frames is of the order of 1.
+    /// Distance of the bounds at which the search ends. The joint spectral radius of frames is of the order of 1.
     pub accuracy: f64,
-    /// The largest number of products looked at. Each edge is looked at even if this is less. Each takes some tens of bytes to the end, beside the
-    /// matrices that are kept for later, which take up to 256 MiB.
+    /// Largest number of products that the search computes. The search computes the product of each single edge even if this number is smaller. Each product
+    /// takes some tens of bytes until the search ends; the matrices that are kept take up to 256 MiB more.
     pub products: u64,
 }
 
 impl Default for Effort {
-    /// 10⁻³, and 100 000 products.
+    /// Returns an accuracy of 10⁻³ and 100 000 products.
     fn default() -> Self {
         Self { accuracy: 1e-3, products: 100_000 }
     }
 }
 
-/// Bounds of the joint spectral radius, and the pattern that attains the lower one.
+/// Bounds of the joint spectral radius, and the pattern that attains the lower bound.
 ///
 /// The joint spectral radius is zero where no infinite path exists.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct WorstCase {
-    /// The joint spectral radius is at least this.
+    /// Lower bound of the joint spectral radius.
     pub(crate) lower: f64,
-    /// The joint spectral radius is at most this; infinite if numbers overflowed.
+    /// Upper bound of the joint spectral radius; infinite if numbers overflowed.
     pub(crate) upper: f64,
-    /// The matrices whose product, in this order of time and repeated for ever, grows by the lower bound per step; empty if that is zero.
+    /// Symbols, in the order of time, whose matrices repeated for ever grow by the lower bound per step; empty if the lower bound is zero.
     pub(crate) cycle: Vec<usize>,
-    /// How many products were looked at.
+    /// Number of products that the search computed.
     pub(crate) products: u64,
-    /// Whether the bounds are as close as was asked for.
+    /// Whether the distance of the bounds is at most the accuracy of the effort.
     pub(crate) complete: bool,
-    /// The quadratic certificate in whose norms the search began; `None` if numbers overflowed.
+    /// Quadratic certificate whose shapes are the norms of the search; `None` if numbers overflowed.
     pub(crate) certificate: Option<Certificate>,
 }
 
 impl Automaton {
     #[cfg(test)]
-    /// Bounds of the joint spectral radius: how fast a state can grow per step along allowed sequences of any length.
+    /// Returns bounds of the joint spectral radius, the fastest growth per step of a state along allowed sequences of any length.
     ///
-    /// The bounds hold whatever the effort; they differ by at most its accuracy if [`WorstCase::complete`].
+    /// The bounds hold for every effort. They differ by at most the accuracy of the effort if [`WorstCase::complete`].
     #[must_use]
     pub(crate) fn worst_case(&self, effort: &Effort) -> WorstCase {
         self.worst_case_watched(effort, &cohaptic_stability::Unwatched).expect("without a watch nothing ends it")
     }
 
-    /// [`Automaton::worst_case`], watched: it is asked before each product, and in each round of the search for a certificate; `None` if the watch ends it.
+    /// Returns bounds of the joint spectral radius, or `None` if the watch ends the search. The watch is asked before each product, and in each round of the
+    /// search for a certificate.
     #[must_use]
     pub(crate) fn worst_case_watched(&self, effort: &Effort, watch: &dyn Watch) -> Option<WorstCase> {
         watch.expects(real_of(effort.products) * self.product_operations());
         let exponent = self.exponent();
         let scaled = self.scaled(exponent);
         let accuracy = libm::ldexp(effort.accuracy, exponent);
-        // Branching makes up for what the shapes are not.
+        // Branching reaches the accuracy with any shapes, so the certificate need not be as sharp.
         let certificate = Certificate::find_watched(self, accuracy.clamp(1e-6, 1e-2), watch)?.ok();
         let mut search = Search::new(&scaled, certificate.as_ref(), accuracy, watch)?;
         search.run(effort.products, watch)?;
         let lower = libm::ldexp(search.lower, -exponent);
         let upper = libm::ldexp(search.upper(), -exponent);
-        // Whatever is of the order of underflow says nothing.
+        // A lower bound of the order of underflow may be rounding alone.
         let lower = if lower > f64::MIN_POSITIVE { lower } else { 0.0 };
         let cycle = if lower > 0.0 { search.cycle } else { Vec::new() };
-        // The rest is not needed.
+        // The search announced the whole budget of products to the watch, and needed fewer.
         watch.done(real_of(effort.products.saturating_sub(search.products)) * self.product_operations());
         Some(WorstCase { lower, upper, cycle, products: search.products, complete: upper - lower <= effort.accuracy, certificate })
     }
 
-    /// What a product takes: itself, and about as much again for each of the squarings that bound its norm.
+    /// Returns the estimated number of operations of a product: those of the product itself, and of the squarings that bound its norm.
     fn product_operations(&self) -> f64 {
         4.0 * real(self.size()).powi(3)
     }
 }
 
-/// The most numbers in products that are kept for leaves, 256 MiB of them; those of further leaves are computed again when their turn comes.
+/// Largest number of matrix entries that are kept for leaves, 256 MiB in total. The products of further leaves are computed again when the leaves are branched.
 const MOST_KEPT: usize = 1 << 25;
 
-/// An edge on a cycle, in the nodes' coordinates.
+/// An edge on a cycle, in the coordinates of its nodes.
 struct Step {
     edge: Edge,
+    /// Matrix R_to A R_from⁻¹.
     image: Approximate,
+    /// Upper bound of the 2-norm of the computed image.
     norm: f64,
 }
 
-/// A path that may have to be followed further.
+/// A path that the search may have to branch.
 struct Leaf {
-    /// σ.
+    /// σ of the path.
     bound: f64,
-    /// The order in which leaves were made decides between equal bounds.
+    /// Number of products at the leaf's creation. Decides between equal bounds, so that the order of the search is the same on every machine.
     order: u64,
-    /// Where it began and where it ends.
+    /// First node of the path.
     root: usize,
+    /// Last node of the path.
     node: usize,
+    /// Number of steps of the path.
     length: usize,
-    /// `None` if there was no room for it.
+    /// Product along the path; `None` if no room was left.
     product: Option<Approximate>,
+    /// Upper bound of the 2-norm of the computed product.
     norm: f64,
-    /// Its last entry among the trails.
+    /// Index of the last step of the path in `Search::trails`.
     trail: Option<usize>,
 }
 
+/// The state of a branch and bound.
 struct Search {
-    /// Those of a product.
+    /// Estimated number of operations of a product.
     operations: f64,
     accuracy: f64,
     steps: Vec<Step>,
-    /// The steps from each node.
+    /// Indices of the steps from each node.
     from: Vec<Vec<usize>>,
+    /// Leaves that are not settled.
     leaves: BinaryHeap<Leaf>,
-    /// The largest σ of a leaf that is not looked at again.
+    /// Largest σ of the settled leaves.
     settled: f64,
+    /// Best lower bound so far.
     lower: f64,
+    /// Symbols of the closed path that attains `lower`.
     cycle: Vec<usize>,
+    /// Number of products so far.
     products: u64,
-    /// Paths as (the entry before, the step).
+    /// Steps of all paths as a tree: the index of the entry before, and the index of the step.
     trails: Vec<(Option<usize>, usize)>,
-    /// How many more numbers may be kept in products of leaves.
+    /// Number of matrix entries that may still be kept for leaves.
     room: usize,
     norms: Norms,
-    /// Closed paths whose radius is known, from whichever of their nodes comes first in order.
+    /// Closed paths whose radius is known, each rotated to the smallest of its rotations.
     closed: BTreeSet<Vec<usize>>,
 }
 
@@ -179,8 +190,9 @@ impl Search {
         })
     }
 
-    /// Goes on as long as there is something to gain; `None` if the watch ends it.
+    /// Branches leaves until the bounds are as close as the accuracy or the budget of products is spent; `None` if the watch ends the search.
     fn run(&mut self, budget: u64, watch: &dyn Watch) -> Option<()> {
+        // The trees of all nodes begin with the single steps, without which U would not be complete.
         for number in 0..self.steps.len() {
             if watch.stops() {
                 return None;
@@ -190,7 +202,7 @@ impl Search {
             let (product, norm) = (step.image.clone(), step.norm);
             self.look_at(number, product, norm, step.edge.from, f64::INFINITY, 0, None);
         }
-        // A norm that is looser than the accuracy saves squarings and costs products.
+        // A looser norm needs fewer squarings, but leaves larger σ and so more products.
         let sharp = (0.25 * self.accuracy).clamp(1e-5, 5e-3);
         while self.products < budget && self.leaves.peek().is_some_and(|leaf| !self.is_settled(leaf.bound)) {
             let Some(mut leaf) = self.leaves.pop() else { break };
@@ -210,7 +222,7 @@ impl Search {
                 let product = step.image.times(step.norm, &above, leaf.norm);
                 let length = leaf.length + 1;
                 let enough = libm::pow(self.lower + self.accuracy, real(length)) * (1.0 - 1e-9);
-                // Only its root of order `length` counts, and only if it is below the bound that the leaf has already.
+                // σ is the least of the roots of all prefixes, so a norm whose root is not below the leaf's σ changes nothing.
                 let useless = libm::pow(leaf.bound, real(length)) * (1.0 + 1e-9);
                 let norm = self.norms.above(&product.matrix, Sharpness { enough, beyond: sharp * real(length), useless });
                 self.look_at(number, product, norm, leaf.root, leaf.bound, leaf.length, leaf.trail);
@@ -220,7 +232,8 @@ impl Search {
         Some(())
     }
 
-    /// Takes in the path that goes on from another by one step.
+    /// Records the path that extends a path by the step `number`: as a closed path, as a settled leaf or as a leaf to branch. `before`, `length` and `trail`
+    /// are those of the path without the step, `norm` is an upper bound of the 2-norm of `product`.
     #[expect(clippy::too_many_arguments, reason = "the parts of a path, which is not yet a leaf")]
     fn look_at(&mut self, number: usize, product: Approximate, norm: f64, root: usize, before: f64, length: usize, trail: Option<usize>) {
         self.products += 1;
@@ -228,7 +241,7 @@ impl Search {
         let bound = before.min(root_above(product.norm(norm), 0.0, real(length)));
         self.trails.push((trail, number));
         let trail = Some(self.trails.len() - 1);
-        // A radius is at most its norm.
+        // The growth of a closed path is at most σ, so a path with a small σ cannot raise the lower bound.
         if node == root && bound > self.enough() {
             self.close(&product, length, trail);
         }
@@ -244,9 +257,10 @@ impl Search {
         }
     }
 
-    /// What the radius of a cycle must exceed to be worth knowing exactly.
+    /// Returns the growth that a cycle must exceed to be computed exactly.
     fn enough(&self) -> f64 {
-        // A hundredth of the accuracy is no reason to compare hundreds of equal cycles to the last digit.
+        // Hundreds of cycles may have the same growth but for rounding. A hundredth of the accuracy keeps the search from comparing all of them to the last
+        // digit.
         self.lower + (0.01 * self.accuracy).max(1e-12 * self.lower)
     }
 
@@ -267,12 +281,12 @@ impl Search {
         path
     }
 
-    /// The product of a path once more.
+    /// Computes the product of a path whose product was not kept.
     fn product(&mut self, trail: Option<usize>) -> Approximate {
         let path = self.path(trail);
         let mut product = self.steps[path[0]].image.clone();
         for number in &path[1..] {
-            // Any bound of the norm gives a bound of the error.
+            // The norm only enters the bound of the error, so the cheapest bound is sharp enough.
             let norm = self.norms.above(&product.matrix, Sharpness { enough: f64::INFINITY, beyond: 1.0, useless: 0.0 });
             let step = &self.steps[*number];
             product = step.image.times(step.norm, &product, norm);
@@ -280,10 +294,10 @@ impl Search {
         product
     }
 
-    /// Looks whether a closed path grows faster than the fastest so far.
+    /// Raises the lower bound if a closed path grows faster than all closed paths before.
     fn close(&mut self, product: &Approximate, length: usize, trail: Option<usize>) {
         let path = self.path(trail);
-        // The same cycle from another of its nodes, or several times around, has the same radius.
+        // A rotation of a cycle, or a cycle taken several times, has the same growth per step and is computed once.
         let rotated = |start: usize| path[start..].iter().chain(&path[..start]);
         let first = (1..length).fold(0, |first, start| if rotated(start).cmp(rotated(first)) == Ordering::Less { start } else { first });
         let repeats = (1..length).any(|start| length.is_multiple_of(start) && rotated(start).eq(&path));
@@ -297,13 +311,14 @@ impl Search {
         }
     }
 
-    /// U, the largest σ of a leaf.
+    /// Returns U, the largest σ of a leaf, settled or not.
     fn upper(&self) -> f64 {
         self.leaves.peek().map_or(0.0, |leaf| leaf.bound).max(self.settled).max(self.lower)
     }
 }
 
-/// The edges on cycles in the coordinates of a certificate's shapes; of round ones, where there is none.
+/// Returns the edges on cycles in the coordinates of the certificate's shapes, or in the original coordinates without a certificate or with singular factors;
+/// `None` if the watch ends the search.
 fn steps(automaton: &Automaton, certificate: Option<&Certificate>, watch: &dyn Watch) -> Option<Vec<Step>> {
     let identity = || vec![Matrix::identity(automaton.size()); automaton.pattern().nodes()];
     let factors: Option<Vec<Matrix>> = certificate.and_then(|certificate| certificate.shapes().iter().map(cholesky).collect());
@@ -329,13 +344,14 @@ fn steps(automaton: &Automaton, certificate: Option<&Certificate>, watch: &dyn W
 /// A computed inverse Z of an upper triangle R.
 #[derive(Clone)]
 struct Inverse {
+    /// Z.
     matrix: Matrix,
-    /// At least g/(1 − g), with g >= ‖I − RZ‖₂; zero if the inverse is exact.
+    /// Upper bound of g/(1 − g), with g >= ‖I − RZ‖₂; zero if the inverse is exact.
     gap: f64,
 }
 
 impl Inverse {
-    /// `None` if it is no inverse at all.
+    /// Returns the computed inverse of an upper triangle, or `None` if ‖I − RZ‖ is not shown to be below a half.
     fn of(factor: &Matrix) -> Option<Self> {
         let size = factor.rows();
         let matrix = triangle_inverse(factor);
@@ -351,12 +367,12 @@ impl Inverse {
     }
 }
 
-/// R_to A R_from⁻¹.
+/// Returns R_to A R_from⁻¹ with a bound of its error.
 fn image(matrix: &Matrix, to: &Matrix, from: &Inverse) -> Approximate {
     let size = matrix.rows();
     let image = to.times(&matrix.times(&from.matrix));
     if from.gap == 0.0 {
-        // Both are the identity.
+        // Only the exact identity has the gap zero, and then R_to is the identity too: the product is exact.
         return Approximate { matrix: image, error: 0.0 };
     }
     let sizes = frobenius_norm(&absolute(to).times(&absolute(matrix).times(&absolute(&from.matrix))));
@@ -375,7 +391,7 @@ fn absolute(matrix: &Matrix) -> Matrix {
 }
 
 impl Ord for Leaf {
-    /// The largest bound first; of equal ones the older.
+    /// The leaf with the larger bound is greater, so that the heap yields it first; of equal bounds the older leaf.
     fn cmp(&self, other: &Self) -> Ordering {
         self.bound.total_cmp(&other.bound).then(other.order.cmp(&self.order))
     }
@@ -399,7 +415,7 @@ impl Eq for Leaf {}
 mod tests {
     use super::*;
 
-    /// Without room for a single product every path is multiplied again, and the bounds are the same to the rounding of their error terms.
+    /// Without room for a single product the search computes every path again, and the bounds are the same to the rounding of their error terms.
     #[test]
     fn without_room_the_bounds_are_the_same() {
         let matrices = [[0.5, 0.4, -0.3, 0.6], [0.4, -0.6, 0.5, 0.3]].map(|entries| Matrix::from_fn(2, 2, |i, j| entries[2 * i + j]));

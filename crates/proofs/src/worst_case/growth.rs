@@ -1,9 +1,9 @@
 //! A lower bound of a spectral radius that rounding cannot invalidate, without eigenvalues.
 //!
-//! The trace of a power is the sum of the eigenvalues' powers, hence ρ(M) >= (|tr Mᵏ|/n)^(1/k): whatever the Jordan form. As k grows the bound becomes
-//! sharp, to ln(n)/k, wherever the trace does not cancel. With k = 2, 4, 8, … by squaring, a complex pair cannot cancel twice running, since
-//! cos 2x = 2cos²x − 1; where more eigenvalues of the same modulus do (a cyclic permutation of three: tr M^(2^j) = 0 for all j), the traces of
-//! Mᵏ·M, Mᵏ·M², …, Mᵏ·Mⁿ cannot all cancel (Turán 1953, second main theorem).
+//! The trace of a power is the sum of the eigenvalues' powers, hence ρ(M) >= (|tr Mᵏ|/n)^(1/k) for every Jordan form. As k grows the bound becomes sharp, to
+//! ln(n)/k, wherever the terms of the trace do not cancel. With k = 2, 4, 8, … by squaring, the terms of a complex pair cannot cancel twice running, since
+//! cos 2x = 2cos²x − 1. The terms of more eigenvalues of the same modulus can cancel each time (a cyclic permutation of three: tr M^(2^j) = 0 for all j), but
+//! the traces of Mᵏ·M, Mᵏ·M², …, Mᵏ·Mⁿ cannot all cancel (Turán 1953, second main theorem).
 //!
 //! Rounding: the exact power is 2^s·(N + E), N computed, ‖E‖₂ <= e. Its square is N² + NE + EN + E², and N² is computed to within γₙ‖N‖_F², so that
 //! e' = 2‖N‖₂e + e² + γₙ‖N‖_F². The trace of N + E is within n·e of that of N, in addition to the rounding of its own sum. Relative to N the error doubles with
@@ -15,10 +15,10 @@ use cohaptic_stability::numerics::{UNDERFLOW, gamma, outward, real};
 use super::norm::{Sharpness, frobenius_norm, norm_above};
 use crate::worst_case::root::{root_above, root_below};
 
-/// Powers up to 2^36, where ln(n)/k is far below the rounding of one number.
+/// Largest number of squarings. At the power 2^36 the slack ln(n)/k is about 10⁻¹⁰.
 const MOST_SQUARINGS: u32 = 36;
 
-/// A computed matrix and how far, in the 2-norm, the exact one may be from it.
+/// A computed matrix, and an upper bound of its distance from the exact matrix in the 2-norm.
 #[derive(Clone, PartialEq, Debug)]
 pub(super) struct Approximate {
     pub matrix: Matrix,
@@ -26,8 +26,8 @@ pub(super) struct Approximate {
 }
 
 impl Approximate {
-    /// The product of the exact matrices, with the error that covers those of both factors and that of the product. The norms are upper bounds of the
-    /// computed factors' 2-norms.
+    /// Returns the product self·other, with an error that covers the errors of both factors and the rounding of the product. `norm` and `other_norm` are upper
+    /// bounds of the 2-norms of the two computed factors.
     pub(super) fn times(&self, norm: f64, other: &Self, other_norm: f64) -> Self {
         let product = self.matrix.times(&other.matrix);
         let frobenius = frobenius_norm(&self.matrix) * frobenius_norm(&other.matrix);
@@ -38,7 +38,7 @@ impl Approximate {
         Self { matrix: product, error }
     }
 
-    /// At least the 2-norm of the exact matrix, given one of the computed one.
+    /// Returns an upper bound of the 2-norm of the exact matrix; `computed` is an upper bound of the 2-norm of the computed matrix.
     pub(super) fn norm(&self, computed: f64) -> f64 {
         outward(computed + self.error)
     }
@@ -49,8 +49,8 @@ impl Approximate {
     }
 }
 
-/// At most ρ^(1/`length`) with ρ the spectral radius of the exact matrix, a product of `length` factors. Gives up, with what it has by then, once the
-/// answer is known to be at most `enough`.
+/// Returns a lower bound of ρ^(1/`length`), with ρ the spectral radius of the exact matrix, a product of `length` factors. Ends early, with the best bound so
+/// far, once ρ^(1/`length`) is known to be at most `enough`.
 pub(super) fn radius_below(product: &Approximate, length: usize, enough: f64) -> f64 {
     let size = real(product.matrix.rows());
     let largest = product.matrix.largest();
@@ -70,8 +70,10 @@ pub(super) fn radius_below(product: &Approximate, length: usize, enough: f64) ->
         if above <= enough || norm == 0.0 {
             break;
         }
+        // Once n times the error exceeds half of the norm, the trace says little about the exact power.
         let (share, sure) = (trace_share(&power), power.error * size < 0.5 * norm);
         best = best.max(root_below(share, exponent, factors * real(length)));
+        // A trace that is small compared with the norm is a sign of cancelling eigenvalues: then the shifted powers are tried.
         if share < 0.05 / size * norm && sure {
             if shifts.is_empty() {
                 shifts = powers(&base);
@@ -90,6 +92,7 @@ pub(super) fn radius_below(product: &Approximate, length: usize, enough: f64) ->
         if largest == 0.0 || !largest.is_finite() {
             break;
         }
+        // Brings the entries back to about 1, so that no power overflows; `exponent` keeps the scale.
         let shift = libm::frexp(largest).1;
         power = squared.scaled_by_power_of_two(-shift);
         exponent = 2.0 * exponent + f64::from(shift);
@@ -98,7 +101,7 @@ pub(super) fn radius_below(product: &Approximate, length: usize, enough: f64) ->
     best
 }
 
-/// At most |tr|/n of the exact matrix, and so of the power of its spectral radius; not below 0.
+/// Returns a lower bound of |tr|/n of the exact matrix, at least 0. The spectral radius of the exact matrix is at least this value too.
 fn trace_share(power: &Approximate) -> f64 {
     let size = real(power.matrix.rows());
     let diagonal = || (0..power.matrix.rows()).map(|place| power.matrix[(place, place)]);
@@ -107,7 +110,7 @@ fn trace_share(power: &Approximate) -> f64 {
     ((diagonal().sum::<f64>().abs() - error) / size * (1.0 - f64::EPSILON)).max(0.0)
 }
 
-/// M, M², …, Mⁿ, with upper bounds of their computed norms.
+/// Returns M, M², …, Mⁿ, each with an upper bound of the 2-norm of the computed matrix.
 fn powers(base: &Approximate) -> Vec<(Approximate, f64)> {
     let norm_of = |of: &Approximate| norm_above(&of.matrix, Sharpness { enough: 0.0, beyond: 0.02, useless: f64::INFINITY });
     let base_norm = norm_of(base);

@@ -1,9 +1,10 @@
-//! An upper bound of the 2-norm that rounding cannot invalidate, as sharp as it has to be.
+//! An upper bound of the 2-norm that rounding cannot invalidate, as sharp as the caller asks.
 //!
 //! With G = MᵀM the 2-norm is ‖G^m‖₂^(1/2m) <= ‖G^m‖_F^(1/2m), and the Frobenius norm is above the 2-norm by at most √n, so that the bound is sharp to
 //! n^(1/4m). Squaring G over and over doubles m each time.
 //!
-//! The Frobenius norm of M itself and its longest row, which cost nothing compared with a product, come first: most products are decided by them.
+//! The Frobenius norm of M is an upper bound, and the length of the longest row is a lower bound. Both cost little compared with a product and come first,
+//! because they decide most cases.
 //!
 //! Rounding: write Ĝ for the computed G^m, m = 2^j, and δⱼ = ‖Ĝ − G^m‖_F / ‖G^m‖₂. A product of computed matrices is within γₙ‖·‖_F‖·‖_F of the exact
 //! one, and ‖·‖_F² <= n‖·‖₂², so δ₀ <= nγₙ and δ₍ⱼ₊₁₎ <= 2δⱼ + δⱼ² + nγₙ(1 + δⱼ)². While δⱼ <= 1/8 this gives δⱼ <= 2^(j+1)·nγₙ·(5/4) + …; the worst case
@@ -15,34 +16,34 @@ use cohaptic_stability::numerics::{UNDERFLOW, gamma, outward, real};
 
 use crate::worst_case::root::root_above;
 
-/// Squarings after which n^(1/4m) is below 1 + 10⁻⁵ for every size that can be worked with.
+/// Largest number of squarings. After so many, n^(1/4m) is below 1 + 10⁻⁵ for every size in use.
 const MOST_SQUARINGS: u32 = 17;
 
-/// How sharp a norm has to be.
+/// The sharpness that a caller needs of a bound of a norm.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sharpness {
-    /// A bound at or below this is good enough.
+    /// Threshold: any bound of at most this value is sharp enough.
     pub enough: f64,
-    /// The relative error that is good enough once the norm is known to be above `enough`.
+    /// Relative error of the bound that is sharp enough if the norm is above `enough`.
     pub beyond: f64,
-    /// Of a norm at or above this any bound is good enough.
+    /// Threshold: if the norm is at least this value, any bound is sharp enough.
     pub useless: f64,
 }
 
-/// Room for the powers of a matrix, to be used again.
+/// Buffers for the powers of a matrix, reused from call to call.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Norms {
     power: Matrix,
     next: Matrix,
 }
 
-/// At least the 2-norm of the matrix.
+/// Returns an upper bound of the 2-norm of the matrix.
 pub(super) fn norm_above(matrix: &Matrix, sharpness: Sharpness) -> f64 {
     Norms::default().above(matrix, sharpness)
 }
 
 impl Norms {
-    /// At least the 2-norm of the matrix.
+    /// Returns an upper bound of the 2-norm of the matrix; infinite if an entry is not finite.
     pub(super) fn above(&mut self, matrix: &Matrix, sharpness: Sharpness) -> f64 {
         let size = real(matrix.rows().max(matrix.columns()));
         let largest = matrix.largest();
@@ -54,7 +55,7 @@ impl Norms {
         }
         let own = libm::frexp(largest).1.clamp(-1000, 1000);
         scale(matrix, libm::ldexp(1.0, -own), &mut self.power);
-        // Before anything of the third order: the Frobenius norm is above, the longest row below.
+        // The Frobenius norm (upper bound) and the longest row (lower bound) cost the second power of the size, a squaring costs the third.
         let longest = (0..matrix.rows()).map(|row| self.power.row(row).iter().map(|entry| entry * entry).sum::<f64>()).fold(0.0, f64::max).sqrt();
         let square_sum = gamma(matrix.rows() * matrix.columns() + 2);
         let mut best = outward(libm::ldexp(outward(frobenius_norm(&self.power) * (1.0 + square_sum)), own)) + UNDERFLOW;
@@ -69,11 +70,12 @@ impl Norms {
             std::mem::swap(&mut self.power, &mut self.next);
             let frobenius = frobenius_norm(&self.power);
             best = best.min(outward(root_above(frobenius, exponent, doubled) * rounding) + UNDERFLOW);
-            // The eigenvalues of G^m are not negative, so that the largest is at least the sum of their squares over their sum. Only saves work.
+            // The eigenvalues of G^m are not negative, so the largest is at least the sum of their squares divided by their sum. This lower bound only decides
+            // when to stop; the returned bound does not depend on it.
             let sum: f64 = (0..self.power.rows()).map(|place| self.power[(place, place)]).sum();
             let at_least = best * libm::exp2(libm::log2(frobenius / sum) / doubled);
             let decided = at_least >= sharpness.useless || (at_least > sharpness.enough && best <= at_least * (1.0 + sharpness.beyond));
-            // How far above the norm the bound can be at most: n^(1/4m).
+            // Logarithm of n^(1/4m), the largest ratio of the bound to the norm.
             let slack = libm::log(size) / (2.0 * doubled);
             if squaring == MOST_SQUARINGS || slack < 1e-5 || best <= sharpness.enough || decided {
                 break;
@@ -110,12 +112,12 @@ fn reshape(matrix: &mut Matrix, rows: usize, columns: usize) {
     }
 }
 
-/// The root of the sum of the squares, of a matrix whose entries are neither huge nor all tiny.
+/// Returns the root of the sum of the squares of all entries. The squares must not overflow or all underflow.
 pub(super) fn frobenius_norm(matrix: &Matrix) -> f64 {
     matrix.entries().iter().map(|entry| entry * entry).sum::<f64>().sqrt()
 }
 
-/// MᵀM, symmetric to the bit. Of a symmetric matrix it is the square.
+/// Returns MᵀM, symmetric to the bit. For a symmetric matrix MᵀM is the square.
 pub(super) fn gram(matrix: &Matrix) -> Matrix {
     let mut product = Matrix::default();
     gram_into(matrix, &mut product);
@@ -139,7 +141,7 @@ fn gram_into(matrix: &Matrix, product: &mut Matrix) {
     mirror(product);
 }
 
-/// The upper triangle copied onto the lower one.
+/// Copies the upper triangle of a square matrix onto the lower triangle.
 pub(super) fn mirror(matrix: &mut Matrix) {
     for row in 0..matrix.rows() {
         for column in 0..row {
@@ -161,7 +163,7 @@ mod tests {
             assert!(above >= norm && above <= norm * (1.0 + 2e-5), "{above:e} for {norm:e}");
         };
         check(&Matrix::identity(1).scaled(-3.0), 3.0);
-        // All singular values alike: where the Frobenius norm is farthest off.
+        // All singular values equal: the case in which the Frobenius norm is largest compared with the 2-norm.
         check(&Matrix::identity(12).scaled(0.3), 0.3);
         check(&Matrix::identity(3).scaled(1e-300), 1e-300);
         check(&Matrix::identity(3).scaled(1e300), 1e300);
@@ -178,7 +180,7 @@ mod tests {
         let matrix = Matrix::identity(12);
         assert!(norm_above(&matrix, Sharpness { enough: 1.0001, beyond: 0.5, useless: f64::INFINITY }) <= 1.0001);
         assert!(norm_above(&matrix, Sharpness { enough: 0.5, beyond: 0.1, useless: f64::INFINITY }) <= 1.2);
-        // Where it cannot help, it need not be sharp, and still is above.
+        // For a norm above `useless` the bound need not be sharp, but must still be a bound.
         let crude = norm_above(&matrix, Sharpness { useless: 0.9, ..SHARP });
         assert!((1.0..=12.0_f64.sqrt() * (1.0 + 1e-9)).contains(&crude));
     }

@@ -1,75 +1,76 @@
-//! Which sequences of symbols can occur: a finite directed graph whose edges carry symbols.
+//! Patterns: the allowed sequences of symbols, as the paths of a finite directed graph whose edges carry symbols.
 
 use thiserror::Error;
 
-/// The largest number of edges of a pattern.
+/// Largest number of edges, and of nodes, of a pattern.
 const MOST_EDGES: usize = 1 << 20;
 
-/// One allowed step.
+/// One allowed step, from node to node.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) struct Edge {
-    /// The node before it, from 0.
+    /// Node before the step, from 0.
     pub(crate) from: usize,
-    /// The node after it, from 0.
+    /// Node after the step, from 0.
     pub(crate) to: usize,
-    /// What happens in it: the index of a matrix, once there are matrices.
+    /// Symbol of the step, from 0: the index of a matrix of an automaton.
     pub(crate) symbol: usize,
 }
 
-/// The sequences of symbols that a network can produce: those along the infinite paths of a graph, which may begin anywhere.
+/// The sequences of symbols that a network can produce: the sequences along the infinite paths of a graph, which may begin at any node.
 ///
-/// Nodes that lie on no cycle do no harm: an infinite path leaves them behind.
+/// Nodes that lie on no cycle are allowed: an infinite path passes each of them at most once.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Pattern {
     nodes: usize,
     symbols: usize,
     edges: Vec<Edge>,
-    /// The strongly connected component of every node.
+    /// Number of the strongly connected component, indexed by node.
     component: Vec<usize>,
 }
 
-/// Why a graph is not a pattern.
+/// Reasons why a graph is not a pattern.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
 #[non_exhaustive]
 pub enum PatternError {
-    /// There is no node.
+    /// The graph has no node.
     #[error("a pattern needs at least one node")]
     NoNode,
-    /// There is no symbol.
+    /// The number of symbols is zero.
     #[error("a pattern needs at least one symbol")]
     NoSymbol,
     /// An edge begins or ends at a node that does not exist.
     #[error("edge {edge} names node {node}, but there are {nodes}, counted from 0")]
     Node {
-        /// Which edge, from 0.
+        /// Number of the edge, from 0.
         edge: usize,
-        /// The node it names.
+        /// Node that the edge names.
         node: usize,
-        /// How many there are.
+        /// Number of nodes of the graph.
         nodes: usize,
     },
     /// A symbol does not exist.
     #[error("symbol {symbol} does not exist: there are {symbols}, counted from 0")]
     Symbol {
-        /// The symbol named.
+        /// Symbol that an edge names.
         symbol: usize,
-        /// How many there are.
+        /// Number of symbols.
         symbols: usize,
     },
     /// The graph is too large.
     #[error("the pattern would have more than {most} edges")]
     TooLarge {
-        /// The largest number.
+        /// Largest number of edges.
         most: usize,
     },
 }
 
 impl Pattern {
-    /// The pattern of a graph.
+    /// Returns the pattern of a graph.
     ///
     /// # Errors
     ///
-    /// A [`PatternError`] if there is no node or symbol, if an edge names one that does not exist, or if there are more than 2²⁰ edges or nodes.
+    /// [`PatternError`] if the graph has no node or no symbol, if an edge names a node or symbol that does not exist, or if the graph has more than 2²⁰ edges
+    /// or nodes.
     pub(crate) fn of(nodes: usize, edges: Vec<Edge>, symbols: usize) -> Result<Self, PatternError> {
         if nodes == 0 {
             return Err(PatternError::NoNode);
@@ -93,23 +94,23 @@ impl Pattern {
     }
 
     #[cfg(test)]
-    /// Every symbol at every time.
+    /// Returns the pattern in which every symbol can occur at every time.
     ///
     /// # Errors
     ///
-    /// If there is no symbol, or more than 2²⁰.
+    /// [`PatternError`] if `symbols` is zero or more than 2²⁰.
     pub(crate) fn free(symbols: usize) -> Result<Self, PatternError> {
         Self::of(1, (0..symbols.min(MOST_EDGES + 1)).map(|symbol| Edge { from: 0, to: 0, symbol }).collect(), symbols)
     }
 
-    /// Every symbol at every time, but the symbol `hit` at most `most` times in a row: with `hit` a lost packet, bounded runs of loss. With `most`
-    /// zero it never happens.
+    /// Returns the pattern in which the symbol `hit` occurs at most `most` times in a row, and every other symbol at every time. If `hit` stands for a lost
+    /// packet, these are bounded runs of loss. With `most` zero the symbol `hit` never occurs.
     ///
-    /// Node k is where the last k symbols were hits.
+    /// At node k the last k symbols were `hit`.
     ///
     /// # Errors
     ///
-    /// If there is no symbol, if `hit` is none of them, or if there are more than 2²⁰ edges.
+    /// [`PatternError`] if `symbols` is zero, if `hit` is not below `symbols`, or if the pattern would have more than 2²⁰ edges.
     pub(crate) fn runs(symbols: usize, hit: usize, most: u32) -> Result<Self, PatternError> {
         if hit >= symbols {
             return Err(if symbols == 0 { PatternError::NoSymbol } else { PatternError::Symbol { symbol: hit, symbols } });
@@ -124,14 +125,14 @@ impl Pattern {
         Self::of(most + 1, edges, symbols)
     }
 
-    /// Several patterns side by side, none of which knows of the others: one symbol of each in every step.
+    /// Returns the pattern of several independent patterns, with one symbol of each pattern in every step.
     ///
-    /// The joint symbol counts with the first pattern as the most significant digit: for two of them, `a * second.symbols() + b`. Nodes are counted
+    /// The first pattern is the most significant digit of a joint symbol: for two patterns the joint symbol is `a * second.symbols() + b`. Nodes are numbered
     /// the same way.
     ///
     /// # Errors
     ///
-    /// If there is no pattern, or if the product has more than 2²⁰ edges.
+    /// [`PatternError`] if `patterns` is empty, or if the product would have more than 2²⁰ edges.
     pub(crate) fn product(patterns: &[Self]) -> Result<Self, PatternError> {
         let (first, others) = patterns.split_first().ok_or(PatternError::NoNode)?;
         let too_large = PatternError::TooLarge { most: MOST_EDGES };
@@ -151,38 +152,39 @@ impl Pattern {
         })
     }
 
-    /// The number of nodes.
+    /// Returns the number of nodes.
     #[must_use]
     pub(crate) const fn nodes(&self) -> usize {
         self.nodes
     }
 
-    /// The number of symbols, whether they occur or not.
+    /// Returns the number of symbols, including symbols that occur on no edge.
     #[must_use]
     pub(crate) const fn symbols(&self) -> usize {
         self.symbols
     }
 
-    /// All edges, in the order given.
+    /// Returns all edges, in the order given.
     #[must_use]
     pub(crate) fn edges(&self) -> &[Edge] {
         &self.edges
     }
 
-    /// Whether an edge lies on a cycle. An infinite path has only finitely many others.
+    /// Whether an edge lies on a cycle. An infinite path takes edges on no cycle only finitely often.
     #[must_use]
     pub(crate) fn recurs(&self, edge: &Edge) -> bool {
         self.component[edge.from] == self.component[edge.to]
     }
 
-    /// The strongly connected component of a node; numbers have no meaning but to be equal or not.
+    /// Returns the number of the strongly connected component of a node, below the number of nodes. Equal numbers mean the same component.
     pub(super) fn component(&self, node: usize) -> usize {
         self.component[node]
     }
 }
 
-/// The strongly connected component of every node (Kosaraju 1978, as in Sharir 1981): nodes in the order in which a search leaves them for good, then the
-/// reversed graph searched from the last of them back. Both searches keep their own stack, since a run of a million losses is a path of that length.
+/// Returns the number of the strongly connected component of every node (Kosaraju 1978, as in Sharir 1981). A first search orders the nodes by the time at
+/// which the search leaves them; a second search follows edges backward, from the node that was left last to the node that was left first. Both searches keep
+/// their own stack instead of recursion, because a run of a million losses is a path of that length.
 fn components(nodes: usize, edges: &[Edge]) -> Vec<usize> {
     let mut forward = vec![Vec::new(); nodes];
     let mut backward = vec![Vec::new(); nodes];
@@ -196,6 +198,7 @@ fn components(nodes: usize, edges: &[Edge]) -> Vec<usize> {
         if std::mem::replace(&mut seen[start], true) {
             continue;
         }
+        // Entries: a node, and the number of edges from the node that were tried.
         let mut stack = vec![(start, 0)];
         while let Some((node, tried)) = stack.pop() {
             let Some(&next) = forward[node].get(tried) else {
@@ -241,7 +244,7 @@ mod tests {
         assert!(matches!(Pattern::product(&[long.clone(), long]), Err(PatternError::TooLarge { .. })));
     }
 
-    /// The words of each length, counted along the paths from node 0: with at most one hit in a row they are Fibonacci numbers.
+    /// The number of words of each length along the paths from node 0; with at most one hit in a row these are the Fibonacci numbers.
     #[test]
     fn runs_are_bounded_and_nothing_else_is() {
         let words = |most: u32, length: usize| {
