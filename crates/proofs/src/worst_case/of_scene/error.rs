@@ -1,4 +1,4 @@
-//! Why a scene has no worst case that can be looked at.
+//! Errors of the worst case of a scene.
 
 use std::fmt;
 use std::time::Duration;
@@ -9,81 +9,81 @@ use cohaptic_units::print::Span;
 use super::super::automaton::AutomatonError;
 use super::super::pattern::PatternError;
 
-/// Why the worst case of a scene cannot be bounded.
+/// Reasons why the worst case of a scene cannot be bounded.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneWorstCaseError {
     /// The scene cannot be analysed at all.
     #[error(transparent)]
     Analysis(#[from] AnalysisError),
-    /// The law of the scene uses position and velocity of a sample by themselves, as one that extrapolates does.
+    /// The control law of the scene uses the position and the velocity of a sample separately, for example to extrapolate.
     #[error(
         "the worst case does not follow {strategy} coordination, which uses the ages of samples: ask `cohaptic stability point` without bounds, which follows random loss in the mean square"
     )]
     Ages {
-        /// Its name.
+        /// Name of the strategy.
         strategy: &'static str,
     },
     /// The pattern is too large, or a matrix overflowed.
     #[error(transparent)]
     Automaton(#[from] AutomatonError),
-    /// The interval of delays is none.
+    /// The first delay of the interval is longer than the second.
     #[error("delays from {} to {}: expected the shorter one first", Span(*.least), Span(*.most))]
     Delays {
-        /// The first.
+        /// First delay.
         least: Duration,
-        /// The second.
+        /// Second delay.
         most: Duration,
     },
-    /// Samples might overtake each other.
+    /// The interval of delays is as long as the period of sending or longer, so that samples could overtake each other.
     #[error(
         "delays from {} to {} with a sample every {}: expected an interval shorter than that, so that no sample overtakes another",
         Span(*.least), Span(*.most), Span(*.update)
     )]
     Overtaking {
-        /// The shortest delay.
+        /// Shortest delay.
         least: Duration,
-        /// The longest.
+        /// Longest delay.
         most: Duration,
-        /// The period of sending.
+        /// Period of sending.
         update: Duration,
     },
-    /// A frame is more than one period of sending.
+    /// A frame is not one period of sending.
     #[error("everything repeats after {}, and samples are sent every {}: expected clocks without drift", Span(*.frame), Span(*.step))]
     Frame {
-        /// After how long everything repeats.
+        /// Duration of a frame, after which all clocks repeat.
         frame: Duration,
-        /// The period of sending.
+        /// Period of sending.
         step: Duration,
     },
-    /// A link does more than delay.
+    /// A link does more than delay by a constant time.
     #[error("what becomes of samples from {from} to {to} follows a pattern of its own: expected a link of constant delay, or an interval of delays")]
     Pattern {
-        /// The sender.
+        /// Name of the sender.
         from: String,
-        /// The receiver.
+        /// Name of the receiver.
         to: String,
     },
-    /// There are too many kinds of frame.
+    /// The pattern has too many kinds of frame.
     #[error("{} kinds of frame with {links} links: expected at most {most}, or peers and links that are all equal; let links lose together, or narrow the interval of delays", Count(*.symbols))]
     TooMany {
-        /// How many links.
+        /// Number of links.
         links: usize,
-        /// How many kinds of frame; `None`: too many to count.
+        /// Number of kinds of frame; `None` if the number exceeds 2¹²⁸ − 1.
         symbols: Option<u128>,
-        /// How many are looked at at most.
+        /// Largest number of kinds of frame.
         most: u128,
     },
-    /// The pattern is too large for states of that size.
+    /// The pattern is too large for the number of states.
     #[error(
         "{edges} steps between {nodes} states of the network with {dimension} states of the scene: expected fewer losses in a row, links that lose together, or peers and links that are all equal"
     )]
     TooLarge {
-        /// The edges of the pattern.
+        /// Number of edges of the pattern.
         edges: usize,
-        /// Its nodes.
+        /// Number of nodes of the pattern.
         nodes: usize,
-        /// The rows of a frame's matrix.
+        /// Number of rows of a frame's matrix.
         dimension: usize,
     },
 }
@@ -94,7 +94,7 @@ impl From<PatternError> for SceneWorstCaseError {
     }
 }
 
-/// A number that may be beyond counting.
+/// A number to print; `None` if the number exceeds `u128`.
 struct Count(Option<u128>);
 
 impl fmt::Display for Count {

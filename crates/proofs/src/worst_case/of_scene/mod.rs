@@ -1,15 +1,16 @@
-//! The worst case of a scene: a bounded number of samples lost in a row, delays anywhere in an interval, and nothing else known about the network.
+//! The worst case of a scene, if nothing is known of the network but a largest number of samples lost in a row and an interval of delays.
 //!
-//! A step is one period of sending. What the network can do in it are the symbols of a pattern; each stands for the matrix of such a frame, made from the same
-//! nodes and ticks as the nominal analysis. A receiver that is given nothing goes on with what it holds, so that the samples held are part of the state.
+//! A step is one period of sending. The symbols of a pattern are the losses and delays that are possible in a step; each symbol stands for the matrix of a
+//! frame, made from the same nodes and ticks as the nominal analysis. A receiver that gets no sample uses the sample that it holds, so the held samples are
+//! part of the state.
 //!
 //! Where all links lose together (an outage of something that all share), equal peers stay equal, and the scene falls into the parts of the nominal
 //! analysis. In coordinates in which these parts are separate, every frame's matrix is block-diagonal, with one sequence of symbols for all blocks; so is
 //! every product, and the norm of a block-diagonal matrix, with the largest of norms of its parts as the norm of the state, is the largest norm of
-//! a block. The joint spectral radius, the limit of the largest norm of a product of k factors to the power of 1/k, is therefore the largest
-//! of those of the blocks, and each is looked at by itself. Where each link loses on its own, peers do not stay equal, and the
-//! scene is looked at as a whole: 2 kinds of frame for each link, 64 for three peers. Beyond, equal peers have a bound from above that does not depend on their
-//! number ([`each`]), and others are refused.
+//! a block. The joint spectral radius, the limit of the largest norm of a product of k factors to the power of 1/k, is therefore the largest joint spectral
+//! radius of a block, and each block is searched by itself. Where each link loses on its own, peers do not stay equal, and the scene is searched as a whole:
+//! with 2 kinds of frame for each link, 64 for three peers. For more equal peers there is an upper bound whose cost does not depend on their number ([`each`]);
+//! more peers that differ are refused.
 //!
 //! # An example
 //!
@@ -37,10 +38,10 @@
 //!
 //! # What the bounds are bounds of
 //!
-//! The frames' matrices as computed; their own errors, [`WorstPart::rounding`], are of the order of 10⁻¹².
+//! The bounds hold for the frames' matrices as computed. The errors of these matrices, [`WorstPart::rounding`], are of the order of 10⁻¹².
 //!
-//! Lost samples are said by the frame in which they would have arrived. If links differ in delay by frames, losing together means the samples that would
-//! arrive in one frame, which were not sent in one.
+//! A lost sample counts in the frame in which it would have arrived. If the delays of links differ by frames, links that lose together lose the samples that
+//! would arrive in the same frame, which were sent in different frames.
 
 mod channel;
 mod composed;
@@ -69,19 +70,19 @@ pub use self::patterns::{Links, Patterns};
 use self::part::of_combination;
 use super::gripenberg::Effort;
 
-/// What bounds say about the worst case.
+/// The verdict of the bounds on the worst case.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum WorstVerdict {
-    /// The upper bound is below 1: every disturbance dies out, whatever the network does within its pattern.
+    /// The upper bound is below 1: every disturbance dies out under every allowed pattern.
     Stable,
-    /// 1 is between the bounds: more effort may tell.
+    /// 1 lies between the bounds: more effort may decide.
     Undecided,
-    /// The lower bound is above 1: with the pattern that attains it some disturbance grows.
+    /// The lower bound is above 1: some disturbance grows under the pattern that attains the lower bound.
     Unstable,
 }
 
 impl WorstVerdict {
-    /// The word in JSON: `stable`, `undecided` or `unstable`.
+    /// Returns the word in JSON: `stable`, `undecided` or `unstable`.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
@@ -95,29 +96,29 @@ impl WorstVerdict {
 /// Bounds of the fastest growth of a scene under bounded patterns.
 #[derive(Clone, PartialEq, Debug)]
 pub struct SceneWorstCase {
-    /// Under some pattern a disturbance grows by at least this factor a step.
+    /// Lower bound of the growth per step: under some pattern a disturbance grows by at least this factor.
     pub lower: f64,
-    /// Under no pattern does one grow by more than this factor a step; infinite if numbers overflowed.
+    /// Upper bound of the growth per step under every pattern; infinite if numbers overflowed.
     pub upper: f64,
-    /// The rate that quadratic certificates prove for all parts; `None` if none was found for some.
+    /// Growth per step that quadratic certificates prove as an upper bound for all parts; `None` if some part has no certificate.
     pub certificate: Option<f64>,
-    /// Which links share their fate.
+    /// Links that lose and delay together.
     pub links: Links,
-    /// How long a step is: the period of sending.
+    /// Duration of a step: the period of sending.
     pub step: Duration,
-    /// The parts that do not mix, in every combination of contacts. At least one.
+    /// Parts that do not influence each other, in every combination of contacts. At least one.
     pub parts: Vec<WorstPart>,
-    /// Which of them has the largest lower bound.
+    /// Index in `parts` of the part with the largest lower bound.
     pub part: usize,
-    /// The parts that are left out, in words.
+    /// Assumptions of the bounds, and parts that are left out, in words.
     pub notes: Vec<String>,
 }
 
-/// Bounds that are no farther apart than by this factor count as one number.
+/// Largest ratio of two bounds that count as one number.
 const CLOSE: f64 = 1.01;
 
 impl SceneWorstCase {
-    /// What the bounds say.
+    /// Returns the verdict of the bounds.
     #[must_use]
     pub fn verdict(&self) -> WorstVerdict {
         if self.upper < 1.0 {
@@ -129,41 +130,41 @@ impl SceneWorstCase {
         }
     }
 
-    /// Whether the bounds are more than 1 % apart: then they leave open how fast the worst case grows.
+    /// Whether the bounds are more than 1 % apart, so that the growth of the worst case stays open.
     #[must_use]
     pub fn is_open(&self) -> bool {
         self.upper > CLOSE * self.lower
     }
 
-    /// The part with the largest lower bound.
+    /// Returns the part with the largest lower bound.
     #[must_use]
     pub fn worst(&self) -> &WorstPart {
         &self.parts[self.part]
     }
 
-    /// How many products of matrices were looked at, of all parts.
+    /// Returns the number of products of matrices that the searches of all parts computed.
     #[must_use]
     pub fn products(&self) -> u64 {
         self.parts.iter().map(|part| part.products).sum()
     }
 }
 
-/// Bounds of how fast a disturbance of the scene can grow under those patterns, as it begins and with the strategy that it names.
+/// Returns bounds of the growth per step of a disturbance under every allowed pattern, for the scene with its settings at the start.
 ///
-/// The effort is spent on each part.
+/// Each part has the whole effort.
 ///
 /// # Errors
 ///
-/// [`SceneWorstCaseError`] if the scene has no frame of one sample each, if its links do more than delay, or if the patterns are too many.
+/// [`SceneWorstCaseError`] if the scene has no frame with one sample per node, if its links do more than delay, or if the pattern is too large.
 pub fn worst_case(scene: &Scene, patterns: &Patterns, effort: &Effort) -> Result<SceneWorstCase, SceneWorstCaseError> {
     worst_case_watched(scene, patterns, effort, &Unwatched)
 }
 
-/// [`worst_case`], watched: it is asked before each product.
+/// Returns the bounds of [`worst_case`], and asks the watch before each product.
 ///
 /// # Errors
 ///
-/// As for [`worst_case`], and [`AnalysisError::Stopped`](cohaptic_stability::AnalysisError::Stopped) if the watch ends it.
+/// As for [`worst_case`], and [`AnalysisError::Stopped`](cohaptic_stability::AnalysisError::Stopped) if the watch ends the search.
 pub fn worst_case_watched(scene: &Scene, patterns: &Patterns, effort: &Effort, watch: &dyn Watch) -> Result<SceneWorstCase, SceneWorstCaseError> {
     let pieces = pieces(scene, "the worst case")?;
     let network = patterns.network(scene)?;
@@ -173,6 +174,7 @@ pub fn worst_case_watched(scene: &Scene, patterns: &Patterns, effort: &Effort, w
         .par_iter()
         .map(|(piece, combination)| {
             let found = of_combination(&piece.scene, &network, combination, patterns, (effort, watch));
+            // Too many independent links for an exact search: equal peers still have the bounds of `each`.
             match found {
                 Err(error @ (SceneWorstCaseError::TooMany { .. } | SceneWorstCaseError::TooLarge { .. })) if patterns.links == Links::Each => {
                     is_open.store(true, Ordering::Relaxed);

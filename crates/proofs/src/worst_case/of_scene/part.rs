@@ -16,29 +16,29 @@ use crate::worst_case::verified::Certificate;
 /// The worst case of a part of a scene.
 #[derive(Clone, PartialEq, Debug)]
 pub struct WorstPart {
-    /// What moves.
+    /// Kind of the part: the bodies that move.
     pub kind: PartKind,
-    /// Which contacts are closed, in words; empty for a linear scene.
+    /// Contacts that are closed, in words; empty for a linear scene.
     pub contacts: String,
-    /// How many states it has, held samples and those on the way among them.
+    /// Number of states of the part, including held samples and samples on the way.
     pub dimension: usize,
-    /// As for the whole.
+    /// Lower bound of the growth per step.
     pub lower: f64,
-    /// As for the whole.
+    /// Upper bound of the growth per step; infinite if numbers overflowed.
     pub upper: f64,
-    /// The rate of a quadratic certificate.
+    /// Growth per step that a quadratic certificate proves as an upper bound; `None` without a certificate.
     pub certificate: Option<f64>,
-    /// The pattern that attains the lower bound when repeated for ever, in words; empty if the lower bound is zero or nothing the network does matters.
+    /// Pattern that attains the lower bound when repeated for ever, in words; empty if the lower bound is zero or the part does not depend on the network.
     pub sequence: String,
-    /// How many steps that pattern has.
+    /// Number of steps of `sequence`.
     pub period: usize,
-    /// How many products of matrices were looked at.
+    /// Number of products of matrices that the search computed.
     pub products: u64,
-    /// A bound of the errors of the frames' matrices, as the largest sum of sizes of a row.
+    /// Upper bound of the errors of the frames' matrices, as the largest sum of absolute errors over a row.
     pub rounding: f64,
 }
 
-/// The worst cases of the parts of a linear scene.
+/// Returns the worst cases of the parts of a scene in one combination of contacts.
 pub(super) fn of_combination(
     scene: &Scene,
     network: &NominalNetwork,

@@ -7,29 +7,29 @@ use cohaptic_stability::frames::NominalNetwork;
 
 use super::error::SceneWorstCaseError;
 
-/// What the network may do.
+/// The losses and delays that the network may choose.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Patterns {
-    /// The most samples in a row that are lost on a link.
+    /// Largest number of samples in a row that a link loses.
     pub losses_in_a_row: u32,
-    /// Every sample takes any time between these two, which differ by less than the period of sending, whatever the scene's links do. `None`: the delays
-    /// of the scene's links.
+    /// Shortest and longest delay of a sample, which replace the delays of the scene's links. The two differ by less than the period of sending. `None`: the
+    /// delays of the scene's links.
     pub delay: Option<(Duration, Duration)>,
-    /// Which links share their fate.
+    /// Links that lose and delay together.
     pub links: Links,
 }
 
-/// Which links share their fate.
+/// Links that lose and delay samples together.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Links {
-    /// In every frame all links lose the samples that are due, or none does, and all delay it alike: an outage of something that they share.
+    /// In every frame either all links lose the samples that are due or none does, and all links add the same delay: an outage of a part that all links share.
     Together,
-    /// Each link in each direction on its own. For up to three peers, or any number of equal ones.
+    /// Each link in each direction loses and delays on its own. For up to three peers, or any number of equal peers.
     Each,
 }
 
 impl Links {
-    /// The word in JSON: `together` or `each`.
+    /// Returns the word in JSON: `together` or `each`.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
@@ -40,7 +40,11 @@ impl Links {
 }
 
 impl Patterns {
-    /// The least delays.
+    /// Returns the network with the shortest delay of every link.
+    ///
+    /// # Errors
+    ///
+    /// [`SceneWorstCaseError`] if the interval of delays is empty or not shorter than the period of sending, or if the scene has no nominal network.
     pub(super) fn network(&self, scene: &Scene) -> Result<NominalNetwork, SceneWorstCaseError> {
         let update = scene.coordination.update;
         match self.delay {
@@ -51,12 +55,12 @@ impl Patterns {
         }
     }
 
-    /// Whether they leave the network anything to choose.
+    /// Whether the network has any choice, of losses or of delays.
     pub(super) fn choose(&self) -> bool {
         self.losses_in_a_row > 0 || !self.width().is_zero()
     }
 
-    /// How far delays may differ.
+    /// Returns the width of the interval of delays.
     pub(super) fn width(&self) -> Duration {
         self.delay.map_or(Duration::ZERO, |(least, most)| most.saturating_sub(least))
     }

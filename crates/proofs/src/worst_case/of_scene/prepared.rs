@@ -11,35 +11,35 @@ use super::error::SceneWorstCaseError;
 use super::frames::Block;
 use super::patterns::{Links, Patterns};
 
-/// The largest number of kinds of frame.
+/// Largest number of kinds of frame.
 const MOST_SYMBOLS: u128 = 64;
-/// The most edges times the third power of the number of states: about a minute for the certificate alone.
+/// Largest product of the number of edges and the third power of the number of states. The certificate alone takes about a minute for this product.
 const MOST_WORK: usize = 1 << 26;
 
-/// A part of a scene and what drives it.
+/// A part of a scene as a switched system.
 #[derive(Debug)]
 pub(super) struct Search {
     pub kind: PartKind,
     pub automaton: Automaton,
-    /// A bound of the errors of the matrices.
+    /// Upper bound of the errors of the matrices, as the largest sum over a row.
     pub rounding: f64,
 }
 
 /// The parts of a linear scene.
 #[derive(Debug)]
 pub(super) struct Prepared {
-    /// What every part is driven by.
+    /// Channels whose joint symbols drive every part.
     pub channels: Vec<Channel>,
     pub searches: Vec<Search>,
-    /// Devices that touch nothing, to which it does not matter what the network does.
+    /// Devices without contact, whose motion does not depend on the network.
     pub devices: Vec<Part>,
 }
 
-/// The classes of peers that stay equal under those patterns.
+/// Returns the classes of peers that stay equal under the patterns.
 pub(super) fn structure(scene: &Scene, network: &NominalNetwork, contacts: &Contacts, patterns: &Patterns) -> Result<Structure, SceneWorstCaseError> {
     match patterns.links {
         Links::Each if patterns.choose() => {
-            // Known before there is anything for each of the links.
+            // Each link has at least two symbols (received, lost). Too many links are refused here, before memory per link is allocated.
             let links = scene.peers.len().saturating_mul(scene.peers.len().saturating_sub(1));
             few_enough(links, std::iter::repeat_n(2, links))?;
             Ok(Structure::of_each(scene, network, contacts)?)
@@ -88,7 +88,7 @@ impl Prepared {
     }
 }
 
-/// The channels of a scene: one of all links, or one of each.
+/// Returns the channels of a scene: one channel of all links, or one channel per link.
 fn channels(scene: &Scene, network: &NominalNetwork, structure: &Structure, patterns: &Patterns) -> Result<Vec<Channel>, SceneWorstCaseError> {
     let name = |class: usize, member: usize| scene.peers[structure.classes[class][member]].name.clone();
     let mut ways = Vec::new();

@@ -1,4 +1,4 @@
-//! A pattern that repeats, in words.
+//! Words for a repeated sequence of joint symbols.
 
 use std::time::Duration;
 
@@ -6,8 +6,8 @@ use cohaptic_units::print::Span;
 
 use super::channel::{Channel, Fate};
 
-/// What a sequence of joint symbols, repeated for ever, does to samples; `delay`: the least delay, if delays are part of the pattern. `name` names
-/// channels, where there are several.
+/// Returns in words the fate of samples under the joint symbols `cycle`, repeated for ever. `delay` is the shortest delay, or `None` if delays are not part of
+/// the pattern. `name` gives the name of a channel, and is used only if there are several channels.
 pub(super) fn sequence(cycle: &[usize], channels: &[Channel], delay: Option<Duration>, name: impl Fn(&Channel) -> String) -> String {
     if cycle.is_empty() {
         return String::new();
@@ -26,7 +26,7 @@ pub(super) fn sequence(cycle: &[usize], channels: &[Channel], delay: Option<Dura
     runs(&rotated(&fates, said))
 }
 
-/// What happens in one frame.
+/// Returns in words the fate of the samples that are due in one frame, with one fate per channel.
 fn one_frame(fates: &[Fate], channels: &[Channel], delay: Option<Duration>, name: &impl Fn(&Channel) -> String) -> String {
     let fate = |fate: &Fate| match (fate, delay) {
         (Fate::Lost, _) => "lost".to_owned(),
@@ -40,7 +40,7 @@ fn one_frame(fates: &[Fate], channels: &[Channel], delay: Option<Duration>, name
     if others.iter().all(|other| other == first) {
         return format!("all {}", fate(first));
     }
-    // Of two kinds of link, those that lose are named.
+    // If some links lose and others receive, the words name the links that lose.
     let lost: Vec<String> = fates.iter().zip(channels).filter(|(fate, _)| **fate == Fate::Lost).map(|(_, channel)| name(channel)).collect();
     if delay.is_none() {
         return format!("lost {}", lost.join(" and "));
@@ -49,7 +49,7 @@ fn one_frame(fates: &[Fate], channels: &[Channel], delay: Option<Duration>, name
     each.join(" and ")
 }
 
-/// Begins after the last loss of a run, so that arrivals are said before losses.
+/// Rotates the frames so that the words begin after the last loss of a run, with arrivals before losses.
 fn rotated(fates: &[Vec<Fate>], mut said: Vec<String>) -> Vec<String> {
     let losses = |frame: usize| fates[frame % fates.len()].iter().filter(|fate| **fate == Fate::Lost).count();
     let start = (0..fates.len()).find(|frame| losses(*frame) == 0 && losses(frame + fates.len() - 1) > 0);
@@ -57,7 +57,7 @@ fn rotated(fates: &[Vec<Fate>], mut said: Vec<String>) -> Vec<String> {
     said
 }
 
-/// Equal ones in a row are counted from three on.
+/// Joins the words of all frames. Three or more equal frames in a row are written once with their number.
 fn runs(said: &[String]) -> String {
     let mut words: Vec<String> = said
         .chunk_by(|one, next| one == next)
