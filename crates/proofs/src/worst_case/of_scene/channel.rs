@@ -1,11 +1,11 @@
-//! Links that share their fate, what can become of their samples, and in which order.
+//! Channels: links that lose and delay together, with the pattern of the fates of their samples.
 //!
-//! A sample is *due* in the first frame in which it can arrive. If its delay has an interval that reaches into the next frame, it may as well arrive there,
-//! before the next one does: the interval is shorter than a period of sending. So on one link a frame brings, at some tick each, a sample that was put off
-//! in the frame before, if one was, and the one that is due in this, unless it is lost or put off in its turn.
+//! A sample is *due* in the first frame in which it can arrive. If its interval of delays reaches into the next frame, the sample may arrive in the next frame
+//! instead (it is *put off*), but before the next sample, because the interval is shorter than a period of sending. So in one frame a link delivers at most two
+//! samples, each at some tick: a sample that was put off in the frame before, and the sample that is due, unless that sample is lost or put off.
 //!
-//! Delays that lead to the same ticks are one *choice*. A symbol of the channel's [`Pattern`] is what happens in a frame on all its links; a node is how
-//! many samples in a row were lost just now, or what was put off.
+//! Delays that lead to the same ticks are one *choice*. A symbol of the channel's [`Pattern`] is the deliveries in a frame on all links of the channel. A node
+//! is the number of samples in a row that were just lost, or the deliveries that were put off.
 
 use std::time::Duration;
 
@@ -13,7 +13,7 @@ use cohaptic_stability::frames::NodeClock;
 
 use super::super::pattern::{Edge, Pattern, PatternError};
 
-/// A link between two nodes, and the least delay on it.
+/// A link between two nodes, with the shortest delay of the link.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Way {
     pub from: usize,
@@ -21,7 +21,7 @@ pub(super) struct Way {
     pub delay: Duration,
 }
 
-/// Links of which all or none lose the samples due in a frame, and which delay it by as much more than their least delays.
+/// Links that all lose the samples due in a frame, or all receive them with the same delay beyond their shortest delays.
 #[derive(Clone, Debug)]
 pub(super) struct Channel {
     pub links: Vec<Link>,
@@ -35,50 +35,57 @@ pub(super) struct Channel {
 pub(super) struct Link {
     pub from: usize,
     pub to: usize,
-    /// How many frames after the one in which it was sent a sample is due.
+    /// Number of frames from the frame in which a sample is sent to the frame in which the sample is due.
     pub age: usize,
-    /// The same of the last frame in which it may arrive.
+    /// Number of frames from the frame in which a sample is sent to the last frame in which the sample may arrive.
     pub oldest: usize,
 }
 
-/// The ticks at which samples arrive on the links of a channel, counted from a frame's first; `None`: no sample.
+/// Ticks at which samples arrive, indexed by link of a channel and counted from the frame's first tick; `None`: no sample.
 type Ticks = Vec<Option<usize>>;
 
-/// What can become of the samples that are due in a frame, but for being lost.
+/// The ticks at which the samples that are due in a frame arrive, for one range of delays.
 #[derive(Clone, PartialEq, Eq, Debug)]
 struct Choice {
-    /// The longest delay beyond the least one that leads here.
+    /// Longest delay of the range, beyond the shortest delay.
     extra: Duration,
+    /// Arrivals in the frame in which the samples are due.
     now: Ticks,
-    /// In the frame after.
+    /// Arrivals in the next frame.
     later: Ticks,
 }
 
-/// What happens in a frame.
+/// The arrivals in a frame.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(super) struct Symbol {
-    /// What was put off in the frame before.
+    /// Arrivals of samples that were put off in the frame before.
     pub late: Ticks,
+    /// Arrivals of samples that are due in this frame.
     pub now: Ticks,
 }
 
-/// What became of the samples that were due in a frame.
+/// The fate of the samples that were due in a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Fate {
     Lost,
-    /// Received with a delay that exceeds the least one by at most this.
+    /// Received with a delay that exceeds the shortest delay by at most this duration.
     Received(Duration),
 }
 
 impl Channel {
-    /// The links of a channel between nodes with those clocks, which tick a whole number of times in a frame. At most `most` frames in a row lose the samples due
-    /// in them; delays are up to `width` beyond the least ones, less than a frame.
+    /// Returns the channel of the links `ways` between nodes with the clocks `clocks`, each of which ticks a whole number of times in a frame. At most `most`
+    /// frames in a row lose the samples that are due. Delays exceed the shortest delays by at most `width`, which is less than a frame.
+    ///
+    /// # Errors
+    ///
+    /// [`PatternError`] if the pattern would be too large.
     pub(super) fn new(ways: &[Way], clocks: &[NodeClock], width: Duration, most: u32) -> Result<Self, PatternError> {
         let ticks = |way: &Way| usize::try_from(clocks[way.to].every).unwrap_or(usize::MAX);
         let arrival = |way: &Way, extra: Duration| clocks[way.from].arrival(&clocks[way.to], way.delay.saturating_add(extra));
         let due = |way: &Way| arrival(way, Duration::ZERO).0 / ticks(way);
         let mut choices = Vec::new();
         let mut extra = Duration::ZERO;
+        // Each round adds one choice, and goes on with the shortest delay at which some link's sample arrives at a later tick.
         loop {
             let arrivals: Vec<(usize, Duration)> = ways.iter().map(|way| arrival(way, extra)).collect();
             let same = ways.iter().zip(&arrivals).map(|(way, (_, longest))| longest.saturating_sub(way.delay)).min().unwrap_or(width).min(width);
@@ -101,7 +108,7 @@ impl Channel {
         Ok(Self { links, choices, pattern, symbols })
     }
 
-    /// What became of what was due in a frame, given its symbol and that of the frame after.
+    /// Returns the fate of the samples that were due in a frame, from the symbol of the frame and the symbol of the next frame.
     pub(super) fn fate(&self, symbol: usize, next: usize) -> Fate {
         let (now, later) = (&self.symbols[symbol].now, &self.symbols[next].late);
         let choice = self.choices.iter().find(|choice| choice.now == *now && choice.later == *later);
@@ -109,7 +116,8 @@ impl Channel {
     }
 }
 
-/// Which symbols can follow each other. Nodes 0 to `most` count the losses in a row; a node for each way of being put off follows.
+/// Returns the pattern and the symbols of a channel. Nodes 0 to `most` count the losses in a row; after them comes one node for each set of arrivals that can
+/// be put off.
 fn pattern(choices: &[Choice], links: usize, most: u32) -> Result<(Pattern, Vec<Symbol>), PatternError> {
     let nothing: Ticks = vec![None; links];
     let mut put_off: Vec<&Ticks> = Vec::new();
@@ -119,7 +127,7 @@ fn pattern(choices: &[Choice], links: usize, most: u32) -> Result<(Pattern, Vec<
         }
     }
     let most = usize::try_from(most).unwrap_or(usize::MAX);
-    // Also refuses what would not fit into memory below.
+    // Refuses a pattern that would not fit into memory, before the edges are made.
     Pattern::runs(choices.len() + 1, choices.len(), u32::try_from(most).unwrap_or(u32::MAX))?;
     let node = |later: &Ticks| put_off.iter().position(|other| *other == later).map_or(0, |place| most + 1 + place);
     let mut symbols: Vec<Symbol> = Vec::new();

@@ -1,20 +1,23 @@
-//! Rows of a frame in which samples heard are put in as rows themselves, with a bound of what that may be off.
+//! Composed rows: rows of a frame in which each heard sample is replaced by the row of that sample, with a bound of the error.
 //!
-//! Let r be a row of a frame as computed, (s, b) its coefficients of states and of samples heard, and let the exact one differ from it by δ, ‖δ‖ <= E, in sums of the sizes of entries.
-//! Let H_k be the computed row that is heard as sample k, the exact one H_k + η_k, ‖η_k‖ <= ε_k. The exact composition is Σ (s + δ_s)·unit + Σ (b_k + δ_k)·(H_k + η_k), so that
+//! Let r be a row of a frame as computed, (s, b) its coefficients of states and of samples heard, and let the exact one differ from it by δ, ‖δ‖ <= E, in sums
+//! of the sizes of entries. Let H_k be the computed row that is heard as sample k, the exact one H_k + η_k, ‖η_k‖ <= ε_k. The exact composition is Σ (s +
+//! δ_s)·unit + Σ (b_k + δ_k)·(H_k + η_k), so that
 //!
 //! ```text
 //! ‖exact − computed‖ <= E·max(1, max_k (‖H_k‖ + ε_k)) + Σ |b_k|·ε_k + γ·(‖s‖ + Σ |b_k|·‖H_k‖)
 //! ```
 //!
-//! The first two are by the triangle inequality, δ's entries each at a row of at most that size. Each entry is a sum of one term of s and a product for each k, in any order: γ for as many operations
+//! The first two are by the triangle inequality, δ's entries each at a row of at most that size. Each entry is a sum of one term of s and a product for each k,
+//! in any order: γ for as many operations
 //! (Higham 2002, Section 3.1), and a smallest number for each product that underflows.
 //!
-//! What a receiver hears, H = w·S + e − c/(N − 1), has w·S rounded once and w itself once: 3·u·|w|·‖S‖ is more. Its other entries stand alone, and 1/(N − 1) rounds once.
+//! What a receiver hears, H = w·S + e − c/(N − 1), has w·S rounded once and w itself once: 3·u·|w|·‖S‖ is more. Its other entries stand alone, and 1/(N − 1)
+//! rounds once.
 
 use cohaptic_stability::numerics::{UNDERFLOW, UNIT, gamma, outward, real};
 
-/// A row, and a bound of the sum of the sizes of its entries' errors.
+/// A row, and an upper bound of the sum of the absolute errors of its entries.
 #[derive(Clone, Debug)]
 pub(super) struct Composed {
     pub(super) entries: Vec<f64>,
@@ -26,12 +29,13 @@ fn size(row: &[f64]) -> f64 {
 }
 
 impl Composed {
-    /// A row that is exact.
+    /// Returns a row without error.
     pub(super) const fn exact(entries: Vec<f64>) -> Self {
         Self { entries, error: 0.0 }
     }
 
-    /// A row of a frame with such an error: its coefficients of states, then of samples heard with their rows, over that number of unknowns. Samples that are not heard yet have none.
+    /// A row of a frame with such an error: its coefficients of states, then of samples heard with their rows, over that number of unknowns. Samples that are
+    /// not heard yet have none.
     pub(super) fn of(row: &[f64], states: usize, heard: &[Option<&Self>], unknowns: usize, frame_error: f64) -> Self {
         let mut entries = row[..states].to_vec();
         entries.resize(unknowns, 0.0);
@@ -50,7 +54,8 @@ impl Composed {
         Self { entries, error: outward(error) + real(unknowns * operations) * UNDERFLOW }
     }
 
-    /// What a receiver hears of this sample: times a weight that is rounded once, with 1 at the place of its own deviation and another weight that is rounded once at that of others.
+    /// What a receiver hears of this sample: times a weight that is rounded once, with 1 at the place of its own deviation and another weight that is rounded
+    /// once at that of others.
     pub(super) fn heard(&self, weight: f64, own: usize, others: Option<(usize, f64)>) -> Self {
         let mut entries: Vec<f64> = self.entries.iter().map(|entry| weight * entry).collect();
         entries[own] += 1.0;
@@ -62,10 +67,10 @@ impl Composed {
         Self { error: outward(error * (1.0 + gamma(entries.len()))), entries }
     }
 
-    /// This row less a multiple of another.
+    /// Returns this row less `by` times the row `other`.
     pub(super) fn less(&self, other: &Self, by: f64) -> Self {
         let entries: Vec<f64> = self.entries.iter().zip(&other.entries).map(|(entry, other)| entry - by * other).collect();
-        // A product and a difference.
+        // Each entry has two roundings: of a product and of a difference.
         let rounded = gamma(2) * (size(&self.entries) + by.abs() * size(&other.entries));
         let error = (self.error + by.abs() * other.error + rounded) * (1.0 + gamma(entries.len() + 4));
         Self { error: outward(error) + real(entries.len()) * UNDERFLOW, entries }

@@ -1,17 +1,18 @@
 //! Each link on its own, at any number of equal peers.
 //!
-//! What a link does is the same for all: e, by how much the samples that it gives a receiver differ from those of a link that gives each sample as soon as it may, in
-//! stretches of ticks between which that changes. It is a combination of the steps v from sample to sample of its sender. For each state c of a link, let Q_c measure these
-//! steps, and let S be a quadratic form of e and v with
+//! What a link does is the same for all: e, by how much the samples that it gives a receiver differ from those of a link that gives each sample as soon as it
+//! may, in stretches of ticks between which that changes. It is a combination of the steps v from sample to sample of its sender. For each state c of a link,
+//! let Q_c measure these steps, and let S be a quadratic form of e and v with
 //!
 //! ```text
 //! Q_next(v after) + S(e, v) <= ρ²·Q_c(v before)         for everything that a link in the state c may do,
 //! V(after) <= ρ²·V(before) + Σ S(e_ij, v_j)             for all states, and all e_ij whatever
 //! ```
 //!
-//! Then V + ΣQ grows by ρ² a step at most, whatever each link does. For the second, let V be of one kind for the average and one for differences; e_ij of the link from j to i
-//! takes part by its mean over j, and S adds up over all links. Permutations of peers take e apart: into a part that is the same for all, into a_i·r + a_j·c with
-//! Σa = 0, and into parts of which S alone depends, not below zero since it is not for v = 0. With Σa² = 1, the sums over i ≠ j of a_i², a_i·a_j and a_j² are N − 1, −1 and N − 1, so that there are two inequalities:
+//! Then V + ΣQ grows by ρ² a step at most, whatever each link does. For the second, let V be of one kind for the average and one for differences; e_ij of the
+//! link from j to i takes part by its mean over j, and S adds up over all links. Permutations of peers take e apart: into a part that is the same for all, into
+//! a_i·r + a_j·c with Σa = 0, and into parts of which S alone depends, not below zero since it is not for v = 0. With Σa² = 1, the sums over i ≠ j of a_i²,
+//! a_i·a_j and a_j² are N − 1, −1 and N − 1, so that there are two inequalities:
 //!
 //! ```text
 //! average:      V⁺ − ρ²V − (N−1)·S(e, v)                                                             heard: y + e
@@ -19,8 +20,8 @@
 //!                           + 2·T((N−1)·c − r, v) + (N−1)·U(v, v)]        heard: −y/(N−1) + r − c/(N−1)
 //! ```
 //!
-//! with S = R(e, e) + 2·T(e, v) + U(v, v). Their size does not depend on N. All links together are one of the things that links may do, which gives the lower bound; between
-//! the two the growth stays open.
+//! with S = R(e, e) + 2·T(e, v) + U(v, v). Their size does not depend on N. All links together are one of the things that links may do, which gives the lower
+//! bound; between the two the growth stays open.
 //!
 //! Rows of the second inequality are composed of rows of a frame; how far they may be off is bounded by [`Composed`].
 
@@ -39,14 +40,14 @@ use crate::inequality::{Inequality, Part, Product, Row, holds, search};
 use crate::newton::upper;
 use crate::worst_case::gripenberg::Effort;
 
-/// How near the least growth that has a certificate the bound is, relative to it.
+/// Relative distance of the bound from the least growth with a certificate, at which the halving ends.
 const NEAR: f64 = 2e-3;
-/// A growth above which no certificate is looked for.
+/// Largest growth per step for which a certificate is searched.
 const LARGEST: f64 = 4.0;
-/// The most states of a link.
+/// Largest number of states of a link.
 const MOST_STATES: usize = 64;
 
-/// Bounds for equal peers; `None` if they are not all equal.
+/// Returns bounds for at least three equal peers; `None` if the peers are not all equal, are fewer, or a link has too many states.
 pub(super) fn bounds(
     scene: &Scene,
     network: &NominalNetwork,
@@ -82,7 +83,7 @@ pub(super) fn bounds(
     Ok(Some(parts))
 }
 
-/// The least growth with a certificate, nearly; infinite if there is none, and `None` if the watch ends it.
+/// Returns nearly the least growth with a certificate; infinite if no growth up to the largest has a certificate, and `None` if the watch ends the search.
 fn least(lower: f64, certified: impl Fn(f64) -> bool, watch: &dyn Watch) -> Option<f64> {
     let (mut low, mut high) = (lower, f64::INFINITY);
     let mut tried = lower.max(0.01) * 1.05;
@@ -110,21 +111,22 @@ fn least(lower: f64, certified: impl Fn(f64) -> bool, watch: &dyn Watch) -> Opti
     Some(high)
 }
 
-/// What a link may do.
+/// The ages of samples that a link may deliver, as states and steps.
 struct Link {
-    /// The first tick of each stretch.
+    /// First tick of each stretch.
     stretches: Vec<usize>,
-    /// For each stretch, how many frames before it the sample was sent that is heard if each comes as soon as it may.
+    /// Age in frames of the sample heard in each stretch if every sample arrives as soon as possible.
     nominal: Vec<usize>,
-    /// From which state to which, and the ages heard in each stretch.
+    /// Steps: the state before, the state after, and the age in frames of the sample heard in each stretch.
     steps: Vec<(usize, usize, Vec<usize>)>,
+    /// Number of states.
     states: usize,
-    /// The oldest age heard.
+    /// Largest age heard, in frames.
     depth: usize,
 }
 
 impl Link {
-    /// `None` if it has too many states.
+    /// Returns the link of a channel, or `None` if the link has too many states.
     fn of(channel: &Channel) -> Option<Self> {
         let age = channel.links[0].age;
         let ticks = |symbol: &Symbol| symbol.late[0].into_iter().chain(symbol.now[0]).collect::<Vec<_>>();
@@ -164,7 +166,7 @@ impl Link {
         (states.len() <= MOST_STATES).then_some(Self { stretches, nominal, steps, states: states.len(), depth })
     }
 
-    /// A frame of one node that hears a sample of its own in each stretch: number −1 in the first, and so on.
+    /// Returns the timetable of one node that hears a different sample in each stretch: number −1 in the first stretch, −2 in the second, and so on.
     fn timetable(&self, nominal: &Timetable) -> Timetable {
         let (mut events, mut tick) = (Vec::new(), 0);
         for event in &nominal.events {
@@ -182,7 +184,7 @@ impl Link {
         Timetable { frame: nominal.frame, events, sent: nominal.sent.clone(), depth: vec![0], held: Vec::new(), clocks: nominal.clocks.clone() }
     }
 
-    /// The inequalities for a growth.
+    /// Returns the inequalities that prove a growth per step of at most `rate`.
     fn inequality(&self, frames: &[FrameMap; 2], peers: f64, rate: f64) -> Inequality {
         let (stretches, steps) = (self.stretches.len(), self.depth);
         let size = stretches + steps;
@@ -212,7 +214,7 @@ impl Link {
         Inequality { shapes, parts, free: vec![true; size * (size + 1) / 2] }
     }
 
-    /// The inequality of the average, or of differences.
+    /// Returns the inequality of the average (`place` 0) or of the differences (`place` 1).
     fn part(&self, frame: &FrameMap, place: usize, peers: f64, rate: f64) -> Part {
         let (others, stretches) = (peers - 1.0, self.stretches.len());
         let apart = place == 1;
@@ -282,7 +284,7 @@ impl Link {
     }
 }
 
-/// How often an entry of the upper triangle stands in a symmetric matrix.
+/// Returns how often an entry of the upper triangle occurs in a symmetric matrix.
 fn twice(i: usize, j: usize) -> f64 {
     if i == j { 1.0 } else { 2.0 }
 }

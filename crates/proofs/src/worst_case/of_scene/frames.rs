@@ -1,8 +1,8 @@
 //! The matrix of one frame in which something happens to samples.
 //!
-//! A frame is that of the nominal analysis: the same nodes, ticks and samplings. Only what a receiver is given, and when, follows from the symbol; and what
-//! it holds at the beginning is an unknown of its own, because it may be of any age. The state is that of the nominal analysis, the newest samples of each
-//! node first, with the sample held on each link after it.
+//! The frame has the nodes, ticks and samplings of the nominal analysis. The symbol decides what samples a receiver gets, and when. The sample that a receiver
+//! holds at the beginning is an unknown of its own, because the sample may be of any age. The state is the state of the nominal analysis, then the newest
+//! samples of each node, then the sample held on each link.
 
 use cohaptic_stability::Matrix;
 use cohaptic_stability::frames::{Autonomous, Event, Lifted, Timetable};
@@ -11,9 +11,9 @@ use super::channel::{Channel, Link};
 
 /// One part of a scene: nodes, and the links between them that can lose and delay.
 pub(super) struct Block<'a> {
-    /// With the timetable of a frame in which deliveries do not matter.
+    /// Nodes and timetable of a frame. The deliveries of the timetable are replaced.
     pub lifted: Lifted<'a>,
-    /// For each channel, the place of each of its links that is in this part, and the nodes at its ends.
+    /// Indexed by channel: each link of the channel that is in this part, with its index in the channel; the ends are nodes of this part.
     pub links: Vec<Vec<(usize, Link)>>,
 }
 
@@ -22,13 +22,13 @@ struct Delivery {
     from: usize,
     to: usize,
     tick: usize,
-    /// How many frames before it was sent.
+    /// Number of frames since the frame in which the sample was sent.
     age: usize,
 }
 
 impl Block<'_> {
-    /// One matrix for each joint symbol of the channels, the first channel's as the most significant digit; and a bound of the errors of their entries, as the
-    /// largest sum over a row.
+    /// Returns one matrix for each joint symbol of the channels, with the first channel as the most significant digit, and an upper bound of the errors of
+    /// their entries, as the largest sum over a row.
     pub(super) fn matrices(&self, channels: &[Channel]) -> (Vec<Matrix>, f64) {
         let count: usize = channels.iter().map(|channel| channel.symbols.len()).product();
         let mut error = 0.0_f64;
@@ -53,16 +53,16 @@ impl Block<'_> {
             rest /= channel.symbols.len();
             for (place, link) in own {
                 let delivery = |tick: usize, age: usize| Delivery { from: link.from, to: link.to, tick, age };
-                // The older one first, should both come at one tick.
+                // The older sample first, so that the receiver holds the newer sample if both arrive at one tick.
                 deliveries.extend(symbol.late[*place].map(|tick| delivery(tick, link.age + 1)));
                 deliveries.extend(symbol.now[*place].map(|tick| delivery(tick, link.age)));
             }
         }
-        // The sample held at the beginning stands with the samples of its sender, as if of an age beyond all that are used.
+        // The frame knows a held sample as a sample of its sender with an age beyond all ages in use, one such age per receiver.
         let timetable = timetable(self.lifted.timetable, &links, &deliveries, &depth);
         let frame = Lifted { timetable: &timetable, ..self.lifted }.frame(&mut Autonomous);
         if self.lifted.sampling.is_silent(self.lifted.time) {
-            // Samples are not used at all.
+            // Samples have no part in the motion, so the state needs none.
             return (frame.monodromy(), frame.error);
         }
 
@@ -87,7 +87,7 @@ impl Block<'_> {
         };
         let columns: Vec<usize> = (0..states + frame.used.len()).map_while(unknown).collect();
         let mut matrix = Matrix::zeros(size, size);
-        // A row: a combination of the unknowns, less how far the reference moved; or an unknown as it was.
+        // A row is a combination of the unknowns, or an unknown without change (`same`), less `moved` times the displacement of the reference.
         let mut put = |row: usize, source: &[f64], same: Option<usize>, moved: f64| {
             for (column, entry) in columns.iter().zip(source) {
                 matrix[(row, *column)] += entry;
@@ -126,7 +126,7 @@ impl Block<'_> {
     }
 }
 
-/// The frame with those deliveries instead of its own.
+/// Returns the timetable `nominal` with `deliveries` instead of its own deliveries.
 fn timetable(nominal: &Timetable, links: &[Link], deliveries: &[Delivery], depth: &[usize]) -> Timetable {
     let number = |age: usize| -i64::try_from(age).unwrap_or(i64::MAX);
     let mut ticks = vec![0; nominal.sent.len()];
