@@ -1,4 +1,4 @@
-//! Proofs against motions, and motions that grow against combinations of contacts.
+//! Tests of proofs against followed motions, and of growing motions against fixed combinations of contacts.
 
 use cohaptic_scene::Scene;
 use cohaptic_stability::numerics::real;
@@ -16,7 +16,7 @@ const PUSHED: &str = r#"
     link         = { delay = "8ms" }
 "#;
 const WALLS: &str = "object.enclosure={ min = -0.02, max = 0.03, stiffness = 2000.0, damping = 20.0 }";
-/// Two light fingers, drawn together by springs that hardly brake, on either side of the object.
+/// Two light fingers on either side of the object, drawn together by springs with little damping.
 const GROWS: &[&str] = &[
     "scene.count=2",
     "object.mass=1.3",
@@ -143,7 +143,8 @@ fn norm(shape: &Matrix, part: &Part, of: &Measured, unknowns: &[f64]) -> f64 {
     shape.times_column(&values).iter().zip(&values).map(|(one, other)| one * other).sum()
 }
 
-/// Motions of each part, followed with the law of the contact, keep to the inequalities of its products, and the shapes that were found shrink along them as proven.
+/// Motions of each part, followed with the law of the contact, keep to the inequalities of its products, and the shapes that were found shrink along them as
+/// proven.
 #[test]
 fn motions_keep_to_the_products_and_to_the_rate() {
     for overrides in STABLE {

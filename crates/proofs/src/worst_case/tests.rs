@@ -1,4 +1,4 @@
-//! Joint spectral radii that are known, and every bound against every cycle.
+//! Tests against known joint spectral radii, and of every bound against every cycle.
 
 use cohaptic_stability::Matrix;
 use proptest::prelude::*;
@@ -20,7 +20,7 @@ fn fine(accuracy: f64) -> Effort {
     Effort { accuracy, products: 100_000 }
 }
 
-/// The bounds enclose the known radius, are as close as promised, and so is the certificate on its side.
+/// The bounds enclose the known radius and are as close as promised, and the certificate is above the radius.
 fn check(automaton: &Automaton, radius: f64, accuracy: f64) -> WorstCase {
     let bounds = automaton.worst_case(&fine(accuracy));
     assert!(bounds.complete && bounds.upper - bounds.lower <= accuracy, "{bounds:?}");
@@ -40,7 +40,7 @@ fn a_published_pair_comes_out() {
     assert!((bounds.lower - 3.917_384_715_148).abs() < 1e-8, "{bounds:?}");
 }
 
-/// Where the answer is known on paper.
+/// Automata whose joint spectral radius is known on paper.
 #[test]
 fn radii_known_on_paper_come_out() {
     // One matrix: its spectral radius, here √6 and far from its norm, and a Jordan block, whose powers grow without being exponential.

@@ -34,8 +34,9 @@ impl Composed {
         Self { entries, error: 0.0 }
     }
 
-    /// A row of a frame with such an error: its coefficients of states, then of samples heard with their rows, over that number of unknowns. Samples that are
-    /// not heard yet have none.
+    /// Returns the composition of a row of a frame whose error is at most `frame_error`. The row has the coefficients of `states` states, then of the samples
+    /// heard.
+    /// `heard` has the rows of these samples over `unknowns` unknowns; `None` stands for a sample that is not heard yet and adds nothing.
     pub(super) fn of(row: &[f64], states: usize, heard: &[Option<&Self>], unknowns: usize, frame_error: f64) -> Self {
         let mut entries = row[..states].to_vec();
         entries.resize(unknowns, 0.0);
@@ -49,13 +50,13 @@ impl Composed {
             largest = largest.max(size + heard.error);
         }
         let operations = 2 * (heard.len() + 1);
-        // The sums of sizes are themselves of `unknowns` numbers.
+        // The last factor covers the rounding of the sums of sizes, each of up to `unknowns` numbers.
         let error = (frame_error * largest + carried + gamma(operations) * all) * (1.0 + 2.0 * gamma(unknowns + heard.len() + 2));
         Self { entries, error: outward(error) + real(unknowns * operations) * UNDERFLOW }
     }
 
-    /// What a receiver hears of this sample: times a weight that is rounded once, with 1 at the place of its own deviation and another weight that is rounded
-    /// once at that of others.
+    /// Returns the row of the sample that a receiver hears: this row times `weight`, plus 1 at the place `own` of the deviation, plus the weight of `others` at
+    /// its place. Both weights were rounded once, and the error covers this rounding.
     pub(super) fn heard(&self, weight: f64, own: usize, others: Option<(usize, f64)>) -> Self {
         let mut entries: Vec<f64> = self.entries.iter().map(|entry| weight * entry).collect();
         entries[own] += 1.0;

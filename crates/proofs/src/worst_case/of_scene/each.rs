@@ -86,6 +86,7 @@ pub(super) fn bounds(
 /// Returns nearly the least growth with a certificate; infinite if no growth up to the largest has a certificate, and `None` if the watch ends the search.
 fn least(lower: f64, certified: impl Fn(f64) -> bool, watch: &dyn Watch) -> Option<f64> {
     let (mut low, mut high) = (lower, f64::INFINITY);
+    // The lower bound has no certificate below it, so the search goes upward from there, and then halves.
     let mut tried = lower.max(0.01) * 1.05;
     while high.is_infinite() && tried < LARGEST {
         if certified(tried) {
@@ -135,7 +136,7 @@ impl Link {
         stretches.dedup();
         let first = channel.symbols.iter().filter_map(|symbol| symbol.now[0]).min()?;
         let nominal = stretches.iter().map(|tick| if *tick < first { age + 1 } else { age }).collect();
-        // A state is a node of the pattern and the age of the sample held when a frame begins.
+        // A state of the link is a node of the pattern, with the age of the sample held when a frame begins.
         let mut states = vec![(0, age + 1)];
         let mut steps = Vec::new();
         let mut done = 0;
@@ -191,7 +192,7 @@ impl Link {
         let parts = frames.iter().enumerate().map(|(place, frame)| self.part(frame, place, peers, rate));
         let mut shapes: Vec<usize> = frames.iter().map(|frame| frame.state_unknowns() + self.depth).collect();
         let links = self.steps.iter().map(|(from, to, ages)| {
-            // The steps of this frame and of older ones.
+            // The unknowns are the differences v between successive samples, of this frame and of earlier frames, newest first.
             let mut part = Part { unknowns: steps + 1, ..Part::empty(2 + from, 2 + to) };
             let mut put = |entries: Vec<f64>| part.put(Row { entries, error: 0.0 });
             let unit = |place: usize, by: f64| (0..=steps).map(|other| if other == place { by } else { 0.0 }).collect::<Vec<f64>>();
@@ -219,12 +220,12 @@ impl Link {
         let (others, stretches) = (peers - 1.0, self.stretches.len());
         let apart = place == 1;
         let states = frame.state_unknowns();
-        // The states, the samples sent before, and e; of differences r and c in its place.
+        // The unknowns are the states, the samples sent before, and e. The differences have r and c instead of e.
         let inputs = states + self.depth;
         let unknowns = inputs + if apart { 2 * stretches } else { stretches };
         let unit = |place: usize, by: f64| -> Vec<f64> { (0..unknowns).map(|other| if other == place { by } else { 0.0 }).collect() };
         let mut heard: Vec<Composed> = Vec::new();
-        // A row of the frame, whose samples are those heard in stretches.
+        // Composes a row of the frame, whose sample −k is the sample heard in stretch k − 1.
         let composed = |row: &[f64], heard: &[Composed]| {
             let rows: Vec<Option<&Composed>> = frame.used.iter().map(|(_, age)| heard.get(age - 1)).collect();
             Composed::of(row, states, &rows, unknowns, frame.error)
@@ -232,7 +233,7 @@ impl Link {
         let sent = frame.sent_by(0).start;
         let own = if apart { -1.0 / others } else { 1.0 };
         for (stretch, age) in self.nominal.iter().enumerate() {
-            // A sample that is sent in this frame does not depend on samples heard after it.
+            // A sample that is sent in this frame depends only on samples heard before, whose rows are in `heard` already.
             let sample = if *age == 0 { composed(frame.sent.row(sent), &heard) } else { Composed::exact(unit(states + age - 1, 1.0)) };
             let by_others = apart.then_some((inputs + stretches + stretch, -1.0 / others));
             heard.push(sample.heard(own, inputs + stretch, by_others));
