@@ -1,8 +1,8 @@
-//! Each link on its own, at any number of equal peers.
+//! Bounds for links that each lose and delay on their own, at any number of equal peers.
 //!
-//! What a link does is the same for all: e, by how much the samples that it gives a receiver differ from those of a link that gives each sample as soon as it
-//! may, in stretches of ticks between which that changes. It is a combination of the steps v from sample to sample of its sender. For each state c of a link,
-//! let Q_c measure these steps, and let S be a quadratic form of e and v with
+//! Every link has the same states and steps. Let e be the difference between the samples that a link gives a receiver and the samples of a link that gives each
+//! sample as soon as possible, one entry per stretch of ticks within which the sample does not change. The difference e is a combination of the steps v from
+//! sample to sample of the sender. For each state c of a link, let Q_c be a quadratic form of these steps, and let S be a quadratic form of e and v with
 //!
 //! ```text
 //! Q_next(v after) + S(e, v) <= ρ²·Q_c(v before)         for everything that a link in the state c may do,
