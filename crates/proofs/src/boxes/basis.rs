@@ -1,35 +1,37 @@
-//! Coordinates in which a matrix is nearly diagonal; nothing here has to be right, since [`super::discs`] checks what comes of them.
+//! Coordinates in which a matrix is nearly diagonal. Inexact coordinates cost verdicts but never make a verdict wrong, since [`super::discs`] checks them.
 //!
-//! Eigenvectors of the large eigenvalues, one column each. All others, of samples on their way for the most part, are small eigenvalues that are often defective: their invariant subspace gets coordinates
-//! y = R·x of a quadratic form xᵀRᵀRx that falls as fast as those eigenvalues nearly do, in which every entry of it is small.
+//! Each large eigenvalue gets its eigenvector as a column. The small eigenvalues belong mostly to samples in transit and are often defective, so that their
+//! eigenvectors do not span their invariant subspace. That subspace gets coordinates y = R·x of a quadratic form xᵀRᵀRx that falls nearly as fast as the small
+//! eigenvalues do. In these coordinates every entry of the matrix on the subspace is small.
 
 use cohaptic_stability::numerics::{ComplexMatrix, Lu, cholesky, eigenvector, orthogonal_complement, triangle_inverse};
 use cohaptic_stability::{Matrix, eigenvalues};
 use num_complex::Complex64;
 
-/// Eigenvalues of at least this share of the largest have eigenvectors of their own.
+/// Share of the largest modulus from which on an eigenvalue gets a column of its own, its eigenvector.
 const LARGE: f64 = 0.4;
-/// The form of the others falls as if they were larger by this factor, and by a share of the largest. Measured on maps of five scenes: between 0.05 and 0.4, 1.1 and 2, 0.01 and 0.1 these leave the least undecided.
+/// Factor by which the quadratic form falls more slowly than the small eigenvalues; [`LEAST`] adds a share of the largest modulus. On maps of five scenes these
+/// values of `LARGE`, `FASTER` and `LEAST` left the least area undecided, among values from 0.05 to 0.4, from 1.1 to 2 and from 0.01 to 0.1.
 const FASTER: f64 = 1.3;
 const LEAST: f64 = 0.1;
-/// Eigenvalues below this are small whatever the others are: a matrix may have none but zeros.
+/// Modulus below which an eigenvalue always counts as small. A nilpotent matrix has zeros only, for which a share of the largest modulus would mean nothing.
 const SMALL: f64 = 0.05;
-/// Matrices with larger entries are divided by them.
+/// Size of an entry above which the matrix is divided by its largest entry.
 const HUGE: f64 = 1e30;
 
-/// Coordinates: columns that are nearly eigenvectors, and the inverse of that matrix.
+/// Coordinates V, whose columns are nearly eigenvectors (`right`), and nearly the inverse W of V (`left`).
 pub(super) struct Basis {
     pub(super) right: ComplexMatrix,
     pub(super) left: ComplexMatrix,
 }
 
 impl Basis {
-    /// `None` where numbers overflow or eigenvectors coincide.
+    /// Returns coordinates of a square matrix; `None` where numbers overflow or eigenvectors coincide.
     pub(super) fn of(matrix: &Matrix) -> Option<Self> {
         if !matrix.is_finite() {
             return None;
         }
-        // Coordinates are those of any multiple: squares of entries shall not overflow.
+        // A matrix and its multiples have the same eigenvectors. The division keeps squares of the entries from overflowing.
         let largest = matrix.largest();
         let scaled = matrix.scaled(if largest > HUGE { 1.0 / largest } else { 1.0 });
         let (matrix, size) = (&scaled, matrix.rows());
@@ -37,7 +39,7 @@ impl Basis {
         let modulus = |value: &Complex64| libm::hypot(value.re, value.im);
         let largest = values.iter().map(modulus).fold(0.0, f64::max);
         let least = (LARGE * largest).max(SMALL);
-        // Of two that are conjugate, the upper one: they have conjugate eigenvectors.
+        // Conjugate eigenvalues have conjugate eigenvectors, so that the eigenvalue in the upper half plane gives both columns.
         let upper: Vec<Complex64> = values.iter().copied().filter(|value| modulus(value) >= least && value.im >= 0.0).collect();
         let small = values.iter().map(modulus).filter(|modulus| *modulus < least).fold(0.0, f64::max);
         let fall = (FASTER * small + LEAST * largest).max(SMALL);
@@ -48,6 +50,7 @@ impl Basis {
             columns.push(vector);
             columns.extend(conjugate);
         }
+        // The invariant subspace of the small eigenvalues fills the columns that the eigenvectors leave.
         let rest = if columns.len() == size { Matrix::zeros(size, 0) } else { rest(matrix, &upper, fall, size - columns.len())? };
         let right = ComplexMatrix::from_fn(size, size, |row, column| match columns.get(column) {
             Some(vector) => vector[row],
@@ -58,10 +61,11 @@ impl Basis {
     }
 }
 
-/// The subspace, of that dimension, of all eigenvalues but some and their conjugates, as columns in which the matrix shrinks it by `fall`.
+/// Returns a basis, as columns, of the invariant subspace of all eigenvalues but `others` and their conjugates. In this basis the matrix shrinks vectors by at
+/// least the factor `fall`. `None` if the subspace does not have the given dimension or the series for the quadratic form does not converge.
 fn rest(matrix: &Matrix, others: &[Complex64], fall: f64, dimension: usize) -> Option<Matrix> {
     let size = matrix.rows();
-    // It is orthogonal to the left eigenvectors of the others.
+    // The invariant subspace is orthogonal to the left eigenvectors of all `others`.
     let transposed = matrix.transposed();
     let mut left = Vec::new();
     for (place, value) in others.iter().enumerate() {
@@ -75,12 +79,13 @@ fn rest(matrix: &Matrix, others: &[Complex64], fall: f64, dimension: usize) -> O
     if basis.columns() != dimension {
         return None;
     }
+    // The form Σ (Aʲ)ᵀ·Aʲ, with A the restricted matrix over `fall`, falls by `fall²` under the matrix: its Cholesky factor R is the change of coordinates.
     let within = basis.transposed().times(&matrix.times(&basis));
     let form = series(within.scaled(1.0 / fall), Matrix::identity(dimension))?;
     Some(basis.times(&triangle_inverse(&cholesky(&form)?)))
 }
 
-/// Σ (Aʲ)ᵀ·Q·Aʲ by doubling; `None` if it does not end.
+/// Returns Σ (Aʲ)ᵀ·Q·Aʲ over all j ≥ 0, by doubling; `None` if the series does not converge within 64 doublings.
 fn series(mut factor: Matrix, mut sum: Matrix) -> Option<Matrix> {
     for _ in 0..64 {
         let more = factor.transposed().times(&sum.times(&factor));
@@ -97,7 +102,7 @@ fn series(mut factor: Matrix, mut sum: Matrix) -> Option<Matrix> {
     None
 }
 
-/// X with A·X = B, nearly.
+/// Returns X with A·X ≈ B; `None` if an entry of X is not finite.
 pub(super) fn solved(matrix: &Matrix, right: &Matrix) -> Option<Matrix> {
     let solution = Lu::of(matrix).solve_all(right);
     solution.is_finite().then_some(solution)

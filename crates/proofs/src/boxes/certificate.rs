@@ -1,7 +1,8 @@
 //! Certificates: the numbers by which anybody can check a proof without the program that found it.
 //!
-//! A certificate names the states of each part of a scene, and for each box of it, or for each span of numbers of peers, the coordinates V, the weights d and the circle of [`super::discs`]. A reader with the scene can write down its matrices and
-//! check inequality (1) there; `crates/stability/tests/reference/check_certificate.py` does.
+//! A certificate names the states of each part of a scene, and for each box of it, or for each span of numbers of peers, the coordinates V, the weights d and
+//! the circle of [`super::discs`]. A reader with the scene can write down its matrices and check inequality (1) there;
+//! `crates/stability/tests/reference/check_certificate.py` does.
 
 use std::fmt::Write as _;
 
@@ -34,7 +35,8 @@ impl BoxCertificate {
     }
 }
 
-/// How many boxes of an answer have a verdict and are open in its certificate, which bounds frames more widely. Both are in the same order; an open box of a certificate is a whole one of the answer.
+/// How many boxes of an answer have a verdict and are open in its certificate, which bounds frames more widely. Both are in the same order; an open box of a
+/// certificate is a whole one of the answer.
 pub(super) fn uncertified(certificate: &[BoxCertificate], answer: impl Iterator<Item = (Ranges, Guarantee)>) -> usize {
     let mut open = certificate.iter().filter(|one| one.guarantee == Guarantee::Undecided).peekable();
     let is_open = |(ranges, guarantee): &(Ranges, Guarantee)| {
@@ -69,7 +71,8 @@ pub struct MomentCertificate {
     pub heard: Option<Gains>,
     /// How many samples of frames before take part.
     pub depth: usize,
-    /// Y of the mean over the peers, of the differences from it, and, but for two peers, of samples of which all sums are zero: row by row, in digits as those of [`PartCertificate`].
+    /// Y of the mean over the peers, of the differences from it, and, but for two peers, of samples of which all sums are zero: row by row, in digits as those
+    /// of [`PartCertificate`].
     pub blocks: Vec<String>,
 }
 
@@ -128,7 +131,8 @@ pub struct PartCertificate {
     pub is_difference: bool,
     /// Of a part of a topology but that of 1, between which ends the eigenvalues of the averaging matrix are that it stands for.
     pub eigenvalues: Option<[f64; 2]>,
-    /// The states, in the order of rows of the coordinates. Positions are counted from the first copy where nothing ties the scene to ground, and velocities multiplied by `time`.
+    /// The states, in the order of rows of the coordinates. Positions are counted from the first copy where nothing ties the scene to ground, and velocities
+    /// multiplied by `time`.
     pub states: Vec<FrameState>,
     /// The gains K and B by which a sample is the one number (K·x + B·v)/(K + B/time); `None`: its position and its velocity.
     pub heard: Option<Gains>,

@@ -1,8 +1,9 @@
 //! Boxes of numbers: lifted systems between whose corners every step matrix is multi-affine.
 //!
-//! The gains of a node count as they are. A body counts by the coefficients of its step map: for a body that nothing ties to ground, m·a = f − b·v, each of them is monotone in m and in b. So
-//! the values at the ends of the box enclose it; where several vary, they are taken apart as if each varied by itself, which encloses more than the box. But of a damping b that stays, a force f keeps the velocity f/b,
-//! so that two of them follow from the others: e₁₁ + b·g₁ = 0 and e₀₁ + b·g₀ = h.
+//! The gains of a node count as they are. A body counts by the coefficients of its step map: for a body that nothing ties to ground, m·a = f − b·v, each of
+//! them is monotone in m and in b. So the values at the ends of the box enclose it; where several vary, they are taken apart as if each varied by itself, which
+//! encloses more than the box. But of a damping b that stays, a force f keeps the velocity f/b, so that two of them follow from the others: e₁₁ + b·g₁ = 0 and
+//! e₀₁ + b·g₀ = h.
 
 use std::borrow::Cow;
 
@@ -32,8 +33,8 @@ pub(super) struct Common<'a> {
     pub(super) time: f64,
 }
 
-/// More numbers than this that vary are refused: a box has two corners to the power of them. Two dampings are four coefficients of a step map each, of bodies that
-/// are equal in all peers; beside them there is room for the weight with which a peer hears others, and for one number more.
+/// More numbers than this that vary are refused: a box has two corners to the power of them. Two dampings are four coefficients of a step map each, of bodies
+/// that are equal in all peers; beside them there is room for the weight with which a peer hears others, and for one number more.
 const MOST_NUMBERS: usize = 10;
 
 /// Parts of the computation that all points share.
@@ -70,8 +71,8 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// The steps of a frame over the box that points enclose: 2ⁿ of them, of which point i has number b at its upper end if bit b of i is set. Bodies are between those of `ends`, whatever those of
-/// the points are.
+/// The steps of a frame over the box that points enclose: 2ⁿ of them, of which point i has number b at its upper end if bit b of i is set. Bodies are between
+/// those of `ends`, whatever those of the points are.
 pub(super) fn steps(points: &[Point], ends: &[Vec<Node>], common: Common<'_>) -> Result<FrameSpan, ProofError> {
     let frame = Frame::of(points, common)?;
     let kinds = enclosed(points, ends, |point| frame.matrices(point))?;
@@ -182,7 +183,8 @@ pub(super) fn takes_one_past(points: &[Point], scale: Scale) -> bool {
 /// A body at each end, and the nodes that have it.
 type EqualBodies = (Vec<Body>, Vec<(usize, BodyOf)>);
 
-/// The points with one more number for each coefficient of a step map that varies between the ends. Bodies that are equal at all ends vary together: their coefficients are the same functions of what varies.
+/// The points with one more number for each coefficient of a step map that varies between the ends. Bodies that are equal at all ends vary together: their
+/// coefficients are the same functions of what varies.
 fn with_bodies(points: &[Point], ends: &[Vec<Node>]) -> Result<Vec<Point>, ProofError> {
     let mut groups: Vec<EqualBodies> = Vec::new();
     for node in 0..points[0].nodes.len() {
@@ -300,7 +302,8 @@ fn ranges(bodies: &[Body]) -> Result<[(f64, f64); 6], ProofError> {
 /// Coefficients that are affine in one number, and whether each falls as that grows.
 type Together = &'static [(usize, bool)];
 
-/// Which coefficients vary, those together that are affine in one number: without a change of the damping over the mass, both effects of a force; without a change of the damping, the effects of a velocity and of a force.
+/// Which coefficients vary, those together that are affine in one number: without a change of the damping over the mass, both effects of a force; without a
+/// change of the damping, the effects of a velocity and of a force.
 fn together(ranges: &[(f64, f64); 6], bodies: &[Body]) -> Vec<Together> {
     let varies = |place: usize| ranges[place].0 < ranges[place].1;
     let groups: &[Together] = if !varies(1) && !varies(3) {

@@ -1,17 +1,18 @@
-//! A delay as a key: between two values of it nothing happens but that samples are on the way for longer.
+//! A delay of links as a key, whose range falls into stretches with one frame each.
 //!
-//! A sample comes into force at the first tick at or after its arrival. That tick is no earlier for a longer delay, and neither is an age that a law takes from the delay. So if a frame of one delay has the same events, samples held and
-//! laws as that of a longer one, so has that of every delay between them: a *stretch* of delays is one scene. Delays are whole nanoseconds, and stretches are neighbours if nothing lies between them.
+//! A sample comes into force at the first tick at or after its arrival. A longer delay makes that tick no earlier, and makes no age smaller that a law takes
+//! from the delay. So if the frames of two delays have the same events, held samples and laws, the frame of every delay between the two has the same too: a
+//! *stretch* of delays is one scene. Delays are whole nanoseconds, and two stretches are neighbours if no whole nanosecond lies between them.
 
 use cohaptic_scene::Scene;
 use cohaptic_stability::KeyRange;
 
 use super::error::ProofError;
 
-/// More stretches than this are refused.
+/// Largest number of stretches of a key; a range with more is refused.
 const MOST_STRETCHES: usize = 2000;
 
-/// What a nanosecond is in the unit of a delay; `None` if the key is no delay of links.
+/// Returns the number of nanoseconds in the unit of a delay; `None` if the key is no delay of links.
 fn per_unit(range: &KeyRange) -> Option<f64> {
     let is_delay = ["link.", "links."].iter().any(|table| range.key.starts_with(table)) && range.key.ends_with(".delay");
     let unit = match range.unit.as_str() {
@@ -24,7 +25,12 @@ fn per_unit(range: &KeyRange) -> Option<f64> {
     is_delay.then_some(unit)
 }
 
-/// The stretches of a key, from its least value on. `frame` says of the scene with a value all that happens in a frame.
+/// Returns the stretches of a key in ascending order, as values in the unit of the key. `frame` returns a text of everything that happens in a frame of the
+/// scene with the given value; frames with equal texts are equal.
+///
+/// # Errors
+///
+/// [`ProofError::Key`] if the key is no delay, [`ProofError::Stretches`] if there are more than [`MOST_STRETCHES`], and the errors of `frame`.
 pub(super) fn stretches(range: &KeyRange, frame: impl Fn(f64) -> Result<String, ProofError>) -> Result<Vec<[f64; 2]>, ProofError> {
     let Some(unit) = per_unit(range) else { return Err(ProofError::Key { key: range.key.clone() }) };
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a delay in whole nanoseconds, which saturates")]
@@ -35,7 +41,8 @@ pub(super) fn stretches(range: &KeyRange, frame: impl Fn(f64) -> Result<String, 
     while from <= high {
         let here = frame(value(from))?;
         let is_same = |delay: u64| Ok::<_, ProofError>(frame(value(delay))? == here);
-        // Most stretches are as long as the one before.
+        // `same` is a delay known to belong to this stretch, `other` a delay known to lie beyond. Most stretches are as long as the stretch before, so that the
+        // end of a stretch of that length is tried first: two frames then replace a bisection.
         let (mut same, mut other) = (from, high + 1);
         let guess = from.saturating_add(length);
         if guess < high && is_same(guess)? {
@@ -47,6 +54,7 @@ pub(super) fn stretches(range: &KeyRange, frame: impl Fn(f64) -> Result<String, 
         if other > high && is_same(high)? {
             same = high;
         }
+        // Bisection is valid because the frames of a stretch are a contiguous range of delays.
         while same < high && other - same > 1 {
             let middle = same + (other - same) / 2;
             if is_same(middle)? {
@@ -64,7 +72,7 @@ pub(super) fn stretches(range: &KeyRange, frame: impl Fn(f64) -> Result<String, 
     Ok(found)
 }
 
-/// Whether two scenes differ in the delays of their links alone.
+/// Returns whether two scenes agree in objects, coordination, peers and timeline, so that links are all that can differ.
 pub(super) fn differ_in_delays_alone(one: &Scene, other: &Scene) -> bool {
     let without = |scene: &Scene| format!("{:?} {:?} {:?} {:?}", scene.object, scene.coordination, scene.peers, scene.timeline);
     without(one) == without(other)

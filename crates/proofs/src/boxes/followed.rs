@@ -316,7 +316,8 @@ impl Motion {
         }
     }
 
-    /// The verdict on the motion between scenes, the corners of a box, and the certificates of its parts where they are asked for. `numbers`: between which ends 1/(N − 1) is.
+    /// The verdict on the motion between scenes, the corners of a box, and the certificates of its parts where they are asked for. `numbers`: between which
+    /// ends 1/(N − 1) is.
     fn decide(&self, scenes: &[&Scene], numbers: Option<[f64; 2]>, mut certified: Certified<'_>) -> Result<Option<Proven>, ProofError> {
         let structure = &self.structure;
         let nodes = scenes.iter().map(|scene| self.nodes(scene)).collect::<Result<Vec<_>, _>>()?;
@@ -400,7 +401,8 @@ impl Motion {
         parts
     }
 
-    /// The corners of a box, for the averages of classes or for differences within one. Weights are affine in 1/(N − 1), which is one number more unless they stay.
+    /// The corners of a box, for the averages of classes or for differences within one. Weights are affine in 1/(N − 1), which is one number more unless they
+    /// stay.
     fn points(&self, ends: &[Vec<Node>], numbers: Option<[f64; 2]>, part: &PartOf<'_>) -> Vec<Point> {
         let (structure, apart) = (&self.structure, part.apart);
         if let Some([low, high]) = part.weight {

@@ -1,12 +1,14 @@
 //! A scene with more and more equal peers, and the verdict on all numbers of them from one to another.
 //!
-//! Averages of classes and differences within one do not mix (`structure`), and only numbers in them depend on N: the mass of a copy, m or
-//! m/N; gains, multiplied by 1, 2/N, N − 1, 4(N − 1)/N² or 4(N − 1)²/N²; and the weights. Of F peers in the other classes, with ν = 1/(N − 1), a class of n is heard with weight nν, itself with (n − 1)ν, and
-//! the growing one with 1 − (F − 1)ν, itself with 1 − Fν; differences hear themselves with −ν. So what a gain hears is that gain times a constant, and that gain times ν times another. Each of these
-//! factors is monotone in N from 2 on, so that those of the ends of a span of numbers enclose them.
+//! Averages of classes and differences within one do not mix (`structure`), and only numbers in them depend on N: the mass of a copy, m or m/N; gains,
+//! multiplied by 1, 2/N, N − 1, 4(N − 1)/N² or 4(N − 1)²/N²; and the weights. Of F peers in the other classes, with ν = 1/(N − 1), a class of n is heard with
+//! weight nν, itself with (n − 1)ν, and the growing one with 1 − (F − 1)ν, itself with 1 − Fν; differences hear themselves with −ν. So what a gain hears is
+//! that gain times a constant, and that gain times ν times another. Each of these factors is monotone in N from 2 on, so that those of the ends of a span of
+//! numbers enclose them.
 //!
-//! Without damping of the object a copy of the mass m/N moves by N times a force, and nothing else of it depends on N. Its forces may be counted in newtons over N: gains are N times as large, copies have the mass m and
-//! devices N times theirs, and the motion is the same. Where gains shrink with N these numbers have limits, and the others have not.
+//! Without damping of the object a copy of the mass m/N moves by N times a force, and nothing else of it depends on N. Its forces may be counted in newtons
+//! over N: gains are N times as large, copies have the mass m and devices N times theirs, and the motion is the same. Where gains shrink with N these numbers
+//! have limits, and the others have not.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -103,8 +105,8 @@ impl Growing {
         self.motions.iter().any(|motion| motion.waves.is_some())
     }
 
-    /// What every number of peers from `low` to `high` has in common, if that is proven, and the certificates of its parts where they are asked for. Parts that are `stable` for all of these numbers
-    /// are passed over, and those found are added.
+    /// What every number of peers from `low` to `high` has in common, if that is proven, and the certificates of its parts where they are asked for. Parts that
+    /// are `stable` for all of these numbers are passed over, and those found are added.
     pub(super) fn decide(
         &self,
         low: u64,
@@ -142,7 +144,8 @@ impl Growing {
         self.motions.iter().enumerate().flat_map(|(place, motion)| parts_of(motion).into_iter().map(move |part| (place, part))).collect()
     }
 
-    /// Of a frame of that number of peers, of all parts that are not proven stable, the size of the largest eigenvalue, nearly, and the largest bound of an entry; `None` if all are.
+    /// Of a frame of that number of peers, of all parts that are not proven stable, the size of the largest eigenvalue, nearly, and the largest bound of an
+    /// entry; `None` if all are.
     pub(super) fn nearness(&self, number: u64) -> Result<Option<[f64; 2]>, ProofError> {
         let mut found: Option<[f64; 2]> = None;
         for (motion, part) in self.parts(number) {
@@ -322,7 +325,8 @@ impl Motion {
         Common { timetable, plans, tied: apart.is_some() || self.structure.tied, time }
     }
 
-    /// The corners of a box: from nodes on, with ν times the gains at each end, and laws and couplings that go from those of `near` to those of `end`. A law that is none of the box's numbers stays as it is.
+    /// The corners of a box: from nodes on, with ν times the gains at each end, and laws and couplings that go from those of `near` to those of `end`. A law
+    /// that is none of the box's numbers stays as it is.
     pub(super) fn corners(&self, nodes: Vec<Node>, [near, end]: [&[Node]; 2], heard: [f64; 2], varies: bool, apart: Option<usize>) -> Vec<Point> {
         let differ = |of: &dyn Fn(&Node, &Node) -> bool| near.iter().zip(end).any(|(near, end)| of(near, end));
         let with = |point: &Point, change: &dyn Fn(&Node, &mut Node)| {
@@ -349,8 +353,9 @@ impl Motion {
         points
     }
 
-    /// Whether all numbers of peers from one on are proven unstable in a part of which the gains of the law or the effects of a force on the copies grow with N, or both, and nothing else changes but
-    /// towards a limit. A frame divided by N/N₀ a step, or by its square, is one of a box then, and an unstable one is so without the division.
+    /// Whether all numbers of peers from one on are proven unstable in a part of which the gains of the law or the effects of a force on the copies grow with
+    /// N, or both, and nothing else changes but towards a limit. A frame divided by N/N₀ a step, or by its square, is one of a box then, and an unstable one is
+    /// so without the division.
     fn is_unstable_beyond(&self, from: u64, apart: Option<usize>) -> Result<bool, ProofError> {
         if self.waves.is_some() {
             return Ok(false);
@@ -422,7 +427,8 @@ pub(super) fn plans_of(structure: &Structure) -> (Plans, Vec<Plans>) {
     (Plans::default(), structure.classes.iter().map(|_| Plans::default()).collect())
 }
 
-/// The weights of the averages of classes (columns) in the targets of classes (rows), of which one grows, or the weight of a difference in itself: constants, and multiples of ν.
+/// The weights of the averages of classes (columns) in the targets of classes (rows), of which one grows, or the weight of a difference in itself: constants,
+/// and multiples of ν.
 pub(super) fn weights_of_growing(structure: &Structure, growing: usize, nu: f64, is_difference: bool) -> Matrix {
     let classes = &structure.classes;
     let others = real(structure.peers - classes[growing].len());

@@ -1,25 +1,25 @@
 //! Verdicts on sets of scenes.
 
-/// A proven verdict on all frames of a box.
+/// Proven verdict on all frames of a box. [`Guarantee`] adds the case that nothing is proven.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Proven {
     Stable,
     Unstable,
 }
 
-/// The verdict on a set of scenes.
+/// Verdict on a set of scenes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Guarantee {
-    /// Every one is stable: proven.
+    /// Every scene of the set is proven stable.
     Stable,
-    /// Every one is unstable: proven.
+    /// Every scene of the set is proven unstable.
     Unstable,
-    /// Not decided.
+    /// Nothing is proven: the set may hold stable scenes, unstable scenes, or both.
     Undecided,
 }
 
 impl Guarantee {
-    /// The word in JSON and CSV.
+    /// Returns the word for the verdict in JSON and CSV.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {

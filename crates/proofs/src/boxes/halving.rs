@@ -1,4 +1,4 @@
-//! Ranges of keys that are halved until they are decided.
+//! Halving of ranges of keys until every piece is decided or a limit is reached.
 
 use cohaptic_stability::Watch;
 use cohaptic_stability::numerics::real;
@@ -7,43 +7,44 @@ use rayon::prelude::*;
 use super::error::ProofError;
 use super::guarantee::Guarantee;
 
-/// From which value of each key to which.
+/// Least and greatest value of each key, indexed by key.
 pub(super) type Ranges = Vec<[f64; 2]>;
 
-/// How far ranges are halved that are not decided.
+/// Limits of the halving of undecided ranges.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Halving {
-    /// At most so often.
+    /// Largest number of halvings.
     pub(super) times: u32,
-    /// Only those that are longer, and have a number within; `None` for all.
+    /// Length, in the unit of the key, above which ranges are halved, if a floating-point number lies within. `None`: ranges of every length are halved.
     pub(super) tolerance: Option<f64>,
-    /// More than these are not halved at once: where an eigenvalue stays at the unit circle, none is ever decided.
+    /// Largest number of ranges of one size that are halved. Where an eigenvalue stays at the unit circle, no range is ever decided.
     pub(super) most: usize,
-    /// The key whose ranges are never halved.
+    /// The key whose ranges are never halved, a delay.
     pub(super) whole: Option<usize>,
 }
 
-/// The verdict on ranges; `None` if they were not looked at.
+/// Function that returns the verdict on ranges; `None` if the ranges were not looked at.
 pub(super) type Look<'a> = &'a (dyn Fn(&[[f64; 2]]) -> Result<Option<Guarantee>, ProofError> + Sync);
 
-/// All that ranges were halved into.
+/// The pieces into which ranges were halved.
 #[derive(Debug)]
 pub(super) struct Halved {
-    /// Larger ones first, then by the last key and then by those before it.
+    /// Pieces with their verdicts, in the order in which the halving reached them: pieces with fewer halvings first.
     pub(super) pieces: Vec<(Ranges, Guarantee)>,
-    /// How many were looked at.
+    /// Number of ranges that were looked at, also of those that were halved afterwards.
     pub(super) attempts: usize,
-    /// Whether every one was looked at; otherwise some are undecided that were not.
+    /// Whether all pieces were looked at. Otherwise pieces that were not looked at are undecided too.
     pub(super) is_whole: bool,
 }
 
 impl Halving {
-    /// The halving that leaves the ranges of a key whole.
+    /// Returns the same halving with the ranges of one key left whole.
     pub(super) const fn but_for(self, whole: Option<usize>) -> Self {
         Self { whole, ..self }
     }
 
-    /// Halves ranges that have been halved `halved` times before.
+    /// Halves ranges that have been halved `halved` times before. Ranges of one size are looked at in parallel; the order of the pieces does not depend on the
+    /// threads.
     pub(super) fn of(self, mut waiting: Vec<Ranges>, halved: u32, look: Look<'_>, watch: &dyn Watch) -> Result<Halved, ProofError> {
         let mut all = Halved { pieces: Vec::new(), attempts: 0, is_whole: true };
         for halved in halved.. {
@@ -55,6 +56,7 @@ impl Halving {
             let found = found.collect::<Result<Vec<_>, _>>()?;
             all.attempts += found.len();
             all.is_whole = all.is_whole && !watch.stops() && found.iter().all(Option::is_some);
+            // At the last size undecided ranges become pieces instead of being halved.
             let is_last = watch.stops() || halved >= self.times || found.len() > self.most;
             let mut next = Vec::new();
             for (ranges, found) in waiting.into_iter().zip(found) {
@@ -68,7 +70,7 @@ impl Halving {
         Ok(all)
     }
 
-    /// Whether these ranges are halved if they are not decided.
+    /// Returns whether undecided ranges may be halved: at least one key is not whole, and every halved key is longer than the tolerance.
     pub(super) fn may_halve(self, ranges: &[[f64; 2]]) -> bool {
         let is_long = |[low, high]: [f64; 2], tolerance| {
             let middle = low.midpoint(high);
@@ -78,12 +80,12 @@ impl Halving {
         !halved.is_empty() && self.tolerance.is_none_or(|tolerance| halved.iter().all(|key| is_long(ranges[*key], tolerance)))
     }
 
-    /// Which of that number of keys are halved.
+    /// Returns the keys, of the given number of keys, whose ranges are halved.
     pub(super) fn halved_keys(self, keys: usize) -> Vec<usize> {
         (0..keys).filter(|key| self.whole != Some(*key)).collect()
     }
 
-    /// The parts of ranges: those of the first key that is halved follow each other.
+    /// Returns the 2ⁿ parts of ranges with n halved keys. Bit b of the place of a part says whether the part has the upper half of halved key b.
     pub(super) fn halves(self, ranges: &[[f64; 2]]) -> Vec<Ranges> {
         let halved = self.halved_keys(ranges.len());
         let part = |place: usize| {

@@ -1,11 +1,12 @@
-//! The samples that classes of peers hold at their ticks, in the steady state.
+//! The samples that classes of peers hold at their ticks, once every link has delivered.
 
 use cohaptic_stability::frames::{Event, Timetable};
 
-/// The sample in force at each tick of a class, of each other.
+/// The sample of each sender that is in force at each tick of a receiving class.
 pub(super) struct Heard {
-    /// By receiver, sender and tick in the frame: the number of the sample.
+    /// Number of the sample in force, indexed by receiver, sender and tick in the frame; `None` if the sender never delivers to the receiver.
     of: Vec<Vec<Vec<Option<i64>>>>,
+    /// Number of samples per frame, indexed by class.
     sent: Vec<usize>,
 }
 
@@ -15,7 +16,8 @@ impl Heard {
         let number_of_ticks =
             |class: usize| timetable.events.iter().filter(|event| matches!(event, Event::Tick { node, .. } if *node == class)).count();
         let mut of: Vec<Vec<Vec<Option<i64>>>> = (0..classes).map(|class| vec![vec![None; number_of_ticks(class)]; classes]).collect();
-        // A sample is held until another comes, also across frames: those of the frame before are held when this one begins.
+        // A sample is held until another arrives, also across frames. The first pass (frame −1) finds the samples that are held when frame 0 begins; the second
+        // pass overwrites the entries of `of` with the samples of the steady state.
         let mut held = vec![vec![None; classes]; classes];
         for frame in [-1, 0] {
             let mut tick = vec![0; classes];
@@ -35,8 +37,10 @@ impl Heard {
         Self { of, sent: timetable.sent.clone() }
     }
 
-    /// The sample of one class that another has in force at a tick of its own, counted from the beginning of the frame, also before it; `None` if none ever comes.
+    /// Returns the number of the sample of `from` that `to` has in force at a tick of `to`. Ticks and samples are counted from the beginning of the frame and
+    /// are negative before it. `None` if no sample ever arrives.
     pub(super) fn at(&self, from: usize, to: usize, tick: i64) -> Option<i64> {
+        // A tick outside the frame maps to the tick of the same place within it; the sample number shifts by the samples of the frames between.
         let ticks = &self.of[to][from];
         let count = whole(ticks.len()).max(1);
         let place = usize::try_from(tick.rem_euclid(count)).unwrap_or(0);

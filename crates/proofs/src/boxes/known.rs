@@ -1,4 +1,4 @@
-//! The pieces of a proof that are known before it begins.
+//! Pieces of a proof whose verdicts are known before the proof begins.
 
 use cohaptic_stability::Watch;
 
@@ -6,16 +6,16 @@ use super::error::ProofError;
 use super::followed::Followed;
 use super::guarantee::Guarantee;
 
-/// The pieces of a proof that were looked at, in this process or in others.
+/// Store of the pieces of a proof that were decided or left undecided, in this process or in another.
 pub trait KnownPieces: Sync {
-    /// The verdict on the scenes between these values of each key; `None` if it is not known.
+    /// Returns the verdict on the scenes within a range \[low, high\] of each key, in the order of the keys; `None` if the verdict is not known.
     fn known(&self, ranges: &[[f64; 2]]) -> Option<Guarantee>;
 
-    /// This verdict was found.
+    /// Stores the verdict on a piece. Called once the piece was looked at, also with [`Guarantee::Undecided`].
     fn found(&self, ranges: &[[f64; 2]], guarantee: Guarantee);
 }
 
-/// Nothing is known before, and nothing kept.
+/// A store that knows no piece and keeps none.
 pub(super) struct NothingKnown;
 
 impl KnownPieces for NothingKnown {
@@ -27,11 +27,13 @@ impl KnownPieces for NothingKnown {
 }
 
 impl Followed<'_> {
-    /// The verdict on ranges: the known one, or it is found.
+    /// Returns the verdict on the ranges: the known verdict, or else the verdict that is computed here and then stored in `pieces`. Counts as one operation of
+    /// the watch.
     pub(super) fn look(&self, ranges: &[[f64; 2]], pieces: &dyn KnownPieces, watch: &dyn Watch) -> Result<Guarantee, ProofError> {
         let guarantee = match pieces.known(ranges) {
             Some(known) => known,
             None => {
+                // An undecided piece is stored too: a later process then halves the piece without deciding it again.
                 let found = self.decide(ranges)?.map_or(Guarantee::Undecided, Guarantee::from);
                 pieces.found(ranges, found);
                 found

@@ -1,4 +1,4 @@
-//! A line along one key: stretches of which each is proven stable or proven unstable, and between them stretches that hold every crossing.
+//! A line along one key: stretches that are proven stable or proven unstable, and undecided stretches between these, which hold every crossing.
 
 use cohaptic_stability::{Family, Watch};
 
@@ -10,54 +10,56 @@ use super::guarantee::Guarantee;
 use super::halving::{Halved, Halving};
 use super::known::{KnownPieces, NothingKnown};
 
-/// Values of a key from one to another, and the verdict on all scenes with them.
+/// Range of values of a key, and the verdict on all scenes with a value in the range.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ProvenStretch {
     /// The least value.
     pub low: f64,
     /// The greatest value.
     pub high: f64,
-    /// The verdict; where it is [`Guarantee::Undecided`], the boundary may be anywhere within, and it is nowhere else.
+    /// The verdict. A boundary of stability lies in a stretch with [`Guarantee::Undecided`], where it may be anywhere, and in no other stretch.
     pub guarantee: Guarantee,
 }
 
-/// A range of a key that is covered by stretches.
+/// Range of a key, covered by stretches.
 #[derive(Clone, PartialEq, Debug)]
 pub struct ProvenLine {
-    /// From the lowest value on; they meet at their ends, and neighbours differ.
+    /// Stretches in ascending order. Neighbours meet at their ends and have different verdicts.
     pub stretches: Vec<ProvenStretch>,
-    /// How many stretches were looked at.
+    /// Number of stretches that were looked at, also of those that were halved afterwards.
     pub attempts: usize,
-    /// The stretches as they were decided, of which neighbours may agree.
+    /// Stretches as they were decided, before neighbours with the same verdict were joined.
     pieces: Vec<ProvenStretch>,
-    /// Whether nobody ended the proof; if somebody did, stretches that were not looked at are undecided too.
+    /// Whether the watch let the proof run to its end. Otherwise stretches that were not looked at are undecided too.
     pub is_whole: bool,
 }
 
-/// More stretches than this are not kept waiting: where an eigenvalue stays at the unit circle, none is ever decided.
+/// Number of stretches from which on undecided stretches are no longer halved. Where an eigenvalue stays at the unit circle, no stretch is ever decided.
 const MOST_WAITING: usize = 1 << 16;
 
-/// How a line is halved.
+/// Returns the halving of a line, whose stretches are halved while they are longer than `tolerance`, in the unit of the key.
 pub(super) const fn halving(tolerance: f64) -> Halving {
     Halving { times: u32::MAX, tolerance: Some(tolerance), most: MOST_WAITING - 1, whole: None }
 }
 
 impl ProvenLine {
-    /// Decides a family with one key over its range: stretches that are not decided are halved until they are no longer than `tolerance`, or have no number within; a delay of links is divided where a sample comes into force at another tick, and nowhere else. What comes out does not
-    /// depend on the number of threads. A stretch is an operation of the watch, which may end the proof.
+    /// Decides a family with one key over the range of the key. Undecided stretches are halved until they are no longer than `tolerance`, in the unit of the
+    /// key, or no floating-point number lies within. A key that is a delay of links is divided where a sample comes into force at another tick, and nowhere
+    /// else. The result does not depend on the number of threads. A stretch is an operation of the watch, which may end the proof.
     ///
     /// # Errors
     ///
-    /// [`ProofError`] if there is not one key that does nothing but set gains, masses and dampings or a delay, and for scenes of which nothing can be proven.
+    /// [`ProofError`] if the family does not have exactly one key, if the key sets anything but gains, masses, dampings or a delay, and for scenes of which
+    /// nothing can be proven.
     pub fn prove(family: &Family, tolerance: f64, watch: &dyn Watch) -> Result<Self, ProofError> {
         Self::prove_with(family, tolerance, &NothingKnown, watch)
     }
 
-    /// [`ProvenLine::prove`], where stretches that are known are not decided again: what comes out is the same.
+    /// Decides a family like [`ProvenLine::prove`] and with the same result, but takes the verdicts of known stretches from `pieces` and stores new ones there.
     ///
     /// # Errors
     ///
-    /// Those of [`ProvenLine::prove`].
+    /// [`ProofError`] for the same reasons as [`ProvenLine::prove`].
     pub fn prove_with(family: &Family, tolerance: f64, pieces: &dyn KnownPieces, watch: &dyn Watch) -> Result<Self, ProofError> {
         if family.keys().len() != 1 {
             return Err(ProofError::OneKey);
@@ -68,6 +70,7 @@ impl ProvenLine {
             halving.of(followed.beginnings(), 0, &|ranges| followed.look(ranges, pieces, watch).map(Some), watch)?;
         let stretch = |(ranges, guarantee): (Vec<[f64; 2]>, Guarantee)| ProvenStretch { low: ranges[0][0], high: ranges[0][1], guarantee };
         let mut found: Vec<ProvenStretch> = pieces.into_iter().map(stretch).collect();
+        // Pieces come in the order of their sizes. Sorted by value, neighbours can be joined.
         found.sort_by(|one, other| one.low.total_cmp(&other.low));
         let mut stretches: Vec<ProvenStretch> = Vec::new();
         for one in &found {
@@ -79,16 +82,17 @@ impl ProvenLine {
         Ok(Self { stretches, attempts, is_whole, pieces: found })
     }
 
-    /// The pieces of the line with all by which they can be checked. Each is decided once more.
+    /// Returns the pieces of the line with the numbers by which their verdicts can be checked. Each piece is decided once more, and is undecided here if the
+    /// wider bounds of the checker decide nothing.
     ///
     /// # Errors
     ///
-    /// As [`ProvenLine::prove`], of the family that was proven, and if the watch ends it.
+    /// [`ProofError`] if the watch ends the certification, and for the reasons of [`ProvenLine::prove`] if `family` is not the family that was proven.
     pub fn certify(&self, family: &Family, watch: &dyn Watch) -> Result<Vec<BoxCertificate>, ProofError> {
         certify(family, None, self.pieces.iter().map(|ProvenStretch { low, high, .. }| vec![[*low, *high]]).collect(), watch)
     }
 
-    /// How many pieces have a verdict of which a certificate says nothing.
+    /// Returns the number of pieces that have a verdict here and are undecided in the certificate.
     #[must_use]
     pub fn uncertified(&self, certificate: &[BoxCertificate]) -> usize {
         uncertified(certificate, self.pieces.iter().map(|piece| (vec![[piece.low, piece.high]], piece.guarantee)))

@@ -1,7 +1,8 @@
 //! Every number of equal peers in the mean square, over equal links that lose independently.
 //!
-//! A delivery with the probability p = 1 − q turns the sample held, h, into q·h + p·u + ξ, with a noise ξ of variance p·q·σ², σ² = E(u − h)², that is independent from link to link. So the second moments of
-//! N peers, of which none is told from another, are those of three kinds of motion that do not mix but by σ² (see [`Symmetric`], of which these are other coordinates):
+//! A delivery with the probability p = 1 − q turns the sample held, h, into q·h + p·u + ξ, with a noise ξ of variance p·q·σ², σ² = E(u − h)², that is
+//! independent from link to link. So the second moments of N peers, of which none is told from another, are those of three kinds of motion that do not mix but
+//! by σ² (see [`Symmetric`], of which these are other coordinates):
 //!
 //! ```text
 //! C    of √N times the mean over the peers of (a, h)        h ← q·h + p·u,                              noise ν·p·q·σ²
@@ -10,10 +11,11 @@
 //! σ² = µ·C[u − h] + (1 − µ)·A[u − out] + (1 − µ)/(1 − ν²)·A[in + ν·out] + ((1 − 2ν)/2 + (1 − ν)/(2 + 2ν))·x
 //! ```
 //!
-//! with a the states of a peer and its samples on the way, in the mean of the samples that it holds, out the mean of its samples that others hold, ν = 1/(N − 1), µ = 1/N, and X\[v\] = vᵀXv. All of it is analytic in ν, down to 0, and a tick is multi-affine in gains
-//! and coefficients of step maps. So the image L(Y) of a fixed Y = (C, A, x) over a span of numbers is a mean, a slope along each number and a radius ([`StepSpan`]), and
-//! Y − L(Y) is positive definite on all of the span if it is at all ends of the slopes, radius included. Y is looked for at a number in the middle, and need not be exact. If it is positive definite too, every number is *stable*; if an
-//! entry of its diagonal is below zero, every one is *unstable* ([`Positive`]).
+//! with a the states of a peer and its samples on the way, in the mean of the samples that it holds, out the mean of its samples that others hold, ν = 1/(N −
+//! 1), µ = 1/N, and X\[v\] = vᵀXv. All of it is analytic in ν, down to 0, and a tick is multi-affine in gains and coefficients of step maps. So the image L(Y)
+//! of a fixed Y = (C, A, x) over a span of numbers is a mean, a slope along each number and a radius ([`StepSpan`]), and Y − L(Y) is positive definite on all
+//! of the span if it is at all ends of the slopes, radius included. Y is looked for at a number in the middle, and need not be exact. If it is positive
+//! definite too, every number is *stable*; if an entry of its diagonal is below zero, every one is *unstable* ([`Positive`]).
 
 use cohaptic_peer::Gains;
 use cohaptic_stability::frames::{Event, External, Lifted, Node, NominalNetwork, Sampling, Scale, Scratch};

@@ -1,11 +1,14 @@
 //! Guarantees: verdicts that hold for sets of scenes, not for one.
 //!
-//! A frame of a lifted system is a product of steps ([`steps`]) whose entries are affine in each gain. Over a box of gains it is a mean, a slope along each of them and a small radius ([`span`]), and its
-//! eigenvalues lie in discs that move along ([`discs`]): all inside the unit circle, or one outside, for the whole box. Boxes of which neither can be shown are split.
+//! A frame of a lifted system is a product of steps ([`steps`]) whose entries are affine in each gain. Over a box of gains the frame is enclosed by a mean, a
+//! slope along each gain and a small radius ([`span`]). The eigenvalues of the frame lie in discs that move with the gains ([`discs`]). A box is stable if all
+//! discs lie inside the unit circle, and unstable if one disc lies outside. A box for which neither can be shown is halved along each key ([`halving`]).
 //!
-//! Equal peers on a graph are parts of one node each, for every eigenvalue of its averaging matrix between two numbers. A server and its clients ([`server`]), and copies that are tied by waves ([`waves`]), have steps of their own.
+//! Equal peers on a graph are split into parts of one node, one part per interval that encloses eigenvalues of the averaging matrix. A server with its clients
+//! ([`server`]) and copies that are tied by waves ([`waves`]) have steps of their own.
 //!
-//! Nothing that is looked for has to be right: each finding is checked with bounds of all rounding errors.
+//! The searches for coordinates, weights and second moments may be inexact: a verdict rests only on inequalities that are checked with bounds of all rounding
+//! errors.
 
 mod basis;
 mod certificate;

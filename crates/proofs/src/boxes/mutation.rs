@@ -1,4 +1,4 @@
-//! What tests make wrong in proofs, to see that they would notice it.
+//! Faults that tests put into proofs, to see that the tests notice a prover with such a fault.
 
 use std::cell::Cell;
 
@@ -9,18 +9,18 @@ use num_complex::Complex64;
 use super::discs::NearlyDiagonal;
 use super::span::StepSpan;
 
-/// A fault in a prover. Those of the structure of a scene are in [`super::points`].
+/// A fault in a prover. Faults in the structure of a scene are in [`super::points`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Mutation {
-    /// Boxes reach half as far as they do.
+    /// Slopes are halved, as if boxes reached half as far as they do.
     HalfTheBox,
-    /// The second number of a box stays at its middle.
+    /// All slopes but the first are zero, as if the other numbers of a box stayed at their middles.
     OneNumber,
-    /// Nothing is of the second order.
+    /// Radii in nearly diagonal coordinates are zero, as if nothing were of the second order.
     FirstOrder,
-    /// Diagonal entries stay where they are in the middle of the box.
+    /// Slopes of diagonal entries are zero: the entries stay where they are in the middle of the box.
     StillDiagonal,
-    /// Entries beside the diagonal stay where they are in the middle of the box.
+    /// Slopes of entries off the diagonal are zero: the entries stay where they are in the middle of the box.
     StillBeside,
 }
 
@@ -28,7 +28,7 @@ thread_local! {
     static NOW: Cell<Option<Mutation>> = const { Cell::new(None) };
 }
 
-/// What comes out with a fault in all proofs of this thread.
+/// Runs a function with the fault in all proofs of this thread, and returns its result. The fault is removed afterwards.
 pub(super) fn with<T>(mutation: Option<Mutation>, run: impl FnOnce() -> T) -> T {
     NOW.set(mutation);
     let result = run();
@@ -36,7 +36,7 @@ pub(super) fn with<T>(mutation: Option<Mutation>, run: impl FnOnce() -> T) -> T 
     result
 }
 
-/// The steps of a frame over a box.
+/// Returns the steps of a frame over a box with the fault of this thread, if the fault concerns steps.
 pub(super) fn of_steps(mut steps: Vec<StepSpan>) -> Vec<StepSpan> {
     for step in &mut steps {
         match NOW.get() {
@@ -48,7 +48,7 @@ pub(super) fn of_steps(mut steps: Vec<StepSpan>) -> Vec<StepSpan> {
     steps
 }
 
-/// A frame over a box in coordinates in which it is nearly diagonal.
+/// Returns a frame in nearly diagonal coordinates with the fault of this thread, if the fault concerns such coordinates.
 pub(super) fn of_discs(mut near: NearlyDiagonal) -> NearlyDiagonal {
     let kept = |keep: &dyn Fn(usize, usize) -> bool, slope: &ComplexMatrix| {
         ComplexMatrix::from_fn(slope.rows(), slope.columns(), |i, j| if keep(i, j) { slope[(i, j)] } else { Complex64::ZERO })

@@ -1,5 +1,5 @@
-//! Every number of equal peers at once: spans of numbers are halved until each is [decided](super::growing). Of a span without end, the other end is N = 2⁵³, which is as far from the limit as a rounding, if there is
-//! a limit.
+//! Every number of equal peers at once: spans of numbers are halved until each is [decided](super::growing). Of a span without end, the other end is N = 2⁵³,
+//! which is as far from the limit as a rounding, if there is a limit.
 
 use cohaptic_scene::Scene;
 use cohaptic_stability::frames::{NominalNetwork, refuse_topology};
@@ -97,8 +97,8 @@ pub fn prove_every_number(scene: &Scene, from: u64, to: Option<u64>, watch: &dyn
 }
 
 impl NumberProof {
-    /// Of all numbers of peers from `from` to `to`, or without end, where the largest class of equal peers over equal links grows and all others stay as they are. How many of that class the scene
-    /// itself has does not matter, but that there are two. Numbers for which none is left are passed over.
+    /// Of all numbers of peers from `from` to `to`, or without end, where the largest class of equal peers over equal links grows and all others stay as they
+    /// are. How many of that class the scene itself has does not matter, but that there are two. Numbers for which none is left are passed over.
     ///
     /// # Errors
     ///
@@ -188,7 +188,8 @@ struct Search {
     is_whole: bool,
 }
 
-/// Halves spans of numbers until each is decided, or has one number alone. `least` has not all parts of the motion that others have. Behind numbers that are unstable, all beyond are asked for at once.
+/// Halves spans of numbers until each is decided, or has one number alone. `least` has not all parts of the motion that others have. Behind numbers that are
+/// unstable, all beyond are asked for at once.
 fn search(
     [from, end, least]: [u64; 3],
     watch: &dyn Watch,
@@ -196,7 +197,8 @@ fn search(
     is_unstable_beyond: impl Fn(u64) -> Result<bool, ProofError>,
 ) -> Result<Search, ProofError> {
     let (mut pieces, mut attempts, mut open, mut is_whole) = (Vec::new(), 0, 0, true);
-    // From the least number on: an undecided span is halved, and the far half waits. Parts that are stable for all of its numbers are so for those of the halves.
+    // From the least number on: an undecided span is halved, and the far half waits. Parts that are stable for all of its numbers are so for those of the
+    // halves.
     let mut waiting: Vec<(u64, u64, Vec<PartPlace>)> = vec![(from, end, Vec::new())];
     watch.expects(1.0);
     while let Some((low, high, mut stable)) = waiting.pop() {
@@ -265,7 +267,8 @@ impl EveryNumber {
         found
     }
 
-    /// The spans that are decided with all by which they can be checked, halved as often as that takes, and the others. Of a span beyond all limits nothing can be checked, so that it counts as undecided there. Each is decided once more.
+    /// The spans that are decided with all by which they can be checked, halved as often as that takes, and the others. Of a span beyond all limits nothing can
+    /// be checked, so that it counts as undecided there. Each is decided once more.
     ///
     /// # Errors
     ///
@@ -317,7 +320,8 @@ mod tests {
     use super::*;
     use cohaptic_stability::Unwatched;
 
-    /// Numbers to 9 are stable one by one, from 10 on unstable in spans that end below 1000, and from 70 on all beyond at once: no number is left out, or twice in a piece.
+    /// Numbers to 9 are stable one by one, from 10 on unstable in spans that end below 1000, and from 70 on all beyond at once: no number is left out, or twice
+    /// in a piece.
     #[test]
     fn pieces_have_no_gaps() {
         let decide = |low: u64, high: u64, _: &mut Vec<PartPlace>| {

@@ -1,7 +1,7 @@
 //! A frame as a straight-line program: operations that set registers to sums of multiples of registers, step by step.
 //!
-//! For laws whose samples carry more than a state. The multiples within a step are affine in each number of a [`super::corners::Point`], as those of [`super::steps`] are. Registers that no body feels, now or in any later
-//! frame, are left out.
+//! For laws whose samples carry more than a state. The multiples within a step are affine in each number of a [`super::corners::Point`], as those of
+//! [`super::steps`] are. Registers that no body feels, now or in any later frame, are left out.
 
 use std::collections::{BTreeMap, BTreeSet};
 

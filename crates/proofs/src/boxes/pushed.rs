@@ -1,4 +1,4 @@
-//! Bodies under their forces, as operations of a [program](super::program). Forces are counted as lengths: multiplied by a compliance.
+//! Steps of bodies under forces, as operations of a [program](super::program). Forces are multiplied by a compliance, so that registers hold lengths \[m\].
 
 use std::time::Duration;
 
@@ -14,17 +14,18 @@ pub(super) fn state(of: impl Fn(bool) -> Register) -> StateRegisters {
     [false, true].map(of)
 }
 
-/// Those of the device of a class.
+/// Returns the registers of the device of a class.
 pub(super) fn device(class: usize) -> StateRegisters {
     state(|velocity| Register::Body { class, of_copy: false, velocity })
 }
 
-/// Those of its copy.
+/// Returns the registers of the copy of a class.
 pub(super) fn copy(class: usize) -> StateRegisters {
     state(|velocity| Register::Body { class, of_copy: true, velocity })
 }
 
-/// The force of a coupling on the object; what has no part here is at rest.
+/// Returns the force of a coupling on the object, K·(x_device − x_object) + B·(v_device − v_object), times the compliance. A body that is `None` has no part in
+/// the motion and is at rest.
 pub(super) fn coupling(gains: Gains, device: Option<StateRegisters>, object: Option<StateRegisters>, scale: Scale) -> Sum {
     let gains = scale.gains(gains);
     let of = |bodies: Option<StateRegisters>, sign: f64| {
@@ -38,21 +39,21 @@ pub(super) fn negative(sum: Sum) -> Sum {
     sum.into_iter().map(|(register, by)| (register, -by)).collect()
 }
 
-/// A body and the force on it.
+/// A body and the force on that body.
 pub(super) struct Pushed {
     pub(super) body: Body,
     pub(super) is_copy: bool,
     pub(super) force: Sum,
 }
 
-/// The tick of the bodies of a class; where it computes for a tick, forces act one later.
+/// Returns the operations of a tick of the bodies of a class. `is_late`: the class computes for a whole tick, so that forces act one tick later.
 pub(super) fn moved(class: usize, bodies: &[Pushed], is_late: bool, span: Duration, scale: Scale) -> Vec<Operation> {
-    // All forces follow from where bodies are before any of them moves.
+    // All forces come first: they depend on the states of the bodies before any body moves.
     let forces = bodies.iter().map(|pushed| force_of(class, pushed, is_late));
     forces.chain(bodies.iter().map(|pushed| step_of(class, pushed, span, scale))).collect()
 }
 
-/// The step of a body under its force.
+/// Returns the step of a body by the coefficients of its step map under the force of this tick.
 fn step_of(class: usize, Pushed { body, is_copy, .. }: &Pushed, span: Duration, scale: Scale) -> Operation {
     let (e, g) = body.scaled_map(span, scale.time).coefficients();
     let [x, v] = if *is_copy { copy(class) } else { device(class) };

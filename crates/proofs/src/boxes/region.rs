@@ -1,4 +1,4 @@
-//! A whole region of two keys: boxes of which each is proven stable or proven unstable, and a rest that is not decided.
+//! A region of two keys: boxes that are proven stable or proven unstable, and boxes that stay undecided.
 
 use cohaptic_stability::{Family, Watch};
 
@@ -10,57 +10,59 @@ use super::guarantee::Guarantee;
 use super::halving::{Halved, Halving};
 use super::known::{KnownPieces, NothingKnown};
 
-/// A box of two keys, and the verdict on all scenes in it.
+/// Box of values of two keys, and the verdict on all scenes in the box.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ProvenBox {
-    /// From which value of the first key to which.
+    /// Least and greatest value of the first key.
     pub x: [f64; 2],
-    /// From which value of the second key to which.
+    /// Least and greatest value of the second key.
     pub y: [f64; 2],
-    /// The verdict on each.
+    /// Verdict on every scene in the box.
     pub guarantee: Guarantee,
 }
 
-/// A region that is covered by boxes.
+/// Region of two keys, covered by boxes.
 #[derive(Clone, PartialEq, Debug)]
 pub struct ProvenRegion {
-    /// They meet at edges alone: larger ones first, then by y and x.
+    /// Boxes that overlap at edges only. Larger boxes come first; boxes of one size are ordered by y and then by x.
     pub boxes: Vec<ProvenBox>,
-    /// How many boxes were looked at.
+    /// Number of boxes that were looked at, also of those that were divided afterwards.
     pub attempts: usize,
-    /// Whether nobody ended the proof; if somebody did, boxes that were not looked at are undecided too.
+    /// Whether the watch let the proof run to its end. Otherwise boxes that were not looked at are undecided too.
     pub is_whole: bool,
-    /// For which numbers of peers its verdicts hold.
+    /// First and last number of peers for which the verdicts hold (`None` as the last: without end); `None`: the number that the scene has.
     every: Option<(u64, Option<u64>)>,
 }
 
-/// How finely a region is divided at most: each range into two to the power of this.
+/// Largest number of halvings: the range of each key is divided into at most two to the power of this number of parts.
 pub const MOST_HALVINGS: u32 = 16;
-/// More boxes than this are not kept waiting, and stay undecided: where an eigenvalue stays at the unit circle, none is ever decided.
+/// Largest number of boxes that wait for a decision; boxes beyond stay undecided. Where an eigenvalue stays at the unit circle, no box is ever decided.
 const MOST_WAITING: usize = 1 << 21;
 
-/// How a region is halved.
+/// Returns the halving of a region, with at most `halvings` and [`MOST_HALVINGS`] halvings of each key.
 pub(super) fn halving(halvings: u32) -> Halving {
     Halving { times: halvings.min(MOST_HALVINGS), tolerance: None, most: MOST_WAITING / 4, whole: None }
 }
 
 impl ProvenRegion {
-    /// Decides a family with two keys over their ranges: boxes that are not decided are divided into four, up to `halvings` times. A key that is a delay of links is divided where a sample comes into force at another tick, and nowhere else.
-    /// With `every` a verdict holds for every number of peers from the first to the second, or without end, of the largest class of equal ones. What comes out does not depend on the number of threads.
-    /// A box is an operation of the watch, which may end the proof.
+    /// Decides a family with two keys over the ranges of both. Undecided boxes are divided into four, up to `halvings` times. A key that is a delay of links is
+    /// divided where a sample comes into force at another tick, and nowhere else. With `every` a verdict holds for every number of peers from the first to the
+    /// second number, or without end, where the largest class of equal peers grows. The result does not depend on the number of threads. A box is an operation
+    /// of the watch, which may end the proof.
     ///
     /// # Errors
     ///
-    /// [`ProofError`] if there are not two keys that each do nothing but set gains, masses and dampings, or delays for one of them, and for scenes of which nothing can be proven.
+    /// [`ProofError`] if the family does not have exactly two keys, if a key sets anything but gains, masses and dampings (one key may set a delay instead),
+    /// and for scenes of which nothing can be proven.
     pub fn prove(family: &Family, halvings: u32, every: Option<(u64, Option<u64>)>, watch: &dyn Watch) -> Result<Self, ProofError> {
         Self::prove_with(family, halvings, every, &NothingKnown, watch)
     }
 
-    /// [`ProvenRegion::prove`], where boxes that are known are not decided again: what comes out is the same.
+    /// Decides a family like [`ProvenRegion::prove`] and with the same result, but takes the verdicts of known boxes from `pieces` and stores new ones there.
     ///
     /// # Errors
     ///
-    /// Those of [`ProvenRegion::prove`].
+    /// [`ProofError`] for the same reasons as [`ProvenRegion::prove`].
     pub fn prove_with(
         family: &Family,
         halvings: u32,
@@ -79,33 +81,35 @@ impl ProvenRegion {
         Ok(Self { boxes, attempts, is_whole, every })
     }
 
-    /// The boxes with all by which they can be checked. Each is decided once more.
+    /// Returns the boxes with the numbers by which their verdicts can be checked. Each box is decided once more, and is undecided here if the wider bounds of
+    /// the checker decide nothing.
     ///
     /// # Errors
     ///
-    /// As [`ProvenRegion::prove`], of the family that was proven, and if the watch ends it.
+    /// [`ProofError`] if the watch ends the certification, and for the reasons of [`ProvenRegion::prove`] if `family` is not the family that was proven.
     pub fn certify(&self, family: &Family, watch: &dyn Watch) -> Result<Vec<BoxCertificate>, ProofError> {
         certify(family, self.every, self.boxes.iter().map(|ProvenBox { x, y, .. }| vec![*x, *y]).collect(), watch)
     }
 
-    /// How many boxes have a verdict of which a certificate says nothing.
+    /// Returns the number of boxes that have a verdict here and are undecided in the certificate.
     #[must_use]
     pub fn uncertified(&self, certificate: &[BoxCertificate]) -> usize {
         uncertified(certificate, self.boxes.iter().map(|one| (vec![one.x, one.y], one.guarantee)))
     }
 
-    /// How many boxes without an area have that verdict: those of a single delay, such as none at all, of which no share tells.
+    /// Returns the number of boxes without an area that have the verdict. Such boxes belong to a single value of a delay, such as zero, and no share of the
+    /// area counts them.
     #[must_use]
     pub fn lines(&self, guarantee: Guarantee) -> usize {
         let is_line = |one: &&ProvenBox| one.x[0] >= one.x[1] || one.y[0] >= one.y[1];
         self.boxes.iter().filter(is_line).filter(|one| one.guarantee == guarantee).count()
     }
 
-    /// The share of the area of the ranges with that verdict. A single delay, such as none at all, has no area: see [`ProvenRegion::lines`].
+    /// Returns the share of the area of the region that has the verdict, from 0 to 1. A single value of a delay has no area: see [`ProvenRegion::lines`].
     #[must_use]
     pub fn share(&self, guarantee: Guarantee) -> f64 {
         let area = |boxes: &mut dyn Iterator<Item = &ProvenBox>| boxes.map(|one| (one.x[1] - one.x[0]) * (one.y[1] - one.y[0])).sum::<f64>();
-        // A sum of nothing is −0.
+        // The sum of no terms is −0.0, which would be printed with its sign.
         area(&mut self.boxes.iter().filter(|one| one.guarantee == guarantee)) / area(&mut self.boxes.iter()) + 0.0
     }
 }

@@ -1,8 +1,8 @@
 //! Frames of a server and its clients, which send each other more than the states of copies.
 //!
-//! As for other laws, averages of classes of equal peers and differences within a class do not mix. The server is a class of its own. Clients send it the states of their devices, and get the
-//! forces of their couplings or the object; a client has no copy. Of differences within a class of clients the server feels nothing, and they nothing of the object. Forces are counted as lengths: multiplied by the
-//! compliance of the object.
+//! As for other laws, averages of classes of equal peers and differences within a class do not mix. The server is a class of its own. Clients send it the
+//! states of their devices, and get the forces of their couplings or the object; a client has no copy. Of differences within a class of clients the server
+//! feels nothing, and they nothing of the object. Forces are counted as lengths: multiplied by the compliance of the object.
 
 use std::time::Duration;
 

@@ -1,4 +1,5 @@
-//! Proofs of servers and of topologies against single scenes, whose radii are computed another way: by pushing real peers through a frame, and of a topology by a frame of all peers together, which knows nothing of eigenvalues of graphs.
+//! Proofs of servers and of topologies against single scenes, whose radii are computed another way: by pushing real peers through a frame, and of a topology by
+//! a frame of all peers together, which knows nothing of eigenvalues of graphs.
 
 use std::path::Path;
 
@@ -192,7 +193,8 @@ fn lines_are_judged_as_single_scenes_are() {
     assert!(crossings >= 8, "{crossings}");
 }
 
-/// In maps: no box that is proven stable holds an unstable scene, and none that is proven unstable a stable one, at points spread over the map and around its boundary.
+/// In maps: no box that is proven stable holds an unstable scene, and none that is proven unstable a stable one, at points spread over the map and around its
+/// boundary.
 #[test]
 #[ignore = ".ci/nightly runs it: it takes long"]
 fn boxes_hold_no_scene_of_the_other_kind() {

@@ -1,4 +1,4 @@
-//! Proofs that several processes share: the ranges are cut into blocks, and each block is looked at by itself.
+//! Proofs that several processes share: the ranges are cut into blocks, and each block is decided independently of all other blocks.
 
 use cohaptic_stability::{Family, Unwatched, Watch};
 use rayon::prelude::*;
@@ -10,38 +10,38 @@ use super::halving::{Halving, Look, Ranges};
 use super::known::KnownPieces;
 use super::{line, region};
 
-/// A proof over the ranges of the open keys of a family, in blocks.
+/// Proof over the ranges of the open keys of a family, divided into blocks.
 #[derive(Clone, Debug)]
 pub struct SharedProof {
-    /// With which ranges it begins.
+    /// Ranges with which the proof begins: one per stretch of a delay, otherwise a single entry.
     beginnings: Vec<Ranges>,
     halving: Halving,
-    /// For which numbers of peers its verdicts hold.
+    /// First and last number of peers for which the verdicts hold (`None` as the last: without end); `None`: the number that the scene has.
     every: Option<(u64, Option<u64>)>,
-    /// How many keys are halved.
+    /// Number of keys whose ranges are halved.
     keys: u32,
-    /// How often the ranges are halved for a block.
+    /// Number of halvings from the ranges of a beginning to the ranges of a block.
     depth: u32,
 }
 
-/// Into how many blocks the ranges are cut with which a proof begins: two to the power of this.
+/// Base-two logarithm of the number of blocks into which each beginning is cut.
 const BLOCKS: u32 = 6;
 
 impl SharedProof {
-    /// That of [`ProvenRegion::prove`](super::ProvenRegion::prove).
+    /// Returns the blocks of the proof that [`ProvenRegion::prove`](super::ProvenRegion::prove) makes with the same arguments.
     ///
     /// # Errors
     ///
-    /// Those of the proof.
+    /// [`ProofError`] for the reasons for which the proof fails.
     pub fn of_region(family: &Family, halvings: u32, every: Option<(u64, Option<u64>)>) -> Result<Self, ProofError> {
         Self::new(family, region::halving(halvings), every)
     }
 
-    /// That of [`ProvenLine::prove`](super::ProvenLine::prove).
+    /// Returns the blocks of the proof that [`ProvenLine::prove`](super::ProvenLine::prove) makes with the same arguments.
     ///
     /// # Errors
     ///
-    /// Those of the proof.
+    /// [`ProofError`] for the reasons for which the proof fails.
     pub fn of_line(family: &Family, tolerance: f64) -> Result<Self, ProofError> {
         Self::new(family, line::halving(tolerance), None)
     }
@@ -54,18 +54,18 @@ impl SharedProof {
         Ok(Self { beginnings: followed.beginnings(), halving, every, keys, depth })
     }
 
-    /// How many blocks there are: 64 for each stretch of a delay, fewer of ranges that are halved less often.
+    /// Returns the number of blocks: 64 for each stretch of a delay, fewer if the ranges are halved less often.
     #[must_use]
     pub fn blocks(&self) -> u64 {
         (self.beginnings.len() as u64) << (self.depth * self.keys)
     }
 
-    /// Looks at every piece of some blocks that is not known, and at those that they are parts of, on all threads of the pool that it is called in. `done` gets each
-    /// block that is whole.
+    /// Decides every piece of the given blocks that is not known, and every larger piece that holds such a block. Runs on all threads of the current thread
+    /// pool. `done` is called with each block of which every piece is known then.
     ///
     /// # Errors
     ///
-    /// Those of the proof.
+    /// [`ProofError`] for the reasons for which the proof fails.
     pub fn look_at(
         &self,
         family: &Family,
@@ -83,13 +83,16 @@ impl SharedProof {
         })
     }
 
-    /// Whether every piece of a block is known.
+    /// Returns whether every piece of a block is known, so that nothing of the block needs to be decided.
     #[must_use]
     pub fn is_known(&self, block: u64, pieces: &dyn KnownPieces) -> bool {
         self.walk(block, &|ranges| Ok(pieces.known(ranges)), &Unwatched).unwrap_or(false)
     }
 
+    /// Looks at the ranges from a beginning down to a block, and then at all pieces of the block. Returns whether every one was looked at.
     fn walk(&self, block: u64, look: Look<'_>, watch: &dyn Watch) -> Result<bool, ProofError> {
+        // The upper bits of a block number are the place of its beginning. Each group of `keys` bits below says which part one halving takes, with the first
+        // halving in the highest group.
         let beginning = usize::try_from(block >> (self.depth * self.keys)).unwrap_or_default();
         let mut ranges = self.beginnings[beginning].clone();
         for halved in 0..self.depth {
@@ -98,6 +101,7 @@ impl SharedProof {
             }
             match look(&ranges)? {
                 None => return Ok(false),
+                // A larger piece that is decided decides the block.
                 Some(Guarantee::Stable | Guarantee::Unstable) => return Ok(true),
                 Some(Guarantee::Undecided) if !self.halving.may_halve(&ranges) => return Ok(true),
                 Some(Guarantee::Undecided) => {}

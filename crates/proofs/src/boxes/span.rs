@@ -1,7 +1,7 @@
 //! Matrices over a box: a mean, a slope along each number, and a radius for all else.
 //!
-//! With sᵢ ∈ [−1, 1] where in the box a number is, M(s) = M₀ + Σ sᵢ·Mᵢ + E, |E| ≤ R entry by entry (a Taylor model of the first order, Makino & Berz 2003). Products of the errors, of slopes
-//! with each other and the rounding of all go into R, so that R is of the second order in the width of the box.
+//! With sᵢ ∈ [−1, 1] where in the box a number is, M(s) = M₀ + Σ sᵢ·Mᵢ + E, |E| ≤ R entry by entry (a Taylor model of the first order, Makino & Berz 2003).
+//! Products of the errors, of slopes with each other and the rounding of all go into R, so that R is of the second order in the width of the box.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -20,8 +20,8 @@ pub(super) struct StepSpan {
 }
 
 impl StepSpan {
-    /// A step between 2ⁿ corners, in the order of the bits of their places: multi-affine, so that it is the sum of its effects (Yates 1937), of which those of several numbers together
-    /// go into the radius.
+    /// A step between 2ⁿ corners, in the order of the bits of their places: multi-affine, so that it is the sum of its effects (Yates 1937), of which those of
+    /// several numbers together go into the radius.
     pub(super) fn of<'a>(corners: impl Iterator<Item = &'a StepMatrix>) -> Self {
         let corners: Vec<&StepMatrix> = corners.collect();
         let (rows, columns) = (corners[0].matrix.rows(), corners[0].matrix.columns());
@@ -109,7 +109,8 @@ impl StepSpan {
         Matrix::from_fn(self.mean.rows(), self.mean.columns(), |i, j| outward(mean(&self.mean, i, j) + slopes(i, j) + self.radius[(i, j)]))
     }
 
-    /// This matrix times another over the same box. Entries of this one that are zero all over the box, but for the least radius of all, are passed over: a step leaves most of the state as it is.
+    /// This matrix times another over the same box. Entries of this one that are zero all over the box, but for the least radius of all, are passed over: a
+    /// step leaves most of the state as it is.
     ///
     /// Where an entry of `other` is not finite, so is no radius of the product: no zero hides that.
     pub(super) fn times(&self, other: &Self) -> Self {
@@ -176,8 +177,8 @@ impl FrameSpan {
         Self { order: (0..steps.len()).collect(), kinds: steps }
     }
 
-    /// The product of all steps, the first at the right; of a long frame as that of its halves, of theirs, and so on. The bound of a step then passes through some products and not
-    /// through the sizes of the entries of all steps after it, which grow without end. Pairs that are alike are multiplied once.
+    /// The product of all steps, the first at the right; of a long frame as that of its halves, of theirs, and so on. The bound of a step then passes through
+    /// some products and not through the sizes of the entries of all steps after it, which grow without end. Pairs that are alike are multiplied once.
     pub(super) fn product(&self) -> StepSpan {
         if self.order.len() <= SHORT {
             return self.product_in_order();

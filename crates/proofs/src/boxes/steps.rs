@@ -1,8 +1,8 @@
 //! A frame in steps: what each instant at which nodes tick does to the relative state, as a matrix of its own.
 //!
-//! The entries of one step are affine in each gain of a node, in each coefficient of a step map, and in the weights, as long as the others stay: forces are sums of gains times states,
-//! and each body adds one multiple of its force. Over a whole frame that is lost; so a frame stays a product here. Between two steps the state has the bodies and those samples alone that
-//! are still used.
+//! The entries of one step are affine in each gain of a node, in each coefficient of a step map, and in the weights, as long as the others stay: forces are
+//! sums of gains times states, and each body adds one multiple of its force. Over a whole frame that is lost; so a frame stays a product here. Between two
+//! steps the state has the bodies and those samples alone that are still used.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::OnceLock;
@@ -164,8 +164,8 @@ impl FrameState {
     }
 }
 
-/// What the operations of a step round, relative to the largest sum of the sizes of the terms of a row: fifteen operations in a row and the coefficients of the step maps, twice for the
-/// difference from the reference. Half of it is left for coefficients that differ by some roundings from those of the numbers meant.
+/// What the operations of a step round, relative to the largest sum of the sizes of the terms of a row: fifteen operations in a row and the coefficients of the
+/// step maps, twice for the difference from the reference. Half of it is left for coefficients that differ by some roundings from those of the numbers meant.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 impl Plan {

@@ -122,7 +122,8 @@ fn numbers_of_which_other_numbers_say_nothing_are_found() {
     }
 }
 
-/// A frame of 300 ticks, in whose steps forces move a copy by more than it has moved: bounds of roundings that pass through the sizes of all entries decide no number of these.
+/// A frame of 300 ticks, in whose steps forces move a copy by more than it has moved: bounds of roundings that pass through the sizes of all entries decide no
+/// number of these.
 #[test]
 fn numbers_of_long_frames_are_decided() {
     let found = spans(&["link.loss={ packets = [2, 3], every = 30 }", "coordination.update=\"10ms\"", "coordination.damping=60"], 2, Some(40));
@@ -364,7 +365,8 @@ fn agreeing(family: &Family, region: &ProvenRegion) -> usize {
     decided
 }
 
-/// No box that is proven has a point of the other kind: at thousands of points within proven boxes, their corners among them, single radii with their own bounds agree.
+/// No box that is proven has a point of the other kind: at thousands of points within proven boxes, their corners among them, single radii with their own
+/// bounds agree.
 #[test]
 #[ignore = ".ci/nightly runs it: it takes long"]
 fn no_box_holds_a_point_that_contradicts_it() {

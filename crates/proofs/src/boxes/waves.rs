@@ -1,14 +1,16 @@
 //! Frames of copies that are tied by waves.
 //!
-//! Each two copies i and j have a line with waves sᵢⱼ to either side. Over equal links between equal clocks bodies feel two sums of them alone: those that a copy gets, S = Σⱼ sᵢⱼ, and those that others get of it, P = Σⱼ sⱼᵢ. With
-//! forces in place of waves (times ρ), d how far a copy has moved since the last sample, ⟨ ⟩ the mean over the ticks since then, and d̄ the mean of all others,
+//! Each two copies i and j have a line with waves sᵢⱼ to either side. Over equal links between equal clocks bodies feel two sums of them alone: those that a
+//! copy gets, S = Σⱼ sᵢⱼ, and those that others get of it, P = Σⱼ sⱼᵢ. With forces in place of waves (times ρ), d how far a copy has moved since the last
+//! sample, ⟨ ⟩ the mean over the ticks since then, and d̄ the mean of all others,
 //!
 //! ```text
 //! S ← 2·b·d̄/(M·h) − ⟨P⟩        P ← 2·b·d/(M·h) − ⟨S⟩        force on the copy: S − b·v
 //! ```
 //!
-//! All other waves bounce to and fro unfelt with eigenvalues of modulus 1 (see `unseen.rs` of `cohaptic-stability`), and have no part here. Averages of classes and differences within one do not mix; the number of peers counts in d̄ alone. The sums of S and of P
-//! over all peers are equal, so that of the averages the P of one class follows from all else; and of two peers every P is the S of the other.
+//! All other waves bounce to and fro unfelt with eigenvalues of modulus 1 (see `unseen.rs` of `cohaptic-stability`), and have no part here. Averages of classes
+//! and differences within one do not mix; the number of peers counts in d̄ alone. The sums of S and of P over all peers are equal, so that of the averages the
+//! P of one class follows from all else; and of two peers every P is the S of the other.
 //!
 //! Waves carry no position, so that each copy may be anywhere, unless an arm holds its device: positions of a class are counted from its copy.
 
@@ -86,7 +88,8 @@ impl Waves {
         scene.coordination.strategy == Coordination::Wave
     }
 
-    /// A frame over a box. Weights are those with which classes hear each other, of averages [with shares](with_shares). `ends`: the nodes of the part at the corners of the box.
+    /// A frame over a box. Weights are those with which classes hear each other, of averages [with shares](with_shares). `ends`: the nodes of the part at the
+    /// corners of the box.
     pub(super) fn frame(&self, part: &Part<'_>, points: &[Point], ends: &[Vec<Node>], time: f64) -> Result<NamedFrame, ProofError> {
         let scale = Scale { time, compliance: ends[0][0].compliance(time) };
         let heard = InForce::new(&self.line, self.every, self.holds);
