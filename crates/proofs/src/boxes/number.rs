@@ -11,72 +11,74 @@ use super::growing::{ENDLESS, Growing, PartPlace};
 use super::guarantee::{Guarantee, Proven};
 use super::mean_square::GrowingMoments;
 
-/// Numbers of peers from one to another, ends included, of which one verdict holds.
+/// Span of numbers of peers, ends included, with one verdict.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct NumberSpan {
-    /// The least.
+    /// Least number of peers.
     pub from: u64,
-    /// The greatest; `None`: all beyond.
+    /// Greatest number of peers; `None`: the span has no end.
     pub to: Option<u64>,
-    /// The verdict on each.
+    /// Verdict on every number of the span.
     pub guarantee: Guarantee,
 }
 
-/// Why numbers are undecided.
+/// Reason why a span of numbers is undecided.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Openness {
-    /// The proof was ended before it had looked at them all.
+    /// The watch ended the proof before all numbers were looked at.
     Ended,
-    /// Something has no limit, and they are beyond [`MOST_FOLLOWED`].
+    /// A number of the scene has no limit as N grows, and the span lies beyond [`MOST_FOLLOWED`].
     Beyond,
-    /// No second moment was found that shows a verdict on the first of them.
+    /// No second moment was found that shows a verdict on the first number of the span.
     Moment,
-    /// A frame of the first of them has eigenvalues that are nearer to the unit circle, or to each other, than its bounds tell apart.
+    /// A frame of the first number of the span has eigenvalues that are nearer to the unit circle, or to each other, than the bounds of the frame tell apart.
     Near(Nearness),
-    /// The first of them is stable; a frame of the limit, as N grows, has such eigenvalues.
+    /// The first number of the span is stable, but a frame of the limit, as N grows, has eigenvalues too near to the unit circle or to each other, as in
+    /// [`Openness::Near`].
     Limit(Nearness),
-    /// More certificates were looked for than a search may.
+    /// The search reached its largest number of attempts, or too many numbers in a row stayed undecided.
     Exhausted,
 }
 
-/// How far a frame is known whose eigenvalues decide nothing.
+/// Size and uncertainty of a frame whose eigenvalues decide nothing.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Nearness {
-    /// The size of the largest eigenvalue of a part that is not proven stable, nearly.
+    /// Approximate modulus of the largest eigenvalue over all parts that are not proven stable.
     pub radius: f64,
-    /// The largest bound of an entry of such a part; infinite if an entry or a bound is no finite number.
+    /// Largest bound of the error of an entry over all parts that are not proven stable; infinite if an entry or a bound is not finite.
     pub bound: f64,
 }
 
-/// The verdicts on all numbers of equal peers.
+/// Verdicts on all numbers of equal peers.
 #[derive(Clone, PartialEq, Debug)]
 pub struct EveryNumber {
-    /// The first of the equal peers of which there are more and more, by its place in [`Scene::peers`].
+    /// Place in [`Scene::peers`] of the first peer of the class that grows.
     pub growing: usize,
-    /// In order, without gaps; neighbours differ.
+    /// Spans in ascending order, without gaps. Neighbours have different verdicts.
     pub spans: Vec<NumberSpan>,
-    /// Why each of the undecided ones among them is, in their order.
+    /// Reason for each undecided span of `spans`, in the order of the undecided spans.
     pub open: Vec<Openness>,
-    /// What grows or vanishes without a limit as N grows, in words.
+    /// The number of the scene that grows or vanishes without a limit as N grows, in words; `None` if every number has a limit, or the proof has a last number
+    /// of peers.
     pub without_limit: Option<String>,
-    /// How many certificates were looked for.
+    /// Number of spans that were looked at, also of those that were halved afterwards.
     pub attempts: u64,
-    /// Whether they are verdicts in the mean square, since links lose.
+    /// Whether the verdicts are about the mean square, because links lose.
     pub is_mean_square: bool,
-    /// Whether all numbers were looked at, and the proof was not ended before.
+    /// Whether the watch let the proof look at all numbers. Otherwise numbers that were not looked at are undecided too.
     pub is_whole: bool,
-    /// The spans as they were decided, of which neighbours may agree.
+    /// Spans as they were decided, before neighbours with the same verdict were joined.
     pieces: Vec<NumberSpan>,
 }
 
-/// Where something has no limit, or numbers without end are not decided together, they are followed up to this.
+/// Largest number of peers that is followed where a number of the scene has no limit, or where all numbers beyond are not decided together.
 pub const MOST_FOLLOWED: u64 = 100_000;
-/// More certificates than this are not looked for.
+/// Largest number of spans that a search looks at.
 const MOST_ATTEMPTS: u64 = 200_000;
-/// Where this number of numbers in a row are undecided, each by itself, all others beyond are left so.
+/// Number of undecided pieces in a row from which on all numbers beyond are left undecided.
 const MOST_OPEN: u64 = 64;
 
-/// A scene that can be decided for every number of peers.
+/// Scene that can be decided for every number of peers.
 #[derive(Debug)]
 pub struct NumberProof {
     network: NominalNetwork,
@@ -87,22 +89,24 @@ pub struct NumberProof {
     without_limit: Option<String>,
 }
 
-/// Decides a scene for every number of peers from `from` to `to`, or without end, as [`NumberProof`] does.
+/// Decides a scene for every number of peers from `from` to `to`, or without end. Shorthand for [`NumberProof::new`] and [`NumberProof::prove`].
 ///
 /// # Errors
 ///
-/// Those of [`NumberProof::new`].
+/// [`ProofError`] for the reasons of [`NumberProof::new`] and of [`NumberProof::prove`].
 pub fn prove_every_number(scene: &Scene, from: u64, to: Option<u64>, watch: &dyn Watch) -> Result<EveryNumber, ProofError> {
     NumberProof::new(scene, from, to)?.prove(watch)
 }
 
 impl NumberProof {
-    /// Of all numbers of peers from `from` to `to`, or without end, where the largest class of equal peers over equal links grows and all others stay as they
-    /// are. How many of that class the scene itself has does not matter, but that there are two. Numbers for which none is left are passed over.
+    /// Prepares the proof for all numbers of peers from `from` to `to`, or without end. The largest class of equal peers over equal links grows, and all other
+    /// classes stay as they are. The scene itself needs two peers of that class; more do not change the result. Numbers that leave no peer in that class are
+    /// passed over.
     ///
     /// # Errors
     ///
-    /// [`ProofError`] if no two peers are equal, if something is not linear, or if links do something else at random than to lose independently.
+    /// [`ProofError`] if `from` is below 2 or above `to`, if no two peers are equal, if a law is not linear, or if links are random otherwise than by
+    /// independent losses.
     pub fn new(scene: &Scene, from: u64, to: Option<u64>) -> Result<Self, ProofError> {
         if from < 2 || to.is_some_and(|to| to < from) {
             return Err(ProofError::Numbers);
@@ -123,16 +127,16 @@ impl NumberProof {
         Ok(proof)
     }
 
-    /// In the mean square, over links that lose independently.
+    /// Returns the second moments of the scene if its links lose independently; `None` if the scene leaves nothing to chance.
     fn moments(&self) -> Result<Option<GrowingMoments<'_>>, ProofError> {
         self.is_mean_square.then(|| GrowingMoments::new(&self.growing, &self.network)).transpose()
     }
 
-    /// Decides all numbers, or what the watch leaves it time for. A span that is looked at is an operation of the watch.
+    /// Decides all numbers, or those for which the watch leaves time. Each span that is looked at is an operation of the watch.
     ///
     /// # Errors
     ///
-    /// [`ProofError::Remembered`], [`ProofError::Drift`] or [`ProofError::Numerous`] of numbers that are no box.
+    /// [`ProofError::Remembered`], [`ProofError::Drift`] or [`ProofError::Numerous`] if a span of numbers of peers is no box of the numbers in the steps.
     pub fn prove(&self, watch: &dyn Watch) -> Result<EveryNumber, ProofError> {
         let Self { growing, from, to, without_limit, .. } = self;
         let moments = self.moments()?;
@@ -146,6 +150,8 @@ impl NumberProof {
             Some(moments) => moments.decide(low, high),
         };
         let is_unstable_beyond = |low| Ok(without_limit.is_some() && moments.is_none() && growing.is_unstable_beyond(low)?);
+        // Without a limit the search ends at `MOST_FOLLOWED`, so that the span from there without end is decided separately.
+        // Without a limit the search ends at `MOST_FOLLOWED`, so that the span from there without end is decided separately.
         let Search { mut pieces, attempts, is_whole } = search([*from, end, growing.least], watch, decide, is_unstable_beyond)?;
         if without_limit.is_some() && pieces.last().is_some_and(|last| last.to.is_some()) {
             let guarantee = if is_whole && is_unstable_beyond(end)? { Guarantee::Unstable } else { Guarantee::Undecided };
@@ -164,7 +170,7 @@ impl NumberProof {
         Ok(EveryNumber { growing: growing.first, spans, open, without_limit, attempts, is_mean_square: self.is_mean_square, is_whole, pieces })
     }
 
-    /// Why a span is undecided, of a proof that has looked at all numbers or not.
+    /// Returns the reason why a span is undecided. `is_whole`: the proof has looked at all numbers.
     fn openness(&self, span: &NumberSpan, is_whole: bool) -> Result<Openness, ProofError> {
         let nearness = |number| Ok::<_, ProofError>(self.growing.nearness(number)?.map(|[radius, bound]| Nearness { radius, bound }));
         Ok(match self {
@@ -180,16 +186,16 @@ impl NumberProof {
     }
 }
 
-/// What comes out of a search.
+/// Result of a search: the spans with their verdicts, in ascending order and without gaps.
 struct Search {
     pieces: Vec<NumberSpan>,
-    /// How many spans were looked at.
+    /// Number of spans that were looked at.
     attempts: u64,
     is_whole: bool,
 }
 
-/// Halves spans of numbers until each is decided, or has one number alone. `least` has not all parts of the motion that others have. Behind numbers that are
-/// unstable, all beyond are asked for at once.
+/// Halves spans of numbers until each is decided, or holds a single number. The number `least` lacks parts of the motion that larger numbers have, so that it
+/// is a span of its own. After an unstable span `is_unstable_beyond` is asked about all numbers beyond at once.
 fn search(
     [from, end, least]: [u64; 3],
     watch: &dyn Watch,
@@ -197,8 +203,8 @@ fn search(
     is_unstable_beyond: impl Fn(u64) -> Result<bool, ProofError>,
 ) -> Result<Search, ProofError> {
     let (mut pieces, mut attempts, mut open, mut is_whole) = (Vec::new(), 0, 0, true);
-    // From the least number on: an undecided span is halved, and the far half waits. Parts that are stable for all of its numbers are so for those of the
-    // halves.
+    // Spans are taken in ascending order: an undecided span is halved, and the far half waits. Parts that are stable for all numbers of a span are stable for
+    // the numbers of both halves too, and are not decided again.
     let mut waiting: Vec<(u64, u64, Vec<PartPlace>)> = vec![(from, end, Vec::new())];
     watch.expects(1.0);
     while let Some((low, high, mut stable)) = waiting.pop() {
@@ -208,7 +214,7 @@ fn search(
             continue;
         }
         attempts += 1;
-        // The least number has no second member of the class that grows, and no differences within it.
+        // At the least number the class that grows has one member, hence no differences within the class.
         let is_mixed = low == least && high > low;
         let is_left = attempts > MOST_ATTEMPTS || open > MOST_OPEN;
         let is_behind_unstable = pieces.last().is_some_and(|last: &NumberSpan| last.guarantee == Guarantee::Unstable);
@@ -218,7 +224,7 @@ fn search(
             continue;
         }
         let found = if is_left || is_mixed { None } else { decide(low, high, &mut stable)? };
-        // Beyond the numbers that are followed, an end without a verdict is not halved: its limit may lie on the circle.
+        // Beyond the numbers that are followed, an undecided span without end is not halved: an eigenvalue of the limit may lie on the unit circle.
         let is_far = low > MOST_FOLLOWED && high == ENDLESS;
         if found.is_none() && low < high && !is_left && !is_far {
             let middle = if is_mixed {
@@ -246,7 +252,8 @@ fn piece(low: u64, high: u64, found: Option<Proven>) -> NumberSpan {
 }
 
 impl EveryNumber {
-    /// The numbers of which a certificate says nothing though they have a verdict, from where to where (`None`: without end), in order.
+    /// Returns the ranges of numbers that have a verdict here and are undecided in the certificate, as first and last number (`None`: without end) in ascending
+    /// order.
     #[must_use]
     pub fn uncertified(&self, certificate: &[NumberCertificate]) -> Vec<(u64, Option<u64>)> {
         let last = |to: Option<u64>| to.unwrap_or(u64::MAX);
@@ -267,18 +274,19 @@ impl EveryNumber {
         found
     }
 
-    /// The spans that are decided with all by which they can be checked, halved as often as that takes, and the others. Of a span beyond all limits nothing can
-    /// be checked, so that it counts as undecided there. Each is decided once more.
+    /// Returns all spans, the decided spans with the numbers by which their verdicts can be checked. Each span is decided once more, and is halved as often as
+    /// the wider bounds of the checker require. The verdict on a span without end, where a number of the scene has no limit, cannot be checked: such a span is
+    /// undecided in the certificate.
     ///
     /// # Errors
     ///
-    /// As [`prove_every_number`], of the scene that was proven.
+    /// [`ProofError`] if the watch ends the certification, and for the reasons of [`prove_every_number`] if `scene` is not the scene that was proven.
     pub fn certify(&self, scene: &Scene, watch: &dyn Watch) -> Result<Vec<NumberCertificate>, ProofError> {
         let network = NominalNetwork::of(scene)?;
         let growing = Growing::new(scene, &network)?;
         let moments = self.is_mean_square.then(|| GrowingMoments::new(&growing, &network)).transpose()?;
         let mut found = Vec::new();
-        // An undecided span is halved, and the far half waits: with a certificate there is less room than without.
+        // A span that is undecided with the wider bounds of a certificate is halved, and the far half waits.
         let mut waiting: Vec<NumberSpan> = self.pieces.iter().rev().copied().collect();
         let mut open = 0;
         while let Some(NumberSpan { from, to, guarantee }) = waiting.pop() {
@@ -320,8 +328,8 @@ mod tests {
     use super::*;
     use cohaptic_stability::Unwatched;
 
-    /// Numbers to 9 are stable one by one, from 10 on unstable in spans that end below 1000, and from 70 on all beyond at once: no number is left out, or twice
-    /// in a piece.
+    /// The numbers up to 9 are stable one by one, the numbers from 10 on are unstable in spans that end below 1000, and from 70 on all numbers beyond are
+    /// unstable at once. Every number then lies in exactly one piece.
     #[test]
     fn pieces_have_no_gaps() {
         let decide = |low: u64, high: u64, _: &mut Vec<PartPlace>| {

@@ -1,7 +1,7 @@
-//! Matrices over a box: a mean, a slope along each number, and a radius for all else.
+//! Matrices over a box: a mean, a slope along each number, and a radius for everything of higher order.
 //!
-//! With sᵢ ∈ [−1, 1] where in the box a number is, M(s) = M₀ + Σ sᵢ·Mᵢ + E, |E| ≤ R entry by entry (a Taylor model of the first order, Makino & Berz 2003).
-//! Products of the errors, of slopes with each other and the rounding of all go into R, so that R is of the second order in the width of the box.
+//! Let sᵢ ∈ [−1, 1] be the place of number i in the box. Then M(s) = M₀ + Σ sᵢ·Mᵢ + E with |E| ≤ R entry by entry (a Taylor model of the first order, Makino &
+//! Berz 2003). Products of errors, products of two slopes and all roundings go into R, so that R is of the second order in the width of the box.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -11,7 +11,7 @@ use cohaptic_stability::numerics::{UNDERFLOW, UNIT, gamma, outward, real};
 
 use super::steps::StepMatrix;
 
-/// A matrix over a box.
+/// Matrix over a box: mean M₀, slopes Mᵢ indexed by number of the box, and radius R.
 #[derive(Clone, Debug)]
 pub(super) struct StepSpan {
     pub(super) mean: Matrix,
@@ -20,8 +20,9 @@ pub(super) struct StepSpan {
 }
 
 impl StepSpan {
-    /// A step between 2ⁿ corners, in the order of the bits of their places: multi-affine, so that it is the sum of its effects (Yates 1937), of which those of
-    /// several numbers together go into the radius.
+    /// Encloses a multi-affine step by its values at 2ⁿ corners: bit b of the place of a corner says whether number b is at its upper end. A multi-affine
+    /// function is the sum of its effects (Yates 1937). The effects of single numbers become slopes, and the effects of several numbers together go into the
+    /// radius.
     pub(super) fn of<'a>(corners: impl Iterator<Item = &'a StepMatrix>) -> Self {
         let corners: Vec<&StepMatrix> = corners.collect();
         let (rows, columns) = (corners[0].matrix.rows(), corners[0].matrix.columns());
@@ -35,6 +36,8 @@ impl StepSpan {
             for column in 0..columns {
                 effects.iter_mut().zip(&corners).for_each(|(effect, corner)| *effect = corner.matrix[(row, column)]);
                 let largest = effects.iter().fold(0.0, |largest: f64, entry| largest.max(entry.abs()));
+                // Yates's scheme: one pass of sums and differences per number turns the values at the corners into effects.
+                // Yates's scheme: one pass of sums and differences per number turns the values at the corners into effects.
                 for number in 0..numbers {
                     for place in (0..corners.len()).filter(|place| place >> number & 1 == 0) {
                         let (low, high) = (effects[place], effects[place | 1 << number]);
@@ -50,26 +53,26 @@ impl StepSpan {
                         radius += share * effect.abs();
                     }
                 }
-                // Each effect is within n roundings of the largest corner, and there are 2ⁿ.
+                // Each of the 2ⁿ effects is off by at most n roundings of the largest corner, before the division by 2ⁿ.
                 span.radius[(row, column)] = outward(radius + error + real(corners.len()) * gamma(numbers + 2) * largest);
             }
         }
         span
     }
 
-    /// The same matrix all over a box of this number of numbers.
+    /// Returns a matrix that is the same at every point of a box with the given number of numbers.
     pub(super) fn constant(mean: Matrix, numbers: usize) -> Self {
         let none = Matrix::zeros(mean.rows(), mean.columns());
         Self { slopes: vec![none.clone(); numbers], radius: none, mean }
     }
 
-    /// With radii that are larger by a factor.
+    /// Returns the matrix with its radius multiplied by a factor.
     pub(super) fn widened(mut self, by: f64) -> Self {
         self.radius = self.radius.scaled(by);
         self
     }
 
-    /// Over a box with one more number, which changes nothing.
+    /// Returns the matrix over a box with one more number, on which the matrix does not depend.
     pub(super) fn with_another_number(mut self) -> Self {
         self.slopes.push(Matrix::zeros(self.mean.rows(), self.mean.columns()));
         self
@@ -79,12 +82,12 @@ impl StepSpan {
         Self { mean: self.mean.transposed(), slopes: self.slopes.iter().map(Matrix::transposed).collect(), radius: self.radius.transposed() }
     }
 
-    /// The sum of two matrices over the same box.
+    /// Returns the sum of two matrices over the same box.
     pub(super) fn plus(&self, other: &Self) -> Self {
         let sum = |one: &Matrix, other: &Matrix| plus(one, other);
         let slopes: Vec<Matrix> = self.slopes.iter().zip(&other.slopes).map(|(one, other)| sum(one, other)).collect();
         let (mean, radius) = (sum(&self.mean, &other.mean), sum(&self.radius, &other.radius));
-        // Each sum rounds once.
+        // Each entry of the mean and of a slope is one sum, which rounds once.
         let rounded = |i: usize, j: usize| UNIT * (mean[(i, j)].abs() + slopes.iter().map(|slope| slope[(i, j)].abs()).sum::<f64>());
         let radius = Matrix::from_fn(mean.rows(), mean.columns(), |i, j| outward(radius[(i, j)] + rounded(i, j)));
         Self { mean, slopes, radius }
@@ -94,12 +97,12 @@ impl StepSpan {
         Self { mean: self.mean.scaled(-1.0), slopes: self.slopes.iter().map(|slope| slope.scaled(-1.0)).collect(), radius: self.radius.clone() }
     }
 
-    /// T·M·Tᵀ.
+    /// Returns T·M·Tᵀ with M this matrix and T the matrix `by`, over the same box.
     pub(super) fn through(&self, by: &Self) -> Self {
         by.times(&by.times(self).transposed()).transposed()
     }
 
-    /// The largest size that each entry can have.
+    /// Returns a bound of the size of each entry over the whole box.
     pub(super) fn largest(&self) -> Matrix {
         self.reach(|matrix, i, j| matrix[(i, j)].abs())
     }
@@ -109,17 +112,18 @@ impl StepSpan {
         Matrix::from_fn(self.mean.rows(), self.mean.columns(), |i, j| outward(mean(&self.mean, i, j) + slopes(i, j) + self.radius[(i, j)]))
     }
 
-    /// This matrix times another over the same box. Entries of this one that are zero all over the box, but for the least radius of all, are passed over: a
-    /// step leaves most of the state as it is.
+    /// Returns this matrix times another over the same box. A step leaves most of the state as it is, so that most entries of this matrix are zero all over the
+    /// box but for the least radius of all entries. Such entries are skipped; the least radius is counted once per column.
     ///
-    /// Where an entry of `other` is not finite, so is no radius of the product: no zero hides that.
+    /// If an entry of `other` is not finite, every radius of the product is not finite either, so that a skipped zero hides no overflow.
     pub(super) fn times(&self, other: &Self) -> Self {
         let (rows, columns, inner) = (self.mean.rows(), other.mean.columns(), self.mean.columns());
-        // The effects of any two numbers, and whatever has an error: what of one is no mean with what of the other is none.
+        // The part of each entry that is no mean: its slopes and its radius. Products of two such parts are of the second order and go into the radius.
         let uneven = |span: &Self| span.reach(|_, _, _| 0.0);
         let (own, others) = (uneven(self), uneven(other));
         let sizes = absolute(&other.mean);
-        // Each product of sums of `inner` terms, and the sum of two, of mean and slopes: a share of |M|·|M'| and of the product of the largest sizes.
+        // Roundings of the mean and of the slopes, which are sums of `inner` or of twice `inner` products: a share of |M|·|M'| and of the product of the
+        // largest sizes.
         let share = gamma(2 * inner + 4) * real(1 + self.slopes.len());
         let weighted = |one: &Matrix, by: f64| Matrix::from_fn(inner, columns, |i, j| one[(i, j)] + share * (by * sizes[(i, j)] + others[(i, j)]));
         let (beside_mean, beside_uneven) = (weighted(&other.radius, 2.0), weighted(&others, 1.0));
@@ -146,7 +150,7 @@ impl StepSpan {
                 add(target, uneven, beside_uneven.row(place));
             }
         }
-        // Three sums of `inner` terms of numbers that are not negative, of a few roundings each.
+        // The radius itself is three sums of `inner` nonnegative terms, each with a few roundings. `UNDERFLOW` covers products below the normal range.
         let rounded = if other.is_finite() { 1.0 + gamma(4 * inner + 32) } else { f64::INFINITY };
         for entry in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
             product.radius[entry] = outward(product.radius[entry] * rounded) + real(inner) * UNDERFLOW;
@@ -159,26 +163,27 @@ impl StepSpan {
     }
 }
 
-/// Frames of no more steps than this are multiplied in order, which costs less.
+/// Largest number of steps of a frame that is multiplied in order, which takes fewer operations than halves do: a step is sparse, a product of steps is not.
 const SHORT: usize = 32;
 
-/// The steps of a frame over a box.
+/// Steps of a frame over a box.
 #[derive(Clone, Debug)]
 pub(super) struct FrameSpan {
-    /// Each that there is, once.
+    /// Matrix of each kind of step.
     pub(super) kinds: Vec<StepSpan>,
-    /// The places of the steps among these, in the order of the frame.
+    /// Place in `kinds` of each step, in the order of the frame.
     pub(super) order: Vec<usize>,
 }
 
 impl FrameSpan {
-    /// Of steps of which none is known to be like another.
+    /// Returns the frame of steps that are each a kind of their own.
     pub(super) fn of(steps: Vec<StepSpan>) -> Self {
         Self { order: (0..steps.len()).collect(), kinds: steps }
     }
 
-    /// The product of all steps, the first at the right; of a long frame as that of its halves, of theirs, and so on. The bound of a step then passes through
-    /// some products and not through the sizes of the entries of all steps after it, which grow without end. Pairs that are alike are multiplied once.
+    /// Returns the product of all steps, with the first step at the right. A long frame is multiplied in pairs of neighbours, then in pairs of these products,
+    /// and so on. The error of a step then passes through a logarithmic number of products. In order it would be multiplied by the sizes of the entries of all
+    /// later steps, whose product grows without end. Equal pairs are multiplied once.
     pub(super) fn product(&self) -> StepSpan {
         if self.order.len() <= SHORT {
             return self.product_in_order();
@@ -187,6 +192,8 @@ impl FrameSpan {
         let mut spans: Vec<Cow<'_, StepSpan>> = self.kinds.iter().map(Cow::Borrowed).collect();
         while order.len() > 1 {
             let mut known = BTreeMap::new();
+            // `spans` grows by each new product; `order` holds places in `spans`, so that equal pairs of places are equal pairs of matrices.
+            // `spans` grows by each new product; `order` holds places in `spans`, so that equal pairs of places are equal pairs of matrices.
             let joined = order.chunks(2).map(|pair| match *pair {
                 [first, second] => *known.entry((first, second)).or_insert_with(|| {
                     let product = spans[second].times(&spans[first]);
@@ -200,7 +207,7 @@ impl FrameSpan {
         spans.swap_remove(order[0]).into_owned()
     }
 
-    /// The same product, bounded step by step as the program that checks certificates does.
+    /// Returns the same product, bounded step by step, as the program that checks certificates bounds it.
     pub(super) fn product_in_order(&self) -> StepSpan {
         let mut steps = self.order.iter().map(|kind| &self.kinds[*kind]);
         let first = steps.next().expect("a frame has a step").clone();
@@ -208,7 +215,7 @@ impl FrameSpan {
     }
 }
 
-/// Adds a row times a factor, unless that is zero.
+/// Adds `factor` times a row to a row. A factor of zero adds nothing, also if the row is not finite.
 fn add(sum: &mut [f64], factor: f64, row: &[f64]) {
     if factor != 0.0 {
         sum.iter_mut().zip(row).for_each(|(sum, entry)| *sum += factor * entry);
@@ -232,7 +239,7 @@ mod tests {
         StepSpan { mean: of(mean), slopes: vec![of(slope)], radius: Matrix::from_fn(2, 2, |_, _| radius) }
     }
 
-    /// A zero times a number that has overflowed is not taken for zero.
+    /// A product with a number that has overflowed has no finite radius, even if the factor is zero.
     #[test]
     fn no_zero_hides_an_overflow() {
         let none = [[0.0; 2]; 2];
@@ -245,14 +252,14 @@ mod tests {
                     assert!(product.radius.entries().iter().all(|entry| !entry.is_finite()), "{product:?}");
                     assert!(super::super::discs::decide(&product).is_none() && super::super::discs::decide(&left.times(&product)).is_none());
                 }
-                // On the left nothing is passed over but zeros.
+                // Only zeros are skipped in the left matrix.
                 let product = span(&[[bad, 0.0], [0.0, 1.0]], &none, radius).times(&left);
                 assert!(!product.mean.is_finite() && !product.radius.is_finite(), "{product:?}");
             }
         }
     }
 
-    /// A long frame by halves holds each of its products, within bounds that are not those of the sizes of all entries.
+    /// The product of a long frame by halves encloses the exact products, with a radius far below that of the product in order.
     #[test]
     fn a_frame_by_halves_holds_all_of_its_products() {
         let turn = |angle: f64| [[angle.cos(), -angle.sin()], [angle.sin(), angle.cos()]];
@@ -272,7 +279,7 @@ mod tests {
         }
     }
 
-    /// An entry of a step that is zero but for the least radius of all counts with that radius, and each kind of entry that is not is counted.
+    /// A skipped entry counts by the least radius, and entries with a larger radius or with a slope count in full.
     #[test]
     fn entries_that_are_passed_over_count_by_the_least_radius() {
         let right = span(&[[1.0, 2.0], [3.0, 4.0]], &[[0.0, 0.5], [0.25, 0.0]], 0.125);

@@ -1,8 +1,8 @@
-//! A frame in steps: what each instant at which nodes tick does to the relative state, as a matrix of its own.
+//! A frame as a product of steps: each instant at which nodes tick acts on the relative state by a matrix of its own.
 //!
-//! The entries of one step are affine in each gain of a node, in each coefficient of a step map, and in the weights, as long as the others stay: forces are
-//! sums of gains times states, and each body adds one multiple of its force. Over a whole frame that is lost; so a frame stays a product here. Between two
-//! steps the state has the bodies and those samples alone that are still used.
+//! The entries of a step are affine in each gain of a node, in each coefficient of a step map and in each weight, while all other numbers stay: forces are sums
+//! of gains times states, and each body adds one multiple of its force. The entries of a whole frame are not affine, so that a frame stays a product here.
+//! Between two steps the state consists of the bodies and of the samples that are still used.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::OnceLock;
@@ -11,57 +11,61 @@ use std::time::Duration;
 use cohaptic_stability::Matrix;
 use cohaptic_stability::frames::{Event, External, Instants, Node, Rows, Sampling, Scale, Scratch, Timetable};
 
-/// A sample of a node: from 0 on those of this frame, −1 the last one of the frame before.
+/// Node and number of a sample. Samples of this frame are numbered from 0, and −1 is the last sample of the frame before.
 type SampleName = (usize, i64);
 
-/// A tick of a node, and the samples that it holds then.
+/// Tick of a node, and the samples that the node holds at the tick.
 #[derive(Clone, Debug)]
 struct Tick {
     node: usize,
     span: Duration,
-    /// And how old each is \[s\], where ages matter; otherwise 0.
+    /// Held samples, each with its age \[s\]; the age is 0 where laws do not use ages.
     held: Vec<(SampleName, f64)>,
 }
 
-/// What happens at one instant.
+/// Samples and ticks of one instant.
 #[derive(Clone, Debug, Default)]
 struct Step {
-    /// Samples that are taken before anything moves.
+    /// Samples that are taken before any body moves.
     samples: Vec<SampleName>,
     at: u64,
     ticks: Vec<Tick>,
 }
 
-/// When what happens in a frame, and which samples are states between its steps.
+/// Steps of a frame in order, and the samples that are states between the steps.
 #[derive(Clone, Debug)]
 pub(super) struct Plan {
     steps: Vec<Step>,
-    /// Before each step, and after the last one.
+    /// Samples that are states before each step, and after the last step: one entry more than `steps`.
     live: Vec<Vec<SampleName>>,
-    /// The first step of each kind: all others of it have the same matrix.
+    /// Place of the first step of each kind, indexed by kind. All steps of a kind have the same matrix.
     firsts: Vec<usize>,
-    /// The kind of each step.
+    /// Kind of each step, indexed by step.
     kinds: Vec<usize>,
-    /// The age of the oldest sample that is held at a tick \[s\], where ages matter; otherwise 0.
+    /// Age of the oldest sample that is held at a tick \[s\]; 0 where laws do not use ages.
     oldest: f64,
 }
 
-/// A sample that is held: its node, its place, and the bits of its age.
+/// Held sample: the node that sent the sample, the place of the sample, and the bits of its age.
 type HeldKind = (usize, usize, u64);
 
-/// All of a step that its matrix depends on. Samples are called by their places: among those before the step, and then those that are taken in it.
+/// Everything in a step that the matrix of the step depends on. Samples are named by places, which count the samples before the step and then the samples taken
+/// in it.
 #[derive(PartialEq, Eq, PartialOrd, Ord, Debug)]
 struct StepKind {
+    /// Number of samples that are states before the step.
     before: usize,
-    /// The nodes that take samples.
+    /// Nodes that take samples, in order.
     taken: Vec<usize>,
-    /// The nodes that tick, for how long, and what they hold.
+    /// Nodes that tick, with the duration of the tick and the held samples.
     ticks: Vec<(usize, Duration, Vec<HeldKind>)>,
+    /// Places of the samples that are states after the step.
+    /// Places of the samples that are states after the step.
     after: Vec<Option<usize>>,
 }
 
 impl Step {
-    /// Its kind, between the samples before it and after it.
+    /// Returns the kind of the step, given the samples that are states before and after the step.
     fn kind(&self, before: &[SampleName], after: &[SampleName]) -> StepKind {
         let place = |name: &SampleName| before.iter().chain(&self.samples).position(|other| other == name);
         let held = |tick: &Tick| tick.held.iter().filter_map(|(name, age)| Some((name.0, place(name)?, age.to_bits()))).collect();
@@ -74,18 +78,19 @@ impl Step {
     }
 }
 
-/// The plans of a timetable, each made when it is first asked for: whether anything is heard, and whether ages matter, is known with the numbers alone.
+/// Plans of one timetable, indexed by whether any sample is heard and by whether laws use ages. Each plan is made on first use, because both are known only
+/// with the numbers of a box.
 #[derive(Debug, Default)]
 pub(super) struct Plans([OnceLock<Plan>; 4]);
 
 impl Plans {
-    /// That of the timetable, which is always the same.
+    /// Returns the plan for the timetable, which must be the same timetable in every call.
     pub(super) fn of(&self, timetable: &Timetable, heard: bool, ages: bool) -> &Plan {
         self.0[usize::from(heard) + 2 * usize::from(ages)].get_or_init(|| Plan::of(timetable, heard, ages))
     }
 }
 
-/// The numbers of a lifted system, and the units of its states.
+/// Numbers of a lifted system, and the units of its states.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Numbers<'a> {
     pub(super) nodes: &'a [Node],
@@ -95,66 +100,66 @@ pub(super) struct Numbers<'a> {
     pub(super) tied: bool,
 }
 
-/// A step matrix, and how far each of its entries may be from the exact one.
+/// Matrix of a step, and the bound of the error of each entry.
 #[derive(Clone, Debug)]
 pub(super) struct StepMatrix {
     pub(super) matrix: Matrix,
     pub(super) error: f64,
 }
 
-/// A state of a frame.
+/// Name of a state of a frame, which is a row and a column of its matrix.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum FrameState {
-    /// Of the device of a class: its position, or its velocity.
+    /// Position or velocity of the device of a class.
     Device {
         /// The place of the class.
         class: usize,
-        /// Whether it is the velocity.
+        /// Whether the state is the velocity.
         velocity: bool,
     },
-    /// Of the copy of a class: its position, or its velocity.
+    /// Position or velocity of the copy of a class.
     Copy {
         /// The place of the class.
         class: usize,
-        /// Whether it is the velocity.
+        /// Whether the state is the velocity.
         velocity: bool,
     },
-    /// A number of a sample of a class.
+    /// Channel of a sample of a class.
     Sample {
         /// The place of the class.
         class: usize,
-        /// The last one before the frame is −1, the one before it −2.
+        /// Number of the sample: −1 is the last sample before the frame, −2 the sample before that.
         number: i64,
-        /// Which of its numbers: position and velocity, or the one that is heard.
+        /// Channel of the sample: 0 is the position and 1 the velocity, or 0 is the only number that is heard.
         channel: usize,
     },
-    /// The force that a sample of a server has for a class.
+    /// Force in a sample of a server that is meant for a class.
     Returned {
-        /// The place of the class that gets it.
+        /// The place of the class that receives the force.
         class: usize,
-        /// Which sample, as above.
+        /// Number of the sample, counted as in [`FrameState::Sample`].
         number: i64,
     },
-    /// The sum of the waves of a sample that a class gets from all others, or others from it.
+    /// Sum of the waves of a sample that a class receives from all other peers, or that all other peers receive from the class.
     Waves {
         /// The place of the class.
         class: usize,
-        /// Which sample, as above.
+        /// Number of the sample, counted as in [`FrameState::Sample`].
         number: i64,
-        /// Whether others get them.
+        /// Whether the other peers receive the waves, instead of the class.
         of_others: bool,
     },
-    /// A force that waits, or a number that a law remembers.
+    /// Force that waits for the next tick, or number that a law remembers.
     Other {
         /// The place of the class.
         class: usize,
-        /// Which of the numbers of the class.
+        /// Row of the state among the rows of the class.
         row: usize,
     },
 }
 
 impl FrameState {
-    /// The state of a row of a class whose own rows begin with 0.
+    /// Returns the state of a row of a class. The rows of the class itself begin with 0.
     pub(crate) fn of(class: usize, rows: Rows, row: usize) -> Self {
         match row {
             _ if rows.device.is_some_and(|device| row < device + 2) => Self::Device { class, velocity: row == 1 },
@@ -164,12 +169,13 @@ impl FrameState {
     }
 }
 
-/// What the operations of a step round, relative to the largest sum of the sizes of the terms of a row: fifteen operations in a row and the coefficients of the
-/// step maps, twice for the difference from the reference. Half of it is left for coefficients that differ by some roundings from those of the numbers meant.
+/// Rounding error of the operations of a step, relative to the largest sum of the sizes of the terms of a row. Fifteen operations in sequence and the
+/// coefficients of the step maps count, twice because of the difference from the reference. Half of the value remains for coefficients that are themselves off
+/// by some roundings.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 impl Plan {
-    /// The steps of a timetable. `heard` says whether anything is heard at all, `ages` whether the ages of samples matter.
+    /// Returns the plan of a timetable. `heard`: at least one sample is heard with a gain that is not zero. `ages`: a law uses the ages of samples.
     fn of(timetable: &Timetable, heard: bool, ages: bool) -> Self {
         let nodes = timetable.sent.len();
         let instants = ages.then(|| Instants::of(timetable));
@@ -185,6 +191,8 @@ impl Plan {
         for event in &timetable.events {
             match *event {
                 Event::Sample { node } => {
+                    // Samples come before the ticks of a step, so that a sample after a tick begins a new step.
+                    // Samples come before the ticks of a step, so that a sample after a tick begins a new step.
                     if steps.last().is_none_or(|step| !step.ticks.is_empty()) {
                         steps.push(Step::default());
                     }
@@ -199,6 +207,9 @@ impl Plan {
                     }
                 }
                 Event::Tick { node, at, span } => {
+                    // Ticks of one instant share a step. A node ticks at most once in a step, since two multiples of its force would make the step quadratic in
+                    // gains. Ticks of one instant share a step. A node ticks at most once in a step, since two multiples of its force would make the step
+                    // quadratic in gains.
                     if steps.last().is_none_or(|step| step.ticks.iter().any(|tick| tick.node == node) || !step.ticks.is_empty() && step.at != at) {
                         steps.push(Step::default());
                     }
@@ -223,7 +234,8 @@ impl Plan {
         Self { kinds: kinds.collect(), steps, live, firsts, oldest }
     }
 
-    /// The states of the frame, in the order of its rows and columns.
+    /// Returns the states of the frame in the order of its rows and columns. The position of the first copy is no state unless the scene is tied to ground: all
+    /// positions are counted from that copy.
     pub(super) fn states(&self, nodes: &[Node], channels: usize, tied: bool) -> Vec<FrameState> {
         let mut names = Vec::new();
         for (place, node) in nodes.iter().enumerate() {
@@ -236,16 +248,18 @@ impl Plan {
         names
     }
 
-    /// The matrices of each kind of step.
+    /// Returns the matrix of each kind of step, indexed by kind.
     pub(super) fn matrices(&self, numbers: Numbers<'_>) -> Vec<StepMatrix> {
         self.firsts.iter().map(|step| self.matrix(*step, numbers)).collect()
     }
 
-    /// The kinds of the steps of a frame, in order.
+    /// Returns the kind of each step of the frame, in order.
     pub(super) fn kinds(&self) -> &[usize] {
         &self.kinds
     }
 
+    /// Returns the matrix of a step, from the states before to the states after the step.
+    /// Returns the matrix of a step, from the states before to the states after the step.
     fn matrix(&self, step: usize, numbers: Numbers<'_>) -> StepMatrix {
         let Numbers { nodes, weights, sampling, scale, tied } = numbers;
         let channels = sampling.channels();
@@ -256,6 +270,9 @@ impl Plan {
             rows.push(node.rows(count));
             count += node.states();
         }
+        // `z` has a row for every state of the nodes, and a column for every state before the step. The reference has a row, which stays zero until the
+        // reference moves, and no column. `z` has a row for every state of the nodes, and a column for every state before the step. The reference has a row,
+        // which stays zero until the reference moves, and no column.
         let reference = (!tied).then(|| rows[0].object);
         let states = count - usize::from(reference.is_some());
         let columns = states + before.len() * channels;
@@ -293,6 +310,8 @@ impl Plan {
             }
             nodes[*node].tick(&mut z, rows[*node], |row| heard.row(row), External::default(), *span, scale, &mut scratch);
         }
+        // The reference has moved during the step: positions after the step are counted from its new place.
+        // The reference has moved during the step: positions after the step are counted from its new place.
         let moved = |by: f64, column: usize| reference.map_or(0.0, |reference| by * z[(reference, column)]);
         let mut matrix = Matrix::zeros(states + after.len() * channels, columns);
         let mut next = 0;
@@ -315,12 +334,13 @@ impl Plan {
     }
 }
 
-/// How far each entry of a step of nodes may be from the exact one; `oldest` is the age of the oldest sample \[s\], for laws that use it.
+/// Returns the bound of the error of each entry of a step of the nodes. `oldest` is the age of the oldest held sample \[s\], for laws that use ages.
 pub(super) fn error(nodes: &[Node], scale: Scale, oldest: f64) -> f64 {
     ROUNDING * nodes.iter().map(|node| node.step_norm_up_to(scale, oldest)).fold(1.0, f64::max)
 }
 
-/// Which samples are states before each step, and after the last: those sent before that are used from there on, in this frame or in a later one.
+/// Returns the samples that are states before each step, and after the last step: samples sent before the step that are used from the step on, in this frame or
+/// a later one.
 fn live(steps: &[Step], sent: &[usize]) -> Vec<Vec<SampleName>> {
     let mut last: BTreeMap<SampleName, usize> = BTreeMap::new();
     for (place, step) in steps.iter().enumerate() {
