@@ -1,9 +1,9 @@
 //! Boxes of numbers: lifted systems between whose corners every step matrix is multi-affine.
 //!
-//! The gains of a node count as they are. A body counts by the coefficients of its step map: for a body that nothing ties to ground, m·a = f − b·v, each of
-//! them is monotone in m and in b. So the values at the ends of the box enclose it; where several vary, they are taken apart as if each varied by itself, which
-//! encloses more than the box. But of a damping b that stays, a force f keeps the velocity f/b, so that two of them follow from the others: e₁₁ + b·g₁ = 0 and
-//! e₀₁ + b·g₀ = h.
+//! The gains of a node are numbers of the box themselves. A body enters by the coefficients of its step map. For a body that nothing ties to ground, m·a = f −
+//! b·v, each coefficient is monotone in m and in b, so that the values at the ends of the box enclose the coefficient. If several coefficients vary, each is a
+//! number of its own, which encloses more than the box. If the damping b stays, a constant force f has the final velocity f/b, so that two coefficients follow
+//! from the others: e₁₁ + b·g₁ = 0 and e₀₁ + b·g₀ = h.
 
 use std::borrow::Cow;
 
@@ -15,35 +15,35 @@ use super::error::ProofError;
 use super::span::{FrameSpan, StepSpan};
 use super::steps::{FrameState, Numbers, Plan, Plans, StepMatrix};
 
-/// The numbers of a part of a scene at a corner of a box.
+/// Numbers of a part of a scene at a corner of a box.
 #[derive(Clone, PartialEq, Debug)]
 pub(super) struct Point {
     pub(super) nodes: Vec<Node>,
     pub(super) weights: Matrix,
 }
 
-/// What the corners of a box have in common.
+/// Data that all corners of a box share.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Common<'a> {
     pub(super) timetable: &'a Timetable,
-    /// The plans of that timetable.
+    /// Plans of `timetable`.
     pub(super) plans: &'a Plans,
     pub(super) tied: bool,
-    /// What velocities are multiplied by \[s\].
+    /// Time by which velocities are multiplied \[s\].
     pub(super) time: f64,
 }
 
-/// More numbers than this that vary are refused: a box has two corners to the power of them. Two dampings are four coefficients of a step map each, of bodies
-/// that are equal in all peers; beside them there is room for the weight with which a peer hears others, and for one number more.
+/// Largest number of numbers that vary in a box, since n numbers make 2ⁿ corners. Two dampings make four coefficients of a step map each, if bodies are equal
+/// in all peers. The limit leaves room for the weight with which a peer hears others, and for one number more.
 const MOST_NUMBERS: usize = 10;
 
-/// Parts of the computation that all points share.
+/// Parts of the computation of steps that all points share.
 struct Frame<'a> {
     plan: &'a Plan,
     sampling: Sampling,
     scale: Scale,
     tied: bool,
-    /// Whether the own states of the past are states as a whole, since the corners take different combinations of them.
+    /// Whether position and velocity of the own past are separate states, because the corners take different combinations of both.
     whole_past: bool,
 }
 
@@ -71,8 +71,8 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// The steps of a frame over the box that points enclose: 2ⁿ of them, of which point i has number b at its upper end if bit b of i is set. Bodies are between
-/// those of `ends`, whatever those of the points are.
+/// Returns the steps of a frame over the box that 2ⁿ points enclose: point i has number b at its upper end if bit b of i is set. Bodies vary between the bodies
+/// of `ends`; the bodies of the points do not count.
 pub(super) fn steps(points: &[Point], ends: &[Vec<Node>], common: Common<'_>) -> Result<FrameSpan, ProofError> {
     let frame = Frame::of(points, common)?;
     let kinds = enclosed(points, ends, |point| frame.matrices(point))?;
@@ -81,13 +81,14 @@ pub(super) fn steps(points: &[Point], ends: &[Vec<Node>], common: Common<'_>) ->
     Ok(FrameSpan { kinds, order: frame.plan.kinds().to_vec() })
 }
 
-/// Matrices over the box that points enclose, from those at each corner. Bodies are between those of `ends`, whatever those of the points are.
+/// Encloses matrices over the box that points enclose, given the function that returns the matrices at a corner. Bodies vary between the bodies of `ends`; the
+/// bodies of the points do not count.
 pub(super) fn enclosed(points: &[Point], ends: &[Vec<Node>], matrices: impl Fn(&Point) -> Vec<StepMatrix>) -> Result<Vec<StepSpan>, ProofError> {
     let corners: Vec<Vec<StepMatrix>> = with_bodies(points, ends)?.iter().map(matrices).collect();
     Ok((0..corners[0].len()).map(|step| StepSpan::of(corners.iter().map(|steps| &steps[step]))).collect())
 }
 
-/// The states of a frame over the box that points enclose.
+/// Returns the states of a frame over the box that points enclose.
 pub(super) fn states(points: &[Point], common: Common<'_>) -> Result<States, ProofError> {
     let frame = Frame::of(points, common)?;
     let names = frame.plan.states(&frame.nodes(&points[0]), frame.sampling.channels(), frame.tied);
@@ -98,29 +99,30 @@ pub(super) fn states(points: &[Point], common: Common<'_>) -> Result<States, Pro
     Ok(States { names, heard })
 }
 
-/// The states of a frame.
+/// Names of the states of a frame.
 pub(super) struct States {
-    /// In the order of rows and columns.
+    /// Names in the order of rows and columns.
     pub(super) names: Vec<FrameState>,
-    /// The gains with which a sample is one number for those that hear it; `None`: position and velocity.
+    /// Gains with which receivers combine a sample into one number; `None`: a sample is a position and a velocity.
     pub(super) heard: Option<Gains>,
 }
 
-/// The steps of a frame whose numbers grow without a limit with N, each divided by N/N₀ for `growing` of two numbers that do: points at N₀, 2·N₀ and 3·N₀.
+/// Encloses, for all N ≥ N₀, the steps T of a frame whose entries grow without a limit with N, each step divided by N/N₀ or by (N/N₀)². `at` has the points at
+/// N₀, 2·N₀ and 3·N₀.
 ///
-/// With one, steps are affine in N, T = A + N·B, so that N₀/N·T = u·A + N₀·B, u = N₀/N from 0 to 1, lies between T(N₀) and N₀·B = T(2·N₀) − T(N₀).
-/// With two, T = A + N·B + N²·C, and (N₀/N)²·T = u²·A + u·L + Q with L = N₀·B and Q = N₀²·C lies between the four where u² and u are 0 or 1.
+/// With [`Growth::Linear`], T = A + N·B is affine in N. With u = N₀/N from 0 to 1, u·T = u·A + N₀·B lies between T(N₀) and N₀·B = T(2·N₀) − T(N₀).
+/// With [`Growth::Quadratic`], T = A + N·B + N²·C. With L = N₀·B and Q = N₀²·C, u²·T = u²·A + u·L + Q lies between the four matrices where u² and u are 0 or 1.
 pub(super) fn steps_beyond(at: [&[Point]; 3], growing: Growth, common: Common<'_>) -> Result<FrameSpan, ProofError> {
     let all: Vec<Point> = at.iter().flat_map(|points| points.iter().cloned()).collect();
     let frame = Frame::of(&all, common)?;
     let [near, far, third] = at.map(|points| points.iter().map(|point| frame.matrices(point)).collect::<Vec<_>>());
-    // Sums of a dozen of them at most, whose own roundings are small beside the errors.
+    // The factors add up to at most a dozen, and the roundings of the sums themselves are small compared with the errors of the steps.
     let sum = |of: [&StepMatrix; 3], by: [f64; 3]| {
         let matrix =
             Matrix::from_fn(of[0].matrix.rows(), of[0].matrix.columns(), |i, j| of.iter().zip(by).map(|(step, by)| by * step.matrix[(i, j)]).sum());
         StepMatrix { matrix, error: 32.0 * of.iter().map(|step| step.error).fold(0.0, f64::max) }
     };
-    // By what T at N₀, 2·N₀ and 3·N₀ are multiplied at each corner but the last, which is T(N₀).
+    // Factors of T at N₀, 2·N₀ and 3·N₀ for each corner but the last, which is T(N₀).
     let corners: &[[f64; 3]] = match growing {
         Growth::Linear => &[[-1.0, 1.0, 0.0]],
         // Q = (T₃ − 2·T₂ + T₁)/2, L = T₂ − T₁ − 3·Q: Q, Q + A = T₁ − L, and Q + L.
@@ -136,28 +138,28 @@ pub(super) fn steps_beyond(at: [&[Point]; 3], growing: Growth, common: Common<'_
     Ok(FrameSpan { kinds: (0..near[0].len()).map(span).collect(), order: frame.plan.kinds().to_vec() })
 }
 
-/// How the steps of a frame grow with the number of peers.
+/// Growth of the steps of a frame with the number N of peers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Growth {
-    /// As N: the gains of the law, or the effects of a force on a copy.
+    /// Growth as N: the gains of the law grow, or the effects of a force on a copy.
     Linear,
-    /// As N²: both.
+    /// Growth as N²: the gains of the law grow, and the effects of a force on a copy too.
     Quadratic,
 }
 
-/// The kinds of steps of a frame at each point, in the units of the first.
+/// Returns the matrices of all kinds of steps at each point, in the units of the first point.
 #[cfg(test)]
 pub(super) fn steps_of_each(points: &[Point], common: Common<'_>) -> Result<Vec<Vec<StepMatrix>>, ProofError> {
     let frame = Frame::of(points, common)?;
     Ok(points.iter().map(|point| frame.matrices(point)).collect())
 }
 
-/// The points, each at the lower end of one more number and then each at its upper end.
+/// Returns all points at the lower end of one more number, followed by all points at its upper end. The new number is so the highest bit of a place.
 pub(super) fn doubled(points: &[Point], at: impl Fn(&Point, bool) -> Point) -> Vec<Point> {
     [false, true].into_iter().flat_map(|upper| points.iter().map(move |point| (point, upper))).map(|(point, upper)| at(point, upper)).collect()
 }
 
-/// Refuses laws whose states mean something else at each corner: numbers that are remembered in units of gains that vary.
+/// Refuses laws that remember numbers in units of gains that vary, since the states would have another meaning at each corner.
 pub(super) fn check_units(points: &[Point], scale: Scale) -> Result<(), ProofError> {
     let units = |point: &Point| -> Vec<u64> {
         let of = |node: &Node| (0..node.law.memory.len()).map(|place| node.memory_unit(place, scale).to_bits()).collect::<Vec<_>>();
@@ -169,7 +171,8 @@ pub(super) fn check_units(points: &[Point], scale: Scale) -> Result<(), ProofErr
     Ok(())
 }
 
-/// Whether at each corner laws take the same combination of the own states of the past, but for some roundings, which the bounds of a step have room for.
+/// Returns whether laws take the same combination of the own past position and velocity at each corner. Differences of some roundings are allowed, for which
+/// the bounds of a step have room.
 pub(super) fn takes_one_past(points: &[Point], scale: Scale) -> bool {
     let shares = |point: &Point| -> Vec<f64> {
         let of = |node: &Node| (node.looks_back() > 0).then(|| node.law.force.past.stiffness / node.past_unit(scale.time));
@@ -180,11 +183,11 @@ pub(super) fn takes_one_past(points: &[Point], scale: Scale) -> bool {
     points.iter().map(shares).all(|shares| shares.len() == first.len() && shares.iter().zip(&first).all(is_first))
 }
 
-/// A body at each end, and the nodes that have it.
+/// Bodies at each end of the box, and the nodes that have exactly these bodies.
 type EqualBodies = (Vec<Body>, Vec<(usize, BodyOf)>);
 
-/// The points with one more number for each coefficient of a step map that varies between the ends. Bodies that are equal at all ends vary together: their
-/// coefficients are the same functions of what varies.
+/// Returns the points with one more number for each coefficient of a step map that varies between the ends. Bodies that are equal at every end share these
+/// numbers, because their coefficients are the same functions of the keys.
 fn with_bodies(points: &[Point], ends: &[Vec<Node>]) -> Result<Vec<Point>, ProofError> {
     let mut groups: Vec<EqualBodies> = Vec::new();
     for node in 0..points[0].nodes.len() {
@@ -214,7 +217,7 @@ fn with_bodies(points: &[Point], ends: &[Vec<Node>]) -> Result<Vec<Point>, Proof
             }
         }
     }
-    // A key that changes bodies alone counts by their coefficients, and no more by itself.
+    // With all bodies at their lower ends, a key that changes bodies alone changes no point any more. The coefficients replace it.
     let mut all = without_idle_numbers(all);
     let numbers = all.len().trailing_zeros() as usize;
     let coefficients_of_bodies: usize = varying.iter().map(|(_, _, together)| together.len()).sum();
@@ -244,7 +247,7 @@ fn with_bodies(points: &[Point], ends: &[Vec<Node>]) -> Result<Vec<Point>, Proof
     Ok(all)
 }
 
-/// The points without the numbers that change none of them.
+/// Removes the numbers on which no point depends.
 fn without_idle_numbers(mut points: Vec<Point>) -> Vec<Point> {
     let mut number = 0;
     while points.len() > 1 << number {
@@ -263,7 +266,7 @@ fn without_idle_numbers(mut points: Vec<Point>) -> Vec<Point> {
     points
 }
 
-/// Which body of a node.
+/// Choice of a body of a node.
 #[derive(Clone, Copy)]
 enum BodyOf {
     Copy,
@@ -288,7 +291,11 @@ const fn map_of([e00, e01, e10, e11, g0, g1]: [f64; 6]) -> StepMap {
     StepMap::new([[e00, e01], [e10, e11]], [g0, g1])
 }
 
-/// Between which values each coefficient of the step maps of bodies lies.
+/// Returns the least and the greatest value of each coefficient of the step maps of the bodies, in the order of [`coefficients`].
+///
+/// # Errors
+///
+/// [`ProofError::Drift`] if a body has several step maps, and [`ProofError::TiedBody`] if an effect of a position varies.
 fn ranges(bodies: &[Body]) -> Result<[(f64, f64); 6], ProofError> {
     let values = bodies.iter().map(|body| body.only_map().map(|map| coefficients(&map)).ok_or(ProofError::Drift)).collect::<Result<Vec<_>, _>>()?;
     let range = |place: usize| {
@@ -299,11 +306,11 @@ fn ranges(bodies: &[Body]) -> Result<[(f64, f64); 6], ProofError> {
     if [0, 2].iter().any(|place| ranges[*place].0 < ranges[*place].1) { Err(ProofError::TiedBody) } else { Ok(ranges) }
 }
 
-/// Coefficients that are affine in one number, and whether each falls as that grows.
+/// Coefficients that are affine in one number: the place of each coefficient, and whether the coefficient falls while the number grows.
 type Together = &'static [(usize, bool)];
 
-/// Which coefficients vary, those together that are affine in one number: without a change of the damping over the mass, both effects of a force; without a
-/// change of the damping, the effects of a velocity and of a force.
+/// Returns the coefficients that vary, grouped by the number in which they are affine. If damping over mass stays, both effects of a force form one group. If
+/// the damping stays, each effect of a velocity forms a group with the effect of a force in the same row.
 fn together(ranges: &[(f64, f64); 6], bodies: &[Body]) -> Vec<Together> {
     let varies = |place: usize| ranges[place].0 < ranges[place].1;
     let groups: &[Together] = if !varies(1) && !varies(3) {
@@ -316,7 +323,7 @@ fn together(ranges: &[(f64, f64); 6], bodies: &[Body]) -> Vec<Together> {
     groups.iter().copied().filter(|places| places.iter().any(|(place, _)| varies(*place))).collect()
 }
 
-/// Whether bodies that nothing ties to ground have one damping, but for roundings.
+/// Returns whether all bodies have the same damping but for roundings, and nothing ties them to ground.
 fn keep_their_damping(bodies: &[Body]) -> bool {
     let of = |body: &Body| {
         let [e00, e01, e10, e11, g0, g1] = coefficients(&body.only_map()?);
@@ -335,7 +342,8 @@ mod tests {
     use cohaptic_stability::frames::NominalNetwork;
     use cohaptic_stability::frames::{Contacts, Structure};
 
-    /// A mass with a damping that stays is two numbers: steps of every mass between the ends are where these say, but for the radius.
+    /// A mass that varies beside a constant damping makes two numbers, and the steps of every mass between the ends are where these numbers say, within the
+    /// radius.
     #[test]
     fn a_mass_beside_a_damping_that_stays_is_two_numbers() {
         let at = |mass: f64, damping: f64| {
@@ -354,7 +362,7 @@ mod tests {
         assert!(span.kinds.iter().all(|step| step.slopes.len() == 2));
         for mass in [0.3, 0.35, 0.45, 0.6] {
             let inside = at(mass, 20.0).0;
-            // In the units of the box.
+            // `steps_of_each` takes the units of the first point, which are the units of the box.
             let exact = steps_of_each(&[point(&low), point(&inside)], common).unwrap().swap_remove(1);
             let [first, last, here] = [&low, &high, &inside].map(|nodes| of_copy(nodes));
             let shares = [1, 3].map(|place| (2.0 * here[place] - first[place] - last[place]) / (first[place] - last[place]).abs());
@@ -365,7 +373,7 @@ mod tests {
                 }
             }
         }
-        // A damping that varies too is taken apart.
+        // If the damping varies too, each coefficient is a number of its own.
         let both = steps(&[point(&low)], &[low.clone(), at(0.6, 21.0).0], common).unwrap();
         assert!(both.kinds.iter().all(|step| step.slopes.len() == 4));
     }

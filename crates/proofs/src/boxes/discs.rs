@@ -1,4 +1,4 @@
-//! Where the eigenvalues of all matrices of a box are: discs around the eigenvalues of the mean that move with the numbers.
+//! Discs that hold the eigenvalues of all matrices of a box. The discs lie around the eigenvalues of the mean and move with the numbers of the box.
 //!
 //! In coordinates V that nearly diagonalise the mean, A(z, s) = W·(z·I − M(s))·V with W near V⁻¹ is nearly diagonal for every s of the box. Let dᵢ > 0. Where
 //! on a circle |z| = ρ
@@ -23,13 +23,13 @@ use super::basis::{Basis, solved};
 use super::guarantee::Proven;
 use super::span::{StepSpan, absolute};
 
-/// A verdict on all matrices of a box, and the numbers by which anybody can check it.
+/// Verdict on all matrices of a box, and the numbers by which the verdict can be checked.
 pub(super) struct Decision {
     pub(super) proven: Proven,
     pub(super) witness: Witness,
 }
 
-/// By which numbers (1) holds; W is the inverse of V.
+/// Numbers for which inequality (1) holds, with W the inverse of V.
 #[derive(Clone, Debug)]
 pub(super) struct Witness {
     /// V.
@@ -39,16 +39,16 @@ pub(super) struct Witness {
     pub(super) circle: FreeCircle,
 }
 
-/// The circle on which no matrix of a box has an eigenvalue.
+/// Circle on which no matrix of a box has an eigenvalue.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum FreeCircle {
-    /// Around zero, with that radius.
+    /// Circle around zero with the given radius.
     AroundZero(f64),
-    /// Around the diagonal entry of that place, with that radius.
+    /// Circle around the diagonal entry of the given place, with the given radius. The circle moves with the entry.
     AroundEntry(usize, f64),
 }
 
-/// The verdict on all matrices of a box.
+/// Returns the verdict on all matrices of a box, or `None` if no verdict is shown.
 pub(super) fn decide(span: &StepSpan) -> Option<Decision> {
     let near = NearlyDiagonal::of(span)?;
     #[cfg(test)]
@@ -58,6 +58,7 @@ pub(super) fn decide(span: &StepSpan) -> Option<Decision> {
     let (proven, circle, weights) = if reaches.iter().all(|(_, high)| *high < 1.0) {
         (Proven::Stable, FreeCircle::AroundZero(1.0), near.free_of(1.0, &reaches)?)
     } else {
+        // A circle around zero is tried first. A circle around one entry also works where other entries have the same modulus.
         let by_circle = circle(&reaches).and_then(|circle| Some((FreeCircle::AroundZero(circle), near.free_of(circle, &reaches)?)));
         let (circle, weights) = by_circle.or_else(|| near.one_outside(&reaches))?;
         (Proven::Unstable, circle, weights)
@@ -65,15 +66,15 @@ pub(super) fn decide(span: &StepSpan) -> Option<Decision> {
     Some(Decision { proven, witness: Witness { coordinates: near.coordinates, weights, circle } })
 }
 
-/// W·M·V over a box, nearly diagonal, and W·V, nearly 1.
+/// W·M·V over a box, which is nearly diagonal, and W·V, which is nearly the unit matrix.
 pub(super) struct NearlyDiagonal {
     /// V.
     coordinates: ComplexMatrix,
     mean: ComplexMatrix,
     pub(super) slopes: Vec<ComplexMatrix>,
-    /// How far an entry of W·M·V may be from its mean and slopes.
+    /// Bound of the distance of each entry of W·M·V from its mean and slopes.
     pub(super) wide: Matrix,
-    /// How far an entry of W·V may be from that of 1.
+    /// Bound of the distance of each entry of W·V from the unit matrix.
     off_unit: Matrix,
 }
 
@@ -87,7 +88,7 @@ impl NearlyDiagonal {
             |matrix: &Matrix| -> ComplexMatrix { w.times(&ComplexMatrix::from_fn(size, size, |i, j| Complex64::from(matrix[(i, j)]))).times(&v) };
         let (mean, unit) = (through(&span.mean), w.times(&v));
         let slopes: Vec<ComplexMatrix> = span.slopes.iter().map(through).collect();
-        // Two complex products each of mean and slopes, and W·V: eight roundings a term and those of the sums.
+        // The mean and each slope pass through two complex products, and W·V is one more: eight roundings per term, and the roundings of the sums.
         let rounding = gamma(8 * size + 32) * real(2 + span.slopes.len());
         let (radius, whole) = (w_size.times(&span.radius).times(&v_size), w_size.times(&span.largest()).times(&v_size));
         let unit_sizes = w_size.times(&v_size);
@@ -105,10 +106,11 @@ impl NearlyDiagonal {
         self.mean.rows()
     }
 
-    /// Between which sizes a number stays that is `centre` in the mean, moves with the slopes and is within `wide` of that.
+    /// Returns the least and the greatest modulus of a number that is `centre` in the middle of the box, moves with the slopes, and is off by at most `wide`.
     fn reach(&self, centre: Complex64, slope: impl Fn(&ComplexMatrix) -> Complex64, wide: f64) -> (f64, f64) {
         let size = modulus(centre);
         let direction = if size > 0.0 { Complex64::new(centre.re / size, -centre.im / size) } else { Complex64::new(1.0, 0.0) };
+        // Only the parts of slopes along the direction of `centre` change the modulus to first order.
         let (mut along, mut across) = (0.0, 0.0);
         for matrix in &self.slopes {
             let turned = slope(matrix) * direction;
@@ -119,13 +121,13 @@ impl NearlyDiagonal {
         (size - along - wide, libm::hypot(size + along, across) + wide)
     }
 
-    /// The largest size of an entry off the diagonal, of z·W·V − W·M·V with |z| at most `largest`.
+    /// Returns a bound of the modulus of an entry of z·W·V − W·M·V off the diagonal, for |z| at most `largest`.
     fn beside(&self, i: usize, j: usize, largest: f64) -> f64 {
         let moving: f64 = self.slopes.iter().map(|slope| modulus(slope[(i, j)])).sum();
         outward(outward(modulus(self.mean[(i, j)]) + moving + self.wide[(i, j)] + self.off_unit[(i, j)] * largest))
     }
 
-    /// A d for which (1) holds on the circle of that radius around zero.
+    /// Returns a d for which (1) holds on the circle around zero with radius `circle`. `reaches`: the least and the greatest modulus of each diagonal entry.
     fn free_of(&self, circle: f64, reaches: &[(f64, f64)]) -> Option<Vec<f64>> {
         let entry = |i: usize, j: usize| {
             let (low, high) = reaches[i];
@@ -135,8 +137,10 @@ impl NearlyDiagonal {
         dominated(&Matrix::from_fn(self.size(), self.size(), entry))
     }
 
-    /// A circle outside of the unit circle around one diagonal entry, which moves along with it and has no other within, and a d for which (1) holds on it.
+    /// Returns a circle around one diagonal entry, and a d for which (1) holds on the circle. The circle moves with the entry, stays outside of the unit circle
+    /// and holds no other diagonal entry.
     fn one_outside(&self, reaches: &[(f64, f64)]) -> Option<(FreeCircle, Vec<f64>)> {
+        // Of two conjugate entries one is enough, since the matrices are real.
         let mut outside: Vec<usize> = (0..self.size()).filter(|place| reaches[*place].0 > 1.0 && self.mean[(*place, *place)].im >= 0.0).collect();
         outside.sort_by(|one, other| reaches[*other].0.total_cmp(&reaches[*one].0));
         outside.into_iter().take(MOST_TRIED).find_map(|centre| {
@@ -159,14 +163,15 @@ impl NearlyDiagonal {
     }
 }
 
-/// How many diagonal entries outside of the unit circle are tried.
+/// Largest number of diagonal entries outside of the unit circle around which a circle is tried.
 const MOST_TRIED: usize = 3;
 
 fn modulus(value: Complex64) -> f64 {
     libm::hypot(value.re, value.im) * (1.0 + 4.0 * f64::EPSILON)
 }
 
-/// The widest free circle, not within the unit circle, that has some diagonal entries outside; `None` if there is none.
+/// Returns the radius of the circle around zero with the widest gap between diagonal entries, at least 1 and with a diagonal entry outside; `None` if there is
+/// no gap.
 fn circle(reaches: &[(f64, f64)]) -> Option<f64> {
     let mut free = None;
     for (low, _) in reaches.iter().filter(|(low, _)| *low > 1.0) {
@@ -179,7 +184,8 @@ fn circle(reaches: &[(f64, f64)]) -> Option<f64> {
     free.map(|(_, circle)| circle)
 }
 
-/// For a matrix with no entry above zero off its diagonal some d > 0 with C·d > 0, rounding included; `None` if there is none, or none was found.
+/// Returns a d > 0 with C·d > 0, rounding included, for a matrix C whose entries off the diagonal are at most zero. `None` if no such d exists or none was
+/// found.
 fn dominated(comparison: &Matrix) -> Option<Vec<f64>> {
     let size = comparison.rows();
     if !comparison.is_finite() || (0..size).any(|place| comparison[(place, place)] <= 0.0) {
@@ -188,7 +194,7 @@ fn dominated(comparison: &Matrix) -> Option<Vec<f64>> {
     let d = solved(comparison, &Matrix::from_fn(size, 1, |_, _| 1.0))?;
     let column: Vec<f64> = (0..size).map(|place| d[(place, 0)]).collect();
     let sizes = absolute(comparison).times_column(&column);
-    // Written so that NaN fails.
+    // Comparisons are written so that NaN fails.
     let holds = column.iter().all(|entry| *entry > 0.0)
         && comparison.times_column(&column).iter().zip(&sizes).all(|(sum, size_of)| *sum > outward(gamma(size + 2) * size_of));
     holds.then_some(column)

@@ -151,7 +151,6 @@ impl NumberProof {
         };
         let is_unstable_beyond = |low| Ok(without_limit.is_some() && moments.is_none() && growing.is_unstable_beyond(low)?);
         // Without a limit the search ends at `MOST_FOLLOWED`, so that the span from there without end is decided separately.
-        // Without a limit the search ends at `MOST_FOLLOWED`, so that the span from there without end is decided separately.
         let Search { mut pieces, attempts, is_whole } = search([*from, end, growing.least], watch, decide, is_unstable_beyond)?;
         if without_limit.is_some() && pieces.last().is_some_and(|last| last.to.is_some()) {
             let guarantee = if is_whole && is_unstable_beyond(end)? { Guarantee::Unstable } else { Guarantee::Undecided };

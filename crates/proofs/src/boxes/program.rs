@@ -1,7 +1,7 @@
-//! A frame as a straight-line program: operations that set registers to sums of multiples of registers, step by step.
+//! A frame as a straight-line program: operations set registers to sums of multiples of registers, step by step.
 //!
-//! For laws whose samples carry more than a state. The multiples within a step are affine in each number of a [`super::corners::Point`], as those of
-//! [`super::steps`] are. Registers that no body feels, now or in any later frame, are left out.
+//! Programs are used for laws whose samples carry more than a state. The multiples within a step are affine in each number of a [`super::corners::Point`], as
+//! the entries of [`super::steps`] are. Registers that no body feels, in this frame or in a later one, are left out.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,49 +15,50 @@ use super::error::ProofError;
 use super::span::FrameSpan;
 use super::steps::{FrameState, StepMatrix};
 
-/// A number that operations set and read.
+/// Variable of the program, which operations set and read.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(super) enum Register {
-    /// Position or velocity of the device of a class, or of its copy.
+    /// Position or velocity of the device or of the copy of a class.
     Body { class: usize, of_copy: bool, velocity: bool },
-    /// A force that acts a tick later.
+    /// Force that acts one tick later.
     Pending { class: usize, on_copy: bool },
-    /// A force of this tick, which no state is.
+    /// Force of this tick, which is set before it is read and so never is a state.
     Force { class: usize, on_copy: bool },
-    /// A sampled position or velocity; the samples of a class in this frame are numbered from 0, the last one before is −1.
+    /// Sampled position or velocity. Samples of a class in this frame are numbered from 0, and −1 is the last sample before the frame.
     Sample { class: usize, number: i64, velocity: bool },
-    /// The force that a sample of a server has for a class.
+    /// Force in a sample of a server that is meant for a class.
     Returned { server: usize, class: usize, number: i64 },
-    /// The waves of a sampling that a class gets from all others, or others from it.
+    /// Sum of the waves of a sampling that a class receives from all other peers, or (`of_others`) that all other peers receive from the class.
     Waves { class: usize, number: i64, of_others: bool },
 }
 
-/// Multiples of registers, which are added up.
+/// Linear combination: registers with their factors.
 pub(super) type Sum = Vec<(Register, f64)>;
 
-/// Registers that are set at once.
+/// Registers that are set at once: every sum reads the values from before the operation.
 pub(super) type Operation = Vec<(Register, Sum)>;
 
-/// A frame.
+/// A frame as operations.
 pub(super) struct Program {
-    /// Operations of each step, in order.
+    /// Operations of each step, in order, indexed by step.
     pub(super) steps: Vec<Vec<Operation>>,
-    /// How many samples each class sends in a frame.
+    /// Number of samples that each class sends in a frame, indexed by class.
     pub(super) sent: Vec<usize>,
-    /// For each class, the position that all of its positions are counted from, where nothing ties them to ground.
+    /// Position from which all positions of a class are counted, indexed by class; `None` where something ties the class to ground.
     pub(super) references: Vec<Option<Register>>,
 }
 
-/// The states of a program between its steps.
+/// Registers that are alive before each step and after the last step, in the order of rows and columns.
 struct Layout {
     order: Vec<Vec<Register>>,
 }
 
-/// What a coefficient and a sum round, in units of the last place, beside one for each term.
+/// Roundings of a coefficient and of a sum, in units of the last place, in addition to one rounding per term.
 const ROUNDINGS: f64 = 32.0;
 
 impl Register {
-    /// As it is called at the end of a frame that it is there after.
+    /// Returns the name at the end of a frame of the register that has this name at the beginning of the next frame. `sent`: samples per frame, indexed by
+    /// class.
     fn before(self, sent: &[usize]) -> Self {
         let renamed = |class: usize, number: i64| number + i64::try_from(sent[class]).unwrap_or(i64::MAX);
         match self {
@@ -68,7 +69,7 @@ impl Register {
         }
     }
 
-    /// The state that it is at the beginning of a frame, with another place for its class.
+    /// Returns the state that the register is at the beginning of a frame, with the place of its class mapped by `placed`.
     fn state(self, placed: impl Fn(usize) -> usize) -> FrameState {
         match self {
             Self::Body { class, of_copy: true, velocity } => FrameState::Copy { class: placed(class), velocity },
@@ -82,7 +83,7 @@ impl Register {
         }
     }
 
-    /// The class of which it is a position.
+    /// Returns the class of a position; `None` for registers that are no position.
     const fn position_of(self) -> Option<usize> {
         match self {
             Self::Body { class, velocity: false, .. } | Self::Sample { class, velocity: false, .. } => Some(class),
@@ -91,16 +92,17 @@ impl Register {
     }
 }
 
-/// A frame over a box, and the names of its states.
+/// Frame over a box, with the names of its states.
 pub(super) struct NamedFrame {
     pub(super) steps: FrameSpan,
     pub(super) states: States,
-    /// What forces are multiplied by to be lengths \[m/N\].
+    /// Compliance by which forces are multiplied to become lengths \[m/N\].
     pub(super) compliance: f64,
 }
 
 impl NamedFrame {
-    /// Of the programs at the corners of a box, of the averages of classes or of how the members of one differ. `ends`: the nodes of that part at the corners.
+    /// Encloses the programs at the corners of a box. `apart`: the class whose differences are followed, or `None` for the averages of classes. `ends`: the
+    /// nodes of that part at the corners.
     pub(super) fn of(
         points: &[Point],
         ends: &[Vec<Node>],
@@ -113,7 +115,7 @@ impl NamedFrame {
         let steps = enclosed(points, ends, |point| program(point).matrices(&layout))?;
         #[cfg(test)]
         let steps = super::mutation::of_steps(steps);
-        // The classes of a part are counted by themselves.
+        // A difference has a single class, which is class 0 of the part.
         let names = layout.states(&first).map(|register| register.state(|class| class - apart.unwrap_or(0))).collect();
         Ok(Self { steps: FrameSpan::of(steps), states: States { names, heard: None }, compliance: scale.compliance })
     }
@@ -126,25 +128,28 @@ impl From<NamedFrame> for (FrameSpan, Named) {
 }
 
 impl Layout {
-    /// The states at the beginning of a frame, in the order of its rows and columns.
+    /// Returns the states at the beginning of a frame in the order of rows and columns. References are left out, since their positions count from themselves.
     fn states(&self, program: &Program) -> impl Iterator<Item = Register> {
         self.order[0].iter().copied().filter(move |register| program.reference(*register) != Some(*register))
     }
 }
 
 impl Program {
-    /// All registers that are set.
+    /// Returns all registers that the operations set.
     fn set(&self) -> impl Iterator<Item = Register> {
         self.steps.iter().flatten().flatten().map(|(register, _)| *register)
     }
 
-    /// The registers that are alive before each step and after the last: those that bodies feel from there on.
+    /// Returns the registers that are alive before each step and after the last step: registers whose values reach a body from there on.
     fn live(&self) -> Vec<BTreeSet<Register>> {
         let bodies: BTreeSet<Register> = self.set().filter(|register| matches!(register, Register::Body { .. })).collect();
+        // The registers alive at the end are the bodies, and the registers alive at the beginning of the next frame under their older names. The set only grows
+        // and is bounded by the registers of the program, so that the loop ends at the least fixed point.
         let mut end = bodies.clone();
         loop {
             let mut live = vec![end.clone()];
             for step in self.steps.iter().rev() {
+                // Going backwards, a register that is set is dead before, and the registers that its sum reads are alive.
                 let mut now = live[live.len() - 1].clone();
                 for operation in step.iter().rev() {
                     let read: Vec<Register> = operation
@@ -167,20 +172,20 @@ impl Program {
         }
     }
 
-    /// Which states the frame has between its steps: those of all programs that differ in multiples alone.
+    /// Returns the layout of the states between steps. Programs that differ in factors alone have the same layout.
     fn layout(&self) -> Layout {
         let mut order: Vec<Vec<Register>> = self.live().into_iter().map(|live| live.into_iter().collect()).collect();
-        // Those that live on from a frame to the next are in one order at both ends.
+        // The registers at the end of a frame are in the order of the beginning, so that the product of the steps maps states to the same states.
         order[self.steps.len()] = order[0].iter().map(|register| register.before(&self.sent)).collect();
         Layout { order }
     }
 
-    /// The matrices of all steps.
+    /// Returns the matrix of each step, in order.
     fn matrices(&self, layout: &Layout) -> Vec<StepMatrix> {
         (0..self.steps.len()).map(|step| self.matrix(step, &layout.order[step], &layout.order[step + 1])).collect()
     }
 
-    /// The position that a register is counted from.
+    /// Returns the position from which a register is counted; `None` if the register is no position, or its class is tied to ground.
     fn reference(&self, register: Register) -> Option<Register> {
         register.position_of().and_then(|class| self.references[class])
     }
@@ -188,7 +193,7 @@ impl Program {
     fn matrix(&self, step: usize, before: &[Register], after: &[Register]) -> StepMatrix {
         let columns: Vec<Register> = before.iter().copied().filter(|register| self.reference(*register) != Some(*register)).collect();
         let unit = |place: Option<usize>| -> Vec<f64> { (0..columns.len()).map(|column| if Some(column) == place { 1.0 } else { 0.0 }).collect() };
-        // Each with the sum of the sizes of all terms, for a bound of roundings.
+        // Each register as a row over the states before the step, with a row of the sums of the sizes of all terms, for the bound of roundings.
         let mut rows: BTreeMap<Register, (Vec<f64>, Vec<f64>)> = before
             .iter()
             .map(|register| {
@@ -202,7 +207,7 @@ impl Program {
             for (register, sum) in operation {
                 let (mut row, mut sizes) = (unit(None), unit(None));
                 for (of, by) in sum {
-                    // A register that is not alive is read for others that are not: nothing feels them.
+                    // A register that is not alive is read only by sums of registers that are not alive either, and whose values are not kept.
                     let Some((values, of_sizes)) = rows.get(of) else { continue };
                     for ((entry, size), (value, of_size)) in row.iter_mut().zip(&mut sizes).zip(values.iter().zip(of_sizes)) {
                         *entry += by * value;

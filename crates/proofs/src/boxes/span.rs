@@ -37,7 +37,6 @@ impl StepSpan {
                 effects.iter_mut().zip(&corners).for_each(|(effect, corner)| *effect = corner.matrix[(row, column)]);
                 let largest = effects.iter().fold(0.0, |largest: f64, entry| largest.max(entry.abs()));
                 // Yates's scheme: one pass of sums and differences per number turns the values at the corners into effects.
-                // Yates's scheme: one pass of sums and differences per number turns the values at the corners into effects.
                 for number in 0..numbers {
                     for place in (0..corners.len()).filter(|place| place >> number & 1 == 0) {
                         let (low, high) = (effects[place], effects[place | 1 << number]);
@@ -192,7 +191,6 @@ impl FrameSpan {
         let mut spans: Vec<Cow<'_, StepSpan>> = self.kinds.iter().map(Cow::Borrowed).collect();
         while order.len() > 1 {
             let mut known = BTreeMap::new();
-            // `spans` grows by each new product; `order` holds places in `spans`, so that equal pairs of places are equal pairs of matrices.
             // `spans` grows by each new product; `order` holds places in `spans`, so that equal pairs of places are equal pairs of matrices.
             let joined = order.chunks(2).map(|pair| match *pair {
                 [first, second] => *known.entry((first, second)).or_insert_with(|| {

@@ -60,7 +60,6 @@ struct StepKind {
     /// Nodes that tick, with the duration of the tick and the held samples.
     ticks: Vec<(usize, Duration, Vec<HeldKind>)>,
     /// Places of the samples that are states after the step.
-    /// Places of the samples that are states after the step.
     after: Vec<Option<usize>>,
 }
 
@@ -192,7 +191,6 @@ impl Plan {
             match *event {
                 Event::Sample { node } => {
                     // Samples come before the ticks of a step, so that a sample after a tick begins a new step.
-                    // Samples come before the ticks of a step, so that a sample after a tick begins a new step.
                     if steps.last().is_none_or(|step| !step.ticks.is_empty()) {
                         steps.push(Step::default());
                     }
@@ -259,7 +257,6 @@ impl Plan {
     }
 
     /// Returns the matrix of a step, from the states before to the states after the step.
-    /// Returns the matrix of a step, from the states before to the states after the step.
     fn matrix(&self, step: usize, numbers: Numbers<'_>) -> StepMatrix {
         let Numbers { nodes, weights, sampling, scale, tied } = numbers;
         let channels = sampling.channels();
@@ -310,7 +307,6 @@ impl Plan {
             }
             nodes[*node].tick(&mut z, rows[*node], |row| heard.row(row), External::default(), *span, scale, &mut scratch);
         }
-        // The reference has moved during the step: positions after the step are counted from its new place.
         // The reference has moved during the step: positions after the step are counted from its new place.
         let moved = |by: f64, column: usize| reference.map_or(0.0, |reference| by * z[(reference, column)]);
         let mut matrix = Matrix::zeros(states + after.len() * channels, columns);
