@@ -1,7 +1,7 @@
-//! Certificates: the numbers by which anybody can check a proof without the program that found it.
+//! Certificates: numbers by which a proof can be checked without the program that found the proof.
 //!
-//! A certificate names the states of each part of a scene, and for each box of it, or for each span of numbers of peers, the coordinates V, the weights d and
-//! the circle of [`super::discs`]. A reader with the scene can write down its matrices and check inequality (1) there;
+//! A certificate names the states of each part of a scene. For each box, or for each span of numbers of peers, a certificate has the coordinates V, the weights
+//! d and the circle of [`super::discs`]. A reader with the scene can derive its matrices and check inequality (1) of that module, as
 //! `crates/stability/tests/reference/check_certificate.py` does.
 
 use std::fmt::Write as _;
@@ -18,14 +18,14 @@ use super::guarantee::{Guarantee, Proven};
 use super::halving::Ranges;
 use super::steps::FrameState;
 
-/// A box of keys, and the numbers by which its verdict can be checked.
+/// Box of keys, and the numbers by which the verdict on the box can be checked.
 #[derive(Clone, Debug)]
 pub struct BoxCertificate {
-    /// From which value of each key to which; and between which ends 1/(N − 1) is, where it holds for every number N of peers between them.
+    /// Least and greatest value of each key. If the verdict holds for several numbers N of peers, the least and the greatest value of 1/(N − 1) follow.
     pub ranges: Vec<[f64; 2]>,
-    /// The verdict on each scene within.
+    /// Verdict on every scene in the box.
     pub guarantee: Guarantee,
-    /// Of a stable box all parts of the motion but devices that touch nothing; of an unstable one the part that grows; else none.
+    /// Parts of the motion: for a stable box all parts but devices that touch nothing, for an unstable box one part that grows, and for an undecided box none.
     pub parts: Vec<PartCertificate>,
 }
 
@@ -35,8 +35,8 @@ impl BoxCertificate {
     }
 }
 
-/// How many boxes of an answer have a verdict and are open in its certificate, which bounds frames more widely. Both are in the same order; an open box of a
-/// certificate is a whole one of the answer.
+/// Returns the number of boxes of an answer that have a verdict and are undecided in the certificate, whose bounds of frames are wider. Certificate and answer
+/// are in the same order, and an undecided box of the certificate is a whole box of the answer.
 pub(super) fn uncertified(certificate: &[BoxCertificate], answer: impl Iterator<Item = (Ranges, Guarantee)>) -> usize {
     let mut open = certificate.iter().filter(|one| one.guarantee == Guarantee::Undecided).peekable();
     let is_open = |(ranges, guarantee): &(Ranges, Guarantee)| {
@@ -45,48 +45,48 @@ pub(super) fn uncertified(certificate: &[BoxCertificate], answer: impl Iterator<
     answer.filter(is_open).count()
 }
 
-/// Numbers of equal peers, and the numbers by which the verdict on them can be checked.
+/// Span of numbers of equal peers, and the numbers by which the verdict on the span can be checked.
 #[derive(Clone, Debug)]
 pub struct NumberCertificate {
-    /// The least.
+    /// Least number of peers.
     pub from: u64,
-    /// The greatest; `None`: all beyond.
+    /// Greatest number of peers; `None`: the span has no end.
     pub to: Option<u64>,
-    /// The verdict on each.
+    /// Verdict on every number of the span.
     pub guarantee: Guarantee,
-    /// As those of [`BoxCertificate`]; empty in the mean square.
+    /// Parts of the motion, chosen as in [`BoxCertificate`]; empty for verdicts in the mean square.
     pub parts: Vec<PartCertificate>,
-    /// In the mean square, of a stable span one for each motion; of an unstable one that which grows; else none.
+    /// Second moments for verdicts in the mean square: one per motion for a stable span, one that grows for an unstable span, otherwise none.
     pub moments: Vec<MomentCertificate>,
 }
 
-/// A second moment Y of equal peers by which (γ·Y − L(Y)) can be checked to be positive definite for all numbers of a span.
+/// Second moment Y of equal peers, for which γ·Y − L(Y) can be checked to be positive definite for all numbers of a span.
 #[derive(Clone, Debug)]
 pub struct MomentCertificate {
-    /// γ.
+    /// Factor γ: 1 for a stable span, above 1 for an unstable span.
     pub factor: f64,
-    /// What velocities are multiplied by \[s\].
+    /// Time by which velocities are multiplied \[s\].
     pub time: f64,
-    /// The gains K and B by which a sample is the one number (K·x + B·v)/(K + B/time).
+    /// Gains K and B with which a sample is the one number (K·x + B·v)/(K + B/time); `None`: a sample is a position and a velocity.
     pub heard: Option<Gains>,
-    /// How many samples of frames before take part.
+    /// Number of samples of earlier frames that are states.
     pub depth: usize,
-    /// Y of the mean over the peers, of the differences from it, and, but for two peers, of samples of which all sums are zero: row by row, in digits as those
-    /// of [`PartCertificate`].
+    /// Blocks of Y: of the mean over the peers, of the differences from the mean and, for more than two peers, of held samples whose sums are all zero. Each
+    /// block is written row by row, in digits as in [`PartCertificate`].
     pub blocks: Vec<String>,
 }
 
-/// The averaging matrix of a topology, and by what its eigenvalues can be enclosed.
+/// Averaging matrix of a topology, and approximate eigenvectors by which its eigenvalues can be enclosed.
 #[derive(Clone, PartialEq, Debug)]
 pub struct TopologyCertificate {
-    /// The weights between peers, a row a peer, where the scene reads them from a file.
+    /// Weights between peers, one row per peer, if the scene reads its topology as a graph from a file; `None` for a topology with a name.
     pub weights: Option<Vec<Vec<f64>>>,
-    /// Nearly its eigenvectors, column by column, but for that of equal entries; in digits as those of [`PartCertificate`].
+    /// Approximate eigenvectors, column by column, without the eigenvector of equal entries; in digits as in [`PartCertificate`].
     pub eigenvectors: String,
 }
 
 impl TopologyCertificate {
-    /// That of the topology of a family; `None` if everybody sends to everybody.
+    /// Returns the certificate of the topology of a family; `None` if every peer sends to every other.
     ///
     /// # Errors
     ///
@@ -103,10 +103,10 @@ impl TopologyCertificate {
     }
 }
 
-/// Parts of a scene with their verdicts, where they are asked for.
+/// Target for the certified parts of a scene and their verdicts; `None` if no certificate is asked for.
 pub(super) type Certified<'a> = Option<&'a mut Vec<(Proven, PartCertificate)>>;
 
-/// The parts that a verdict needs: all, or one that grows.
+/// Returns the parts that a verdict needs: all parts for a stable verdict, the first unstable part for an unstable verdict, otherwise none.
 pub(super) fn needed(verdict: Option<Proven>, mut parts: Vec<(Proven, PartCertificate)>) -> Vec<PartCertificate> {
     if verdict != Some(Proven::Stable) {
         parts.retain(|(of, _)| Some(*of) == verdict);
@@ -122,29 +122,30 @@ impl MomentCertificate {
     }
 }
 
-/// A part of the motion of a scene over a box: the averages of its classes of equal peers, or how the members of one of them differ.
+/// Part of the motion of a scene over a box: the averages of the classes of equal peers, or the differences between the members of one class.
 #[derive(Clone, PartialEq, Debug)]
 pub struct PartCertificate {
-    /// The members of each class, by their places in the scene.
+    /// Members of each class, as places in the scene, indexed by class.
     pub members: Vec<Vec<usize>>,
-    /// Whether it is how the members of a class differ.
+    /// Whether the part is the differences between the members of a class.
     pub is_difference: bool,
-    /// Of a part of a topology but that of 1, between which ends the eigenvalues of the averaging matrix are that it stands for.
+    /// Interval of the eigenvalues of the averaging matrix that the part stands for. `None` without a topology and for the part of the eigenvalue 1.
     pub eigenvalues: Option<[f64; 2]>,
-    /// The states, in the order of rows of the coordinates. Positions are counted from the first copy where nothing ties the scene to ground, and velocities
+    /// States in the order of the rows of the coordinates. Positions are counted from the first copy if nothing ties the scene to ground. Velocities are
     /// multiplied by `time`.
     pub states: Vec<FrameState>,
-    /// The gains K and B by which a sample is the one number (K·x + B·v)/(K + B/time); `None`: its position and its velocity.
+    /// Gains K and B with which a sample is the one number (K·x + B·v)/(K + B/time); `None`: a sample is a position and a velocity.
     pub heard: Option<Gains>,
-    /// What velocities are multiplied by \[s\].
+    /// Time by which velocities are multiplied \[s\].
     pub time: f64,
-    /// With a server or waves, what forces are multiplied by \[m/N\].
+    /// Compliance by which forces are multiplied \[m/N\], with a server or waves; otherwise `None`.
     pub compliance: Option<f64>,
-    /// V, column by column, real and imaginary part of each entry, each as sixteen hexadecimal digits of its IEEE 754 representation.
+    /// Coordinates V, column by column, with real and imaginary part of each entry. Each number is written as the sixteen hexadecimal digits of its IEEE 754
+    /// representation.
     pub coordinates: String,
-    /// d, in such digits too.
+    /// Weights d, in digits as in `coordinates`.
     pub weights: String,
-    /// The circle on which there is no eigenvalue.
+    /// Circle on which no matrix of the box has an eigenvalue.
     pub circle: FreeCircle,
 }
 
@@ -159,16 +160,16 @@ impl PartCertificate {
     }
 }
 
-/// By what the states of a frame get their names.
+/// Source of the names of the states of a frame.
 pub(super) enum Named {
-    /// The points that it was computed from.
+    /// Points from which the frame was computed.
     AtPoints(Vec<Point>),
-    /// They have them, with what forces are multiplied by.
+    /// Known names of the states, and the compliance by which forces are multiplied \[m/N\].
     Known(States, f64),
 }
 
 impl Named {
-    /// The certificate of a part with those states.
+    /// Returns the certificate of a part with these states.
     pub(super) fn certificate(
         self,
         members: Vec<Vec<usize>>,
@@ -184,7 +185,7 @@ impl Named {
     }
 }
 
-/// Each number as sixteen hexadecimal digits of its IEEE 754 representation.
+/// Writes each number as sixteen hexadecimal digits of its IEEE 754 representation, without separators.
 pub(crate) fn digits(numbers: impl Iterator<Item = f64>) -> String {
     let mut text = String::new();
     for number in numbers {

@@ -7,13 +7,14 @@
 //! |z·(WV)ᵢᵢ − (WMV)ᵢᵢ|·dᵢ > Σ_{j≠i} |z·(WV)ᵢⱼ − (WMV)ᵢⱼ|·dⱼ          for all i and s,                              (1)
 //! ```
 //!
-//! A is diagonally dominant, so that no M(s) has an eigenvalue on the circle (Gershgorin 1931; V and W need no property at all). It stays so while the entries
-//! off the diagonal shrink to zero, so that as many eigenvalues lie inside as diagonal entries do. With ρ = 1 and all of them inside, every M(s) is **stable**,
-//! and (1) holds for larger |z| too; with ρ ≥ 1 and one of them outside for all s, every M(s) is **unstable**. So it is if (1) holds on a circle around one
-//! diagonal entry that moves along with it, outside of the unit circle and away from the others.
+//! A is diagonally dominant, so that no M(s) has an eigenvalue on the circle (Gershgorin 1931; V and W need no property at all). A stays dominant while the
+//! entries off the diagonal shrink to zero, so that the number of eigenvalues inside the circle equals the number of diagonal entries inside. With ρ = 1 and
+//! all diagonal entries inside, every M(s) is **stable**; (1) then holds for larger |z| too. With ρ ≥ 1 and a diagonal entry outside for all s, every M(s) is
+//! **unstable**. Every M(s) is also **unstable** if (1) holds on a circle around one diagonal entry that moves with that entry, stays outside of the unit
+//! circle and holds no other diagonal entry.
 //!
-//! cᵢ(s) = (WMV)ᵢᵢ goes linearly with s but for a radius, so that how near it comes to the circle is known to first order; entries off the diagonal are of
-//! first order and count by the products of two. For the dᵢ are chosen as well as can be: those for which the comparison matrix of (1) times d is 1.
+//! cᵢ(s) = (WMV)ᵢᵢ is linear in s but for a radius, so that the distance of cᵢ from the circle is known to first order. Entries off the diagonal are of first
+//! order and count by products of two entries, because of the choice of dᵢ: the comparison matrix of (1) times d is a vector of ones.
 
 use cohaptic_stability::Matrix;
 use cohaptic_stability::numerics::{ComplexMatrix, gamma, outward, real};

@@ -1,4 +1,4 @@
-//! A family of scenes with open keys, and the verdict on all of them in a box of values; and for every number of equal peers too, where that is asked for.
+//! A family of scenes with open keys, and the verdict on all scenes in a box of values, optionally for every number of equal peers.
 
 use std::borrow::Cow;
 
@@ -19,33 +19,33 @@ use super::server::Server;
 use super::steps::Plans;
 use super::waves::{self, Waves};
 
-/// One motion in one combination of contacts: the classes of its peers, for all values of the keys.
+/// Motion of a piece of the scene in one combination of contacts, for all values of the keys.
 pub(super) struct Motion {
-    /// Which of the pieces of a scene it is.
+    /// Place of the piece among the pieces of a scene.
     piece: usize,
     pub(super) structure: Structure,
-    /// The class that grows, where a verdict is asked for every number of peers.
+    /// Class that grows, if a verdict for every number of peers is asked for.
     growing: Option<usize>,
-    /// How its peers act on each other.
+    /// Action of the peers of the motion on each other.
     action: Action,
-    /// Those of the averages of classes, and of the differences within each.
+    /// Plans of the averages of classes, and of the differences within each class, indexed by class.
     plans: (Plans, Vec<Plans>),
 }
 
-/// How peers act on each other.
+/// Action of peers on each other.
 enum Action {
-    /// Each follows the mean of all others.
+    /// Each peer follows the mean of all others.
     Mean,
     /// Equal peers, each of which follows the mean of its neighbours.
     Graph(EnclosedSpectrum),
-    /// As a server and its clients.
+    /// A server and its clients.
     Server(Server),
-    /// By waves over equal links.
+    /// Waves over equal links.
     Waves(Waves),
 }
 
 impl Action {
-    /// What the scene has that proofs follow for its own number of peers alone; `None` if it has no such.
+    /// Returns the feature that limits a proof to the scene's own number of peers, or `None` if a proof can cover every number.
     const fn special(&self) -> Option<&'static str> {
         match self {
             Self::Mean => None,
@@ -56,38 +56,38 @@ impl Action {
     }
 }
 
-/// A part of a motion: the averages of all classes, or how the members of one differ.
+/// Part of a motion: the averages of all classes, or the differences between the members of one class.
 struct PartOf<'a> {
     apart: Option<usize>,
     timetable: &'a Timetable,
     plans: &'a Plans,
     tied: bool,
-    /// On a graph, between which numbers the weight is with which a peer hears its own samples.
+    /// On a graph, least and greatest weight with which the node of the part hears its own samples; otherwise `None`.
     weight: Option<[f64; 2]>,
 }
 
-/// Values of a delay between which no frame differs, and its motions. Without a delay among the keys there is one stretch.
+/// Range of a delay within which all frames are equal, and the motions of the scenes in the range. Without a delay among the keys there is one stretch.
 pub(super) struct Stretch {
-    /// From which value of the delay to which.
+    /// Least and greatest value of the delay; `None` if no key is a delay.
     range: Option<[f64; 2]>,
     pub(super) motions: Vec<Motion>,
 }
 
-/// A family whose keys do nothing but set gains, masses and dampings, but for one that may be a delay, and its motions.
+/// Family whose keys set gains, masses and dampings only, except for at most one key that is a delay, and the motions of the family.
 pub(super) struct Followed<'a> {
     family: &'a Family,
-    /// The key that is a delay.
+    /// Place of the key that is a delay.
     delay: Option<usize>,
     pub(super) stretches: Vec<Stretch>,
-    /// Between which ends 1/(N − 1) is, where a verdict is asked for every number N of peers.
+    /// Least and greatest value of 1/(N − 1), if a verdict for every number N of peers is asked for.
     numbers: Option<[f64; 2]>,
 }
 
-/// Where one box of numbers of peers decides nothing, it is halved this number of times at most.
+/// Largest number of halvings of the range of 1/(N − 1) in a box that stays undecided.
 const HALVINGS: u32 = 3;
 
 impl<'a> Followed<'a> {
-    /// `every`: from which number of equal peers on, and to which, a verdict shall hold; `None`: for the number that the scene has.
+    /// Prepares the proofs of a family. `every`: first and last number of peers for which verdicts shall hold; `None`: the number that the scene has.
     pub(super) fn new(family: &'a Family, every: Option<(u64, Option<u64>)>) -> Result<Self, ProofError> {
         let keys = family.keys();
         let mut unlearned = (0..keys.len()).filter(|key| !family.learned()[*key]);
@@ -123,7 +123,7 @@ impl<'a> Followed<'a> {
         Ok(Self { family, delay, stretches: found.into_iter().map(stretch).collect::<Result<_, _>>()?, numbers })
     }
 
-    /// The boxes of values with which a proof begins: a key that is a delay is divided into stretches.
+    /// Returns the boxes of values with which a proof begins: one box per stretch of the delay, otherwise one box.
     pub(super) fn beginnings(&self) -> Vec<Vec<[f64; 2]>> {
         let whole: Vec<[f64; 2]> = self.family.keys().iter().map(|key| [key.low, key.high]).collect();
         let of = |stretch: &Stretch| {
@@ -136,12 +136,12 @@ impl<'a> Followed<'a> {
         self.stretches.iter().map(of).collect()
     }
 
-    /// The key that is a delay, which is not divided further.
+    /// Returns the place of the key that is a delay, whose stretches are not divided further.
     pub(super) fn delay(&self) -> Option<usize> {
         self.delay
     }
 
-    /// What all scenes of a box have in common, from one value to another of each key, if that is proven.
+    /// Returns the proven verdict on all scenes of a box, or `None` if the box is undecided. `ranges`: least and greatest value of each key.
     pub(super) fn decide(&self, ranges: &[[f64; 2]]) -> Result<Option<Proven>, ProofError> {
         match self.numbers {
             None => self.decide_at(ranges, None, None),
@@ -149,7 +149,7 @@ impl<'a> Followed<'a> {
         }
     }
 
-    /// The verdict on a box with all by which it can be checked, in one piece or one for each part of the numbers of peers; nothing if there is none.
+    /// Returns the certificates of a box: one, or one per part of the numbers of peers; none if the box is undecided.
     pub(super) fn certify(&self, ranges: &[[f64; 2]]) -> Result<Vec<BoxCertificate>, ProofError> {
         let mut found = Vec::new();
         let Some(numbers) = self.numbers else {
@@ -164,13 +164,14 @@ impl<'a> Followed<'a> {
         Ok(found)
     }
 
-    /// A box with all numbers of peers for which none is decided.
+    /// Returns the certificate of an undecided box, for all numbers of peers.
     fn open(&self, mut ranges: Vec<[f64; 2]>) -> BoxCertificate {
         ranges.extend(self.numbers);
         BoxCertificate { ranges, guarantee: Guarantee::Undecided, parts: Vec::new() }
     }
 
-    /// The verdict that holds between two ends of 1/(N − 1).
+    /// Returns the verdict that holds for all values of 1/(N − 1) from `low` to `high`. An undecided range is halved up to `halvings` times, and both halves
+    /// must agree.
     fn decide_over(
         &self,
         ranges: &[[f64; 2]],
@@ -207,7 +208,7 @@ impl<'a> Followed<'a> {
         for motion in &self.stretches[stretch].motions {
             let scenes: Vec<&Scene> = all.iter().filter_map(|pieces| pieces.get(motion.piece)).map(|piece| &*piece.scene).collect();
             match motion.decide(&scenes, numbers, certified.as_deref_mut())? {
-                // One motion that grows is enough.
+                // One unstable motion makes the whole scene unstable.
                 Some(Proven::Unstable) => return Ok(Some(Proven::Unstable)),
                 Some(Proven::Stable) => {}
                 None => proven = None,
@@ -217,14 +218,14 @@ impl<'a> Followed<'a> {
     }
 }
 
-/// The motions of a family for one value of its delay, if it has one.
+/// Returns the motions of a family. `delayed`: the place of the key that is a delay, and its value.
 fn motions(family: &Family, delayed: Option<(usize, f64)>, every: Option<(u64, Option<u64>)>) -> Result<Vec<Motion>, ProofError> {
     let keys = family.keys();
     let at = |value: &dyn Fn(usize) -> f64| {
         let of = |key: usize| delayed.filter(|(place, _)| *place == key).map_or_else(|| value(key), |(_, delay)| delay);
         family.scene(&(0..keys.len()).map(of).collect::<Vec<f64>>())
     };
-    // Values inside tell peers apart that are equal by chance at an end.
+    // A scene inside the ranges separates peers that are equal by coincidence at an end of the ranges.
     let scenes = [at(&|key| keys[key].odd(key))?, at(&|key| keys[key].low)?, at(&|key| keys[key].high)?];
     scenes.iter().try_for_each(refuse)?;
     let graph = scenes[0].topology.as_ref().map(|topology| Graph::from(&**topology));
@@ -258,12 +259,12 @@ fn motions(family: &Family, delayed: Option<(usize, f64)>, every: Option<(u64, O
     Ok(motions)
 }
 
-/// The scene as if every peer heard every other, whose peers an averaging matrix of the graph puts together.
+/// Returns the scene without its topology, as if every peer heard every other. The averaging matrix of the graph replaces the topology.
 fn mutual(scene: &Scene) -> Cow<'_, Scene> {
     if scene.topology.is_some() { Cow::Owned(scene.without_topology()) } else { Cow::Borrowed(scene) }
 }
 
-/// The spectrum of a graph of the peers of scenes, which have to be equal.
+/// Returns the enclosed spectrum of a graph, whose peers must all be equal.
 fn on_graph(graph: &Graph, scenes: &[&Scene], structure: &Structure) -> Result<EnclosedSpectrum, AnalysisError> {
     if let Some(other) = structure.classes.get(1) {
         return Err(on_this_topology(GraphError::Unequal { peer: scenes[0].peers[other[0]].name.clone() }));
@@ -273,7 +274,7 @@ fn on_graph(graph: &Graph, scenes: &[&Scene], structure: &Structure) -> Result<E
     Ok(spectrum)
 }
 
-/// The class that grows, if nothing but the weights depends on how many peers there are.
+/// Returns the class that grows, if only the weights depend on the number of peers.
 fn growing(structure: &Structure, scenes: &[&Scene], from: u64) -> Result<usize, ProofError> {
     let growing = structure.largest_equal().ok_or(ProofError::Unequal)?;
     let least = (structure.peers - structure.classes[growing].len() + 2) as u64;
@@ -285,7 +286,7 @@ fn growing(structure: &Structure, scenes: &[&Scene], from: u64) -> Result<usize,
     if scenes.iter().all(is_same) { Ok(growing) } else { Err(ProofError::Scaled) }
 }
 
-/// Boxes of a family with all by which their verdicts can be checked. A box is an operation of the watch, which may end it.
+/// Returns the certificates of boxes of a family, in the order of the boxes. A box is an operation of the watch, which may end the certification.
 pub(super) fn certify(
     family: &Family,
     every: Option<(u64, Option<u64>)>,
@@ -306,7 +307,7 @@ pub(super) fn certify(
 }
 
 impl Motion {
-    /// The nodes of all classes.
+    /// Returns the node of each class.
     fn nodes(&self, scene: &Scene) -> Result<Vec<Node>, ProofError> {
         match &self.action {
             Action::Mean => Ok(self.structure.nodes(scene)),
@@ -316,8 +317,8 @@ impl Motion {
         }
     }
 
-    /// The verdict on the motion between scenes, the corners of a box, and the certificates of its parts where they are asked for. `numbers`: between which
-    /// ends 1/(N − 1) is.
+    /// Returns the verdict on the motion over a box, whose corners are `scenes`, and adds the certificates of its parts to `certified`. `numbers`: least and
+    /// greatest value of 1/(N − 1).
     fn decide(&self, scenes: &[&Scene], numbers: Option<[f64; 2]>, mut certified: Certified<'_>) -> Result<Option<Proven>, ProofError> {
         let structure = &self.structure;
         let nodes = scenes.iter().map(|scene| self.nodes(scene)).collect::<Result<Vec<_>, _>>()?;
@@ -368,7 +369,7 @@ impl Motion {
         Ok(proven)
     }
 
-    /// The parts of the motion but for devices that touch nothing.
+    /// Returns the parts of the motion without devices that touch nothing.
     fn parts(&self) -> Vec<PartOf<'_>> {
         let structure = &self.structure;
         let mut parts = Vec::new();
@@ -401,8 +402,8 @@ impl Motion {
         parts
     }
 
-    /// The corners of a box, for the averages of classes or for differences within one. Weights are affine in 1/(N − 1), which is one number more unless they
-    /// stay.
+    /// Returns the corners of a box for a part of the motion. Weights are affine in 1/(N − 1), which is one more number of the box unless the weights are
+    /// constant.
     fn points(&self, ends: &[Vec<Node>], numbers: Option<[f64; 2]>, part: &PartOf<'_>) -> Vec<Point> {
         let (structure, apart) = (&self.structure, part.apart);
         if let Some([low, high]) = part.weight {
@@ -427,7 +428,7 @@ impl Motion {
     }
 }
 
-/// Refuses scenes of which a deterministic frame is not all.
+/// Refuses scenes with chance, whose frames are not deterministic.
 fn refuse(scene: &Scene) -> Result<(), ProofError> {
     if has_chance(scene) { Err(ProofError::Chance) } else { Ok(()) }
 }

@@ -1,8 +1,9 @@
-//! Frames of a server and its clients, which send each other more than the states of copies.
+//! Frames of a server and its clients, whose samples carry more than the states of copies.
 //!
-//! As for other laws, averages of classes of equal peers and differences within a class do not mix. The server is a class of its own. Clients send it the
-//! states of their devices, and get the forces of their couplings or the object; a client has no copy. Of differences within a class of clients the server
-//! feels nothing, and they nothing of the object. Forces are counted as lengths: multiplied by the compliance of the object.
+//! As for other laws, averages of classes of equal peers and differences within a class do not mix. The server is a class of its own. Clients send the states
+//! of their devices to the server and receive the forces of their couplings or the state of the object; a client has no copy. The server feels nothing of
+//! differences within a class of clients, and these differences feel nothing of the object. Forces are multiplied by the compliance of the object, so that
+//! registers hold lengths.
 
 use std::time::Duration;
 
@@ -19,21 +20,21 @@ use super::heard::Heard;
 use super::program::{NamedFrame, Operation, Program, Register, Sum};
 use super::pushed::{Pushed, StateRegisters, coupling, device, moved, negative, state};
 
-/// The coordination of a server with its clients.
+/// Coordination of a server with its clients.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Server {
-    /// Its class.
+    /// Class of the server.
     class: usize,
-    /// Whether clients hear the forces of their couplings, and not the object.
+    /// Whether clients receive the forces of their couplings, instead of the state of the object.
     returns_forces: bool,
 }
 
-/// The place of the parameter `returns`, and that of its word `force`.
+/// Place of the parameter `returns` among the parameters of the coordination; `FORCE` is the place of the word `force` among its words.
 const RETURNS: usize = 1;
 const FORCE: usize = 0;
 
 impl Server {
-    /// The server of scenes that differ in numbers only, and the classes of their peers; `None` if they have none.
+    /// Returns the server of scenes that differ in numbers only, and the classes of the peers of these scenes; `None` if the scenes have no server.
     pub(super) fn structure(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts) -> Result<Option<(Structure, Self)>, ProofError> {
         let coordination = &scenes[0].coordination;
         if coordination.strategy != Coordination::ClientServer {
@@ -49,37 +50,38 @@ impl Server {
         Ok(Some((structure, Self { class, returns_forces: matches!(returns, LawValue::Word(FORCE)) })))
     }
 
-    /// The nodes of all classes.
+    /// Returns the node of each class.
     pub(super) fn nodes(self, structure: &Structure, scene: &Scene) -> Vec<Node> {
         let mut nodes: Vec<Node> = (0..structure.classes.len()).map(|class| structure.node_with(scene, class, LinearLaw::none())).collect();
-        // A client has no copy of its own: the unit of forces is that of the object.
+        // A client has no copy of its own. Its node gets the object of the server, so that all nodes have the same compliance as the unit of forces.
         let object = nodes[self.class].object;
         nodes.iter_mut().for_each(|node| node.object = object);
         nodes
     }
 
-    /// Whether the members of a class can differ in a way that a device feels.
+    /// Returns whether the members of a class can differ in a way that a device feels.
     pub(super) fn has_differences(structure: &Structure, class: usize) -> bool {
         structure.classes[class].len() > 1 && structure.touching[class]
     }
 
-    /// A frame over a box, of the averages of classes or of how the members of one differ. `ends`: the nodes of that part at the corners of the box.
+    /// Returns a frame over a box, of the averages of classes or of the differences between the members of the class `apart`. `ends`: the nodes of that part at
+    /// the corners of the box.
     pub(super) fn frame(self, structure: &Structure, ends: &[Vec<Node>], apart: Option<usize>, time: f64) -> Result<NamedFrame, ProofError> {
-        // Of each class, how many members send to the server.
+        // Number of members of each class, all of which send to the server.
         let sizes = Matrix::from_fn(1, structure.classes.len(), |_, class| real(structure.classes[class].len()));
         let points: Vec<Point> = ends.iter().map(|nodes| Point { nodes: nodes.clone(), weights: sizes.clone() }).collect();
         let scale = Scale { time, compliance: ends[0][0].compliance(time) };
         let heard = Heard::new(&structure.timetable);
         let program = |point: &Point| {
             let frame = Frame { server: self, apart, point, scale, heard: &heard };
-            // Of differences there is nothing that all have in common.
+            // Differences contain no common motion of all bodies, so that no position serves as a reference.
             frame.program(&structure.timetable, structure.tied || apart.is_some())
         };
         NamedFrame::of(&points, ends, apart, scale, program)
     }
 }
 
-/// A frame of a part of a scene with the numbers of a point: nodes of all classes, or of the one whose members differ.
+/// Frame of a part of a scene at a point, whose nodes are those of all classes, or the node of the class whose members differ.
 struct Frame<'a> {
     server: Server,
     apart: Option<usize>,
@@ -92,7 +94,7 @@ impl Frame<'_> {
     fn program(&self, timetable: &Timetable, tied: bool) -> Program {
         let classes = timetable.sent.len();
         let (mut ticks, mut sent) = (vec![0_i64; classes], vec![0_i64; classes]);
-        // Samples, and ticks of one instant, are a step each.
+        // Consecutive samples form a step, and so do the ticks of one instant. The key of a step is the instant of its ticks, or `None` for samples.
         let mut steps: Vec<(Option<u64>, Vec<Operation>)> = Vec::new();
         for event in &timetable.events {
             let (at, operations) = match *event {
@@ -118,7 +120,7 @@ impl Frame<'_> {
         Program { steps, sent: timetable.sent.clone(), references: vec![(!tied).then_some(object); classes] }
     }
 
-    /// The node of a class; `None` if it has no part in a difference.
+    /// Returns the node of a class; `None` if the part is the differences of another class.
     fn node(&self, class: usize) -> Option<&Node> {
         match self.apart {
             None => self.point.nodes.get(class),
@@ -126,23 +128,23 @@ impl Frame<'_> {
         }
     }
 
-    /// The node of a class whose device is held to the object.
+    /// Returns the node of a class whose device is coupled to the object; `None` if the device touches nothing.
     fn touching(&self, class: usize) -> Option<&Node> {
         self.node(class).filter(|node| node.device.is_some())
     }
 
-    /// The object, if it has a part here.
+    /// Returns the registers of the object, which is the copy of the server; `None` for differences of clients.
     fn object(&self) -> Option<StateRegisters> {
         let class = self.server.class;
         self.node(class).map(|_| state(|velocity| Register::Body { class, of_copy: true, velocity }))
     }
 
-    /// The state that one class holds of another at a tick of its own.
+    /// Returns the sampled state of `from` that `to` holds at a tick of `to`; `None` if no sample ever arrives.
     fn held(&self, from: usize, to: usize, tick: i64) -> Option<StateRegisters> {
         self.heard.at(from, to, tick).map(|number| state(|velocity| Register::Sample { class: from, number, velocity }))
     }
 
-    /// A sample of a class, taken before its tick of that number.
+    /// Returns the operation that takes sample `number` of a class, before the tick of the class with the number `tick`.
     fn sample(&self, class: usize, number: i64, tick: i64) -> Operation {
         let Server { class: server, returns_forces } = self.server;
         let of = |bodies: StateRegisters| -> Operation {
@@ -157,7 +159,7 @@ impl Frame<'_> {
         }
         let returned = |client: usize| {
             let node = self.touching(client).filter(|_| client != server)?;
-            // By what was held before this instant: deliveries count for its tick.
+            // The force uses the sample that was held at the tick before: a delivery at the instant of the sample counts from the next tick on.
             let force = self.coupling(node.coupling, self.held(client, server, tick - 1), self.object());
             Some((Register::Returned { server, class: client, number }, force))
         };
@@ -171,7 +173,7 @@ impl Frame<'_> {
     fn tick(&self, class: usize, tick: i64, span: Duration) -> Vec<Operation> {
         let Some(node) = self.node(class) else { return Vec::new() };
         let Server { class: server, returns_forces } = self.server;
-        // The force of its coupling on the object.
+        // Force of the coupling of this class on the object.
         let coupling = self.touching(class).map(|_| {
             if class == server {
                 self.coupling(node.coupling, Some(device(class)), self.object())
