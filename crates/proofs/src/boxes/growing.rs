@@ -1,6 +1,6 @@
-//! A scene with more and more equal peers, and the verdict on all numbers of them from one to another.
+//! A scene whose largest class of equal peers grows, and the verdict on all numbers N of peers in a span.
 //!
-//! Averages of classes and differences within one do not mix (`structure`), and only numbers in them depend on N: the mass of a copy, m or m/N; gains,
+//! Averages of classes and differences within a class do not mix (`structure`), and only numbers in them depend on N: the mass of a copy, m or m/N; gains,
 //! multiplied by 1, 2/N, N − 1, 4(N − 1)/N² or 4(N − 1)²/N²; and the weights. Of F peers in the other classes, with ν = 1/(N − 1), a class of n is heard with
 //! weight nν, itself with (n − 1)ν, and the growing one with 1 − (F − 1)ν, itself with 1 − Fν; differences hear themselves with −ν. So what a gain hears is
 //! that gain times a constant, and that gain times ν times another. Each of these factors is monotone in N from 2 on, so that those of the ends of a span of
@@ -28,40 +28,40 @@ use super::span::FrameSpan;
 use super::steps::Plans;
 use super::waves::{self, Part, Waves};
 
-/// As good as without end: a weight of 1/(N − 1) is below a rounding.
+/// Number of peers that stands for a span without end: the weight 1/(N − 1) is below a rounding there.
 pub(super) const ENDLESS: u64 = 1 << 53;
 
-/// Where a verdict is to be checked, radii are this number of times as wide: the checker encloses with wider intervals than the prover.
+/// Factor by which radii are widened for a certificate, since the checker encloses with wider intervals than the prover.
 pub(super) const WIDER: f64 = 8.0;
 
-/// A motion of the scene, in one combination of contacts: its classes, of which one grows.
+/// Motion of the scene in one combination of contacts, with one class that grows.
 #[derive(Debug)]
 pub(super) struct Motion {
     pub(super) scene: Scene,
     pub(super) structure: Structure,
     /// The class that grows.
     growing: usize,
-    /// Whether forces are counted in newtons over N.
+    /// Whether forces are counted in newtons divided by N.
     divides_forces: bool,
-    /// Those of the averages of classes, and of the differences within each.
+    /// Plans of the averages of classes, and of the differences within each class, indexed by class.
     plans: (Plans, Vec<Plans>),
-    /// If waves tie its copies.
+    /// Waves that tie the copies, if the coordination has waves.
     waves: Option<Waves>,
 }
 
-/// A scene of which the largest class of equal peers grows.
+/// Scene whose largest class of equal peers grows.
 #[derive(Debug)]
 pub(super) struct Growing {
     pub(super) motions: Vec<Motion>,
     /// The first peer of the class that grows.
     pub(super) first: usize,
-    /// The least number of peers of which one is of the class that grows.
+    /// Least number of peers that leaves one peer in the class that grows.
     pub(super) least: u64,
-    /// The place of the part that was last proven unstable.
+    /// Place of the part that was last proven unstable, which is tried first for other numbers.
     grown: AtomicUsize,
 }
 
-/// A part by the place of its motion: the averages of all classes, or how the members of one differ.
+/// Part of the motion: the place of its motion, and the class whose members differ, or `None` for the averages of all classes.
 pub(super) type PartPlace = (usize, Option<usize>);
 
 impl Growing {
@@ -69,7 +69,7 @@ impl Growing {
         let all = pieces(scene, "the proof for every number of peers")?;
         let (mut motions, mut least, mut first) = (Vec::new(), 2, 0);
         let pairs = pairs(&all, &mut false)?;
-        // A frame of clocks that drift has very many events: it is not made for a refusal.
+        // Refusals come before any frame is made, because a frame of clocks that drift has very many events.
         for (piece, combination) in &pairs {
             if !Waves::tie(&piece.scene) {
                 check_laws(&piece.scene)?;
@@ -85,7 +85,7 @@ impl Growing {
             };
             let growing = structure.largest_equal().ok_or(ProofError::Unequal)?;
             for class in 0..structure.classes.len() {
-                // It does not depend on N.
+                // The motion of a device that touches nothing does not depend on N.
                 if alone(&structure, &piece.scene, class, 1).is_some_and(|(part, _)| part.radius.verdict() != Verdict::Stable) {
                     return Err(ProofError::Loose { peer: scene.peers[structure.classes[class][0]].name.clone() });
                 }
@@ -100,13 +100,13 @@ impl Growing {
         Ok(Self { motions, first, least: least as u64, grown: AtomicUsize::new(0) })
     }
 
-    /// Whether waves tie its copies.
+    /// Returns whether waves tie the copies of any motion.
     pub(super) fn has_waves(&self) -> bool {
         self.motions.iter().any(|motion| motion.waves.is_some())
     }
 
-    /// What every number of peers from `low` to `high` has in common, if that is proven, and the certificates of its parts where they are asked for. Parts that
-    /// are `stable` for all of these numbers are passed over, and those found are added.
+    /// Returns the proven verdict on every number of peers from `low` to `high`, or `None`, and adds the certificates of the parts to `certified`. The parts in
+    /// `stable` are known to be stable for all of these numbers and are skipped; parts that are proven stable here are added to `stable`.
     pub(super) fn decide(
         &self,
         low: u64,
@@ -115,7 +115,7 @@ impl Growing {
         mut certified: Certified<'_>,
     ) -> Result<Option<Proven>, ProofError> {
         let parts = self.parts(low);
-        // That which made other numbers unstable comes first; the verdict is that of any order.
+        // The part that made other numbers unstable comes first. The order does not change the verdict.
         let grown = self.grown.load(Ordering::Relaxed).min(parts.len() - 1);
         let mut all = Some(Proven::Stable);
         for (place, part) in parts.iter().enumerate().cycle().skip(grown).take(parts.len()) {
@@ -123,7 +123,7 @@ impl Growing {
                 continue;
             }
             match self.motions[part.0].decide(low, high, part.1, certified.as_deref_mut())? {
-                // One part that grows is enough.
+                // One unstable part makes the whole motion unstable.
                 Some(Proven::Unstable) => {
                     self.grown.store(place, Ordering::Relaxed);
                     return Ok(Some(Proven::Unstable));
@@ -135,7 +135,7 @@ impl Growing {
         Ok(all)
     }
 
-    /// The parts of the motion of that number of peers.
+    /// Returns the parts of all motions for a number of peers.
     fn parts(&self, number: u64) -> Vec<PartPlace> {
         let parts_of = |motion: &'_ Motion| {
             let has_differences = |class: &usize| motion.structure.apart[*class].is_some() && (*class != motion.growing || motion.size(number) > 1);
@@ -144,8 +144,8 @@ impl Growing {
         self.motions.iter().enumerate().flat_map(|(place, motion)| parts_of(motion).into_iter().map(move |part| (place, part))).collect()
     }
 
-    /// Of a frame of that number of peers, of all parts that are not proven stable, the size of the largest eigenvalue, nearly, and the largest bound of an
-    /// entry; `None` if all are.
+    /// Returns the approximate modulus of the largest eigenvalue and the largest bound of an entry, over all parts that are not proven stable for a number of
+    /// peers; `None` if all parts are proven stable.
     pub(super) fn nearness(&self, number: u64) -> Result<Option<[f64; 2]>, ProofError> {
         let mut found: Option<[f64; 2]> = None;
         for (motion, part) in self.parts(number) {
@@ -159,7 +159,7 @@ impl Growing {
         Ok(found)
     }
 
-    /// Whether all numbers of peers from one on are proven unstable, where something grows without a limit.
+    /// Returns whether all numbers of peers from `from` on are proven unstable, where a number of the scene grows without a limit.
     pub(super) fn is_unstable_beyond(&self, from: u64) -> Result<bool, ProofError> {
         for motion in &self.motions {
             let parts =
@@ -173,7 +173,7 @@ impl Growing {
         Ok(false)
     }
 
-    /// The number of a node that has no limit as N grows, in words.
+    /// Returns the number of a node that has no limit as N grows, in words; `None` if all numbers have limits.
     pub(super) fn without_limit(&self) -> Result<Option<String>, ProofError> {
         for motion in &self.motions {
             let [far, near] = [ENDLESS, ENDLESS / 2].map(|number| motion.scaled(number).swap_remove(motion.growing));
@@ -194,12 +194,12 @@ impl Growing {
     }
 }
 
-/// The larger of two numbers, or NaN if one is.
+/// Returns the larger of two numbers, or NaN if one of them is NaN.
 fn larger(one: f64, other: f64) -> f64 {
     if other > one || other.is_nan() { other } else { one }
 }
 
-/// A body that a force moves less by this factor.
+/// Returns the body with the effects of a force divided by a factor.
 fn heavier(body: &Body, by: f64) -> Body {
     let of = |map: StepMap| {
         let (e, g) = map.coefficients();
@@ -208,7 +208,7 @@ fn heavier(body: &Body, by: f64) -> Body {
     body.only_map().map_or(*body, |map| body.with_map(of(map)))
 }
 
-/// By what a force changes the velocity of a copy in a tick; `None` where its ticks differ.
+/// Returns the effect of a force on the velocity of the copy in a tick; `None` if the ticks of the copy differ in length.
 fn force(node: &Node) -> Option<f64> {
     node.object.only_map().map(|map| map.coefficients().1[1])
 }
@@ -230,13 +230,13 @@ fn differs(far: f64, near: f64) -> bool {
 }
 
 impl Motion {
-    /// The nodes of all classes, with forces in newtons.
+    /// Returns the node of each class for a number of peers, with forces in newtons.
     fn scaled(&self, number: u64) -> Vec<Node> {
         let scene = self.scene.scaled_for(usize::try_from(number).unwrap_or(usize::MAX));
         if self.waves.is_some() { Waves::nodes(&self.structure, &scene) } else { self.structure.nodes(&scene) }
     }
 
-    /// The nodes of all classes.
+    /// Returns the node of each class for a number of peers, with forces in newtons or in newtons divided by N.
     fn nodes(&self, number: u64) -> Vec<Node> {
         let nodes = self.scaled(number);
         if !self.divides_forces {
@@ -257,12 +257,12 @@ impl Motion {
         nodes.into_iter().zip(halves).map(divided).collect()
     }
 
-    /// What velocities are multiplied by \[s\].
+    /// Returns the time by which velocities are multiplied for a number of peers \[s\].
     pub(super) fn time(&self, number: u64) -> f64 {
         self.structure.time(&self.scene.scaled_for(usize::try_from(number).unwrap_or(usize::MAX)), &self.scaled(number))
     }
 
-    /// Whether a copy moves by N times a force, and N times all gains have limits.
+    /// Returns whether a force moves a copy in proportion to N, and N times all gains have limits.
     fn has_limits_of_divided_forces(&self) -> bool {
         let [two, near, far] = [2, ENDLESS / 2, ENDLESS].map(|number| self.scaled(number));
         let free = |node: &Node| node.object.only_map().map(|map| map.coefficients().0);
@@ -274,12 +274,12 @@ impl Motion {
         })
     }
 
-    /// How many members the class that grows has among that number of peers.
+    /// Returns the number of members of the class that grows, for a number of peers.
     fn size(&self, number: u64) -> u64 {
         number.saturating_sub((self.structure.peers - self.structure.classes[self.growing].len()) as u64)
     }
 
-    /// The nodes of all classes, or that of one.
+    /// Returns the node of each class, or only the node of the class `apart`.
     pub(super) fn part(&self, number: u64, apart: Option<usize>) -> Vec<Node> {
         let nodes = self.nodes(number);
         apart.map_or_else(|| nodes.clone(), |class| vec![nodes[class].clone()])
@@ -290,7 +290,7 @@ impl Motion {
         if self.waves.is_some() && apart.is_none() { waves::with_shares(&weights, &self.shares(nu)) } else { weights }
     }
 
-    /// How large each class is beside the one that grows; of itself it does not matter.
+    /// Returns the size of each class relative to the class that grows, whose own entry is 1 and is not used.
     fn shares(&self, nu: f64) -> Vec<f64> {
         let classes = &self.structure.classes;
         let others = real(self.structure.peers - classes[self.growing].len());
@@ -299,7 +299,7 @@ impl Motion {
             .collect()
     }
 
-    /// The frame of the waves of the averages of all classes, or of how the members of one differ, whose nodes are those at both ends.
+    /// Returns the frame of waves of a part, whose nodes are `ends` at both ends of the span of numbers.
     fn frame_of_waves(
         &self,
         waves: &Waves,
@@ -309,7 +309,7 @@ impl Motion {
         apart: Option<usize>,
     ) -> Result<NamedFrame, ProofError> {
         let mut points = points;
-        // Of one other peer they are as affine in ν as the weights are.
+        // With a single other peer the shares are affine in ν, as the weights are. Otherwise the shares are one more number of the box.
         if apart.is_none() && self.structure.peers - self.structure.classes[self.growing].len() > 1 {
             let shares = [low, high].map(|number| self.shares(nu(number)));
             points =
@@ -325,8 +325,8 @@ impl Motion {
         Common { timetable, plans, tied: apart.is_some() || self.structure.tied, time }
     }
 
-    /// The corners of a box: from nodes on, with ν times the gains at each end, and laws and couplings that go from those of `near` to those of `end`. A law
-    /// that is none of the box's numbers stays as it is.
+    /// Returns the corners of a box, beginning with `nodes`. `heard` is ν times the gain at both ends. Couplings vary from those of `near` to those of `end`,
+    /// and laws vary likewise if `varies`; otherwise laws stay.
     pub(super) fn corners(&self, nodes: Vec<Node>, [near, end]: [&[Node]; 2], heard: [f64; 2], varies: bool, apart: Option<usize>) -> Vec<Point> {
         let differ = |of: &dyn Fn(&Node, &Node) -> bool| near.iter().zip(end).any(|(near, end)| of(near, end));
         let with = |point: &Point, change: &dyn Fn(&Node, &mut Node)| {
@@ -338,7 +338,7 @@ impl Motion {
         if varies && differ(&|near, end| near.law != end.law) {
             points = doubled(&points, |point, upper| if upper { with(point, &|end, node| node.law = end.law.clone()) } else { point.clone() });
         }
-        // ν times the gains is a number of its own beside the gains.
+        // The product of ν and the gains is a number of its own in addition to the gains, which keeps the step affine in each number.
         if self.weights(0.0, apart) != self.weights(1.0, apart) {
             let hears = |point: &Point, heard: f64| Point { weights: self.weights(heard / gain(&point.nodes[0]), apart), ..point.clone() };
             points = if heard[0].to_bits() == heard[1].to_bits() {
@@ -353,9 +353,9 @@ impl Motion {
         points
     }
 
-    /// Whether all numbers of peers from one on are proven unstable in a part of which the gains of the law or the effects of a force on the copies grow with
-    /// N, or both, and nothing else changes but towards a limit. A frame divided by N/N₀ a step, or by its square, is one of a box then, and an unstable one is
-    /// so without the division.
+    /// Returns whether a part is proven unstable for all numbers of peers from `from` on. In the part the gains of the law or the effects of a force on the
+    /// copies, or both, grow with N, and all other numbers have limits. Each step divided by N/N₀, or by its square, then lies in a box. A frame that is
+    /// unstable after this division by at least 1 is unstable without the division too.
     fn is_unstable_beyond(&self, from: u64, apart: Option<usize>) -> Result<bool, ProofError> {
         if self.waves.is_some() {
             return Ok(false);
@@ -390,7 +390,7 @@ impl Motion {
         Ok(decide(&span).is_some_and(|decision| decision.proven == Proven::Unstable))
     }
 
-    /// The frame of the averages of all classes, or of how the members of one differ; and what velocities are multiplied by in it \[s\].
+    /// Returns the frame of a part over a span of numbers, the source of the names of its states, and the time by which velocities are multiplied \[s\].
     fn frame(&self, [low, high]: [u64; 2], apart: Option<usize>) -> Result<(FrameSpan, Named, f64), ProofError> {
         let ends = [low, high].map(|number| self.part(number, apart));
         let [first, last] = ends.each_ref().map(Vec::as_slice);
@@ -404,7 +404,7 @@ impl Motion {
         Ok((frame, named, time))
     }
 
-    /// The verdict on the averages of all classes, or on how the members of one differ.
+    /// Returns the verdict on a part for all numbers from `low` to `high`, and adds its certificate to `certified`.
     fn decide(&self, low: u64, high: u64, apart: Option<usize>, certified: Certified<'_>) -> Result<Option<Proven>, ProofError> {
         let (frame, named, time) = self.frame([low, high], apart)?;
         let span = match certified {
@@ -422,13 +422,13 @@ impl Motion {
     }
 }
 
-/// Plans, not yet made, of the averages of classes, and of the differences within each.
+/// Returns empty plans for the averages of classes, and for the differences within each class, indexed by class.
 pub(super) fn plans_of(structure: &Structure) -> (Plans, Vec<Plans>) {
     (Plans::default(), structure.classes.iter().map(|_| Plans::default()).collect())
 }
 
-/// The weights of the averages of classes (columns) in the targets of classes (rows), of which one grows, or the weight of a difference in itself: constants,
-/// and multiples of ν.
+/// Returns the weights of the averages of classes (columns) in the targets of classes (rows), of which one grows, or the weight of a difference in its own
+/// target. Each weight is a constant plus a multiple of ν.
 pub(super) fn weights_of_growing(structure: &Structure, growing: usize, nu: f64, is_difference: bool) -> Matrix {
     let classes = &structure.classes;
     let others = real(structure.peers - classes[growing].len());
@@ -444,13 +444,13 @@ pub(super) fn weights_of_growing(structure: &Structure, growing: usize, nu: f64,
     })
 }
 
-/// A gain of the law that is not zero, if there is one: all of them are multiples of the same function of N.
+/// Returns a gain of the law that is not zero, or 1 if all are zero. One gain represents all, since all gains are multiples of the same function of N.
 fn gain(node: &Node) -> f64 {
     let gains = node.law.rows().flat_map(|row| [row.own.stiffness, row.own.damping, row.past.stiffness, row.past.damping]);
     gains.into_iter().find(|gain| *gain != 0.0).unwrap_or(1.0)
 }
 
-/// ν.
+/// Returns ν = 1/(N − 1) for a number N of peers.
 pub(super) fn nu(number: u64) -> f64 {
     1.0 / (count_of(number) - 1.0)
 }

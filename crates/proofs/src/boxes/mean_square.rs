@@ -31,7 +31,7 @@ use super::guarantee::Proven;
 use super::span::StepSpan;
 use super::steps::{StepMatrix, error};
 
-/// The second moments of a scene with more and more equal peers.
+/// Second moments of a scene whose largest class of equal peers grows.
 pub(super) struct GrowingMoments<'a> {
     motions: Vec<(&'a Motion, Independent)>,
 }
@@ -48,7 +48,8 @@ impl<'a> GrowingMoments<'a> {
         Ok(Self { motions: growing.motions.iter().map(of).collect::<Result<_, _>>()? })
     }
 
-    /// What every number of peers from `low` to `high` has in common, if that is proven. Two peers have fewer kinds of motion, and are no end of a span.
+    /// Returns the proven verdict on every number of peers from `low` to `high`, or `None`. Two peers have fewer kinds of motion, and are never the end of a
+    /// longer span.
     pub(super) fn decide(&self, low: u64, high: u64) -> Result<Option<Proven>, ProofError> {
         let mut all = Some(Proven::Stable);
         for (motion, independent) in &self.motions {
@@ -66,7 +67,7 @@ impl<'a> GrowingMoments<'a> {
         Ok(all)
     }
 
-    /// The verdict on those numbers with all by which it can be checked; `None` if there is none.
+    /// Returns the verdict on the numbers from `low` to `high` with the second moments by which the verdict can be checked; `None` if no verdict is proven.
     pub(super) fn certify(&self, low: u64, high: u64) -> Result<Option<(Proven, Vec<MomentCertificate>)>, ProofError> {
         let mut all = Vec::new();
         let mut is_decided = true;
@@ -83,10 +84,10 @@ impl<'a> GrowingMoments<'a> {
     }
 }
 
-/// A radius of at least this is above 1.
+/// Least γ for a verdict of instability, above 1 by more than roundings.
 const ABOVE: f64 = 1.0 + 4096.0 * f64::EPSILON;
 
-/// The operator of that number of peers; `node` is that of any of them.
+/// Returns the operator of second moments for a number of equal peers, each with the node `node`.
 fn operator(motion: &Motion, independent: &Independent, number: u64, node: &Node, time: f64) -> Symmetric {
     let nodes = std::slice::from_ref(node);
     let lifted = Lifted {
@@ -100,7 +101,7 @@ fn operator(motion: &Motion, independent: &Independent, number: u64, node: &Node
     Symmetric::new(usize::try_from(number).unwrap_or(usize::MAX), &lifted, &independent.hazards)
 }
 
-/// The verdict on two peers, by the radius of their second moment.
+/// Returns the verdict on two peers by the spectral radius of the operator of their second moments.
 fn of_two(motion: &Motion, independent: &Independent) -> Option<Proven> {
     let node = motion.part(2, Some(0)).swap_remove(0);
     let operator = operator(motion, independent, 2, &node, motion.time(2));
@@ -111,7 +112,7 @@ fn of_two(motion: &Motion, independent: &Independent) -> Option<Proven> {
     }
 }
 
-/// The verdict on two peers by a Y, whose kinds of motion are the mean and the difference of both.
+/// Returns the verdict on two peers with the second moment Y that shows it. The kinds of motion are the mean and the difference of both peers.
 fn moment_of_two(motion: &Motion, independent: &Independent) -> Option<(Proven, MomentCertificate)> {
     let node = motion.part(2, Some(0)).swap_remove(0);
     let time = motion.time(2);
@@ -125,12 +126,12 @@ fn moment_of_two(motion: &Motion, independent: &Independent) -> Option<(Proven, 
     holds.then(|| (proven, MomentCertificate::new(gamma, time, heard, independent.hazards.depth(), &blocks.iter().collect::<Vec<_>>())))
 }
 
-/// γ for a spectral radius: above 1 and well below a radius that is far above, where Y is then far from positive.
+/// Returns γ for a spectral radius: 1 if the radius is below 1, otherwise half the radius but above 1. A γ well below the radius leaves Y far from positive.
 fn factor(radius: f64) -> f64 {
     if radius < 1.0 { 1.0 } else { (0.5 * radius).max(ABOVE) }
 }
 
-/// What Y shows if γY − L(Y) is positive definite.
+/// Returns the verdict that Y shows if γY − L(Y) is positive definite.
 fn proven(gamma: f64, y: &[Matrix]) -> Option<Proven> {
     match (is_definite(y), is_indefinite(y)) {
         (true, _) if gamma <= 1.0 => Some(Proven::Stable),
@@ -139,7 +140,7 @@ fn proven(gamma: f64, y: &[Matrix]) -> Option<Proven> {
     }
 }
 
-/// The gains by which a sample is one number.
+/// Returns the gains with which a sample is one number; `None` if a sample is a position and a velocity.
 const fn heard_by(sampling: Sampling) -> Option<Gains> {
     match sampling {
         Sampling::Combined(gains) => Some(gains),
@@ -147,7 +148,7 @@ const fn heard_by(sampling: Sampling) -> Option<Gains> {
     }
 }
 
-/// Y, or what it becomes over a box.
+/// Second moment Y over a box: C (`common`), A (`apart`) and x (`rest`).
 #[derive(Clone)]
 struct Moment {
     common: StepSpan,
@@ -155,9 +156,9 @@ struct Moment {
     rest: StepSpan,
 }
 
-/// What happens to a peer between two deliveries, or a delivery.
+/// Event of a frame of a peer: its own motion between two deliveries, or a delivery.
 enum Action {
-    /// Samples are taken, and then it ticks, if it does.
+    /// The peer takes samples and then ticks, if `span` is the duration of a tick.
     Move {
         samples: Vec<usize>,
         span: Option<std::time::Duration>,
@@ -168,7 +169,7 @@ enum Action {
     },
 }
 
-/// Where the rows of a peer are: its states, samples of earlier frames and of this one, and held samples: h, or in and out.
+/// Numbers of rows of a peer, in order: its states, samples of earlier frames, samples of this frame. Held samples follow: h, or in and out.
 struct Rows {
     states: usize,
     depth: usize,
@@ -181,13 +182,13 @@ impl Rows {
         self.states + self.depth + self.sent
     }
 
-    /// Between frames: without the samples of this one.
+    /// Returns the number of rows between frames, without the samples of this frame and without held samples.
     const fn kept(&self) -> usize {
         self.states + self.depth
     }
 }
 
-/// The numbers of a box: those of its corners, and ν as the last one.
+/// Numbers of a box: the numbers of its corners, and ν as the last number.
 struct Numbers {
     nu: [f64; 2],
     count: usize,
@@ -198,7 +199,7 @@ impl Numbers {
         StepSpan::constant(matrix, self.count)
     }
 
-    /// A function of ν between its values at the ends; half of its second derivative is at most `bend`.
+    /// Encloses a function of ν over the box by its chord. Half of the second derivative of the function is at most `bend` in size.
     fn curve(&self, of: impl Fn(f64) -> f64, bend: f64) -> StepSpan {
         let [high, low] = self.nu.map(of);
         let half = 0.5 * (self.nu[0] - self.nu[1]);
@@ -208,7 +209,7 @@ impl Numbers {
         span
     }
 
-    /// A matrix of entries that are constants and multiples of ν.
+    /// Returns the matrix `constant` + ν·`slope` over the box.
     fn of_nu(&self, constant: &Matrix, slope: &Matrix) -> StepSpan {
         let (middle, half) = (0.5 * (self.nu[0] + self.nu[1]), 0.5 * (self.nu[0] - self.nu[1]));
         let entry = |i: usize, j: usize| constant[(i, j)] + middle * slope[(i, j)];
@@ -223,16 +224,16 @@ fn single(entry: f64) -> Matrix {
     Matrix::from_fn(1, 1, |_, _| entry)
 }
 
-/// A row with some entries.
+/// Returns a row of the given size with the given entries, as places and values; all other entries are zero.
 fn row(size: usize, entries: &[(usize, f64)]) -> Matrix {
     Matrix::from_fn(1, size, |_, column| entries.iter().filter(|(place, _)| *place == column).map(|(_, entry)| entry).sum())
 }
 
-/// A frame of a peer over links with chance.
+/// Frame of a peer over links that lose.
 struct Frame<'a> {
     motion: &'a Motion,
     independent: &'a Independent,
-    /// By what factor the radius of what a frame makes of second moments is larger.
+    /// Factor by which the radius of L(Y) is widened.
     wider: f64,
 }
 
@@ -284,7 +285,7 @@ impl Frame<'_> {
         let holds = is_everywhere_positive(&left(&y.common, &image.common))
             && is_everywhere_positive(&left(&y.apart, &image.apart))
             && is_everywhere_positive(&left(&y.rest, &image.rest));
-        // A sample that never arrives is held for ever.
+        // A sample may also never be replaced and be held for ever: stability needs that motion to be stable as well.
         let is_proven = holds && (proven == Proven::Unstable || self.independent.held.verdict() == Verdict::Stable);
         let moment = || MomentCertificate::new(gamma, time, heard_by(sampling), depth, &[&y.common, &y.apart, &y.rest].map(|one| &one.mean));
         Ok(is_proven.then(|| (proven, moment())))
@@ -318,7 +319,7 @@ impl Frame<'_> {
         actions
     }
 
-    /// L(Y).
+    /// Returns L(Y), the second moment after a frame that begins with the second moment Y, over the box.
     fn image(
         &self,
         y: &Moment,
@@ -329,7 +330,7 @@ impl Frame<'_> {
         translation: Option<&[f64]>,
     ) -> Moment {
         let skipped = translation.map(|_| rows.position);
-        // Rows that are kept between frames, among the rows within one: at its beginning, and from its end.
+        // Matrices from the rows between frames to the rows within a frame at its beginning, and back at its end.
         let begins = |held: usize, skipped: Option<usize>| {
             let places: Vec<usize> = (0..rows.kept()).chain((0..held).map(|held| rows.held() + held)).filter(|row| Some(*row) != skipped).collect();
             numbers.constant(Matrix::from_fn(rows.held() + held, places.len(), |row, column| f64::from(u8::from(places[column] == row))))
@@ -372,7 +373,7 @@ impl Frame<'_> {
     }
 }
 
-/// What samples and a tick do to a peer.
+/// Returns the matrix of samples and a tick of a peer.
 fn moved(
     node: &Node,
     rows: &Rows,
@@ -401,11 +402,11 @@ fn moved(
     StepMatrix { matrix: z, error: error(std::slice::from_ref(node), scale, 0.0) }
 }
 
-/// What a delivery does: to rows from `held` on, of the sample at that row.
+/// Returns the second moment after a delivery of the sample at row `sample` to the held samples, whose rows begin at `held`.
 fn delivered(moment: &Moment, (held, sample): (usize, usize), probability: f64, numbers: &Numbers) -> Moment {
     let (p, q) = (probability, 1.0 - probability);
     let (sizes, constant) = ((held + 1, held + 2), |matrix| numbers.constant(matrix));
-    // σ², each term at its own factor.
+    // Terms of σ², each with its factor as in the formula of the module.
     let square = |of: &StepSpan, by: &StepSpan| of.through(by);
     let mu = numbers.curve(|nu| nu / (1.0 + nu), 1.0);
     let rest_of_mu = numbers.curve(|nu| 1.0 / (1.0 + nu), 1.0);
@@ -419,7 +420,7 @@ fn delivered(moment: &Moment, (held, sample): (usize, usize), probability: f64, 
         of_rest.times(&moment.rest),
     ];
     let sigma = terms.iter().skip(1).fold(terms[0].clone(), |sum, term| sum.plus(term));
-    // The product of p and q and its rounding.
+    // Encloses a product of probabilities with its rounding.
     let factor = |value: f64| {
         let mut span = constant(single(value));
         span.radius = single(4.0 * UNIT * value.abs());
@@ -448,7 +449,7 @@ fn delivered(moment: &Moment, (held, sample): (usize, usize), probability: f64, 
     }
 }
 
-/// Y from the blocks of [`Symmetric`], whose samples held have other coordinates: differences and sums of in and out.
+/// Returns Y from the blocks of [`Symmetric`], whose coordinates of held samples are differences and sums of in and out.
 fn of_blocks(blocks: &[Matrix], numbers: &Numbers, nu: f64) -> Option<Moment> {
     let [common, apart, rest @ ..] = blocks else { return None };
     let size = apart.rows();
@@ -468,7 +469,8 @@ fn symmetric(matrix: &Matrix) -> Matrix {
     Matrix::from_fn(matrix.rows(), matrix.columns(), |i, j| 0.5 * (matrix[(i, j)] + matrix[(j, i)]))
 }
 
-/// Whether a symmetric matrix is positive definite all over a box: where the numbers are at their ends, in coordinates in which it is nearly 1 in the middle.
+/// Returns whether a symmetric matrix is positive definite all over a box. The corners of the box are enough, since the matrix is affine but for its radius.
+/// The check uses coordinates in which the matrix is nearly the unit matrix in the middle of the box.
 fn is_everywhere_positive(span: &StepSpan) -> bool {
     let Some(factor) = cholesky(&symmetric(&span.mean)) else { return false };
     let inverse = triangle_inverse(&factor).transposed();
@@ -483,7 +485,7 @@ fn is_everywhere_positive(span: &StepSpan) -> bool {
             |i: usize, j: usize| span.mean[(i, j)] + span.slopes.iter().enumerate().map(|(number, slope)| sign(number) * slope[(i, j)]).sum::<f64>();
         let largest = |i: usize, j: usize| span.mean[(i, j)].abs() + span.slopes.iter().map(|slope| slope[(i, j)].abs()).sum::<f64>();
         let rounded = gamma(span.slopes.len() + 4);
-        // Of two entries that mean the same number the mean is as near to it as the farther of both.
+        // Entries (i, j) and (j, i) stand for the same number. Their mean is off by at most the larger of both errors.
         let error = |i: usize, j: usize| span.radius[(i, j)] + rounded * largest(i, j);
         let error = Matrix::from_fn(size, size, |i, j| error(i, j).max(error(j, i)) * (1.0 + 8.0 * UNIT));
         is_positive(&Matrix::from_fn(size, size, |i, j| 0.5 * (at(i, j) + at(j, i))), &error)

@@ -205,9 +205,7 @@ impl Plan {
                     }
                 }
                 Event::Tick { node, at, span } => {
-                    // Ticks of one instant share a step. A node ticks at most once in a step, since two multiples of its force would make the step quadratic in
-                    // gains. Ticks of one instant share a step. A node ticks at most once in a step, since two multiples of its force would make the step
-                    // quadratic in gains.
+                    // Ticks of one instant share a step. A node ticks at most once in a step, since two ticks of a node would multiply its gains.
                     if steps.last().is_none_or(|step| step.ticks.iter().any(|tick| tick.node == node) || !step.ticks.is_empty() && step.at != at) {
                         steps.push(Step::default());
                     }

@@ -1,18 +1,18 @@
 //! Frames of copies that are tied by waves.
 //!
-//! Each two copies i and j have a line with waves sᵢⱼ to either side. Over equal links between equal clocks bodies feel two sums of them alone: those that a
-//! copy gets, S = Σⱼ sᵢⱼ, and those that others get of it, P = Σⱼ sⱼᵢ. With forces in place of waves (times ρ), d how far a copy has moved since the last
-//! sample, ⟨ ⟩ the mean over the ticks since then, and d̄ the mean of all others,
+//! Each pair of copies i and j has a line with waves sᵢⱼ in either direction. Over equal links between equal clocks bodies feel only two sums of waves: the
+//! waves that a copy receives, S = Σⱼ sᵢⱼ, and the waves that all others receive from the copy, P = Σⱼ sⱼᵢ. Waves are written as forces (times ρ). Let d be the
+//! distance that a copy has moved since the last sample, ⟨ ⟩ the mean over the ticks since then, and d̄ the mean of d over all others. Then
 //!
 //! ```text
 //! S ← 2·b·d̄/(M·h) − ⟨P⟩        P ← 2·b·d/(M·h) − ⟨S⟩        force on the copy: S − b·v
 //! ```
 //!
-//! All other waves bounce to and fro unfelt with eigenvalues of modulus 1 (see `unseen.rs` of `cohaptic-stability`), and have no part here. Averages of classes
-//! and differences within one do not mix; the number of peers counts in d̄ alone. The sums of S and of P over all peers are equal, so that of the averages the
-//! P of one class follows from all else; and of two peers every P is the S of the other.
+//! All other combinations of waves are reflected for ever with eigenvalues of modulus 1, and no body feels them (see `unseen.rs` of `cohaptic-stability`). They
+//! are left out here. Averages of classes and differences within a class do not mix, and the number of peers enters d̄ only. The sums of S and of P over all
+//! peers are equal, so that in the averages the P of one class follows from all other sums. With two peers every P is the S of the other peer.
 //!
-//! Waves carry no position, so that each copy may be anywhere, unless an arm holds its device: positions of a class are counted from its copy.
+//! Waves carry no position, so that a copy may be anywhere unless an arm holds its device. Positions of a class are therefore counted from its copy.
 
 use std::time::Duration;
 
@@ -30,27 +30,27 @@ use super::error::ProofError;
 use super::program::{NamedFrame, Operation, Program, Register, Sum};
 use super::pushed::{Pushed, copy, coupling, device, moved, negative};
 
-/// Coordination by waves over equal links.
+/// Coordination by waves over equal links between equal clocks.
 #[derive(Clone, Debug)]
 pub(super) struct Waves {
-    /// A frame of one node that hears itself: that of every peer.
+    /// Frame of one node that hears itself, which is the frame of every peer.
     line: Timetable,
-    /// M.
+    /// Number M of ticks from one sample to the next.
     every: usize,
-    /// M·h \[s\].
+    /// Time M·h from one sample to the next \[s\].
     period: f64,
-    /// Whether a wave goes on when its ticks are over.
+    /// Whether a wave stays in force after its M ticks until another wave arrives.
     holds: bool,
-    /// For each class, whether an arm ties its copy to ground.
+    /// Whether an arm ties the copy of a class to ground, indexed by class.
     tied: Vec<bool>,
 }
 
-/// The place of the parameter `on-loss`, and that of its word `hold`.
+/// Place of the parameter `on-loss` among the parameters of the coordination; `HOLD` is the place of the word `hold` among its words.
 const ON_LOSS: usize = 1;
 const HOLD: usize = 1;
 
 impl Waves {
-    /// The waves of scenes that differ in numbers only, and the classes of their peers; `None` if they have none.
+    /// Returns the waves of scenes that differ in numbers only, and the classes of the peers of these scenes; `None` if no waves tie the copies.
     pub(super) fn structure(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts) -> Result<Option<(Structure, Self)>, ProofError> {
         let scene = scenes[0];
         if !Self::tie(scene) {
@@ -73,7 +73,7 @@ impl Waves {
         Ok(Some((structure, Self { line, every, period, holds: on_loss == LawValue::Word(HOLD), tied })))
     }
 
-    /// The nodes of all classes, whose laws have b as their damping.
+    /// Returns the node of each class, whose law has the damping b of the wave lines.
     pub(super) fn nodes(structure: &Structure, scene: &Scene) -> Vec<Node> {
         let node = |class: usize| {
             let own = Gains { stiffness: 0.0, damping: scene.own_damping(structure.classes[class][0]) };
@@ -83,13 +83,13 @@ impl Waves {
         (0..structure.classes.len()).map(node).collect()
     }
 
-    /// Whether waves tie the copies of a scene.
+    /// Returns whether waves tie the copies of a scene.
     pub(super) fn tie(scene: &Scene) -> bool {
         scene.coordination.strategy == Coordination::Wave
     }
 
-    /// A frame over a box. Weights are those with which classes hear each other, of averages [with shares](with_shares). `ends`: the nodes of the part at the
-    /// corners of the box.
+    /// Returns a frame over a box. The weights of `points` are the weights with which classes hear each other, for averages [with shares](with_shares). `ends`:
+    /// the nodes of the part at the corners of the box.
     pub(super) fn frame(&self, part: &Part<'_>, points: &[Point], ends: &[Vec<Node>], time: f64) -> Result<NamedFrame, ProofError> {
         let scale = Scale { time, compliance: ends[0][0].compliance(time) };
         let heard = InForce::new(&self.line, self.every, self.holds);
@@ -97,43 +97,43 @@ impl Waves {
     }
 }
 
-/// The averages of all classes, or how the members of one differ.
+/// Part of the motion: the averages of all classes, or the differences between the members of the class `apart`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Part<'a> {
     pub(super) structure: &'a Structure,
     pub(super) apart: Option<usize>,
-    /// The class whose P follows from all else.
+    /// Class whose P follows from all other sums.
     pub(super) rest: usize,
-    /// Whether there are two peers.
+    /// Whether the scene has exactly two peers, so that every P is the S of the other peer.
     pub(super) is_pair: bool,
 }
 
 impl<'a> Part<'a> {
-    /// For the number of peers that a scene has.
+    /// Returns the part for the number of peers that a scene has.
     pub(super) fn of(structure: &'a Structure, apart: Option<usize>) -> Self {
         Self { structure, apart, rest: structure.classes.len() - 1, is_pair: structure.peers == 2 }
     }
 
-    /// The sizes of all classes in units of the size of the class whose P follows.
+    /// Returns the size of each class divided by the size of the class `rest`.
     pub(super) fn shares(&self) -> Vec<f64> {
         let size = |class: usize| real(self.structure.classes[class].len());
         (0..self.structure.classes.len()).map(|class| size(class) / size(self.rest)).collect()
     }
 }
 
-/// The weights of classes, a row for each, and below them the sizes of all classes beside one.
+/// Returns the weights of classes, one row per class, with the sizes of all classes relative to one class as a last row.
 pub(super) fn with_shares(weights: &Matrix, shares: &[f64]) -> Matrix {
     let classes = weights.columns();
     Matrix::from_fn(classes + 1, classes, |row, column| if row < classes { weights[(row, column)] } else { shares[column] })
 }
 
-/// The sampling whose waves are in force at each tick.
+/// Number of the sampling whose waves are in force, indexed by tick of the frame; `None` where no waves are in force.
 struct InForce(Vec<Option<i64>>);
 
 impl InForce {
     fn new(line: &Timetable, every: usize, holds: bool) -> Self {
         let mut of = Vec::new();
-        // A frame is not shorter than a wave: after one of them all is as in every other.
+        // A frame is not shorter than a wave, so that the state after one frame is the state after every frame.
         let mut newest: Option<(i64, usize)> = None;
         for frame in [-1, 0] {
             of.clear();
@@ -154,7 +154,7 @@ impl InForce {
         Self(of)
     }
 
-    /// At a tick that is counted from the beginning of the frame, also before it.
+    /// Returns the number of the sampling in force at a tick. Ticks and samplings are counted from the beginning of the frame and are negative before it.
     fn at(&self, tick: i64, sent: usize) -> Option<i64> {
         let ticks = whole(self.0.len()).max(1);
         let place = usize::try_from(tick.rem_euclid(ticks)).unwrap_or(0);
@@ -166,7 +166,7 @@ fn whole(number: usize) -> i64 {
     i64::try_from(number).unwrap_or(i64::MAX)
 }
 
-/// A frame of a part of a scene with the numbers of a point: nodes of all classes, or of the one whose members differ.
+/// Frame of a part of a scene at a point, whose nodes are those of all classes, or the node of the class whose members differ.
 struct Frame<'a> {
     waves: &'a Waves,
     part: &'a Part<'a>,
@@ -198,17 +198,17 @@ impl Frame<'_> {
         Program { steps, sent: vec![line.sent[0]; classes], references: (0..classes).map(reference).collect() }
     }
 
-    /// The class of a node.
+    /// Returns the class of the node at a place of the part.
     fn class(&self, place: usize) -> usize {
         self.part.apart.unwrap_or(place)
     }
 
-    /// The waves of a sampling that a class gets.
+    /// Returns the register of S, the waves of a sampling that a class receives.
     fn gets(&self, place: usize, number: i64) -> Register {
         Register::Waves { class: self.class(place), number, of_others: false }
     }
 
-    /// Those that others get of it.
+    /// Returns P, the waves of a sampling that all others receive from a class, as a sum of registers.
     fn others_get(&self, place: usize, number: i64) -> Sum {
         let own = |place: usize| Register::Waves { class: self.class(place), number, of_others: true };
         let places = 0..self.point.nodes.len();
@@ -218,7 +218,7 @@ impl Frame<'_> {
         if self.part.apart.is_some() || place != self.part.rest {
             return vec![(own(place), 1.0)];
         }
-        // Of all averages the sums over all peers are equal.
+        // The sums of S and of P over all peers are equal, which determines the P of the last class.
         let of = |other: usize| {
             let by = self.point.weights[(places.len(), other)];
             [(self.gets(other, number), by), (own(other), -by)]
@@ -226,16 +226,16 @@ impl Frame<'_> {
         places.clone().filter(|other| *other != place).flat_map(of).chain([(self.gets(place, number), 1.0)]).collect()
     }
 
-    /// What a class has moved by since the sampling before, times a factor.
+    /// Returns the distance that a class has moved since the sampling before `number`, times a factor.
     fn moved(&self, place: usize, number: i64, by: f64) -> [(Register, f64); 2] {
         let class = self.class(place);
         [(copy(class)[0], by), (Register::Sample { class, number: number - 1, velocity: false }, -by)]
     }
 
-    /// A sampling of all classes, before their tick of that number.
+    /// Returns the operation that takes sampling `number` of all classes, before their tick with the number `tick`.
     fn sampled(&self, number: i64, tick: i64) -> Operation {
         let places = 0..self.point.nodes.len();
-        // The mean over the ticks since the last one, with the other sign.
+        // Negative mean over the M ticks since the last sampling, −⟨ ⟩.
         let mean = |of: &dyn Fn(i64) -> Sum| -> Sum {
             let in_force = (tick - whole(self.waves.every)..tick).filter_map(|tick| self.heard.at(tick, self.waves.line.sent[0]));
             in_force.flat_map(of).map(|(register, by)| (register, -by / real(self.waves.every))).collect()
