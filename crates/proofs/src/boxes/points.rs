@@ -22,11 +22,11 @@ struct Case {
     family: Family,
     ranges: [[f64; 2]; 2],
     spread: Vec<Point>,
-    /// Points within 10⁻² to 10⁻⁹ of a crossing, relative to the way between two points.
+    /// Points at 10⁻² to 10⁻⁹ from a crossing, relative to the distance between two points of `spread`.
     near: Vec<Point>,
 }
 
-/// Of `verdicts.py`.
+/// Constants of `verdicts.py`, which places the points of `spread` in the same way.
 const GRID: usize = 1 << 20;
 const STEPS: [usize; 2] = [648_055, 400_521];
 
@@ -59,16 +59,16 @@ fn cases() -> Vec<Case> {
     serde_json::from_str::<Vec<Value>>(&text).unwrap().iter().map(case).collect()
 }
 
-/// What boxes say of the points in them.
+/// Agreement of decided boxes with the points in these boxes.
 #[derive(Default, Debug)]
 struct Found {
-    /// How often a box that was decided held a point.
+    /// Number of pairs of a decided box and a point in that box.
     judged: usize,
     contradictions: Vec<String>,
 }
 
 impl Found {
-    /// Decides a box and, if it is not decided, its quarters, as long as there are points in them.
+    /// Decides a box. An undecided box that holds points is divided into quarters, up to `depth` times.
     fn divide(&mut self, case: &Case, followed: &Followed<'_>, ranges: [[f64; 2]; 2], points: &[&Point], depth: u32) {
         let within = |ranges: &[[f64; 2]; 2]| {
             let holds = |point: &&&Point| ranges.iter().zip(point.at).all(|([low, high], value)| (*low..=*high).contains(&value));
@@ -82,10 +82,10 @@ impl Found {
         y.into_iter().flat_map(|y| x.map(|x| [x, y])).for_each(|quarter| self.divide(case, followed, quarter, &points, depth - 1));
     }
 
-    /// Whether a box is decided.
+    /// Decides a box, records contradictions with its points, and returns whether the box is decided.
     fn judge(&mut self, case: &Case, followed: &Followed<'_>, ranges: [[f64; 2]; 2], points: &[&Point]) -> bool {
         let proven = match followed.decide(&ranges) {
-            // Dampings of devices that differ.
+            // Dampings of devices that differ make too many numbers for a box.
             Err(ProofError::Numerous { .. }) => None,
             decided => decided.unwrap(),
         };
@@ -97,7 +97,8 @@ impl Found {
         true
     }
 
-    /// All points of a case. Around those near a crossing there are boxes of many sizes, each with the point at another place.
+    /// Compares boxes with all points of a case. Around each point near a crossing boxes of many sizes are decided, each with the point at another place in the
+    /// box.
     fn of(&mut self, case: &Case, change: &dyn Fn(&mut Followed<'_>)) {
         let mut followed = Followed::new(&case.family, None).unwrap_or_else(|error| panic!("{}: {error}", case.name));
         change(&mut followed);

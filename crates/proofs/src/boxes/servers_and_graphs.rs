@@ -25,7 +25,7 @@ fn owned(set: &[&str]) -> Vec<String> {
     set.iter().map(|text| (*text).to_owned()).collect()
 }
 
-/// The file that scenes are read as: weights are beside it.
+/// Path under which scenes are parsed. Files of weights are in the same directory.
 fn file() -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/scene.toml")
 }
@@ -43,7 +43,7 @@ fn family(set: &[&str], keys: &[&str]) -> Family {
     Family::new(PAPER, &file(), &owned(set), keys).unwrap_or_else(|error| panic!("{set:?}: {error}"))
 }
 
-/// The verdict on one scene, by other means than a proof's.
+/// Returns the verdict on one scene, computed in another way than by a proof.
 fn verdict(scene: &Scene) -> Verdict {
     let Some(topology) = &scene.topology else { return analyse(scene, Method::Full).unwrap().verdict() };
     let network = NominalNetwork::of(&scene.without_topology()).unwrap();
@@ -57,7 +57,7 @@ fn verdict(scene: &Scene) -> Verdict {
     bounded_radius(&frame.monodromy(), frame.error).verdict()
 }
 
-/// Numbers from 0 to 1, spread by irrational steps.
+/// Returns entry `number` of a sequence from 0 to 1 that is spread by steps of an irrational number.
 #[expect(clippy::cast_precision_loss, reason = "small counts")]
 fn spread(number: usize, irrational: f64) -> f64 {
     ((number + 1) as f64 * irrational).fract()
@@ -115,7 +115,7 @@ fn frames_of_a_server_have_the_eigenvalues_of_real_peers() {
     }
 }
 
-/// The eigenvalues of matrices, each matrix as often as it counts, but for those near zero.
+/// Returns the eigenvalues of matrices without those near zero, with the eigenvalues of each matrix as often as the matrix counts.
 fn sorted(matrices: &[(Matrix, usize)]) -> Vec<(f64, f64)> {
     let of = |(matrix, copies): &(Matrix, usize)| {
         let values = eigenvalues(matrix).into_iter().map(|value| (value.re, value.im)).filter(|(re, im)| re.hypot(*im) > 0.02);

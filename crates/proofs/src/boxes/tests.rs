@@ -1,4 +1,4 @@
-//! Proofs against the radii of single scenes, which are computed another way and have bounds of their own.
+//! Proofs compared with the spectral radii of single scenes, which are computed in another way and have bounds of their own.
 
 use cohaptic_scene::Scene;
 use cohaptic_stability::frames::{Autonomous, Contacts, Lifted, NominalNetwork, Sampling, Structure};
@@ -33,7 +33,7 @@ fn scene(set: &[&str]) -> Scene {
 
 const PD: &str = "coordination.strategy=\"proportional-derivative\"";
 
-/// The verdict on that number of peers, by the radius of that one scene.
+/// Returns the verdict on a number of peers by the spectral radius of the single scene.
 fn single(set: &[&str], number: u64) -> Verdict {
     let count = format!("scene.count={number}");
     analyse(&scene(&[set, &[&count]].concat()), Method::Reduced).unwrap().verdict()
@@ -47,7 +47,7 @@ fn spans(set: &[&str], from: u64, to: Option<u64>) -> EveryNumber {
     prove_every_number(&scene(set), from, to, &Unwatched).unwrap()
 }
 
-/// On both sides of each end of a span, at its ends and in the middle, single scenes say the same; and nothing is left open but numbers beyond all limits.
+/// Single scenes agree with the spans on both sides of each end, at the ends and in the middle. Only numbers without a limit stay undecided.
 #[test]
 fn every_number_is_judged_as_single_scenes_are() {
     for set in [
@@ -87,7 +87,7 @@ fn every_number_is_judged_as_single_scenes_are() {
                 if number > 90_000 {
                     continue;
                 }
-                // A radius knows nothing of a number that a proof left open, and the other way round.
+                // An undecided number and a marginal radius say nothing about each other.
                 match (span.guarantee, single(set, number.min(2_000).max(span.from.min(2_000)))) {
                     (Guarantee::Stable, Verdict::Stable | Verdict::Marginal)
                     | (Guarantee::Unstable, Verdict::Unstable | Verdict::Marginal | Verdict::Overflow) => {}
@@ -131,7 +131,7 @@ fn numbers_of_long_frames_are_decided() {
     assert!(found.spans.len() > 1, "{found:?}");
 }
 
-/// Where gains and the effects of forces both grow with N, numbers without end are decided too.
+/// Spans without end are decided also if gains and the effects of forces both grow with N.
 #[test]
 fn numbers_beyond_all_are_decided_where_two_numbers_grow() {
     let last = spans(&[PD], 2, None).spans.pop().unwrap();
@@ -164,7 +164,7 @@ fn steps_that_grow_without_end_are_enclosed() {
         let near = 1000;
         let box_of_all = corners::steps_beyond([&heard(near), &heard(2 * near), &heard(3 * near)], growth, common).unwrap().kinds;
         for times in [1, 2, 3, 7, 100, 12_345] {
-            // In the units of the box: its compliance is that of the first point.
+            // The box uses the compliance of its first point as its unit of force.
             let points = [heard(near), heard(times * near)].concat();
             let steps = corners::steps_of_each(&points, common).unwrap().pop().unwrap();
             assert_eq!(steps.len(), box_of_all.len());
@@ -237,7 +237,7 @@ fn scenes_without_a_proof_are_refused_by_name() {
     assert!(matches!(prove_every_number(&scene(&[]), 9, Some(8), &Unwatched), Err(ProofError::Numbers)));
 }
 
-/// What is refused is so before a frame is made: here one that would be too long.
+/// Refusals come before a frame is made: the frame of this scene would be too long.
 #[test]
 fn peers_without_an_equal_one_are_refused_before_a_frame_is_made() {
     let clocks = &["peers=[{ name = \"peer2\", clock = { drift = 1.234567e-3 } }]"];
@@ -245,7 +245,7 @@ fn peers_without_an_equal_one_are_refused_before_a_frame_is_made() {
     assert!(matches!(prove_every_number(&scene(clocks), 2, None, &Unwatched), Err(ProofError::Unequal)));
 }
 
-/// Stops when it was asked so often.
+/// Watch that stops after it was asked a given number of times.
 #[derive(Default)]
 struct Patience {
     left: std::sync::atomic::AtomicU64,
@@ -274,7 +274,7 @@ fn add(count: &std::sync::atomic::AtomicU64, operations: f64) {
     count.fetch_add(operations as u64, std::sync::atomic::Ordering::Relaxed);
 }
 
-/// Ended before its time, a proof keeps what it has found, and all other numbers are undecided.
+/// A proof that the watch ends keeps its verdicts, and all other numbers are undecided.
 #[test]
 fn a_proof_that_is_ended_keeps_what_it_has() {
     let patient = Patience { left: u64::MAX.into(), ..Patience::default() };
@@ -297,7 +297,8 @@ fn a_proof_that_is_ended_keeps_what_it_has() {
     }
 }
 
-/// In the mean square too: at the ends of spans, in between and at random, the second moments of single scenes, which have bounds of their own, say the same.
+/// The second moments of single scenes, which have bounds of their own, agree with the spans in the mean square: at the ends of spans, in between and at random
+/// numbers.
 #[test]
 #[ignore = ".ci/nightly runs it: it takes long"]
 fn every_number_is_judged_in_the_mean_square_as_single_scenes_are() {
@@ -342,7 +343,7 @@ fn family(set: &[&str], x: &str, y: &str) -> Family {
 
 const GAINS: [&str; 2] = ["coordination.stiffness=100..6000", "coordination.damping=0..60"];
 
-/// Number of points within proven boxes of a region that were looked at: single radii with their own bounds agree at all of them. Fails where one does not.
+/// Returns the number of points within proven boxes of a region that were compared with single radii. Panics where a radius disagrees with its box.
 fn agreeing(family: &Family, region: &ProvenRegion) -> usize {
     let mut scratch = FamilyScratch::default();
     let mut decided = 0;
@@ -365,8 +366,7 @@ fn agreeing(family: &Family, region: &ProvenRegion) -> usize {
     decided
 }
 
-/// No box that is proven has a point of the other kind: at thousands of points within proven boxes, their corners among them, single radii with their own
-/// bounds agree.
+/// No proven box holds a point of the other kind: single radii with their own bounds agree at thousands of points within proven boxes, the corners included.
 #[test]
 #[ignore = ".ci/nightly runs it: it takes long"]
 fn no_box_holds_a_point_that_contradicts_it() {
@@ -383,7 +383,7 @@ fn no_box_holds_a_point_that_contradicts_it() {
         (&["scene.count=3", "peers=[{ name = \"peer2\", device = { mass = 0.2 } }, { name = \"peer3\", contact = \"none\" }]"], GAINS),
         (&["scene.count=3", "coordination.strategy=\"extrapolated\""], GAINS),
         (&["scene.count=3", "coordination.strategy=\"extrapolated\"", "coordination.extrapolated.horizon=10ms"], GAINS),
-        // Two gains that vary take another combination of the past at each corner, and one alone the same.
+        // If two gains vary, each corner takes another combination of the past. If one gain varies, all corners take the same.
         (&["scene.count=3", "coordination.strategy=\"local-lag\""], ["coordination.stiffness=100..1000", "coordination.damping=0..20"]),
         (
             &["scene.count=3", "coordination.strategy=\"local-lag\"", "coordination.damping=0"],
@@ -452,7 +452,7 @@ fn a_line_encloses_every_crossing() {
     }
 }
 
-/// Dividing on never takes back what was proven, and leaves less open.
+/// More halvings keep every verdict and leave less undecided.
 #[test]
 fn finer_boxes_decide_more() {
     let family = family(&["scene.count=3"], GAINS[0], GAINS[1]);
@@ -514,7 +514,7 @@ fn the_product_of_the_steps_is_the_frame() {
     }
 }
 
-/// Pieces that were looked at, and how many of them were not known.
+/// Store of pieces that counts the pieces that were not known.
 #[derive(Default)]
 struct Kept(std::sync::Mutex<(std::collections::BTreeMap<Vec<u64>, Guarantee>, usize)>);
 
@@ -534,7 +534,7 @@ impl KnownPieces for Kept {
     }
 }
 
-/// In whatever order, and by however many processes: a proof of which all blocks are known is that of one process, and looks at nothing.
+/// A proof whose blocks are all known decides nothing anew and equals the proof of one process, whatever the order of the blocks and the number of processes.
 #[test]
 fn blocks_make_the_proof_of_one_process() {
     let line = Family::new(SCENE, "two.toml".as_ref(), &[], vec![KeyRange::parse("object.mass=0.05..1").unwrap()]).unwrap();
@@ -563,9 +563,9 @@ fn blocks_make_the_proof_of_one_process() {
     shared.look_at(&line, &half, &kept, |_| (), &Unwatched).unwrap();
     let known = (0..64).filter(|block| shared.is_known(*block, &kept)).count();
     assert!((32..64).contains(&known), "{known}");
-    // What is missing is looked at.
+    // A missing piece is decided again.
     assert_eq!(ProvenLine::prove_with(&line, 1e-6, &kept, &Unwatched).unwrap(), ProvenLine::prove(&line, 1e-6, &Unwatched).unwrap());
-    // Somebody who ends it is heard.
+    // The watch can end the proof.
     let ended = Patience::default();
     shared.look_at(&line, &[0], &Kept::default(), |block| panic!("{block} is not whole"), &ended).unwrap();
 }

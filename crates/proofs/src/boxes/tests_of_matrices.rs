@@ -10,7 +10,7 @@ use super::span::{FrameSpan, StepSpan};
 use super::steps::StepMatrix;
 use super::tests::proven;
 
-/// Samples that move on and are forgotten: all eigenvalues are zero, with a single eigenvector.
+/// A shift register of samples has only eigenvalues that are zero, with a single eigenvector.
 #[test]
 fn a_matrix_without_eigenvalues_but_zero_is_stable() {
     let moves_on = Matrix::from_fn(5, 5, |row, column| if column == row + 1 { 3.0 } else { 0.0 });
@@ -18,7 +18,7 @@ fn a_matrix_without_eigenvalues_but_zero_is_stable() {
     assert_eq!(proven(&StepSpan::of([StepMatrix { matrix: Matrix::zeros(2, 2), error: 0.0 }].iter())), Some(Proven::Stable));
 }
 
-/// Squares of the entries of a frame that grows as much are no numbers.
+/// The entries of this frame are so large that their squares overflow.
 #[test]
 fn a_matrix_whose_squares_overflow_is_unstable() {
     let of = Matrix::from_fn(3, 3, |i, j| if i <= j { 1e180 / real(1 + i + j) } else { 1e170 });

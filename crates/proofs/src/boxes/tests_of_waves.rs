@@ -1,4 +1,4 @@
-//! Proofs of waves against single scenes, which real peers are pushed through.
+//! Proofs of waves compared with single scenes, whose matrices come from real peers that are pushed through a frame.
 
 use cohaptic_scene::{FromScene, Scene};
 use cohaptic_stability::frames::{Contacts, Node, NominalNetwork, Trust, alone, full_along};
@@ -29,7 +29,7 @@ fn family(set: &[&str], keys: &[&str]) -> Family {
     Family::new(PAPER, "waves.toml".as_ref(), &owned(set), keys).unwrap_or_else(|error| panic!("{set:?}: {error}"))
 }
 
-/// The eigenvalues of matrices, each matrix as often as it counts, but for those near zero.
+/// Returns the eigenvalues of matrices without those near zero, with the eigenvalues of each matrix as often as the matrix counts.
 fn sorted(matrices: &[(Matrix, usize)]) -> Vec<(f64, f64)> {
     let of = |(matrix, copies): &(Matrix, usize)| {
         let values: Vec<(f64, f64)> =
