@@ -6,9 +6,9 @@
 //! that gain times a constant, and that gain times ν times another. Each of these factors is monotone in N from 2 on, so that those of the ends of a span of
 //! numbers enclose them.
 //!
-//! Without damping of the object a copy of the mass m/N moves by N times a force, and nothing else of it depends on N. Its forces may be counted in newtons
-//! over N: gains are N times as large, copies have the mass m and devices N times theirs, and the motion is the same. Where gains shrink with N these numbers
-//! have limits, and the others have not.
+//! Without damping of the object a copy of the mass m/N moves by N times a force, and nothing else of the copy depends on N. Forces may then be counted in
+//! newtons divided by N: gains are N times as large, copies have the mass m, devices have N times their mass, and the motion is the same. Where gains shrink
+//! with N, the scaled numbers have limits and the original numbers have none.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 

@@ -11,11 +11,12 @@
 //! σ² = µ·C[u − h] + (1 − µ)·A[u − out] + (1 − µ)/(1 − ν²)·A[in + ν·out] + ((1 − 2ν)/2 + (1 − ν)/(2 + 2ν))·x
 //! ```
 //!
-//! with a the states of a peer and its samples on the way, in the mean of the samples that it holds, out the mean of its samples that others hold, ν = 1/(N −
-//! 1), µ = 1/N, and X\[v\] = vᵀXv. All of it is analytic in ν, down to 0, and a tick is multi-affine in gains and coefficients of step maps. So the image L(Y)
-//! of a fixed Y = (C, A, x) over a span of numbers is a mean, a slope along each number and a radius ([`StepSpan`]), and Y − L(Y) is positive definite on all
-//! of the span if it is at all ends of the slopes, radius included. Y is looked for at a number in the middle, and need not be exact. If it is positive
-//! definite too, every number is *stable*; if an entry of its diagonal is below zero, every one is *unstable* ([`Positive`]).
+//! Here a is the states of a peer and its samples in transit, in the mean of the samples that the peer holds, and out the mean of the samples of the peer that
+//! others hold. ν = 1/(N − 1), µ = 1/N, and X\[v\] = vᵀXv. Everything is analytic in ν, down to 0, and a tick is multi-affine in gains and coefficients of step
+//! maps. So the image L(Y) of a fixed Y = (C, A, x) over a span of numbers is a mean, a slope along each number and a radius ([`StepSpan`]). γ·Y − L(Y) is
+//! positive definite on all of the span if the matrix is so at all ends of the slopes, radius included. Y is computed at a number in the middle of the span and
+//! need not be exact. If Y is positive definite and γ = 1, every number is *stable*. If Y has an entry below zero on its diagonal and γ > 1, every number is
+//! *unstable* ([`Positive`]).
 
 use cohaptic_peer::Gains;
 use cohaptic_stability::frames::{Event, External, Lifted, Node, NominalNetwork, Sampling, Scale, Scratch};
@@ -285,7 +286,7 @@ impl Frame<'_> {
         let holds = is_everywhere_positive(&left(&y.common, &image.common))
             && is_everywhere_positive(&left(&y.apart, &image.apart))
             && is_everywhere_positive(&left(&y.rest, &image.rest));
-        // A sample may also never be replaced and be held for ever: stability needs that motion to be stable as well.
+        // A sample on a link without deliveries is held for ever: stability needs the motion of held samples to be stable as well.
         let is_proven = holds && (proven == Proven::Unstable || self.independent.held.verdict() == Verdict::Stable);
         let moment = || MomentCertificate::new(gamma, time, heard_by(sampling), depth, &[&y.common, &y.apart, &y.rest].map(|one| &one.mean));
         Ok(is_proven.then(|| (proven, moment())))

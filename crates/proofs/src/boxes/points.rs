@@ -1,7 +1,7 @@
 //! Proofs against points whose verdicts were computed apart, with 60 digits: see `crates/stability/tests/reference/verdicts.py`.
 //!
-//! No box that is proven stable may hold an unstable point, and none that is proven unstable a stable one. Faults of the prover, of which [`FAULTS`] lists
-//! some, must show: each of them makes boxes that do.
+//! A box that is proven stable must not hold an unstable point, and a box that is proven unstable must not hold a stable point. Each fault of the prover in
+//! [`FAULTS`] must show: with the fault some boxes hold such points, or too few points lie in decided boxes.
 
 use cohaptic_stability::frames::Structure;
 use cohaptic_stability::{Family, KeyRange};
@@ -143,8 +143,8 @@ type Change = fn(&mut Followed<'_>);
 
 /// Faults of the prover, and faults in what it knows of a scene.
 ///
-/// [`Mutation::StillBeside`] is not among them: no point of all these shows it, since it is of the second order in boxes that radii of that order keep small.
-/// Matrices in closed form do, in `tests.rs`.
+/// [`Mutation::StillBeside`] is not listed, because no point shows that fault: the fault is of the second order, and radii of that order keep the boxes small.
+/// Matrices with known eigenvalues show the fault, in `tests_of_matrices.rs`.
 const FAULTS: [(&str, Option<Mutation>, Change); 7] = [
     ("boxes of half their size", Some(Mutation::HalfTheBox), |_| ()),
     ("one number that varies of two", Some(Mutation::OneNumber), |_| ()),

@@ -266,8 +266,7 @@ impl Plan {
             count += node.states();
         }
         // `z` has a row for every state of the nodes, and a column for every state before the step. The reference has a row, which stays zero until the
-        // reference moves, and no column. `z` has a row for every state of the nodes, and a column for every state before the step. The reference has a row,
-        // which stays zero until the reference moves, and no column.
+        // reference moves, and no column.
         let reference = (!tied).then(|| rows[0].object);
         let states = count - usize::from(reference.is_some());
         let columns = states + before.len() * channels;
