@@ -11,9 +11,9 @@
 //! σ² = µ·C[u − h] + (1 − µ)·A[u − out] + (1 − µ)/(1 − ν²)·A[in + ν·out] + ((1 − 2ν)/2 + (1 − ν)/(2 + 2ν))·x
 //! ```
 //!
-//! Here a is the states of a peer and its samples in transit, in the mean of the samples that the peer holds, and out the mean of the samples of the peer that
-//! others hold. ν = 1/(N − 1), µ = 1/N, and X\[v\] = vᵀXv. Everything is analytic in ν, down to 0, and a tick is multi-affine in gains and coefficients of step
-//! maps. So the image L(Y) of a fixed Y = (C, A, x) over a span of numbers is a mean, a slope along each number and a radius ([`StepSpan`]). γ·Y − L(Y) is
+//! Here a is the states of a peer and its samples in transit, `in` the mean of the samples that the peer holds, and `out` the mean of the samples of the peer
+//! that others hold. ν = 1/(N − 1), µ = 1/N, and X\[v\] = vᵀXv. Everything is analytic in ν, down to 0, and a tick is multi-affine in gains and coefficients of
+//! step maps. So the image L(Y) of a fixed Y = (C, A, x) over a span of numbers is a mean, a slope along each number and a radius ([`StepSpan`]). γ·Y − L(Y) is
 //! positive definite on all of the span if the matrix is so at all ends of the slopes, radius included. Y is computed at a number in the middle of the span and
 //! need not be exact. If Y is positive definite and γ = 1, every number is *stable*. If Y has an entry below zero on its diagonal and γ > 1, every number is
 //! *unstable* ([`Positive`]).
