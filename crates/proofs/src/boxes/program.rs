@@ -143,8 +143,8 @@ impl Program {
     /// Returns the registers that are alive before each step and after the last step: registers whose values reach a body from there on.
     fn live(&self) -> Vec<BTreeSet<Register>> {
         let bodies: BTreeSet<Register> = self.set().filter(|register| matches!(register, Register::Body { .. })).collect();
-        // The registers alive at the end are the bodies, and the registers alive at the beginning of the next frame under their older names. The set only grows
-        // and is bounded by the registers of the program, so that the loop ends at the least fixed point.
+        // The registers alive at the end are the bodies, and the registers alive at the beginning of the next frame under their names in this frame. The set
+        // only grows. The number of a sample rises with each pass until this frame takes the sample, so that the set reaches a fixed point.
         let mut end = bodies.clone();
         loop {
             let mut live = vec![end.clone()];
