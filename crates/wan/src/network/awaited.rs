@@ -13,9 +13,9 @@ use super::pending::LineId;
 /// Awaited receivers, and the instants at which packets may reach them.
 #[derive(Clone, Debug)]
 pub(super) struct Awaited {
-    /// Whether a node is awaited, indexed by node.
+    /// `true` if a node is awaited, indexed by node.
     is_awaited: Vec<bool>,
-    /// Whether the receiver of a link is awaited, indexed by link. Empty in a network with links between all nodes, whose link numbers give the receiver.
+    /// `true` if the receiver of a link is awaited, indexed by link. Empty in a network with links between all nodes, whose link numbers give the receiver.
     is_receiver_awaited: Vec<bool>,
     /// Instants to come, earliest first. An instant may occur several times.
     instants: BinaryHeap<Reverse<Instant>>,

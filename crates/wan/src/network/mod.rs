@@ -85,7 +85,7 @@ pub struct Network<P> {
     /// Whether the model of any link draws random numbers, or did before it was changed.
     is_random: bool,
     has_filters: bool,
-    /// Whether a packet that a node sends to all passes the node's uplink once, instead of once per receiver.
+    /// `true` if a packet that a node sends to all passes the node's uplink once, instead of once per receiver.
     has_relay: bool,
 }
 
@@ -267,6 +267,7 @@ impl<P: Clone> Network<P> {
         let packet = InNetwork { sequence, offered: now, entered: now, path, size, payload };
         match line.offer(now, None) {
             Outcome::Arrives(at) => {
+                self.settle_before(at, now);
                 self.traffic.schedule(at, LineId::Link(link), packet);
                 Ok(Some(at))
             }
@@ -287,8 +288,8 @@ impl<P: Clone> Network<P> {
         // Departures due by `now` make room in queues before the packet is offered.
         if self.has_inner_events {
             self.let_happen(now);
-            // Without uplinks `paths` is empty, and the link's own counter numbers the packet.
         }
+        // Without uplinks `paths` is empty, and the link's own counter numbers the packet.
         let sequence = match self.paths.get_mut(place) {
             None => self.lines.links[place].offered(),
             Some(count) => {
@@ -543,7 +544,7 @@ impl<P: Clone> Network<P> {
         place
     }
 
-    /// Lets time pass. Inner events happen at once, so that the next packet finds the room they leave; final arrivals wait to be polled.
+    /// Lets time pass. Inner events happen now, so that the next packet finds the state that they leave. Mere arrivals wait to be polled.
     #[inline]
     fn let_pass(&mut self, now: Instant) -> Result<(), TimeWentBack> {
         check_time(&mut self.now, now)?;

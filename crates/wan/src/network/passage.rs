@@ -25,6 +25,25 @@ impl<P: Clone> Network<P> {
         }
     }
 
+    /// Lets everything that is due happen before an event that is appended at `now`, mere arrivals included. Networks with inner events have done so when the
+    /// packet was offered. In networks without inner events arrivals wait in `pending` until they are polled, and `pending` orders events of one instant by
+    /// link. If they waited on, their order among events of the present instant would depend on whether the driver polled them in between, and on whether
+    /// another link of the network has inner events.
+    #[inline(always)]
+    pub(super) fn settle(&mut self, now: Instant) {
+        if !self.has_inner_events && self.traffic.pending.may_be_due(now) {
+            self.let_happen(now);
+        }
+    }
+
+    /// Settles what is due if a packet that is offered at `now` arrives at `now`. Any other arrival is later than all that is due.
+    #[inline(always)]
+    pub(super) fn settle_before(&mut self, at: Instant, now: Instant) {
+        if at <= now {
+            self.settle(now);
+        }
+    }
+
     /// Lets one pending event happen, and returns the arrival if the packet has left its last line.
     #[inline(always)]
     pub(super) fn happen(&mut self, pending: Pending<P>) -> Option<PacketEvent<P, Path>> {
@@ -85,7 +104,10 @@ impl<P: Clone> Network<P> {
             return self.offer_filtered(now, line, words, packet());
         }
         match self.lines.get_mut(line).offer(now, words) {
-            Outcome::Arrives(at) => self.traffic.schedule(at, line, packet()),
+            Outcome::Arrives(at) => {
+                self.settle_before(at, now);
+                self.traffic.schedule(at, line, packet());
+            }
             Outcome::Dropped(cause) => self.drop(now, line, cause, packet()),
             Outcome::Enters => self.enter_engine(now, line, packet()),
         }
@@ -98,7 +120,10 @@ impl<P: Clone> Network<P> {
             return self.drop(now, line, DropCause::Filter, packet);
         }
         match self.lines.get_mut(line).offer(now, words) {
-            Outcome::Arrives(at) => self.traffic.schedule(at, line, packet),
+            Outcome::Arrives(at) => {
+                self.settle_before(at, now);
+                self.traffic.schedule(at, line, packet);
+            }
             Outcome::Dropped(cause) => self.drop(now, line, cause, packet),
             Outcome::Enters => self.enter_engine(now, line, packet),
         }
@@ -122,18 +147,11 @@ impl<P: Clone> Network<P> {
 
     /// Lets `act` act on the engine of a line, and schedules the wake that the engine announces.
     pub(super) fn with_engine(&mut self, line: LineId, act: impl FnOnce(&mut Line<P, InNetwork<P>>, &mut Outputs<InNetwork<P>>, &mut Exits<'_, P>)) {
+        self.settle(self.now);
         let engine = self.lines.get_mut(line);
-        let before = self.traffic.happened.len();
         act(engine, &mut self.outputs, &mut Exits { traffic: &mut self.traffic, line });
         if let Some(at) = engine.announce() {
             self.traffic.announce(at, line);
-        }
-        if !self.has_inner_events && self.traffic.happened.len() > before {
-            // A network without inner events keeps due arrivals in `pending` until they are polled. The arrivals due came before this drop, as in `drop`, so
-            // they are put before it.
-            let dropped = self.traffic.happened.split_off(before);
-            self.let_happen(self.now);
-            self.traffic.happened.extend(dropped);
         }
     }
 
@@ -141,10 +159,7 @@ impl<P: Clone> Network<P> {
     #[inline(never)]
     pub(super) fn drop(&mut self, now: Instant, line: LineId, cause: DropCause, packet: InNetwork<P>) {
         self.lines.get_mut(line).drop(cause);
-        if !self.has_inner_events {
-            // Arrivals due that still wait to be polled came before this drop.
-            self.let_happen(now);
-        }
+        self.settle(now);
         let event = self.traffic.event(packet, now, Fate::Dropped(cause));
         self.traffic.happened.push_back(event);
     }

@@ -14,7 +14,7 @@ use crate::stages::queue::{EqualPackets, Load, nanos};
 /// A kind of link: the configuration that links share, prepared for packets of one load.
 #[derive(Clone, Debug)]
 pub(super) struct Kind {
-    /// Whether the links draw random numbers.
+    /// `true` if the links draw random numbers.
     pub(super) is_random: bool,
     loss: Losses,
     delay: Delays,
