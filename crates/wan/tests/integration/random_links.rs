@@ -55,7 +55,7 @@ pub(crate) struct Sending {
     pub(crate) from: NodeId,
     pub(crate) to: NodeId,
     pub(crate) size: Bytes,
-    /// Whether the driver drains the network afterwards.
+    /// `true` if the driver drains the network afterwards.
     pub(crate) poll: bool,
 }
 

@@ -278,7 +278,8 @@ impl Line {
             self.avg *= (1.0 - words.weight).powf(m);
             self.idle_since = now;
         }
-        self.avg = (1.0 - words.weight) * self.avg + words.weight * self.bytes() as f64;
+        // As (1 − w)·avg + w·q but for the rounding, which decides where the average tends to a threshold: a queue of `max` bytes that stays.
+        self.avg += words.weight * (self.bytes() as f64 - self.avg);
         let (min, max) = (words.min as f64, words.max as f64);
         if self.avg < min {
             self.unhit = 0.0;

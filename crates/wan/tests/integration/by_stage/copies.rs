@@ -23,7 +23,7 @@ fn config() -> BoxedStrategy<LinkConfig> {
         .boxed()
 }
 
-/// Whether any bit of a packet is flipped.
+/// Returns whether any bit of a packet is flipped.
 fn is_hit(corruption: &Corruption, chance: &mut Dar, size: u64, number: u64, copy: u8) -> bool {
     let bytes = (0..size).filter(|byte| corruption.within.as_ref().is_none_or(|within| within.contains(byte))).count();
     let mut draws = draws(number, copy).draws(Purpose::Corruption);
