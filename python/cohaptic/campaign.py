@@ -34,8 +34,8 @@ _PIECES = 64
 """About how many pieces a campaign is cut into: enough to keep workers busy to the end, and few enough to cost nothing."""
 
 
-class Campaign(Table):
-    """The table of :func:`campaign`, and what its runs come to."""
+class Runs(Table):
+    """A table with a row a run, and the document of its runs."""
 
     def __init__(self, answer: _native.CampaignAnswer) -> None:
         super().__init__(answer.table)
@@ -43,9 +43,13 @@ class Campaign(Table):
 
     @cached_property
     def summary(self) -> dict[str, Any]:
-        """The document of ``cohaptic campaign --json``, without the time that the campaign took and the files."""
+        """The document of the command with ``--json``, without the time that the runs took and the files."""
         document: dict[str, Any] = json.loads(self._answer.summary)
         return document
+
+
+class Campaign(Runs):
+    """The table of :func:`campaign`, with the document of ``cohaptic campaign`` as ``summary``."""
 
     def plot(self, name: str = "discrepancy") -> Picture:
         """The program's own picture: ``discrepancy``, or ``verdicts`` where combinations were judged."""

@@ -2,29 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
-from functools import cached_property
-from typing import Any
 
-from cohaptic import _native
-from cohaptic.campaign import Vary, Workers, _answer
+from cohaptic.campaign import Runs, Vary, Workers, _answer
 from cohaptic.scene import Scene
-from cohaptic.table import Table
 
 
-class Comparison(Table):
-    """The table of :func:`compare`, a row a run, and the strategies side by side."""
-
-    def __init__(self, answer: _native.CampaignAnswer) -> None:
-        super().__init__(answer.table)
-        self._answer = answer
-
-    @cached_property
-    def summary(self) -> dict[str, Any]:
-        """The document of ``cohaptic compare --json``, without the time that the comparison took and the files."""
-        document: dict[str, Any] = json.loads(self._answer.summary)
-        return document
+class Comparison(Runs):
+    """The table of :func:`compare`, with the document of ``cohaptic compare`` as ``summary``."""
 
 
 def compare(
