@@ -22,7 +22,7 @@ pub struct Large {
     pub peers: usize,
     /// Neighbours on a ring; all others without.
     pub neighbours: Option<usize>,
-    /// Whether its links have jitter and lose packets.
+    /// `true` if its links have jitter and lose packets.
     pub impaired: bool,
     /// How many threads run it.
     pub threads: usize,

@@ -11,7 +11,7 @@ impl<'a> Input<'a> {
         Self(bytes)
     }
 
-    /// Whether all bytes are taken.
+    /// Returns whether all bytes are taken.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.0.is_empty()

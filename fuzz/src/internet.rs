@@ -71,7 +71,7 @@ pub(crate) fn repair(packet: &mut [u8], is_offloaded: bool) {
     }
 }
 
-/// Whether the checksums of IPv4, TCP and UDP are right, as far as the packet has any.
+/// Returns whether the checksums of IPv4, TCP and UDP are right, as far as the packet has any.
 pub(crate) fn is_right(packet: &[u8]) -> bool {
     let Some((transport, protocol)) = layout(packet) else { return true };
     if packet[0] >> 4 == 4 && sum(&[&packet[..transport]]) != 0xffff {

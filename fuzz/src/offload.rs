@@ -39,7 +39,7 @@ pub fn run(data: &[u8]) {
     }
 }
 
-/// Whether two packets are equal but for the identification of IPv4, with its checksum, where the packet must not be cut further (RFC 6864).
+/// Returns whether two packets are equal but for the identification of IPv4, with its checksum, where the packet must not be cut further (RFC 6864).
 fn is_same(found: &[u8], expected: &[u8]) -> bool {
     let is_ignored = |place: usize| expected[0] >> 4 == 4 && expected.len() > 6 && expected[6] & 0x40 != 0 && [4, 5, 10, 11].contains(&place);
     found.len() == expected.len() && found.iter().zip(expected).enumerate().all(|(place, (found, expected))| found == expected || is_ignored(place))

@@ -108,7 +108,7 @@ pub fn run(data: &[u8]) {
 }
 
 impl World {
-    /// Whether the datagram was offered to a link.
+    /// Returns whether the datagram was offered to a link.
     fn datagram(&mut self, action: u8, input: &mut Input<'_>) -> bool {
         let is_mesh = self.engine.names().len() == 3;
         let step = input.byte();

@@ -38,7 +38,7 @@ struct World {
     /// The bytes of packets that came, as the engine read them. Those of the link that damages are known by their length alone.
     came: BTreeSet<Vec<u8>>,
     lengths: BTreeSet<usize>,
-    /// Whether every packet that came had right checksums.
+    /// `true` if every packet that came had right checksums.
     are_right: bool,
     departed: [u64; 2],
 }

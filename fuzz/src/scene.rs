@@ -47,7 +47,7 @@ fn has_many_peers(text: &str) -> bool {
     text.contains("count") && toml::from_str(text).ok().and_then(count).is_some_and(|count| count > MOST_PEERS)
 }
 
-/// Whether a text may name a file outside of the folder, which could be a device without an end.
+/// Returns whether a text may name a file outside of the folder, which could be a device without an end.
 fn leaves_folder(text: &str) -> bool {
     ["..", "\"/", "'/", "\"\\", "=/", "= /"].iter().any(|part| text.contains(part))
 }

@@ -264,7 +264,7 @@ impl World {
     }
 }
 
-/// Whether the program may be told this.
+/// Returns whether the program may be told this.
 fn may_end_with(error: Error) -> bool {
     matches!(error, Error::WouldBlock | Error::ConnectionRefused | Error::ConnectionReset | Error::TimedOut | Error::BrokenPipe)
 }

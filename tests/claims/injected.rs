@@ -87,7 +87,7 @@ pub(crate) fn stored_at_first(scene: &Scene) -> f64 {
     scene.peers.iter().map(|one| 0.25 * pair * squares(&one.position[0])).sum()
 }
 
-/// Whether a link takes longer for a larger packet: extra numbers make samples larger.
+/// Returns whether a link takes longer for a larger packet: extra numbers make samples larger.
 pub(crate) fn has_rates(draft: &Draft) -> bool {
     draft.link.contains("rate") || draft.links.iter().any(|link| link.keys.contains("rate"))
 }

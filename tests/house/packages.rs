@@ -22,7 +22,7 @@ fn accepted() -> BTreeSet<String> {
     listed
 }
 
-/// Whether an expression of SPDX holds with the accepted licences. `A/B` is how old packages write `A OR B`.
+/// Returns whether an expression of SPDX holds with the accepted licences. `A/B` is how old packages write `A OR B`.
 fn is_accepted(expression: &str, listed: &BTreeSet<String>) -> bool {
     let spaced = expression.replace('(', " ( ").replace(')', " ) ").replace('/', " OR ");
     let mut words = spaced.split_whitespace().peekable();

@@ -48,7 +48,7 @@ fn text(page: &str) -> String {
     kept
 }
 
-/// Whether the place is within the text of a link, `[…](…)`.
+/// Returns whether the place is within the text of a link, `[…](…)`.
 fn is_in_link(text: &str, place: usize) -> bool {
     let opens = text[..place].rfind(['[', ']']).is_some_and(|bracket| text[bracket..].starts_with('['));
     opens && text[place..].find(['[', ']']).is_some_and(|bracket| text[place + bracket..].starts_with("]("))

@@ -81,7 +81,7 @@ impl Step {
         }
     }
 
-    /// Whether it needs what may not be there.
+    /// Returns whether it needs what may not be there.
     pub(crate) const fn is_optional(self) -> bool {
         matches!(self, Self::Testkit | Self::Peers)
     }

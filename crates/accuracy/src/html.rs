@@ -12,7 +12,7 @@ use crate::{Row, Subject, plots};
 pub struct About {
     /// A line for readers, such as the machine and the command; empty without such a line.
     pub line: String,
-    /// Whether the measurement ended early.
+    /// `true` if the measurement ended early.
     pub partial: bool,
 }
 

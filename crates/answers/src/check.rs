@@ -37,7 +37,7 @@ pub struct OutcomeDocument {
     pub high: Option<f64>,
     /// Found value, if the result is a number.
     pub measured: Option<f64>,
-    /// Whether the result is as expected.
+    /// `true` if the result is as expected.
     pub passed: bool,
     /// The expectation, in words.
     pub expected: String,

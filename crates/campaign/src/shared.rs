@@ -43,7 +43,7 @@ pub struct ShardReport {
 pub struct PartState {
     /// Number of runs of the part.
     pub runs: u64,
-    /// Whether the runs are done.
+    /// `true` if the runs are done.
     pub is_done: bool,
 }
 

@@ -109,7 +109,7 @@ struct Shared {
 struct Bytes {
     left: Vec<u8>,
     place: usize,
-    /// Whether reading ends after the last byte. Otherwise reading waits forever.
+    /// `true` if reading ends after the last byte. Otherwise reading waits forever.
     ends: bool,
     shared: Arc<Mutex<Shared>>,
 }

@@ -20,7 +20,7 @@ pub struct ServerConfig {
     pub address: SocketAddr,
     /// Secret to be shown by every request; `None` for a random secret.
     pub token: Option<Token>,
-    /// Whether `address` may be reachable from other machines. The traffic is not encrypted, so anybody on the way can read the token.
+    /// `true` if `address` may be reachable from other machines. The traffic is not encrypted, so anybody on the way can read the token.
     pub allow_remote: bool,
     /// Accepted names in the `Host` header, besides `localhost` and addresses, such as `"lab-pc.example"`. Requests for other names are refused, so that a
     /// page of another site cannot reach the server through a name pointing to this machine (DNS rebinding).

@@ -25,7 +25,7 @@ pub struct OwnFolder {
     path: PathBuf,
     /// Lock on [`FOLDER_LOCK`]; `None` on a file system without locks.
     lock: Option<Lock>,
-    /// Whether the folder did not exist before [`OwnFolder::take`].
+    /// `true` if the folder did not exist before [`OwnFolder::take`].
     is_new: bool,
 }
 

@@ -25,8 +25,8 @@ pub(crate) struct SamplesInFlight<const A: usize> {
 
 #[derive(Clone, Debug)]
 struct Slot<const A: usize> {
-    /// Copies in flight, at least 1 in a used slot.
     sample: Sample<A>,
+    /// Copies in flight, at least 1 in a used slot.
     copies: usize,
 }
 

@@ -21,7 +21,7 @@ pub(crate) struct Plan {
     pub(crate) ticking: Ticking,
     /// Choice for the device of each peer, indexed by peer.
     pub(crate) devices: Vec<DeviceChoice>,
-    /// Whether links with nothing but a constant delay use the complete chain of stages too.
+    /// `true` if links with nothing but a constant delay use the complete chain of stages too.
     pub(crate) general_links: bool,
 }
 

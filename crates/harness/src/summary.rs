@@ -91,7 +91,7 @@ pub struct PeerSummary {
 pub struct AccessSummary {
     /// Index of the peer in the scene.
     pub peer: usize,
-    /// Whether the peer sends through this line; else the peer receives through it.
+    /// `true` if the peer sends through this line; else the peer receives through it.
     pub uplink: bool,
     /// Counters of the line.
     pub stats: LinkStats,

@@ -55,9 +55,9 @@ pub struct Asked {
 pub(crate) struct Stages {
     /// Delay of the link; `None` if a packet's delay depends on more than the delay's law.
     pub(crate) delay: Option<cohaptic_wan::Delay>,
-    /// Whether the loss model marks packets instead of dropping packets.
+    /// `true` if the loss model marks packets instead of dropping packets.
     pub(crate) marks: bool,
-    /// Whether copies are made before losses.
+    /// `true` if copies are made before losses.
     pub(crate) copies_first: bool,
 }
 

@@ -26,7 +26,7 @@ pub struct Figure {
     /// Standard error of the achieved value; zero if nothing varies. `None` if packets are too few or have a too long memory, or if the law has no such
     /// error: deviation and autocorrelation of Pareto laws, with an infinite fourth moment.
     pub standard_error: Option<f64>,
-    /// Whether the asked value is more than four standard errors away.
+    /// `true` if the asked value is more than four standard errors away.
     pub outside: bool,
 }
 

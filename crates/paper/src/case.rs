@@ -44,7 +44,7 @@ pub(crate) struct Case {
     pub(crate) delay_us: u32,
     /// Number of peers touching the object, at most `peers`.
     pub(crate) touching: usize,
-    /// Whether all gains are scaled with the number of peers.
+    /// `true` if all gains are scaled with the number of peers.
     pub(crate) scaled: bool,
 }
 

@@ -37,7 +37,7 @@ pub(crate) struct StabilityTest {
     pub(crate) strategy: Strategy,
     /// Coordination stiffness KT \[N/m\].
     pub(crate) stiffness: f64,
-    /// Whether the users are arms that follow a sine. Otherwise the users are forces.
+    /// `true` if the users are arms that follow a sine. Otherwise the users are forces.
     pub(crate) arms: bool,
     /// Delay one way \[ms\].
     pub(crate) delay_ms: u32,

@@ -35,7 +35,7 @@ pub use figures::{Figure, Table};
 /// Resolution of the computation, and size of the drawings.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Options {
-    /// Whether to use coarser grids, for a result in some seconds instead of a minute.
+    /// `true` if to use coarser grids, for a result in some seconds instead of a minute.
     pub quick: bool,
     /// Size of the drawings.
     pub size: Size,

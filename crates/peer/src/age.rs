@@ -43,7 +43,7 @@ impl Age {
 #[derive(Clone, Debug, Default)]
 pub struct Ages<const A: usize> {
     aged: Vec<Aged<A>>,
-    /// Whether the own state was part of a held state at the latest [`Ages::apply`]. The own state moves, so the mean must then be computed at each tick.
+    /// `true` if the own state was part of a held state at the latest [`Ages::apply`]. The own state moves, so the mean must then be computed at each tick.
     fading: bool,
 }
 
@@ -60,7 +60,7 @@ struct Aged<const A: usize> {
     turned: Option<(HeldAttitude, HeldAttitude)>,
     /// Sequence number from which a sample counts as a return; `None` without an awaited return.
     awaited: Option<u64>,
-    /// Whether the sender has returned since the last [`Ages::take_return`].
+    /// `true` if the sender has returned since the last [`Ages::take_return`].
     returned: bool,
 }
 

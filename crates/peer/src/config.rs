@@ -134,6 +134,6 @@ impl Contact {
 pub struct Direction {
     /// Index of the axis: 0 for x, 1 for y, 2 for z.
     pub axis: usize,
-    /// Whether the direction points towards larger coordinates.
+    /// `true` if the direction points towards larger coordinates.
     pub positive: bool,
 }

@@ -29,7 +29,7 @@ pub struct PeerConfig {
     pub coupling: Gains,
     /// Period of the tick on the peer's own clock, which shows 0 at the first tick.
     pub tick: Duration,
-    /// Whether forces have a compute delay: each force acts a tick after its computation.
+    /// `true` if forces have a compute delay: each force acts a tick after its computation.
     pub compute_delay: bool,
     /// β [N·s/m], the damping of the copy by the strategy. Part of the copy's plant, and added to FT in the record.
     pub own_damping: f64,
@@ -58,7 +58,7 @@ pub struct Peer<const A: usize, D, S> {
     held: Held<A>,
     /// Rotation of copy and device, for an object with an inertia. Boxed, because most scenes do not rotate.
     rotation: Option<Box<Rotation>>,
-    /// Whether a sample has changed since the last computation of the mean.
+    /// `true` if a sample has changed since the last computation of the mean.
     stale_mean: bool,
     next_sequence: u64,
     /// Time on the peer's own clock: 0 at the first tick.
@@ -78,7 +78,7 @@ struct Asked {
     role: Role,
     prediction: bool,
     horizon: bool,
-    /// Whether [`Peer::heard`] has anything to do at a tick.
+    /// `true` if [`Peer::heard`] has anything to do at a tick.
     any: bool,
 }
 

@@ -11,7 +11,7 @@ pub(crate) struct Stepper {
     integrator: Integrator,
     short: (Duration, StepMap),
     long: (Duration, StepMap),
-    /// Whether no spring ties the body to ground, so that [`StepMap::advance_free`] applies.
+    /// `true` if no spring ties the body to ground, so that [`StepMap::advance_free`] applies.
     free: bool,
 }
 

@@ -26,7 +26,7 @@ pub struct Axis {
     /// Number whose multiples are the only ticks; `None` for free ticks.
     multiples: Option<u32>,
     ends_at_ticks: bool,
-    /// Whether the axis ends at the content, without a margin.
+    /// `true` if the axis ends at the content, without a margin.
     tight: bool,
     /// Names at 0, 1, 2 and so on; empty for a numeric axis.
     categories: Vec<Text>,

@@ -18,7 +18,7 @@ pub struct Gauge {
     pub high: Option<f64>,
     /// Measured value; `None` for no measurement.
     pub measured: Option<f64>,
-    /// Whether the measured value is within the limits.
+    /// `true` if the measured value is within the limits.
     pub passed: bool,
 }
 

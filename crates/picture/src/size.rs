@@ -23,7 +23,7 @@ pub struct Size {
     pub(crate) height: Option<f64>,
     /// Size of letters \[px\].
     pub(crate) font: f64,
-    /// Whether the document states its size in millimetres.
+    /// `true` if the document states its size in millimetres.
     pub(crate) print: bool,
 }
 

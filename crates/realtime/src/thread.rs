@@ -15,7 +15,7 @@ use thread_priority::{
 pub struct Wishes {
     /// Priority under `SCHED_FIFO`, 1 to 99: the thread runs before every ordinary thread. `None`: no request.
     pub priority: Option<u8>,
-    /// Whether to lock all present and future memory of the process, so that no page fault delays the thread.
+    /// `true` if to lock all present and future memory of the process, so that no page fault delays the thread.
     pub lock_memory: bool,
 }
 

@@ -15,7 +15,7 @@ pub struct Piece<'a> {
     pub axes: usize,
     /// Names of the components of a turning object's motion. Empty if the object does not turn.
     pub motion: String,
-    /// Whether each peer has no device in this piece, indexed by peer.
+    /// `true` if each peer has no device in this piece, indexed by peer.
     pub absent: Vec<bool>,
 }
 

@@ -198,7 +198,7 @@ impl WholeRadius {
 #[derive(Clone, Debug)]
 pub(crate) struct PartsRadius {
     structure: Structure,
-    /// Whether something other than an arm ties the object to ground.
+    /// `true` if something other than an arm ties the object to ground.
     tied: bool,
     /// Frame of the averages, if the frame fits on the stack.
     together: Option<StackFrame>,

@@ -21,11 +21,11 @@ use crate::{AnalysisError, Matrix};
 /// The contacts of a scene that are closed, which make a scene with one-sided contacts linear.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Contacts {
-    /// Whether the device and the copy of each peer are coupled, indexed by peer.
+    /// `true` if the device and the copy of each peer are coupled, indexed by peer.
     pub touching: Vec<bool>,
-    /// Whether every copy is at a wall of the enclosure.
+    /// `true` if every copy is at a wall of the enclosure.
     pub at_wall: bool,
-    /// Whether each peer has no device at all, indexed by peer.
+    /// `true` if each peer has no device at all, indexed by peer.
     pub absent: Vec<bool>,
 }
 
@@ -34,9 +34,9 @@ pub struct Contacts {
 pub struct Structure {
     /// Members of each class in rising order, as indices of [`Scene::peers`]. The classes are in the order of their first members.
     pub classes: Vec<Vec<usize>>,
-    /// Whether the members of each class touch the object, indexed by class.
+    /// `true` if the members of each class touch the object, indexed by class.
     pub touching: Vec<bool>,
-    /// Whether the members of each class have no device, indexed by class.
+    /// `true` if the members of each class have no device, indexed by class.
     pub(crate) absent: Vec<bool>,
     pub(crate) at_wall: bool,
     /// Timetable of a frame of the classes' averages, with one node per class.
@@ -47,7 +47,7 @@ pub struct Structure {
     pub weights: Matrix,
     /// Whether something ties the object to ground: an arm's stiffness, a wall, or a peer that holds its initial samples forever.
     pub tied: bool,
-    /// Whether some peer never receives a sample over a link and holds its initial sample forever.
+    /// `true` if some peer never receives a sample over a link and holds its initial sample forever.
     pub silent: bool,
     /// Number of peers of the scene.
     pub peers: usize,

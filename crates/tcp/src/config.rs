@@ -16,15 +16,15 @@ pub struct TcpConfig {
     pub initial_window: u32,
     /// Algorithm that changes the congestion window. Default CUBIC.
     pub congestion: CongestionControl,
-    /// Whether the SYN offers selective acknowledgements (RFC 2018, 2883). Default on.
+    /// `true` if the SYN offers selective acknowledgements (RFC 2018, 2883). Default on.
     pub sack: bool,
-    /// Whether losses are detected by time (RFC 8985). Otherwise three segments that arrived later tell of a loss (RFC 6675). Needs `sack`. Default on.
+    /// `true` if losses are detected by time (RFC 8985). Otherwise three segments that arrived later tell of a loss (RFC 6675). Needs `sack`. Default on.
     pub rack: bool,
-    /// Whether the sender sends tail loss probes (RFC 8985). Needs `sack`. Default on.
+    /// `true` if the sender sends tail loss probes (RFC 8985). Needs `sack`. Default on.
     pub tail_loss_probe: bool,
-    /// Whether the SYN offers timestamps (RFC 7323). Default on.
+    /// `true` if the SYN offers timestamps (RFC 7323). Default on.
     pub timestamps: bool,
-    /// Whether the SYN asks for explicit congestion notification (RFC 3168), and an answer to a SYN grants it. Default off.
+    /// `true` if the SYN asks for explicit congestion notification (RFC 3168), and an answer to a SYN grants it. Default off.
     pub ecn: bool,
     /// Condition under which a connection with `ecn` continues without ECN, because a middlebox may drop or refuse a SYN with ECN. Default: when a SYN
     /// is lost.
@@ -63,11 +63,11 @@ pub struct TcpConfig {
     pub send_buffer: usize,
     /// Lower bound of the send buffer \[byte\], not zero. The buffer is twice the congestion window, within both bounds. Default 64 KiB.
     pub least_send_buffer: usize,
-    /// Whether Nagle's algorithm is off, so that a small segment leaves while another small segment is unacknowledged. Default off.
+    /// `true` if Nagle's algorithm is off, so that a small segment leaves while another small segment is unacknowledged. Default off.
     pub nodelay: bool,
     /// Times of the probes of an idle connection. `None` sends no probes. Default `None`.
     pub keepalive: Option<Keepalive>,
-    /// Whether the congestion window shrinks while the program sends nothing (RFC 2861). Default on.
+    /// `true` if the congestion window shrinks while the program sends nothing (RFC 2861). Default on.
     pub slow_start_after_idle: bool,
 }
 

@@ -13,7 +13,7 @@ pub const SEED_VARIABLE: &str = "COHAPTIC_TEST_SEED";
 pub(crate) struct Seed {
     pub(crate) value: u64,
     pub(crate) test: String,
-    /// Whether the seed is derived from the place. The failed test then fails again as it stands.
+    /// `true` if the seed is derived from the place. The failed test then fails again as it stands.
     pub(crate) is_of_place: bool,
 }
 

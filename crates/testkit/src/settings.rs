@@ -13,11 +13,11 @@ use crate::hit::Laws;
 pub(crate) struct Settings {
     /// Size of the receive buffer of a UDP socket \[bytes\].
     pub(crate) receive_buffer: usize,
-    /// Whether events are recorded.
+    /// `true` if events are recorded.
     pub(crate) traces: bool,
-    /// Whether recorded events contain digests of the packets' bytes.
+    /// `true` if recorded events contain digests of the packets' bytes.
     pub(crate) digests: bool,
-    /// Whether packets are recorded, with their bytes.
+    /// `true` if packets are recorded, with their bytes.
     pub(crate) keeps_packets: bool,
     /// Maximum number of polls of tasks, or of handled packets and timers, at one instant.
     pub(crate) patience: u64,

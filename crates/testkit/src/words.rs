@@ -79,7 +79,7 @@ pub(crate) fn hits_on(words: &str) -> Result<Vec<hit::Hit>, WordsError> {
 #[derive(Debug, Default)]
 struct Reader {
     hosts: Names,
-    /// Whether a line has named the hosts. Other lines then cannot add hosts.
+    /// `true` if a line has named the hosts. Other lines then cannot add hosts.
     is_closed: bool,
     every: Option<LinkModel>,
     links: BTreeMap<(usize, usize), LinkModel>,

@@ -17,7 +17,8 @@ pub struct Table {
     pub made: Option<fn() -> &'static [Key]>,
     /// Form of the value under any other name, or `None` if other names are unknown keys.
     pub others: Option<&'static Form>,
-    /// Whether the table is laid over another table. A missing key then has the value of the other table, and the default only if that table lacks the key too.
+    /// `true` if the table is laid over another table. A missing key then has the value of the other table, and the default only if that table lacks the key
+    /// too.
     pub is_laid_over: bool,
 }
 
@@ -114,7 +115,7 @@ pub struct Key {
     pub name: &'static str,
     /// Meaning of the key, in one or two sentences without the last full stop.
     pub about: &'static str,
-    /// Whether the key must be given, and the default.
+    /// Need for the key in a file, and the default.
     pub need: Need,
     /// Form of the value.
     pub form: Form,
@@ -147,7 +148,7 @@ impl Key {
     }
 }
 
-/// Whether a key must be given.
+/// Need for a key in a file.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Need {
     /// The key must be given.

@@ -66,7 +66,7 @@ impl SoakPlan {
 pub struct Outcome {
     /// How long it lasted.
     pub elapsed: Duration,
-    /// Whether somebody ended it before its time.
+    /// `true` if somebody ended it before its time.
     pub interrupted: bool,
     /// What was seen at each look.
     pub rows: Vec<Row>,

@@ -174,7 +174,7 @@ impl Account {
         }
     }
 
-    /// Whether it balances, as far as that can be told.
+    /// Returns whether it balances, as far as that can be told.
     #[must_use]
     pub const fn balances(&self) -> bool {
         self.open.is_some() || self.first == self.second

@@ -54,7 +54,7 @@ struct Seen {
     frame: Duration,
     /// Period of the tick \[s\].
     tick: f64,
-    /// Whether the device of each peer touches the object.
+    /// `true` if the device of each peer touches the object.
     touching: Vec<bool>,
     /// Positions of the copies at their latest ticks \[m\].
     copies: Vec<f64>,

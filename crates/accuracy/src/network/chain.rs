@@ -7,7 +7,7 @@ pub(super) struct LossChain {
     pub(super) transitions: Vec<Vec<f64>>,
     /// Long-run fraction of packets in each state.
     pub(super) stationary: Vec<f64>,
-    /// Whether packets are lost, for each state.
+    /// `true` if packets are lost, for each state.
     pub(super) lost: Vec<bool>,
 }
 

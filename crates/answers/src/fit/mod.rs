@@ -27,7 +27,7 @@ pub struct Corrections {
     pub offset_s: Option<f64>,
     /// Known least delay: one common time is added to every delay, so that the smallest delay becomes this delay.
     pub least: Option<Duration>,
-    /// Whether a significant linear drift between the two clocks is removed.
+    /// `true` if a significant linear drift between the two clocks is removed.
     pub skew: bool,
 }
 

@@ -15,7 +15,7 @@ pub struct Source {
     pub(super) measurements: Measurements,
     /// Counts of a pair of captures; `None` for other sources.
     pub(super) matched: Option<Ends>,
-    /// Whether both ends share one clock, as in a log of fates.
+    /// `true` if both ends share one clock, as in a log of fates.
     pub(super) has_one_clock: bool,
 }
 

@@ -41,7 +41,7 @@ pub struct Measured {
     pub span: Duration,
     /// The methods, kind by kind.
     pub methods: Vec<MeasuredMethod>,
-    /// Whether the watch stopped the measurement. Some kinds are missing then.
+    /// `true` if the watch stopped the measurement. Some kinds are missing then.
     pub interrupted: bool,
 }
 
@@ -54,7 +54,7 @@ pub struct MeasuredMethod {
     pub name: String,
     /// Option which selects the method on the command line; empty for the default.
     pub option: String,
-    /// Whether the scene as it stands uses this method.
+    /// `true` if the scene as it stands uses this method.
     pub chosen: bool,
     /// Processor time per [`Kind::cost_of`] \[ms\], the median of some rounds. `None` if the method does not apply; the note then gives the reason.
     pub cost_ms: Option<f64>,
@@ -219,7 +219,7 @@ fn once(work: &Work, watch: &dyn MeasurementWatch) -> Option<()> {
 struct Limited<'a> {
     watch: &'a dyn MeasurementWatch,
     expected: Mutex<f64>,
-    /// Whether this is the first analysis of a method. Later analyses are never late, because the first was not.
+    /// `true` if this is the first analysis of a method. Later analyses are never late, because the first was not.
     is_first: bool,
 }
 

@@ -111,9 +111,9 @@ pub struct Method {
     pub name: String,
     /// Option which selects the method on the command line; empty for the default.
     pub option: String,
-    /// Whether the scene as it stands uses this method.
+    /// `true` if the scene as it stands uses this method.
     pub chosen: bool,
-    /// Whether the errors of the methods of this kind are measured against this method.
+    /// `true` if the errors of the methods of this kind are measured against this method.
     pub(crate) is_reference: bool,
     /// Work which shows the cost and the error, or the reason why the method does not apply to the scene.
     pub(crate) work: Result<Work, String>,
@@ -139,7 +139,7 @@ pub(crate) struct Run {
     /// The scene, with the simulated span as its duration.
     pub(crate) scene: Box<Scene>,
     pub(crate) model: Model,
-    /// Whether packets are watched, which makes the run use events.
+    /// `true` if packets are watched, which makes the run use events.
     pub(crate) watches_packets: bool,
     /// Number of compared axes: the axes of the scene as it stands.
     pub(crate) compared_axes: usize,

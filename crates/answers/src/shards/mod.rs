@@ -22,6 +22,6 @@ pub struct Names {
 pub struct Piece {
     /// Number of units in the piece.
     pub units: u64,
-    /// Whether the units are done.
+    /// `true` if the units are done.
     pub is_done: bool,
 }

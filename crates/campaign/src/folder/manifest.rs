@@ -38,7 +38,7 @@ pub(crate) struct Manifest {
     part: Option<u64>,
     /// Number of runs per part.
     part_runs: u64,
-    /// Whether the plan has verdicts.
+    /// `true` if the plan has verdicts.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     verdicts: bool,
     pub(crate) roster: Roster,

@@ -50,7 +50,7 @@ pub(crate) struct Folder {
     path: PathBuf,
     /// Lock of a process working alone; `None` if workers share the folder.
     lock: Option<Lock>,
-    /// Whether the folder was created for this campaign.
+    /// `true` if the folder was created for this campaign.
     is_new: bool,
 }
 

@@ -72,7 +72,7 @@ pub(crate) struct Roster {
     pub(crate) fewest_axes: usize,
     /// Whether any run has an access line, through which a peer sends or receives.
     pub(crate) access_lines: bool,
-    /// Whether the object turns in any run.
+    /// `true` if the object turns in any run.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub(crate) turns: bool,
     /// Names of the measures of all runs.

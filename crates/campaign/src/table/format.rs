@@ -97,7 +97,7 @@ pub(crate) struct Gist {
 /// Columns of a table, each indexed by run.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub(crate) struct RunColumns {
-    /// Whether the run came to its end without [diverging](cohaptic_harness::Summary::has_diverged), indexed by run.
+    /// `true` if the run came to its end without [diverging](cohaptic_harness::Summary::has_diverged), indexed by run.
     pub(crate) complete: Vec<bool>,
     /// Requested columns, in the requested order; NaN for a run without a value.
     pub(crate) columns: Vec<Vec<f64>>,

@@ -47,7 +47,7 @@ pub struct Column {
     pub name: String,
     /// Type of the values.
     pub kind: Kind,
-    /// Whether a row may have [`Value::Absent`] here.
+    /// `true` if a row may have [`Value::Absent`] here.
     pub optional: bool,
 }
 

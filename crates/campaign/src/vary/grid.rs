@@ -12,7 +12,7 @@ pub(super) struct Grid {
     high: f64,
     pub(super) unit: String,
     count: usize,
-    /// Whether neighbours have equal ratios rather than equal differences.
+    /// `true` if neighbours have equal ratios rather than equal differences.
     pub(super) logarithmic: bool,
 }
 

@@ -20,7 +20,7 @@ struct Turn {
     threads: usize,
     /// Number of runs after which the worker is stopped; `None` for no stop.
     stop: Option<u64>,
-    /// Whether the leftovers of a killed process are put into the folder.
+    /// `true` if the leftovers of a killed process are put into the folder.
     killed: bool,
 }
 

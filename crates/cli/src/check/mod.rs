@@ -29,7 +29,7 @@ struct Checked {
     expectations: Vec<OutcomeDocument>,
     /// Notes on results that more computing time would make stronger or more exact.
     notes: Vec<String>,
-    /// Whether the scene has an `[expect]` table.
+    /// `true` if the scene has an `[expect]` table.
     expects: bool,
     /// Exit status that this scene alone would give the command.
     #[serde(skip)]

@@ -10,7 +10,7 @@ use crate::progress::Progress;
 pub(super) struct Guide {
     /// Phase seen last, whose message has been printed if the phase has a message.
     said: Option<Phase>,
-    /// Whether the command asks the device for force. Without force the device never becomes active, and the last step of homing is left out.
+    /// `true` if the command asks the device for force. Without force the device never becomes active, and the last step of homing is left out.
     pushes: bool,
 }
 

@@ -27,7 +27,7 @@ pub(super) enum Target {
     Usb(Listed),
     Simulated {
         in_virtual_time: bool,
-        /// Whether the device begins without firmware, as a real device does after it is switched on.
+        /// `true` if the device begins without firmware, as a real device does after it is switched on.
         switched_on: bool,
     },
 }

@@ -150,7 +150,7 @@ struct Watching {
     guide: Guide,
     line: Progress,
     file: Option<SamplesFile>,
-    /// Whether rows go to standard output: standard output is no terminal, and no JSON document is asked for.
+    /// `true` if rows go to standard output: standard output is no terminal, and no JSON document is asked for.
     prints_rows: bool,
     /// Time of the next row on standard output, or of the next update of the terminal's line.
     next_look: Duration,

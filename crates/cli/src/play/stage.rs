@@ -31,7 +31,7 @@ const PATIENCE: Duration = Duration::from_secs(10);
 pub(super) struct Wish {
     strategy: Option<String>,
     peers: Option<usize>,
-    /// Whether the next part begins from the initial states of the scene, not from the states in which the present part ends.
+    /// `true` if the next part begins from the initial states of the scene, not from the states in which the present part ends.
     reset: bool,
 }
 
@@ -74,18 +74,18 @@ pub(super) struct PlayStage {
     pub(super) frames: Frames,
     /// Scene of the first part, to which a reset returns.
     beginning: PlayedScene,
-    /// Whether the page shows its three guided steps, which describe the default scene only.
+    /// `true` if the page shows its three guided steps, which describe the default scene only.
     is_guided: bool,
     /// Files that changes of links may name.
     pub(super) files: ControlFiles,
     /// One pointer per possible peer, indexed by peer. The pointers outlive the parts, so that a hand keeps its position across a border.
     pointers: Vec<Pointer>,
-    /// Whether a page has taken the hand, indexed by peer.
+    /// `true` if a page has taken the hand, indexed by peer.
     taken: Mutex<Vec<bool>>,
     part: Mutex<Option<Arc<Part>>>,
     links: Mutex<Option<KeyedLinks>>,
     wish: Mutex<Option<Wish>>,
-    /// Whether `wish` holds a wish. An atomic, so that the real-time thread asks without a lock.
+    /// `true` if `wish` holds a wish. An atomic, so that the real-time thread asks without a lock.
     is_wished: AtomicBool,
     finished: Mutex<Option<Arc<Finished>>>,
     /// Address for other people, known once the server listens.

@@ -23,7 +23,7 @@ pub(crate) struct RowsFile {
     /// Paths of all files with rows of the same computation in the folder when the file was opened, of other workers too.
     others: Vec<PathBuf>,
     file: File,
-    /// Whether opening the file created its folder.
+    /// `true` if opening the file created its folder.
     made_folder: bool,
 }
 

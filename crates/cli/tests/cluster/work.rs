@@ -151,7 +151,7 @@ pub(crate) fn words() -> Vec<&'static str> {
     WORK.split(' ').collect()
 }
 
-/// Whether a program is installed.
+/// Returns whether a program is installed.
 pub(crate) fn has(program: &str) -> bool {
     let folders = std::env::var_os("PATH").unwrap_or_default();
     std::env::split_paths(&folders).any(|folder| folder.join(program).is_file())

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::integration::desk::Desk;
 
-/// Whether there is a Python that can check; says so if there is none.
+/// Returns whether there is a Python that can check; says so if there is none.
 pub(crate) fn can_check() -> bool {
     let can = Command::new("python3").args(["-c", "import tomllib"]).output().is_ok_and(|output| output.status.success());
     if !can {

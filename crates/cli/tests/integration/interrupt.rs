@@ -37,7 +37,7 @@ fn send_interrupt(child: &Child) {
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
 }
 
-/// Whether a file has any content.
+/// Returns whether a file has any content.
 fn has_content(desk: &Desk, file: &str) -> bool {
     desk.path(file).metadata().is_ok_and(|metadata| metadata.len() > 0)
 }
@@ -82,7 +82,7 @@ fn after_an_interruption_the_variant_does_not_begin() {
     assert!(parse(&outcome.stdout).get("against").is_none() && !desk.path("out/against").exists());
 }
 
-/// Whether a process has a handler for SIGINT, number 2: bit 1 of the signals that it catches.
+/// Returns whether a process has a handler for SIGINT, number 2: bit 1 of the signals that it catches.
 #[cfg(target_os = "linux")]
 pub(crate) fn listens(id: u32) -> bool {
     let status = std::fs::read_to_string(format!("/proc/{id}/status")).unwrap_or_default();

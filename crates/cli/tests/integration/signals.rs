@@ -102,7 +102,7 @@ fn fill(full: &UnixStream) {
     full.set_nonblocking(false).unwrap();
 }
 
-/// Whether a file has any content.
+/// Returns whether a file has any content.
 fn has_content(desk: &Desk, file: &str) -> bool {
     desk.path(file).metadata().is_ok_and(|metadata| metadata.len() > 0)
 }
@@ -195,7 +195,7 @@ fn a_campaign_and_a_map_say_what_they_keep() {
     }
 }
 
-/// Whether a command listens to signals and has computed for a tenth of a second.
+/// Returns whether a command listens to signals and has computed for a tenth of a second.
 fn listens_and_computes(id: u32) -> bool {
     crate::integration::stop::has_worked(10, id)
 }

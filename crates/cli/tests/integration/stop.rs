@@ -41,7 +41,7 @@ fn stopped_after(worked: u64, desk: &Desk, line: &str, signal: &str) -> Outcome 
     Outcome { status, stdout: desk.read("stdout"), stderr: desk.read("stderr") }
 }
 
-/// Whether a process listens to signals, and has computed that long [1/100 s].
+/// Returns whether a process listens to signals, and has computed that long [1/100 s].
 pub(crate) fn has_worked(worked: u64, id: u32) -> bool {
     crate::integration::interrupt::listens(id) && computed(id).is_some_and(|computed| computed >= worked)
 }

@@ -5,7 +5,7 @@ use crate::pages::notes::Vary;
 /// Stands for any lines that the page leaves out.
 pub(crate) const LEFT_OUT: &str = "…";
 
-/// Whether the lines are what the page shows. Spaces at the end of a line do not count.
+/// Returns whether the lines are what the page shows. Spaces at the end of a line do not count.
 pub(crate) fn same(shown: &[&str], printed: &[&str], vary: &Vary) -> bool {
     let parts: Vec<&[&str]> = shown.split(|line| line.trim() == LEFT_OUT).collect();
     let [first, rest @ ..] = &parts[..] else { return printed.is_empty() };
@@ -39,7 +39,7 @@ pub(crate) fn same_line(shown: &str, printed: &str, vary: &Vary) -> bool {
         || (vary.figures_of(shown) && words(shown) == words(printed))
 }
 
-/// Whether the printed line has all parts of the other one, between which something is left out, in their order.
+/// Returns whether the printed line has all parts of the other one, between which something is left out, in their order.
 fn has_parts(shown: &str, printed: &str) -> bool {
     let parts: Vec<&str> = shown.split(LEFT_OUT).collect();
     let [first, middle @ .., last] = &parts[..] else { return false };
@@ -51,8 +51,8 @@ fn has_parts(shown: &str, printed: &str) -> bool {
     true
 }
 
-/// Whether the lines differ in nothing but figures with their errors, `X +- 1.2e-13`, and these by no more than the larger error says. Such an error is a
-/// bound of what rounding did, which depends on the processor: it may be ten times the other one.
+/// Returns whether the lines differ in nothing but figures with their errors, `X +- 1.2e-13`, and these by no more than the larger error says. Such an error is
+/// a bound of what rounding did, which depends on the processor: it may be ten times the other one.
 fn within_errors(shown: &str, printed: &str) -> bool {
     let (shown, printed): (Vec<&str>, Vec<&str>) = (shown.split(' ').collect(), printed.split(' ').collect());
     let number = |word: Option<&&str>| word.and_then(|word| word.parse::<f64>().ok());

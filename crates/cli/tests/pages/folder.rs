@@ -81,7 +81,7 @@ impl Folder {
         Outcome { printed: String::from_utf8(output.stdout).unwrap(), statuses, status: output.status.code() }
     }
 
-    /// Whether a program is installed, or a line with more words than that succeeds.
+    /// Returns whether a program is installed, or a line with more words than that succeeds.
     pub(crate) fn has(&self, needs: &str) -> bool {
         let line = if needs.contains(' ') { needs.to_owned() } else { format!("command -v {needs}") };
         self.run(&line, "").status == Some(0)

@@ -25,12 +25,12 @@ pub(crate) struct Vary {
 }
 
 impl Vary {
-    /// Whether figures of this line are not compared.
+    /// Returns whether figures of this line are not compared.
     pub(crate) fn figures_of(&self, line: &str) -> bool {
         self.figures.iter().any(|text| line.contains(text))
     }
 
-    /// Whether both lines have the same text of those that are all that is compared.
+    /// Returns whether both lines have the same text of those that are all that is compared.
     pub(crate) fn leaves_alone(&self, one: &str, other: &str) -> bool {
         self.lines.iter().any(|text| one.contains(text) && other.contains(text))
     }

@@ -97,7 +97,7 @@ pub(crate) fn anchors(text: &str) -> Vec<String> {
     found
 }
 
-/// Whether an anchor is that of a later heading of this name: `name-1`.
+/// Returns whether an anchor is that of a later heading of this name: `name-1`.
 fn is_numbered(other: &str, name: &str) -> bool {
     other.strip_prefix(name).and_then(|end| end.strip_prefix('-')).is_some_and(|end| end.parse::<u32>().is_ok())
 }

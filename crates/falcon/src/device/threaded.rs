@@ -25,7 +25,7 @@ struct Shared {
     wanted: Mailbox<Triple>,
     /// Device after the newest exchange, written by the thread.
     snapshot: Mailbox<Snapshot>,
-    /// Whether the thread is to stop the device and end.
+    /// `true` if the thread is to stop the device and end.
     stop: AtomicBool,
     /// End of the thread, set once.
     ended: OnceLock<Ended>,

@@ -167,7 +167,7 @@ pub struct Snapshot {
     pub at: Instant,
     /// Phase of the device.
     pub phase: Phase,
-    /// Whether the device is homed, and the user has switched forces on since then.
+    /// `true` if the device is homed, and the user has switched forces on since then.
     pub armed: bool,
     /// Homed encoders.
     pub homed: [bool; 3],

@@ -64,7 +64,7 @@ pub struct Driver<T: Transport> {
     homed_in_row: u32,
     /// Consecutive believed reports with an encoder that is not homed.
     unhomed_in_row: u32,
-    /// Whether the user has switched forces on since homing.
+    /// `true` if the user has switched forces on since homing.
     armed: bool,
     implausible_in_row: u32,
     faults_in_row: u32,

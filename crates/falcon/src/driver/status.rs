@@ -71,7 +71,7 @@ pub struct Reading {
 pub struct Status {
     /// Phase of the device.
     pub phase: Phase,
-    /// Whether the device is homed and the user has switched forces on since then, so that forces go out.
+    /// `true` if the device is homed and the user has switched forces on since then, so that forces go out.
     pub armed: bool,
     /// Homed encoders, as reported by the device; all false before the first report.
     pub homed: [bool; 3],

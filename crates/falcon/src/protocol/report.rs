@@ -51,7 +51,7 @@ impl Buttons {
 pub struct Report {
     /// Counts of the encoders top, right, left. A count has no meaning until its encoder is homed.
     pub encoders: [i16; 3],
-    /// Whether the encoder has passed its index since power-on, for each encoder.
+    /// `true` if the encoder has passed its index since power-on, for each encoder.
     pub homed: [bool; 3],
     /// Pressed buttons.
     pub buttons: Buttons,

@@ -11,9 +11,9 @@ use crate::kinematics::{Jacobian, Triple};
 pub struct Moment {
     /// Time of the packet.
     pub now: Instant,
-    /// Whether the homing of the device is confirmed.
+    /// `true` if the homing of the device is confirmed.
     pub homed: bool,
-    /// Whether the user has switched forces on, by a pull of the grip.
+    /// `true` if the user has switched forces on, by a pull of the grip.
     pub armed: bool,
     /// Arrival of the last report; `None` before the first report.
     pub reading_at: Option<Instant>,

@@ -10,11 +10,11 @@ use crate::kinematics::Triple;
 pub struct SimulatorConfig {
     /// Seed of the random numbers, for the offsets of encoders that are not homed, and for faults.
     pub seed: u64,
-    /// Whether firmware runs at the beginning.
+    /// `true` if firmware runs at the beginning.
     pub running: bool,
     /// The image that the boot loader accepts; `None` accepts every image of at least 1 KiB.
     pub image: Option<Vec<u8>>,
-    /// Whether a zero byte precedes the answer to the greeting.
+    /// `true` if a zero byte precedes the answer to the greeting.
     pub leading_zero: bool,
     /// Number of greetings that the boot loader ignores.
     pub deaf_greetings: u32,

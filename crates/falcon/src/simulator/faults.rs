@@ -15,7 +15,7 @@ pub struct Faults {
     pub garble_to_device: f64,
     /// A packet to the host that contains only 0 to 15 of the due bytes. The further bytes come with the next packet.
     pub fragment: f64,
-    /// Whether the device receives packets and sends no answers.
+    /// `true` if the device receives packets and sends no answers.
     pub mute: bool,
     /// Index of the firmware byte, from 0, that the boot loader returns wrong in the first attempt.
     pub wrong_echo: Option<usize>,

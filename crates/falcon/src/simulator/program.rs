@@ -74,14 +74,14 @@ pub(super) struct Program {
     greetings: u32,
     /// Firmware received so far.
     loaded: Vec<u8>,
-    /// Whether the wrong echo of [`Faults`] has been sent.
+    /// `true` if the wrong echo of [`Faults`] has been sent.
     echoes_spoiled: bool,
     framer: Framer,
     /// Last complete packet.
     command: CommandParts,
     /// Arrival of the last complete packet.
     commanded: Option<Instant>,
-    /// Whether the torque time-out since the last packet is counted.
+    /// `true` if the torque time-out since the last packet is counted.
     timed_out: bool,
     buttons: Buttons,
     observed: Observed,

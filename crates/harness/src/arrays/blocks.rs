@@ -68,7 +68,7 @@ pub(super) struct Seen {
 pub(super) struct Moved<const L: usize> {
     /// Largest distance along an axis between two copies before they moved \[m\], indexed by run.
     pub(super) discrepancy: [f64; L],
-    /// Whether all numbers are finite after the move, indexed by run.
+    /// `true` if all numbers are finite after the move, indexed by run.
     pub(super) finite: [bool; L],
 }
 

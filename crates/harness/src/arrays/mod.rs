@@ -107,7 +107,7 @@ struct Arrays<'a, const A: usize, const L: usize> {
     sent: Vec<Sample<A, L>>,
     /// Largest distance between two copies along an axis so far \[m\], indexed by run.
     max_discrepancy: [f64; L],
-    /// Whether all numbers were finite after the latest tick, indexed by run.
+    /// `true` if all numbers were finite after the latest tick, indexed by run.
     finite: [bool; L],
     /// Results of the runs that have ended, indexed by run.
     summaries: [Option<Summary>; L],

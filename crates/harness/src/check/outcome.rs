@@ -18,7 +18,7 @@ pub struct Outcome {
     pub high: Option<f64>,
     /// Measured value; `None` if there is no number.
     pub measured: Option<f64>,
-    /// Whether the expectation holds.
+    /// `true` if the expectation holds.
     pub passed: bool,
     /// Expectation as text: `at most 20ms`.
     pub expected: String,
@@ -75,7 +75,7 @@ impl Outcome {
 /// Finding about the stability of a scene.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Finding {
-    /// Whether the finding is as expected.
+    /// `true` if the finding is as expected.
     pub passed: bool,
     /// Finding as text that continues after "but": `a small disturbance grows`.
     pub found: String,

@@ -11,7 +11,7 @@ pub(crate) struct Ramp {
     /// Value at `since`.
     from: f64,
     since: Instant,
-    /// Whether the number moves towards 1.
+    /// `true` if the number moves towards 1.
     rises: bool,
     /// Time from 0 to 1.
     over: Duration,

@@ -60,7 +60,7 @@ pub(crate) struct RemotePeers<const A: usize> {
     told: Vec<Option<Age>>,
     /// Datagrams for other processes, in the order of arrival.
     outbox: VecDeque<Transmit>,
-    /// Whether any peer is in another process.
+    /// `true` if any peer is in another process.
     pub(crate) has_processes: bool,
     /// Index of the first local peer.
     pub(crate) lead: usize,

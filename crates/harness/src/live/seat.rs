@@ -74,7 +74,7 @@ pub struct SeatStats {
 /// Seat of a remote peer.
 #[derive(Clone, Debug)]
 pub(crate) struct Seat {
-    /// Whether the peer is in another process.
+    /// `true` if the peer is in another process.
     pub(crate) is_process: bool,
     /// Indices of the fades that fall and rise with the silence of the peer: all fades, or for a pointer only the fade of its own hand.
     followed: Range<usize>,
@@ -82,7 +82,7 @@ pub(crate) struct Seat {
     silence: Silence,
     /// Instant at which the peer was last heard.
     pub(crate) heard: Option<Instant>,
-    /// Whether the peer is silent. True before the peer is heard for the first time, unless a pointer is held from the start.
+    /// `true` if the peer is silent. True before the peer is heard for the first time, unless a pointer is held from the start.
     is_silent: bool,
     /// Sequence number that the peer gave its newest sample.
     newest: u64,

@@ -16,7 +16,7 @@ pub(crate) trait Remote<const A: usize> {
     /// Type of the devices that are not simulated.
     type Device: Device<A> + From<RestingDevice<A>>;
 
-    /// Whether every peer of every scene is local, so all peers can tick in one loop without calls of `attend`.
+    /// `true` if every peer of every scene is local, so all peers can tick in one loop without calls of `attend`.
     const IS_EMPTY: bool;
 
     /// Returns the index of the first local peer. In lockstep its tick count stands for all local peers.

@@ -82,7 +82,7 @@ struct Form {
     bytes: Bytes,
     /// Values of a path between two rows.
     between: Between,
-    /// Whether the recording of a path begins again after its end.
+    /// `true` if the recording of a path begins again after its end.
     repeat: bool,
     /// Origin of the times of a recorded path.
     start: Start,

@@ -82,7 +82,7 @@ pub struct Context<'a> {
     pub names: Option<&'a Names>,
     /// Modulators of the file. `None` before the list is read, and if the list was refused.
     pub modulators: Option<&'a Arc<Modulators>>,
-    /// Whether a table is read without the table below, over which the table will be laid. No key is reported as missing then.
+    /// `true` if a table is read without the table below, over which the table will be laid. No key is reported as missing then.
     pub partial: bool,
     /// Time from the start of the run to its end. `None` if the run has no fixed end, or if the time was refused.
     pub ends: Option<Duration>,

@@ -92,7 +92,7 @@ fn has_count(document: &Node) -> bool {
 struct Insertion {
     /// Dotted path of the current node.
     path: String,
-    /// Whether the scene makes its peers by `count`.
+    /// `true` if the scene makes its peers by `count`.
     counted: bool,
 }
 

@@ -121,13 +121,13 @@ impl Attachment {
 pub struct TunSpec {
     /// Name of the device.
     pub name: String,
-    /// Whether the device exists already. An existing device keeps its addresses and its MTU.
+    /// `true` if the device exists already. An existing device keeps its addresses and its MTU.
     pub existing: bool,
     /// Addresses that the device gets.
     pub addresses: Vec<Network>,
     /// Largest packet of the device \[bytes\], or `None` for the default of the system, 1500.
     pub mtu: Option<u16>,
-    /// Whether the kernel passes large segments without checksums to the router, and takes such segments back: fewer system calls for the same packets.
+    /// `true` if the kernel passes large segments without checksums to the router, and takes such segments back: fewer system calls for the same packets.
     pub offloads: bool,
     /// Network namespace of the device: a name as in `ip netns`, or a path. `None` for the namespace of the program.
     pub namespace: Option<String>,

@@ -19,7 +19,7 @@ pub struct SeatStatus<'a> {
     pub address: Option<SocketAddr>,
     /// Instant of the latest admitted sample of the holder. `None` if the seat was never taken.
     pub heard: Option<Instant>,
-    /// Whether the latest sample was admitted less than `stale_after` ago.
+    /// `true` if the latest sample was admitted less than `stale_after` ago.
     pub present: bool,
     /// Number of times that the seat was taken.
     pub joinings: u64,

@@ -16,9 +16,9 @@ const OLD: Duration = Duration::from_millis(20);
 /// Readiness of a Falcon for a session.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Readiness {
-    /// Whether the Falcon takes part: the device is homed, and its user has switched forces on.
+    /// `true` if the Falcon takes part: the device is homed, and its user has switched forces on.
     pub is_ready: bool,
-    /// Whether the Falcon is simulated.
+    /// `true` if the Falcon is simulated.
     pub is_simulated: bool,
     /// Phase of the device's driver.
     pub phase: Phase,

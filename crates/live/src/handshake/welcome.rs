@@ -29,7 +29,7 @@ pub const WELCOME_MAGIC: [u8; 4] = *b"CHPW";
 pub struct Welcome {
     /// Number of axes of a sample, 1 to 3.
     pub axes: u8,
-    /// Whether samples carry attitudes, as in scenes whose object turns.
+    /// `true` if samples carry attitudes, as in scenes whose object turns.
     pub turns: bool,
     /// Number of the session.
     pub session: u64,

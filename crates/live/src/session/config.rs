@@ -17,7 +17,7 @@ use crate::{AdmissionConfigError, SessionKey};
 pub struct SessionConfig {
     /// Local address of the socket to which peers of kind `udp` send. Not used in a scene without such peers.
     pub listen: SocketAddr,
-    /// Whether a session without a key may listen at an address that other machines can reach.
+    /// `true` if a session without a key may listen at an address that other machines can reach.
     pub allow_remote: bool,
     /// Session key. If set, every datagram must carry a tag made with the key. `None`: datagrams carry no tags.
     pub key: Option<SessionKey>,

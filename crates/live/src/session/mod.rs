@@ -84,7 +84,7 @@ pub struct Session {
     peers: usize,
     /// Clock of the run. Restarted when the run begins.
     clock: MonotonicClock,
-    /// Whether writing the record has failed.
+    /// `true` if writing the record has failed.
     is_stopped: bool,
 }
 

@@ -27,7 +27,7 @@ pub struct EndedPacket {
     pub to: usize,
     /// Time from the offer of the packet to the link until its delivery or loss.
     pub after: Duration,
-    /// Whether the packet was lost.
+    /// `true` if the packet was lost.
     pub is_lost: bool,
 }
 

@@ -23,9 +23,9 @@ pub(super) struct Outside {
     socket: UdpEndpoint,
     buffers: ReceiveBuffers,
     admission: AdmissionControl,
-    /// Whether the scene has more than one peer in another program. A received sample may then have to be sent on to another program at once.
+    /// `true` if the scene has more than one peer in another program. A received sample may then have to be sent on to another program at once.
     passes_on: bool,
-    /// Whether the last reading filled a whole batch, so that more datagrams may wait in the kernel.
+    /// `true` if the last reading filled a whole batch, so that more datagrams may wait in the kernel.
     is_more: bool,
     /// Buffer in which each outgoing datagram is made before the socket copies the datagram into its queue.
     sealed: [u8; MAX_DATAGRAM],

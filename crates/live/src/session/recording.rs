@@ -29,7 +29,7 @@ pub(crate) struct Recording {
     rows: SyncSender<Row>,
     /// Thread of the writer, which returns the files once the queue is closed and empty.
     writer: JoinHandle<Result<Files, RecordError>>,
-    /// Whether other files than `inputs.csv` are written. Rows for other files are not even queued otherwise.
+    /// `true` if other files than `inputs.csv` are written. Rows for other files are not even queued otherwise.
     has_others: bool,
 }
 

@@ -29,7 +29,7 @@ pub(super) struct Watch {
     pub(super) releases: Lateness,
     /// Traffic of the directed links: the entry `from * peers + to`, for every pair of peers. Pairs without a link stay empty.
     pub(super) links: Vec<Carried>,
-    /// Whether the conductor wants a status. Otherwise `links` is not kept up, because this takes time for each delivered packet.
+    /// `true` if the conductor wants a status. Otherwise `links` is not kept up, because this takes time for each delivered packet.
     pub(super) is_shown: bool,
     /// Packets for the next [`Motion`](super::Motion). `None` if the conductor wants no motion.
     pub(super) ended: Option<EndedPackets>,

@@ -74,7 +74,7 @@ struct HoldsUp {
     number: u64,
     /// Beginning of the latest pair.
     begun: Option<Wall>,
-    /// Whether the conductor has ended the session. The conductor must not be called afterwards.
+    /// `true` if the conductor has ended the session. The conductor must not be called afterwards.
     ended: bool,
 }
 
@@ -148,7 +148,7 @@ struct TakesPart {
     /// Number of samples sent to the program, from the latest status.
     released: u64,
     change: Option<LinkChange>,
-    /// Whether the conductor has ended the session. The conductor must not be called afterwards.
+    /// `true` if the conductor has ended the session. The conductor must not be called afterwards.
     ended: bool,
 }
 

@@ -30,7 +30,7 @@ pub(super) struct OrderOfArrival {
     /// Largest number arrived so far plus one.
     next_expected: u64,
     reordered: u64,
-    /// Whether each arrival was reordered, indexed by arrival.
+    /// `true` if each arrival was reordered, indexed by arrival.
     was_reordered: Vec<bool>,
     extent_sum: u64,
     extent_max: u64,

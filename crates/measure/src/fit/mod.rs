@@ -91,7 +91,7 @@ pub struct Goodness {
     pub effective: f64,
     /// Median gap between packets sent \[s\]. For packets sent in bursts, with most gaps zero, the median gap between bursts.
     pub spacing_s: f64,
-    /// Whether at least 95 % of the gaps are within a fifth of the median. If so, correlation and loss are per packet, otherwise in time.
+    /// `true` if at least 95 % of the gaps are within a fifth of the median. If so, correlation and loss are per packet, otherwise in time.
     pub evenly_spaced: bool,
     /// Mean of the measured delays \[s\].
     pub mean_s: f64,

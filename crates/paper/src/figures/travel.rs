@@ -57,7 +57,7 @@ struct Quantity {
     range: (f64, f64),
     values: fn(&PeerTrace) -> &[f64],
     scale: f64,
-    /// Whether the quantity is the position, whose panel shows the distance of 20 mm.
+    /// `true` if the quantity is the position, whose panel shows the distance of 20 mm.
     is_position: bool,
 }
 

@@ -140,7 +140,7 @@ pub struct LawParameter {
     pub default: &'static str,
     /// Meaning of the parameter, without a final full stop.
     pub about: &'static str,
-    /// Whether the timeline of a scene may change the parameter. A parameter that defines the beginning of a run, or the meaning of samples, cannot change.
+    /// `true` if the timeline of a scene may change the parameter. A parameter that defines the beginning of a run, or the meaning of samples, cannot change.
     pub can_change: bool,
 }
 

@@ -16,7 +16,7 @@ pub(super) struct Past<const A: usize> {
     lag: usize,
     /// Index of the oldest state in the first copy, below `lag`.
     oldest: usize,
-    /// Whether a state is known; not before the first tick.
+    /// `true` if a state is known; not before the first tick.
     is_known: bool,
 }
 

@@ -32,7 +32,7 @@ pub struct Wave<const A: usize> {
     share: f64,
     /// ρ/(M·h), the wave of a motion of one metre in the ticks between samples [√W/m].
     rate: f64,
-    /// Whether a wave continues after its M ticks.
+    /// `true` if a wave continues after its M ticks.
     holds: bool,
     /// Ticks of each line, indexed by the order of peers without this peer. Both counts of a line are adjacent, because a sample needs both.
     ticks: Vec<Ticks>,

@@ -72,7 +72,7 @@ pub struct Rotation {
     copy: Turning,
     device: Option<Turning>,
     held: HeldAttitudes,
-    /// Whether a held attitude has changed since the last computation of the means.
+    /// `true` if a held attitude has changed since the last computation of the means.
     stale: bool,
     computed: Torques,
     applied: Torques,

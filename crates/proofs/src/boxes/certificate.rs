@@ -127,7 +127,7 @@ impl MomentCertificate {
 pub struct PartCertificate {
     /// Members of each class, as places in the scene, indexed by class.
     pub members: Vec<Vec<usize>>,
-    /// Whether the part is the differences between the members of a class.
+    /// `true` if the part is the differences between the members of a class.
     pub is_difference: bool,
     /// Interval of the eigenvalues of the averaging matrix that the part stands for. `None` without a topology and for the part of the eigenvalue 1.
     pub eigenvalues: Option<[f64; 2]>,

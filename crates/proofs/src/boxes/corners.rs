@@ -43,7 +43,7 @@ struct Frame<'a> {
     sampling: Sampling,
     scale: Scale,
     tied: bool,
-    /// Whether position and velocity of the own past are separate states, because the corners take different combinations of both.
+    /// `true` if position and velocity of the own past are separate states, because the corners take different combinations of both.
     whole_past: bool,
 }
 

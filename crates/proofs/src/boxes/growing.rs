@@ -41,7 +41,7 @@ pub(super) struct Motion {
     pub(super) structure: Structure,
     /// The class that grows.
     growing: usize,
-    /// Whether forces are counted in newtons divided by N.
+    /// `true` if forces are counted in newtons divided by N.
     divides_forces: bool,
     /// Plans of the averages of classes, and of the differences within each class, indexed by class.
     plans: (Plans, Vec<Plans>),

@@ -33,7 +33,7 @@ pub(super) struct Halved {
     pub(super) pieces: Vec<(Ranges, Guarantee)>,
     /// Number of ranges that were looked at, also of those that were halved afterwards.
     pub(super) attempts: usize,
-    /// Whether all pieces were looked at. Otherwise pieces that were not looked at are undecided too.
+    /// `true` if all pieces were looked at. Otherwise pieces that were not looked at are undecided too.
     pub(super) is_whole: bool,
 }
 

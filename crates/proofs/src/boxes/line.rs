@@ -30,7 +30,7 @@ pub struct ProvenLine {
     pub attempts: usize,
     /// Stretches as they were decided, before neighbours with the same verdict were joined.
     pieces: Vec<ProvenStretch>,
-    /// Whether the watch let the proof run to its end. Otherwise stretches that were not looked at are undecided too.
+    /// `true` if the watch let the proof run to its end. Otherwise stretches that were not looked at are undecided too.
     pub is_whole: bool,
 }
 

@@ -63,9 +63,9 @@ pub struct EveryNumber {
     pub without_limit: Option<String>,
     /// Number of spans that were looked at, also of those that were halved afterwards.
     pub attempts: u64,
-    /// Whether the verdicts are about the mean square, because links lose.
+    /// `true` if the verdicts are about the mean square, because links lose.
     pub is_mean_square: bool,
-    /// Whether the watch let the proof look at all numbers. Otherwise numbers that were not looked at are undecided too.
+    /// `true` if the watch let the proof look at all numbers. Otherwise numbers that were not looked at are undecided too.
     pub is_whole: bool,
     /// Spans as they were decided, before neighbours with the same verdict were joined.
     pieces: Vec<NumberSpan>,

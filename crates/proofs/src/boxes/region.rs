@@ -28,7 +28,7 @@ pub struct ProvenRegion {
     pub boxes: Vec<ProvenBox>,
     /// Number of boxes that were looked at, also of those that were divided afterwards.
     pub attempts: usize,
-    /// Whether the watch let the proof run to its end. Otherwise boxes that were not looked at are undecided too.
+    /// `true` if the watch let the proof run to its end. Otherwise boxes that were not looked at are undecided too.
     pub is_whole: bool,
     /// First and last number of peers for which the verdicts hold (`None` as the last: without end); `None`: the number that the scene has.
     every: Option<(u64, Option<u64>)>,

@@ -25,7 +25,7 @@ use super::pushed::{Pushed, StateRegisters, coupling, device, moved, negative, s
 pub(super) struct Server {
     /// Class of the server.
     class: usize,
-    /// Whether clients receive the forces of their couplings, instead of the state of the object.
+    /// `true` if clients receive the forces of their couplings, instead of the state of the object.
     returns_forces: bool,
 }
 

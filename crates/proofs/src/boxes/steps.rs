@@ -113,14 +113,14 @@ pub enum FrameState {
     Device {
         /// The place of the class.
         class: usize,
-        /// Whether the state is the velocity.
+        /// `true` if the state is the velocity.
         velocity: bool,
     },
     /// Position or velocity of the copy of a class.
     Copy {
         /// The place of the class.
         class: usize,
-        /// Whether the state is the velocity.
+        /// `true` if the state is the velocity.
         velocity: bool,
     },
     /// Channel of a sample of a class.
@@ -145,7 +145,7 @@ pub enum FrameState {
         class: usize,
         /// Number of the sample, counted as in [`FrameState::Sample`].
         number: i64,
-        /// Whether the other peers receive the waves, instead of the class.
+        /// `true` if the other peers receive the waves, instead of the class.
         of_others: bool,
     },
     /// Force that waits for the next tick, or number that a law remembers.

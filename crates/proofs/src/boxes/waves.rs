@@ -39,9 +39,9 @@ pub(super) struct Waves {
     every: usize,
     /// Time M·h from one sample to the next \[s\].
     period: f64,
-    /// Whether a wave stays in force after its M ticks until another wave arrives.
+    /// `true` if a wave stays in force after its M ticks until another wave arrives.
     holds: bool,
-    /// Whether an arm ties the copy of a class to ground, indexed by class.
+    /// `true` if an arm ties the copy of a class to ground, indexed by class.
     tied: Vec<bool>,
 }
 
@@ -104,7 +104,7 @@ pub(super) struct Part<'a> {
     pub(super) apart: Option<usize>,
     /// Class whose P follows from all other sums.
     pub(super) rest: usize,
-    /// Whether the scene has exactly two peers, so that every P is the S of the other peer.
+    /// `true` if the scene has exactly two peers, so that every P is the S of the other peer.
     pub(super) is_pair: bool,
 }
 

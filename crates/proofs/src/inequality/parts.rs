@@ -61,7 +61,7 @@ pub(crate) struct Inequality {
     /// Number of rows of each shape.
     pub(crate) shapes: Vec<usize>,
     pub(crate) parts: Vec<Part>,
-    /// Whether a multiplier may be below zero, indexed by multiplier.
+    /// `true` if a multiplier may be below zero, indexed by multiplier.
     pub(crate) free: Vec<bool>,
 }
 

@@ -28,14 +28,14 @@ pub(crate) fn rate(inequality: &Inequality, solution: &Solution) -> Option<f64> 
     Some(outward(f64::sqrt(square)).min(1.0))
 }
 
-/// Whether every part is shown to hold, with positive definite shapes, and with multipliers of at least zero except where `free` allows any sign.
+/// Returns whether every part is shown to hold, with positive definite shapes, and with multipliers of at least zero except where `free` allows any sign.
 pub(crate) fn holds(inequality: &Inequality, solution: &Solution) -> bool {
     let signs = inequality.free.iter().zip(&solution.multipliers).all(|(free, multiplier)| *free || *multiplier >= 0.0);
     let is_shape = |shape: &Matrix| *shape == shape.transposed() && is_positive(shape, &Matrix::zeros(shape.rows(), shape.columns()));
     signs && solution.shapes.iter().all(is_shape) && shrinks(inequality, solution, 1.0)
 }
 
-/// Whether every part is shown to hold with the quadratic forms before a step multiplied by `square`.
+/// Returns whether every part is shown to hold with the quadratic forms before a step multiplied by `square`.
 fn shrinks(inequality: &Inequality, solution: &Solution, square: f64) -> bool {
     inequality.parts.iter().all(|part| {
         let (difference, error) = difference(part, solution, square);

@@ -27,7 +27,8 @@ impl<'a> Along<'a> {
         Self { scene, axis, contacts: Contacts { touching, at_wall: false, absent: piece.absent.clone() } }
     }
 
-    /// Whether a peer pushes along the axis to larger positions (`true`) or to smaller positions (`false`); `None` if the peer does not push along the axis.
+    /// Returns whether a peer pushes along the axis to larger positions (`true`) or to smaller positions (`false`); `None` if the peer does not push along the
+    /// axis.
     pub(super) fn pushes(&self, peer: usize) -> Option<bool> {
         match self.scene.peers[peer].contact {
             ContactKind::Push(direction) if direction.axis == self.axis => Some(direction.positive),

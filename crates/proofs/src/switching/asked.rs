@@ -25,9 +25,9 @@ pub(super) struct Asked {
     pub(super) sampling: Sampling,
     /// Factor of velocities in the states \[s\].
     pub(super) time: f64,
-    /// Whether positions are absolute, not relative to a reference copy.
+    /// `true` if positions are absolute, not relative to a reference copy.
     pub(super) tied: bool,
-    /// Whether every part without contacts is stable.
+    /// `true` if every part without contacts is stable.
     rest_is_stable: bool,
     /// Certificates of the parts without contacts, where a certificate exists.
     pub(super) rest: Vec<PartCertificate>,
@@ -88,7 +88,7 @@ impl Asked {
         Ok(asked)
     }
 
-    /// Whether the inequality takes some contact to be open at rest.
+    /// Returns whether the inequality takes some contact to be open at rest.
     pub(super) fn takes_rest(&self) -> bool {
         self.groups.iter().any(|group| group.has_rest)
     }

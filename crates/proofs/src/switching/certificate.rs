@@ -36,7 +36,7 @@ pub struct SwitchingCertificate {
 pub struct PushCertificate {
     /// Members of each class, as indices of peers of the scene.
     pub members: Vec<Vec<usize>>,
-    /// Whether the part is about the differences between members of a class. Otherwise the part is about the averages of classes.
+    /// `true` if the part is about the differences between members of a class. Otherwise the part is about the averages of classes.
     pub is_difference: bool,
     /// States that V measures. The depth p of each contact before the frame follows these states in V. Positions are measured from the first copy if nothing
     /// ties the scene to ground.

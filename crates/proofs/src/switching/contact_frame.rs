@@ -24,7 +24,7 @@ pub(super) struct Contact {
     pub(super) node: usize,
     pub(super) kind: Kind,
     pub(super) gains: Gains,
-    /// Whether an arm with a stiffness holds the device.
+    /// `true` if an arm with a stiffness holds the device.
     pub(super) armed: bool,
 }
 

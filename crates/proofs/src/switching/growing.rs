@@ -40,7 +40,7 @@ struct Motion<'a> {
     values: Vec<f64>,
     /// Absolute position of the reference, from which all other positions are measured.
     reference: f64,
-    /// Whether a contact was closed at its last tick, indexed by contact.
+    /// `true` if a contact was closed at its last tick, indexed by contact.
     closed: Vec<bool>,
     changes: usize,
 }

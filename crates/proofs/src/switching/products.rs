@@ -11,7 +11,7 @@ pub(super) struct Group {
     /// Number of peers of the class.
     pub(super) members: f64,
     pub(super) is_wall: bool,
-    /// Whether depths are measured from a rest in which the contact is open.
+    /// `true` if depths are measured from a rest in which the contact is open.
     pub(super) has_rest: bool,
 }
 
@@ -21,7 +21,7 @@ pub(super) struct PartFrame<'a> {
     pub(super) frame: &'a ContactFrame,
     /// Index of the group of each contact of the frame.
     pub(super) groups: &'a [usize],
-    /// Whether the part is about the differences of equal peers.
+    /// `true` if the part is about the differences of equal peers.
     pub(super) is_apart: bool,
 }
 
@@ -74,7 +74,7 @@ struct Multipliers<'a> {
     first: Vec<usize>,
     /// Pairs of groups of walls: the group of copy i, the group of copy j, and the index of the pair's first multiplier.
     shared: Vec<(usize, usize, usize)>,
-    /// Whether a multiplier may be below zero, indexed by multiplier: true only for those of (a).
+    /// `true` if a multiplier may be below zero, indexed by multiplier: true only for those of (a).
     free: Vec<bool>,
 }
 

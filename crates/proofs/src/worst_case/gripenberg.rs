@@ -63,7 +63,7 @@ pub(crate) struct WorstCase {
     pub(crate) cycle: Vec<usize>,
     /// Number of products that the search computed.
     pub(crate) products: u64,
-    /// Whether the distance of the bounds is at most the accuracy of the effort.
+    /// `true` if the distance of the bounds is at most the accuracy of the effort.
     pub(crate) complete: bool,
     /// Quadratic certificate whose shapes are the norms of the search; `None` if numbers overflowed.
     pub(crate) certificate: Option<Certificate>,

@@ -170,7 +170,7 @@ impl Pattern {
         &self.edges
     }
 
-    /// Whether an edge lies on a cycle. An infinite path takes edges on no cycle only finitely often.
+    /// Returns whether an edge lies on a cycle. An infinite path takes edges on no cycle only finitely often.
     #[must_use]
     pub(crate) fn recurs(&self, edge: &Edge) -> bool {
         self.component[edge.from] == self.component[edge.to]

@@ -147,7 +147,7 @@ impl Certificate {
     }
 }
 
-/// Whether ρ²P_from − AᵀP_to A > 0 can be shown, or A is zero, which contracts at any rate.
+/// Returns whether ρ²P_from − AᵀP_to A > 0 can be shown, or A is zero, which contracts at any rate.
 fn contracts(matrix: &Matrix, from: &Matrix, to: &Matrix, rate: f64) -> bool {
     if matrix.largest() == 0.0 {
         return true;

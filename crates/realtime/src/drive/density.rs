@@ -11,7 +11,7 @@ pub(super) struct Density {
     since: Instant,
     /// Packets in and out since then.
     packets: u64,
-    /// Whether the previous window had at least [`DENSE`] packets per [`WINDOW`].
+    /// `true` if the previous window had at least [`DENSE`] packets per [`WINDOW`].
     is_dense: bool,
 }
 

@@ -30,7 +30,7 @@ pub trait Driven {
     /// if strangers can make one reading longer than the program may be late.
     const AHEAD: Option<Duration>;
 
-    /// Whether the loop rests for 50 µs between two readings while traffic is dense and the thread may sleep ([`Pacing::Sleep`]). Packets with nearly equal
+    /// `true` if the loop rests for 50 µs between two readings while traffic is dense and the thread may sleep ([`Pacing::Sleep`]). Packets with nearly equal
     /// departures then go in one call of the kernel, and each packet is late by up to the rest.
     const RESTS: bool;
 

@@ -28,7 +28,7 @@ pub struct EndpointConfig {
     pub largest: usize,
     /// Datagrams waiting to be sent while the kernel's buffer is full, at most. Further datagrams are dropped and counted.
     pub waiting: usize,
-    /// Whether the kernel can join up to 64 datagrams of one sender before handing over the datagrams. Joining costs less time per datagram, but one call of
+    /// `true` if the kernel can join up to 64 datagrams of one sender before handing over the datagrams. Joining costs less time per datagram, but one call of
     /// [`UdpEndpoint::receive`] can then hand on 64 times [`UdpEndpoint::BATCH`] datagrams.
     pub joined: bool,
 }

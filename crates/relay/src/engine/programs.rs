@@ -31,7 +31,7 @@ pub(super) struct Programs {
 struct Known {
     /// Address of the program; `None` if not learnt yet.
     address: Option<SocketAddr>,
-    /// Whether the address is configured. A configured address never changes.
+    /// `true` if the address is configured. A configured address never changes.
     is_given: bool,
     /// Instant of the latest datagram from the program; zero before the first.
     heard: Instant,

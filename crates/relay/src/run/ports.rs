@@ -48,7 +48,7 @@ struct OpenPort {
     socket: UdpEndpoint,
     /// Instants at which the queued datagrams should have left, one per datagram in the socket's outbox, in the same order.
     departures: VecDeque<Instant>,
-    /// Whether the socket's index is in [`Ports::dirty`].
+    /// `true` if the socket's index is in [`Ports::dirty`].
     is_dirty: bool,
 }
 

@@ -24,7 +24,7 @@ pub struct Headers {
     pub(super) covered: usize,
     /// Index of the first byte of the transport header, or `None` if the header is not in this packet.
     pub(super) transport: Option<usize>,
-    /// Whether the packet is no fragment.
+    /// `true` if the packet is no fragment.
     pub(super) is_whole: bool,
     /// Length of the packet \[bytes\], at most the number of bytes read.
     pub length: usize,
@@ -160,7 +160,7 @@ struct Found {
     protocol: Protocol,
     /// Index of the transport header, or `None` if the header is not in this packet.
     at: Option<usize>,
-    /// Whether the packet is no fragment.
+    /// `true` if the packet is no fragment.
     whole: bool,
 }
 

@@ -7,7 +7,7 @@ use crate::Radius;
 pub struct Cell<R = Radius> {
     /// Radius by the criterion of the family; below 1 the scene is stable.
     pub radius: R,
-    /// Whether the radius leaves out random parts of the links, because the second moment of this scene cannot be followed. A nominal radius is the square
+    /// `true` if the radius leaves out random parts of the links, because the second moment of this scene cannot be followed. A nominal radius is the square
     /// of the spectral radius of the scene in which every delay is its mean and no packet is lost.
     pub is_nominal: bool,
 }

@@ -18,18 +18,18 @@ pub(super) struct Layout {
     pub(super) touching: Vec<bool>,
     /// Number of numbers that the strategy of each peer remembers.
     pub(super) memory: Vec<usize>,
-    /// Whether each peer has computed forces that wait to be applied, as with a compute delay.
+    /// `true` if each peer has computed forces that wait to be applied, as with a compute delay.
     pub(super) pending: Vec<bool>,
     /// Index of the newest sample of earlier frames of each peer; older samples follow.
     pub(super) samples: Vec<usize>,
     /// Number of receivers for which a sample carries extra numbers.
     pub(super) receivers: usize,
-    /// Whether the extra numbers are waves.
+    /// `true` if the extra numbers are waves.
     pub(super) has_waves: bool,
     pub(super) size: usize,
     /// Indices of states on which nothing depends: positions of devices that touch nothing and have no arm.
     pub(super) loose: Vec<usize>,
-    /// Whether something ties the copy of each peer to ground.
+    /// `true` if something ties the copy of each peer to ground.
     pub(super) tied: Vec<bool>,
 }
 

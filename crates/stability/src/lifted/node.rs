@@ -100,9 +100,9 @@ pub struct Node {
     pub law: LinearLaw,
     /// Spring and damper that tie the copy to ground, if any.
     pub wall: Option<Gains>,
-    /// Whether forces act one tick after their computation.
+    /// `true` if forces act one tick after their computation.
     pub compute_delay: bool,
-    /// Whether position and velocity of the own past are both states. If not, only the combination that the law uses is a state.
+    /// `true` if position and velocity of the own past are both states. If not, only the combination that the law uses is a state.
     pub keeps_whole_past: bool,
 }
 

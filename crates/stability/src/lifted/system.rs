@@ -18,7 +18,7 @@ pub struct Lifted<'a> {
     pub sampling: Sampling,
     /// Common time that velocities are multiplied by to be lengths \[s\].
     pub time: f64,
-    /// Whether something ties the motion to ground. If not, everything can be moved together without a force, and positions are taken relative to the first
+    /// `true` if something ties the motion to ground. If not, everything can be moved together without a force, and positions are taken relative to the first
     /// node's copy.
     pub tied: bool,
 }

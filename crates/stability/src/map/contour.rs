@@ -12,7 +12,7 @@ use super::Map;
 pub struct Polyline {
     /// Points (x, y) of the line. A closed line does not repeat its first point at the end.
     pub points: Vec<(f64, f64)>,
-    /// Whether the line goes on from the last point to the first.
+    /// `true` if the line goes on from the last point to the first.
     pub closed: bool,
 }
 

@@ -90,7 +90,7 @@ pub struct Map {
     pub y: Vec<f64>,
     /// Radius of each cell, indexed by y, then by x. A row is empty if the filling was stopped before the row was finished.
     pub radius: Vec<Vec<f64>>,
-    /// Whether each cell is nominal, indexed as `radius`: see [`Cell::is_nominal`](crate::Cell::is_nominal).
+    /// `true` if each cell is nominal, indexed as `radius`: see [`Cell::is_nominal`](crate::Cell::is_nominal).
     pub nominal: Vec<Vec<bool>>,
 }
 
@@ -99,7 +99,7 @@ pub struct Map {
 pub struct MapRow {
     /// Radius of each cell.
     pub radius: Vec<f64>,
-    /// Whether each cell is nominal.
+    /// `true` if each cell is nominal.
     pub nominal: Vec<bool>,
 }
 

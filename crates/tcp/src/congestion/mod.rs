@@ -29,7 +29,7 @@ pub(crate) struct Congestion {
     cubic: Option<Cubic>,
     /// Initial window \[segments\].
     initial: u32,
-    /// Whether the window, and not the program, held back data in the last flight.
+    /// `true` if the window, and not the program, held back data in the last flight.
     is_limiting: bool,
     /// Largest number of unacknowledged segments in the last flight.
     most_out: u32,

@@ -65,9 +65,9 @@ pub(crate) struct News {
     pub(crate) acked: u32,
     /// Number of segments newly known to have arrived, by a block or by the acknowledgement number.
     pub(crate) delivered: u32,
-    /// Whether a segment became sacked.
+    /// `true` if a segment became sacked.
     pub(crate) has_sacked: bool,
-    /// Whether a segment that was sent again, and not sacked before, was acknowledged, so that a round trip is ambiguous (Karn's rule).
+    /// `true` if a segment that was sent again, and not sacked before, was acknowledged, so that a round trip is ambiguous (Karn's rule).
     pub(crate) has_acked_again: bool,
     /// Instant at which the first acknowledged segment that was neither sacked before nor ever sent again was sent.
     pub(crate) first_acked: Option<Instant>,

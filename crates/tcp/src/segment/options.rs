@@ -9,7 +9,7 @@ pub struct Options {
     pub mss: Option<u16>,
     /// Number of bits by which the sender's windows are shifted (RFC 7323, section 2). Only on a SYN.
     pub window_scale: Option<u8>,
-    /// Whether the sender understands selective acknowledgements (RFC 2018). Only on a SYN.
+    /// `true` if the sender understands selective acknowledgements (RFC 2018). Only on a SYN.
     pub sack_permitted: bool,
     /// Value and echo of the timestamps option (RFC 7323, section 3) \[ticks\].
     pub timestamps: Option<(u32, u32)>,

@@ -155,7 +155,8 @@ impl World {
         self.programs[side].error.map(|(_, error)| error).or_else(|| self.ends[side].as_ref()?.error())
     }
 
-    /// Whether an end may fail so: it has heard nothing for as long as it repeats its SYN with ACK, the least of all limits; or it was reset by one that is over.
+    /// Returns whether an end may fail so: it has heard nothing for as long as it repeats its SYN with ACK, the least of all limits; or it was reset by one
+    /// that is over.
     fn is_legitimate(&self, side: usize, error: Error) -> bool {
         let silence = self.closed_at[side].map(|at| at.saturating_duration_since(self.heard_at[side]));
         let is_peer_over = self.closed_at[1 - side].is_some_and(|over| self.closed_at[side].is_some_and(|at| over <= at));

@@ -376,7 +376,7 @@ fn syns(world: &World) -> Vec<(Instant, u8)> {
     left.map(|left| (left.at, left.segment.flags.bits())).collect()
 }
 
-/// Whether data of the server's was marked as capable.
+/// Returns whether data of the server's was marked as capable.
 fn is_capable(world: &World) -> bool {
     world.log.iter().flatten().any(|left| left.from == 1 && left.segment.ecn == Ecn::Capable0)
 }

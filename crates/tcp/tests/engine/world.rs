@@ -71,9 +71,9 @@ pub(crate) struct World {
     pub(crate) log: Option<Vec<Left>>,
     /// Says which segments are lost on the way.
     pub(crate) drops: Filter,
-    /// Whether packets cross the links as octets; otherwise as they are, which is faster.
+    /// `true` if packets cross the links as octets; otherwise as they are, which is faster.
     pub(crate) is_encoded: bool,
-    /// Whether every octet is looked at.
+    /// `true` if every octet is looked at.
     pub(crate) is_checked: bool,
     pub(crate) marks: bool,
     links: [Link<Packet>; 2],

@@ -16,7 +16,7 @@ use crate::current;
 /// Acts that other threads have left for the thread of a run.
 #[derive(Default)]
 pub(super) struct Elsewhere {
-    /// Whether `left` may hold something. Read without the lock between two polls of tasks.
+    /// `true` if `left` may hold something. Read without the lock between two polls of tasks.
     is_any: AtomicBool,
     left: Mutex<Left>,
 }

@@ -14,7 +14,7 @@ pub(crate) struct Ends {
     pub(super) to: u32,
     from_port: u16,
     to_port: u16,
-    /// Whether both addresses are of IPv6.
+    /// `true` if both addresses are of IPv6.
     is_six: bool,
     pub(super) kind: Kind,
 }

@@ -189,9 +189,9 @@ impl Core {
 /// State of a host.
 #[derive(Debug, Default)]
 struct HostState {
-    /// Whether the host has crashed and has not been restarted.
+    /// `true` if the host has crashed and has not been restarted.
     is_down: bool,
-    /// Whether the program of the host was killed and has not been restarted.
+    /// `true` if the program of the host was killed and has not been restarted.
     is_idle: bool,
     /// Sockets of the host, by port.
     bound: Bound,

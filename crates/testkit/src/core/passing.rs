@@ -19,7 +19,7 @@ pub(crate) struct Outgoing<'a> {
     /// Address of the receiver. `None`: the peer to which the socket is connected.
     pub(crate) to: Option<&'a SocketAddr>,
     pub(crate) bytes: &'a [u8],
-    /// Whether the datagram is marked as ECN-capable.
+    /// `true` if the datagram is marked as ECN-capable.
     pub(crate) ecn_capable: bool,
 }
 

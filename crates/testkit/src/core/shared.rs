@@ -36,15 +36,15 @@ pub(crate) struct Shared {
     home: Mutex<Option<Box<Core>>>,
     /// Acts left by other threads for the thread of the run.
     pub(super) elsewhere: Elsewhere,
-    /// Whether the run is over. From then on any thread may lock the state, so that a socket or another value of the run can be dropped there.
+    /// `true` if the run is over. From then on any thread may lock the state, so that a socket or another value of the run can be dropped there.
     has_ended: AtomicBool,
     names: Arc<Names>,
     /// Number of the run, from 1 on.
     run: u64,
-    /// Whether the state stays in `home` during the run, because other threads read the state.
+    /// `true` if the state stays in `home` during the run, because other threads read the state.
     stays: bool,
-    /// Whether the time of the state is that of the clock, so that the clock need not be asked. Always true with the clock of this crate. Tokio's clock must be
-    /// asked, except while the executor of this crate polls tasks: tokio's clock could then be moved only by a task itself.
+    /// `true` if the time of the state is that of the clock, so that the clock need not be asked. Always true with the clock of this crate. Tokio's clock must
+    /// be asked, except while the executor of this crate polls tasks: tokio's clock could then be moved only by a task itself.
     #[cfg(feature = "tokio")]
     is_synced: AtomicBool,
     clock: Clock,

@@ -48,7 +48,7 @@ pub(crate) struct SocketState {
     /// Bytes of all datagrams in `inbox`, without overhead.
     pub(super) held: usize,
     readers: Waiters,
-    /// Whether IP has refused a datagram that was sent, and the program has not been told.
+    /// `true` if IP has refused a datagram that was sent, and the program has not been told.
     pub(super) refused: bool,
     pub(super) may_broadcast: bool,
     /// Instant at which the host crashed or its program was killed; `None` while the socket lives.

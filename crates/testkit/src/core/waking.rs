@@ -12,7 +12,7 @@ pub(crate) fn registered(waker: &Waker) -> Registered {
 /// Wakers of the tasks that wait for the same thing, such as a datagram at a socket.
 #[derive(Debug, Default)]
 pub(super) struct Waiters {
-    /// Whether the task of `first` waits. `first` is kept after it was woken: most often the same task waits again, and its waker need not be cloned.
+    /// `true` if the task of `first` waits. `first` is kept after it was woken: most often the same task waits again, and its waker need not be cloned.
     first_waits: bool,
     /// Waker of the first waiting task. If `first_waits` is false, a waker that was woken before, or `None`.
     first: Option<Waker>,

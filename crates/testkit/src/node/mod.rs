@@ -88,7 +88,7 @@ pub struct Packet {
     pub to: SocketAddr,
     /// Content of the packet, with the damage done by the link, if any.
     pub bytes: Bytes,
-    /// Whether an active queue has marked the packet: congestion experienced (RFC 3168).
+    /// `true` if an active queue has marked the packet: congestion experienced (RFC 3168).
     pub marked: bool,
 }
 
@@ -116,7 +116,7 @@ pub struct Transmit {
     pub from_port: u16,
     /// Content of the packet.
     pub bytes: Bytes,
-    /// Whether both ends understand explicit congestion notification. An active queue then marks the packet in place of dropping it.
+    /// `true` if both ends understand explicit congestion notification. An active queue then marks the packet in place of dropping it.
     pub ecn_capable: bool,
 }
 

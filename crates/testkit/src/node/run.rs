@@ -62,7 +62,7 @@ pub(super) enum Does {
 pub(super) struct Ports {
     pub(super) from: u16,
     pub(super) to: u16,
-    /// Whether the packet is of IPv6.
+    /// `true` if the packet is of IPv6.
     pub(super) is_six: bool,
 }
 

@@ -54,7 +54,7 @@ const POLLS: u32 = 61;
 struct Idle {
     /// Instant for which the pump has set its timer \[ns\], or [`NO_INSTANT`].
     armed: AtomicU64,
-    /// Whether the pump must set its timer anew.
+    /// `true` if the pump must set its timer anew.
     is_wanted: AtomicBool,
     /// Reading at which the hook has left the clock \[ns\], if nothing that could move the clock runs between the hook and the executor; otherwise
     /// [`NO_INSTANT`].
@@ -63,7 +63,7 @@ struct Idle {
     until: Instant,
     /// Instant at which tokio last parked its thread \[ns\].
     parked: AtomicU64,
-    /// Whether tokio is jumping to an instant at which nothing will ever have happened. Tokio's timers do not reach that far, so this takes several jumps.
+    /// `true` if tokio is jumping to an instant at which nothing will ever have happened. Tokio's timers do not reach that far, so this takes several jumps.
     is_idle: AtomicBool,
     /// Wakes the pump and the executor, which share a task.
     main: Mutex<Option<Waker>>,

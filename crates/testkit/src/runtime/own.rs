@@ -34,7 +34,7 @@ struct Here {
     ready: RefCell<Vec<usize>>,
     /// Wakes the executor if it is itself a task of another executor.
     main: RefCell<Option<Waker>>,
-    /// Whether the executor waits to be woken.
+    /// `true` if the executor waits to be woken.
     waits: Cell<bool>,
 }
 
@@ -65,7 +65,7 @@ pub(crate) fn is_any_ready() -> bool {
 /// Tasks that other threads have woken.
 #[derive(Default)]
 struct Elsewhere {
-    /// Whether `woken` may hold tasks. Read without the lock.
+    /// `true` if `woken` may hold tasks. Read without the lock.
     is_any: AtomicBool,
     woken: Mutex<WokenElsewhere>,
 }
@@ -87,7 +87,7 @@ impl Elsewhere {
 /// Waker of a task: the index of the task, and the executor to which the task belongs.
 struct Place {
     number: usize,
-    /// Whether the task is in a queue already. A task is queued at most once.
+    /// `true` if the task is in a queue already. A task is queued at most once.
     is_queued: AtomicBool,
     executor: u64,
     elsewhere: Arc<Elsewhere>,

@@ -34,7 +34,7 @@ pub(crate) struct Task {
     program: RefCell<Option<Program>>,
     /// Instant of the last poll. The task waits since then.
     polled: Cell<Instant>,
-    /// Whether the task was stopped, perhaps while it was being polled.
+    /// `true` if the task was stopped, perhaps while it was being polled.
     is_doomed: Cell<bool>,
     /// Waker of the task. Every poll uses the same waker.
     waker: RefCell<Option<Waker>>,

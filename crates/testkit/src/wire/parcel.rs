@@ -14,7 +14,7 @@ use crate::trace::PacketName;
 pub(crate) struct Parcel<A> {
     pub(crate) addresses: A,
     pub(crate) bytes: Octets,
-    /// Whether the sender understands congestion marks.
+    /// `true` if the sender understands congestion marks.
     pub(crate) ecn_capable: bool,
     /// Report of the link. Valid only for a parcel that its link has delivered.
     pub(crate) arrival: Arrival,
@@ -25,9 +25,9 @@ pub(crate) struct Parcel<A> {
 pub(crate) struct Arrival {
     pub(crate) packet: PacketName,
     pub(crate) at: Instant,
-    /// Whether an active queue marked the packet.
+    /// `true` if an active queue marked the packet.
     pub(crate) marked: bool,
-    /// Whether the path of the packet is cut, so that the packet is lost on arrival.
+    /// `true` if the path of the packet is cut, so that the packet is lost on arrival.
     pub(crate) is_cut: bool,
 }
 

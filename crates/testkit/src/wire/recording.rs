@@ -17,9 +17,9 @@ use crate::trace::{Happening, Trace};
 pub(crate) struct Recording {
     trace: Trace,
     packets: Vec<Seen>,
-    /// Whether happenings are recorded.
+    /// `true` if happenings are recorded.
     pub(crate) traces: bool,
-    /// Whether the trace holds digests of the contents of packets.
+    /// `true` if the trace holds digests of the contents of packets.
     pub(super) digests: bool,
     keeps_packets: bool,
 }

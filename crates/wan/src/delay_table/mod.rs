@@ -163,7 +163,7 @@ struct Columns {
     sent: Column,
     /// Column `delay` or `arrived`.
     end: Column,
-    /// Whether `end` has times of arrival instead of delays.
+    /// `true` if `end` has times of arrival instead of delays.
     end_is_instant: bool,
     lost: Option<Column>,
     loss: Option<Column>,

@@ -28,9 +28,9 @@ pub struct PacketRecord<L = ()> {
     pub size: Bytes,
     /// Fate of the packet.
     pub fate: Fate,
-    /// Whether the packet was marked with congestion experienced.
+    /// `true` if the packet was marked with congestion experienced.
     pub marked: bool,
-    /// Whether bits of the packet were flipped.
+    /// `true` if bits of the packet were flipped.
     pub damaged: bool,
 }
 

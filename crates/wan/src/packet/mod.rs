@@ -16,7 +16,7 @@ use crate::fates::fate::DropCause;
 pub struct PacketInfo {
     /// Size of the packet.
     pub size: Bytes,
-    /// Whether both ends understand explicit congestion notification (RFC 3168). An active queue marks such a packet where it would drop any other packet.
+    /// `true` if both ends understand explicit congestion notification (RFC 3168). An active queue marks such a packet where it would drop any other packet.
     pub ecn_capable: bool,
 }
 
@@ -37,9 +37,9 @@ pub(crate) struct Packet<T> {
     /// 0 for the packet itself, 1 for the copy that this link made.
     pub(crate) copy: u8,
     pub(crate) info: PacketInfo,
-    /// Whether an earlier line on the path marked the packet.
+    /// `true` if an earlier line on the path marked the packet.
     pub(crate) was_marked: bool,
-    /// Whether an earlier line on the path flipped bits of the packet.
+    /// `true` if an earlier line on the path flipped bits of the packet.
     pub(crate) was_damaged: bool,
     /// Marks of this line and of earlier lines together.
     pub(crate) marks: Marks,
@@ -63,11 +63,11 @@ impl<T> Packet<T> {
 /// Marks and damage of a packet: all effects of a link besides delay and loss.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub(crate) struct Marks {
-    /// Whether an active queue marked the packet ("congestion experienced").
+    /// `true` if an active queue marked the packet ("congestion experienced").
     pub(crate) congestion: bool,
     /// Flipped bits.
     pub(crate) damage: Option<Damage>,
-    /// Whether the checksum of the receiver will find the damage, so that the packet is dropped on arrival.
+    /// `true` if the checksum of the receiver will find the damage, so that the packet is dropped on arrival.
     pub(crate) discarded_on_arrival: bool,
 }
 

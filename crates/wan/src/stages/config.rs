@@ -36,7 +36,7 @@ pub struct LinkConfig {
     pub outages: Outages,
     /// Model of loss. Loss stands before the queue, so that a lost packet uses no bandwidth.
     pub loss: Loss,
-    /// Whether a packet that supports ECN is marked instead of lost.
+    /// `true` if a packet that supports ECN is marked instead of lost.
     pub marks_instead_of_loss: bool,
     /// Chance that a packet is sent twice. After this stage the copy passes all later stages independently of the original.
     pub duplication: Chance,

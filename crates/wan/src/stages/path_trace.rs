@@ -17,7 +17,7 @@ use cohaptic_units::{Instant, Probability};
 pub struct PathTrace {
     rows: Arc<[Row]>,
     between: Between,
-    /// Whether the recording begins anew at the instant of its last row, whose delay and loss then never hold.
+    /// `true` if the recording begins anew at the instant of its last row, whose delay and loss then never hold.
     repeats: bool,
 }
 

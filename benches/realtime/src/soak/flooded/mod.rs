@@ -43,7 +43,7 @@ pub struct FloodedPlan {
     pub program: PathBuf,
     /// Datagrams a second of the recorded hello; the other floods of datagrams have a quarter of it each.
     pub rate: u32,
-    /// Whether the programs ask for priority and locked memory, as they do unless told otherwise.
+    /// `true` if the programs ask for priority and locked memory, as they do unless told otherwise.
     pub priority: bool,
 }
 

@@ -5,8 +5,8 @@ use serde_json::Value;
 use super::{Outcome, PROCESSES, Row};
 use crate::soak::verdict::{Judgement, median, too_few, verdict};
 
-/// Whether memory is flat \[kB\]: the median of the last third of the looks is at most 2 % and 1 MiB above that of the second third. The first third is left
-/// out, in which buffers are touched for the first time.
+/// Returns whether memory is flat \[kB\]: the median of the last third of the looks is at most 2 % and 1 MiB above that of the second third. The first third is
+/// left out, in which buffers are touched for the first time.
 #[must_use]
 pub fn is_flat(second: u64, last: u64) -> bool {
     second > 0 && last <= second + second / 50 + 1024

@@ -16,7 +16,7 @@ pub(super) struct Scale {
     low: f64,
     high: f64,
     is_logarithmic: bool,
-    /// Whether some means lie beyond the end of the axis.
+    /// `true` if some means lie beyond the end of the axis.
     pub(super) is_cut: bool,
 }
 

@@ -155,7 +155,7 @@ pub(super) fn status(order: &Order, arguments: &MapArguments, folder: &Path) -> 
 /// Destination of finished rows, with the first failure to write. Shared by all threads of the computation.
 struct Keeper<'a> {
     file: Mutex<(Option<RowsFile>, Option<Failure>)>,
-    /// Whether a failure is kept. An atomic, so that `stops` needs no lock.
+    /// `true` if a failure is kept. An atomic, so that `stops` needs no lock.
     broken: AtomicBool,
     /// Worker of the shard; `None` if the command computes all rows.
     worker: Option<&'a Worker>,

@@ -79,7 +79,7 @@ fn taken_part(desk: &Desk, languages: &[Language], with_key: bool, seconds: f64)
     Some((settled, summaries, session.end()))
 }
 
-/// Whether everything comes to rest before the first of the programs ends.
+/// Returns whether everything comes to rest before the first of the programs ends.
 fn settles(control: &Control, running: &mut [Running]) -> bool {
     wait_for("the programs to come to rest or to end", || {
         let settled = is_settled(&control.state());

@@ -64,7 +64,7 @@ impl Page {
         }
     }
 
-    /// Whether the server closes within the patience.
+    /// Returns whether the server closes within the patience.
     fn is_closed(&mut self) -> bool {
         let begin = Instant::now();
         while begin.elapsed() < PATIENCE {

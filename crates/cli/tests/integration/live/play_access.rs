@@ -193,7 +193,7 @@ fn texts_have_contrast_on_light_and_on_dark_ground() {
     end(session);
 }
 
-/// Whether the picture of the rooms changes in half a second.
+/// Returns whether the picture of the rooms changes in half a second.
 fn moves(browser: &mut Browser) -> bool {
     let picture = "document.getElementById('rooms').toDataURL()";
     let before = browser.value(picture);

@@ -110,7 +110,7 @@ pub(super) fn assert_same(desk: &Desk, session: &str, run: &str) {
     }
 }
 
-/// Whether the balance holds that every socket has: each datagram that was handled has one outcome.
+/// Returns whether the balance holds that every socket has: each datagram that was handled has one outcome.
 pub(super) fn assert_counted(door: &Value) {
     let count = |key: &str| door[key].as_u64().unwrap();
     let refused: u64 = door["refused"].as_object().unwrap().values().map(|count| count.as_u64().unwrap()).sum();

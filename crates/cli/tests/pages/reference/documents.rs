@@ -90,7 +90,7 @@ fn paths(path: &str, value: &Value, found: &mut BTreeSet<String>) {
     }
 }
 
-/// Whether a path is that of a key of the table: `NAME` at its end stands for any name and what is within.
+/// Returns whether a path is that of a key of the table: `NAME` at its end stands for any name and what is within.
 fn is_of(path: &str, key: &str) -> bool {
     match key.strip_suffix("NAME") {
         Some(prefix) => path.starts_with(prefix) || prefix.strip_suffix('.') == Some(path),

@@ -63,7 +63,7 @@ struct Reference {
     explained: Vec<Explained>,
     page: &'static str,
     anchor: String,
-    /// Whether tables within tables come after the others.
+    /// `true` if tables within tables come after the others.
     puts_off: bool,
     later: Vec<(String, &'static str, &'static Table)>,
 }

@@ -24,7 +24,7 @@ pub(in crate::arrays) struct Block {
     /// Contacts of all eight lanes. `None` if no lane has ever had a one-sided contact along this axis.
     pub(super) contacts: Option<Box<[Contact; WIDTH]>>,
     pub(super) axis: usize,
-    /// Whether any of the devices is tied to ground, so its step map has no free motion.
+    /// `true` if any of the devices is tied to ground, so its step map has no free motion.
     pub(super) is_tied: bool,
 }
 

@@ -39,7 +39,7 @@ pub(in crate::arrays) struct PerPacket<const A: usize, const L: usize> {
     end: Instant,
     /// Links, ordered by receiver, then sender, then run; see [`Rows`].
     links: Links<A>,
-    /// Whether a peer sends at the present tick, indexed by peer of the scene.
+    /// `true` if a peer sends at the present tick, indexed by peer of the scene.
     sends: Vec<bool>,
     in_flight: InFlight<A>,
     /// Samples held, indexed by axis, then ordered by receiver and sender. Each receiver has whole quads, the last of which may be padded.
@@ -469,7 +469,7 @@ struct DirectSending<'a, const A: usize, const L: usize> {
     receivers: Range<usize>,
     links: &'a mut DirectLinks,
     senders: &'a [usize],
-    /// Whether a peer of the scene is among `senders`, indexed by peer.
+    /// `true` if a peer of the scene is among `senders`, indexed by peer.
     sends: &'a [bool],
     sent: &'a [Sample<A, L>],
     in_flight: &'a mut InFlight<A>,

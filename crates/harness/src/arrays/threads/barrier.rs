@@ -13,7 +13,7 @@ pub(super) struct Barrier {
     arrived: AtomicUsize,
     /// Number of meetings so far. Its change releases the waiting threads.
     meetings: AtomicUsize,
-    /// Whether a thread panicked, so waiting threads must not wait for it.
+    /// `true` if a thread panicked, so waiting threads must not wait for it.
     is_broken: AtomicBool,
 }
 

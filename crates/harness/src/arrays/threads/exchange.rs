@@ -22,7 +22,7 @@ struct Told<const A: usize> {
     samples: Vec<(usize, Sample<A, 1>)>,
     /// Least and greatest position of the thread's copies \[m\], indexed by tick since the last report, then axis.
     extremes: Vec<(f64, f64)>,
-    /// Whether all numbers of the thread's peers have been finite so far.
+    /// `true` if all numbers of the thread's peers have been finite so far.
     is_finite: bool,
 }
 
@@ -40,7 +40,7 @@ pub(super) struct Thread<'e, const A: usize> {
     /// Extremes of all threads at a meeting. A field, to use the same memory at every meeting.
     extremes_of_all: Vec<(f64, f64)>,
     is_finite: bool,
-    /// Whether all numbers of all threads were finite at the last meeting.
+    /// `true` if all numbers of all threads were finite at the last meeting.
     all_are_finite: bool,
     /// Largest distance between two copies along an axis up to the last meeting \[m\].
     max_discrepancy: f64,

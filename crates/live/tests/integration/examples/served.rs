@@ -25,7 +25,7 @@ struct Served {
     answers: u64,
     /// Sequence number of the first sample of each other peer.
     first_number: u64,
-    /// Whether false samples are sent before the samples of the other peers.
+    /// `true` if false samples are sent before the samples of the other peers.
     strangers: bool,
 }
 

@@ -23,7 +23,7 @@ pub struct Contents {
     pub seen_again: usize,
     /// Datagrams with several packets, cut or joined by the network card.
     pub super_packets: usize,
-    /// Whether the file ends within a block. All blocks before were read.
+    /// `true` if the file ends within a block. All blocks before were read.
     pub cut_off: bool,
 }
 

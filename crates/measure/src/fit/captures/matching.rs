@@ -10,15 +10,15 @@ use super::views;
 pub(super) struct Pairs {
     /// Number of the receiver's datagram, indexed by the sender's datagram; `None` without a counterpart.
     pub(super) arrival_of: Vec<Option<usize>>,
-    /// Whether a datagram of the sender shows a packet already shown by another. Such a datagram does not count as a packet.
+    /// `true` if a datagram of the sender shows a packet already shown by another. Such a datagram does not count as a packet.
     pub(super) is_again: Vec<bool>,
-    /// Whether a datagram of the sender may have arrived inside a long datagram of which the receiver's capture shows only the first packet.
+    /// `true` if a datagram of the sender may have arrived inside a long datagram of which the receiver's capture shows only the first packet.
     pub(super) is_hidden: Vec<bool>,
-    /// Whether a datagram of the receiver has a counterpart.
+    /// `true` if a datagram of the receiver has a counterpart.
     pub(super) taken: Vec<bool>,
-    /// Whether a datagram of the receiver shows a packet again and must not be matched.
+    /// `true` if a datagram of the receiver shows a packet again and must not be matched.
     is_copy: Vec<bool>,
-    /// Whether a datagram of the sender equals another in everything compared.
+    /// `true` if a datagram of the sender equals another in everything compared.
     pub(super) is_ambiguous: Vec<bool>,
 }
 

@@ -50,7 +50,7 @@ pub struct LawFit {
     /// Probability of a larger distance for a true law with parameters not fitted: 2·Σ(−1)ᵏ⁻¹·e^(−2k²mD²) for m independent delays (Smirnov 1948, The
     /// Annals of Mathematical Statistics 19(2)). Too large for fitted parameters.
     pub p_value: f64,
-    /// Whether the distance is at most [`Goodness::kolmogorov_limit`](super::Goodness::kolmogorov_limit).
+    /// `true` if the distance is at most [`Goodness::kolmogorov_limit`](super::Goodness::kolmogorov_limit).
     pub fits: bool,
 }
 

@@ -36,7 +36,7 @@ pub struct Skew {
     pub standard_error: f64,
     /// Interval of the true drift with confidence of at least 0.99, with the choice of the location taken into account.
     pub interval_99: [f64; 2],
-    /// Whether zero lies outside the interval. Only a significant drift is removed.
+    /// `true` if zero lies outside the interval. Only a significant drift is removed.
     pub significant: bool,
     /// Location of the delays used for the estimate.
     pub location: Location,

@@ -130,7 +130,7 @@ impl SceneWorstCase {
         }
     }
 
-    /// Whether the bounds are more than 1 % apart, so that the growth of the worst case stays open.
+    /// Returns whether the bounds are more than 1 % apart, so that the growth of the worst case stays open.
     #[must_use]
     pub fn is_open(&self) -> bool {
         self.upper > CLOSE * self.lower

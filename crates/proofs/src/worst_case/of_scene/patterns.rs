@@ -55,7 +55,7 @@ impl Patterns {
         }
     }
 
-    /// Whether the network has any choice, of losses or of delays.
+    /// Returns whether the network has any choice, of losses or of delays.
     pub(super) fn choose(&self) -> bool {
         self.losses_in_a_row > 0 || !self.width().is_zero()
     }

@@ -64,7 +64,7 @@ struct Segment<'a> {
     field: usize,
     /// Bytes of data in each packet but the last.
     size: usize,
-    /// Whether the checksum field held the right sum of the pseudo-header.
+    /// `true` if the checksum field held the right sum of the pseudo-header.
     is_checked: bool,
 }
 

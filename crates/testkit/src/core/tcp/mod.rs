@@ -77,7 +77,7 @@ struct End {
     machine: Connection,
     readers: Waiters,
     writers: Waiters,
-    /// Whether a stream of a program holds this end.
+    /// `true` if a stream of a program holds this end.
     is_held: bool,
     /// Whether the last write found the send buffer full, or the handshake is not complete.
     is_write_blocked: bool,
@@ -101,7 +101,7 @@ struct End {
 #[derive(Clone, Copy, Debug)]
 struct Gone {
     at: Instant,
-    /// Whether only the program was killed. If false, the host has crashed.
+    /// `true` if only the program was killed. If false, the host has crashed.
     is_killed: bool,
 }
 

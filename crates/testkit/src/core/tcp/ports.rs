@@ -24,7 +24,7 @@ pub(crate) struct HoldId {
 struct Hold {
     number: u64,
     ip: IpAddr,
-    /// Whether the socket has set `SO_REUSEADDR`.
+    /// `true` if the socket has set `SO_REUSEADDR`.
     is_shared: bool,
     /// Listener of the socket, once the socket listens.
     listener: Option<ListenId>,

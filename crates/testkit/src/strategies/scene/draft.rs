@@ -22,7 +22,7 @@ pub struct Draft {
     pub mass: f64,
     /// Damping of each copy [N·s/m].
     pub damping: f64,
-    /// Whether the mass is divided among the copies.
+    /// `true` if the mass is divided among the copies.
     pub split_mass: bool,
     /// Initial position of all bodies \[m\].
     pub position: Place,
@@ -59,7 +59,7 @@ pub struct DraftPeer {
     pub name: String,
     /// Length of a tick \[µs\].
     pub tick: u64,
-    /// Whether forces act a tick late.
+    /// `true` if forces act a tick late.
     pub compute_delay: bool,
     /// Index of the first tick at which the peer sends.
     pub phase: u64,

@@ -39,7 +39,7 @@ pub(super) struct Search<S: Space> {
     phase: Phase<S>,
     /// Candidates with which the test has passed.
     passed: Vec<S::Value>,
-    /// Whether anything was accepted since the first phase last began.
+    /// `true` if anything was accepted since the first phase last began.
     progress: bool,
     /// Number of times that the phases have begun anew.
     round: u32,

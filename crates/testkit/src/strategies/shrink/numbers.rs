@@ -7,7 +7,7 @@ use crate::strategies::grid::{is_round, next_towards, round_between};
 #[derive(Clone, Debug)]
 pub(super) struct Numbers<P> {
     places: std::vec::IntoIter<P>,
-    /// Whether a number is left as it is if the test passes with the next round number.
+    /// `true` if a number is left as it is if the test passes with the next round number.
     only_nearest: bool,
     /// Number that shrinks now.
     now: Option<(P, Bisection)>,

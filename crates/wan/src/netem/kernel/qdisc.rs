@@ -124,11 +124,11 @@ pub struct Dequeued<T> {
     pub size: u32,
     /// 0 for the packet, 1 for its copy.
     pub copy: u8,
-    /// Whether the packet was marked instead of lost. The kernel counts the mark as a drop.
+    /// `true` if the packet was marked instead of lost. The kernel counts the mark as a drop.
     pub marked: bool,
     /// The flipped bit, or `None`. The kernel completes checksums before it flips the bit, so a host that verifies checksums drops the packet.
     pub corrupted: Option<FlippedBit>,
-    /// Whether the packet left before packets that were waiting.
+    /// `true` if the packet left before packets that were waiting.
     pub reordered: bool,
 }
 

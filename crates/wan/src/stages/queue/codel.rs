@@ -17,7 +17,7 @@ pub struct CoDel {
     pub interval: Duration,
     /// Number of waiting bytes up to which no packet is dropped: one packet of the largest size.
     pub mtu: Bytes,
-    /// Whether a packet that supports ECN is marked instead of dropped.
+    /// `true` if a packet that supports ECN is marked instead of dropped.
     pub ecn: bool,
 }
 
@@ -33,7 +33,7 @@ impl Default for CoDel {
 pub(crate) struct CoDelState {
     /// Instant at which waits will have exceeded the target for an interval, or `None` while waits are below the target.
     first_above: Option<Instant>,
-    /// Whether packets are being dropped by the control law.
+    /// `true` if packets are being dropped by the control law.
     dropping: bool,
     /// Instant from which the next packet is dropped.
     drop_next: Instant,

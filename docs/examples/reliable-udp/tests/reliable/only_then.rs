@@ -14,7 +14,7 @@ fn runner(cases: u32) -> TestRunner {
     TestRunner::new(ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() })
 }
 
-/// Whether a transmission was acknowledged after its message had been sent again.
+/// Returns whether a transmission was acknowledged after its message had been sent again.
 fn is_acknowledged_behind_a_retransmission(events: &[Event]) -> bool {
     let (mut message_of, mut last_of) = (BTreeMap::new(), BTreeMap::new());
     events.iter().any(|event| match event {
