@@ -87,6 +87,8 @@ pages! {
     commands_run: "docs/commands-run.md",
     compare: "docs/compare.md",
     the_book: "docs/README.md",
+    emulator: "docs/emulator.md",
+    emulator_stages: "docs/emulator-stages.md",
     extending: "docs/extending.md",
     falcon: "docs/falcon.md",
     hard_cases: "docs/hard-cases.md",
