@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import html
 import json
+import re
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,10 +16,18 @@ if TYPE_CHECKING:
 
 
 class Picture:
-    """A picture as SVG, which notebooks show."""
+    """A picture as SVG, which notebooks show.
+
+    >>> Picture("<svg><title>Delays &amp; losses</title></svg>")
+    <Picture: Delays & losses>
+    """
 
     def __init__(self, svg: str) -> None:
         self.svg = svg
+
+    def __repr__(self) -> str:
+        title = re.search("<title>(.*?)</title>", self.svg, re.DOTALL)
+        return f"<Picture: {html.unescape(title[1])}>" if title else "<Picture>"
 
     def _repr_svg_(self) -> str:
         return self.svg

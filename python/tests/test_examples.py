@@ -2,15 +2,21 @@
 
 import importlib.util
 import itertools
+from pathlib import Path
 from types import ModuleType
 
 import gymnasium
+import matplotlib as mpl
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from conftest import ROOT
 
-from cohaptic import Link
+from cohaptic import Link, Scene
 from cohaptic.gym import RemoteEnv
+
+# Without a display.
+mpl.use("agg")
 
 
 def example(name: str) -> ModuleType:
@@ -35,6 +41,22 @@ def test_a_ping_takes_both_links() -> None:
     trips = (back.arrived - sent[there.delivered][order])[back.delivered]
     # SimPy counts its time in sums of floating-point numbers.
     assert np.allclose(np.sort(ping(500, seed=7)), np.sort(trips), atol=2e-9)
+
+
+def test_the_figure_of_a_paper_shows_what_was_computed(tmp_path: Path) -> None:
+    paper_figure = example("paper_figure")
+    scene = Scene(ROOT / "scenarios" / "coordination" / "n3.toml")
+    figure, (left, right) = plt.subplots(1, 2)
+    paper_figure.regions(left, scene)
+    # The shares that `cohaptic stability map` prints for the same grid on the front page: 55.15 % and 26.98 %.
+    assert [text.get_text() for text in left.get_legend().get_texts()] == ["AP, 55%", "PD, 27%"]
+    paper_figure.discrepancies(right, scene)
+    medians = {line.get_label(): line.get_ydata() for line in right.get_lines()}
+    assert np.all(medians["AP"] > medians["PD"])
+    assert np.all(np.diff(medians["AP"]) > 0)
+    plt.close(figure)
+    paper_figure.draw(scene, str(tmp_path / "figure.pdf"))
+    assert (tmp_path / "figure.pdf").read_bytes().startswith(b"%PDF")
 
 
 def test_delay_makes_balancing_harder() -> None:
