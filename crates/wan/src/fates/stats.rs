@@ -135,7 +135,7 @@ impl LinkStats {
         self.seldom.dropped.iter().sum()
     }
 
-    /// Returns the number of packets inside the link: waiting, on the line, or propagating.
+    /// Returns the number of packets inside the link: waiting, in transmission, or propagating.
     #[must_use]
     pub fn in_flight(&self) -> u64 {
         self.offered() + self.duplicated() - self.delivered() - self.dropped_in_all()

@@ -63,7 +63,7 @@ pub enum ExactError {
         /// Requested rate \[bytes/s\].
         bytes_per_sec: u64,
     },
-    /// A negative cell overhead: a cell cannot be smaller on the line than its payload.
+    /// A negative cell overhead: a cell cannot be smaller in transmission than its payload.
     CellOverhead {
         /// Requested cell overhead \[bytes\].
         found: i32,

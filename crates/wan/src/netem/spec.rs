@@ -25,7 +25,7 @@ pub struct Netem {
     pub duplicate: Option<ChanceSpec>,
     /// `reorder` and its `gap`: sends a packet at once, before the waiting packets.
     pub reorder: Option<ReorderSpec>,
-    /// `rate`: the rate of the line, and the framing of packets.
+    /// `rate`: the rate of the transmitter, and the framing of packets.
     pub rate: Option<RateSpec>,
     /// `slot`: lets packets leave in bunches.
     pub slot: Option<SlotSpec>,

@@ -62,7 +62,7 @@ pub struct NetworkConfig {
     pub seed: u64,
     /// Names of the nodes. The names address the random numbers of links: links with equal names and an equal seed draw equal numbers.
     pub nodes: Vec<String>,
-    /// `true` if links with a constant delay and no other impairment take the general path too. Only speed differs, no answer.
+    /// `true` if links with a constant delay and no other impairment take the general pipeline too. Only speed differs, no answer.
     pub general: bool,
 }
 

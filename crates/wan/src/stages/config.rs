@@ -148,8 +148,8 @@ impl LinkConfig {
         waits_for_line || self.without_queues(load).token_bucket.is_some()
     }
 
-    /// Returns the span by which the link delays every packet of `load`, or `None` if the link does anything else. The span is the time on the line, if no
-    /// packet waits for the line, plus the propagation delay.
+    /// Returns the span by which the link delays every packet of `load`, or `None` if the link does anything else. The span is the transmission time, if no
+    /// packet waits for a transmission, plus the propagation delay.
     #[must_use]
     pub fn constant_delay_of(&self, load: Load) -> Option<Duration> {
         let line = self.bottleneck.as_ref().map_or(Some(Duration::ZERO), |bottleneck| bottleneck.time_without_wait(load))?;

@@ -1,7 +1,7 @@
 //! Modulation: links whose configuration changes by chance. A chain of states in continuous time selects one of several whole configurations.
 //!
-//! Examples are a Wi-Fi cell that is busy or not, a phone that changes cells, and a route that flaps. The chain's path is a function of the seed and the name
-//! of the modulator, so that links with the same modulator change at the same instants without sharing state.
+//! Examples are a Wi-Fi cell that is busy or not, a phone that changes cells, and a route that flaps. The sequence of states is a function of the seed and the
+//! name of the modulator, so that links with the same modulator change at the same instants without sharing state.
 
 use alloc::string::String;
 use alloc::sync::Arc;
@@ -141,7 +141,7 @@ impl Modulator {
         Self::new(name, rates.iter().enumerate().map(state).collect())
     }
 
-    /// Returns the name, which is with the seed the address of the path's random numbers.
+    /// Returns the name, which is with the seed the address of the modulator's random numbers.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
@@ -163,7 +163,7 @@ pub struct Modulated {
 
 impl Modulated {
     /// Returns a link that has the n-th configuration while the modulator is in its n-th state. A change of state is a live change: packets in propagation
-    /// keep their delay, and a packet on the line keeps the bits already sent.
+    /// keep their delay, and a packet in transmission keeps the bits already sent.
     ///
     /// # Errors
     ///
@@ -193,7 +193,7 @@ impl Modulated {
     }
 }
 
-/// Path of a modulator as one link follows it.
+/// Sequence of a modulator's states as one link follows it.
 #[derive(Clone, Debug)]
 pub(crate) struct ModulationStage {
     modulated: Modulated,
@@ -207,12 +207,12 @@ pub(crate) struct ModulationStage {
 }
 
 impl ModulationStage {
-    /// Returns the path at `now`, after all changes since the begin of time.
+    /// Returns the modulation at `now`, after all changes since the begin of time.
     pub(crate) fn new(seed: u64, modulated: Modulated, now: Instant) -> Self {
         let draws = Stream::new(seed, alloc::format!("modulator {}", modulated.modulator.name).as_bytes());
         let mut stage = Self { modulated, draws, state: 0, changes: 0, until: Instant::ZERO };
         stage.until = stage.end_of_state(Instant::ZERO);
-        // A link that joins later walks the same path from the begin of time, so that it changes with all other links of the modulator.
+        // A link that joins later walks through the same states from the begin of time, so that it changes with all other links of the modulator.
         while stage.next_change().is_some_and(|at| at <= now) {
             stage.change();
         }
@@ -224,7 +224,7 @@ impl ModulationStage {
         (self.until < Instant::MAX).then_some(self.until)
     }
 
-    /// Moves the path to the next state.
+    /// Moves to the next state.
     pub(crate) fn change(&mut self) {
         let weights = &self.modulated.modulator.states[self.state].next;
         let total: f64 = weights.iter().sum();

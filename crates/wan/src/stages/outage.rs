@@ -210,7 +210,7 @@ impl OutageStage {
         if let Some(random) = self.outages.random {
             while self.span_ends <= now {
                 self.span += 1;
-                // Spans up and down alternate, and each is drawn once, so that the path does not depend on when packets ask.
+                // Spans up and down alternate, and each is drawn once, so that the spans do not depend on when packets ask.
                 let law = if self.span.is_multiple_of(2) { random.up } else { random.down };
                 self.span_ends = self.span_ends.saturating_add(drawn(law, draws, self.span));
                 // The sum saturates at the end of time. Without this exit a packet at the end of time would draw spans for ever.

@@ -19,7 +19,7 @@ pub(super) struct Kind {
     loss: Losses,
     delay: Delays,
     line: Line,
-    /// Computation for eight links at once; `None` without correlated delays, with a line, or where [`Chains::new`] returns `None`.
+    /// Computation for eight links at once; `None` without correlated delays, with a rate, or where [`Chains::new`] returns `None`.
     pub(super) chains: Option<Chains>,
 }
 
@@ -30,10 +30,10 @@ pub(super) enum Losses {
     GilbertElliott(GilbertElliott),
 }
 
-/// The line of a link and the queue before the line, for packets of one size.
+/// The transmitter of a link and its queue, for packets of one size.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Line {
-    /// No packet waits. Each packet takes this time on the line \[ns\]; 0 without a line.
+    /// No packet waits. Each packet takes this time to transmit \[ns\]; 0 without a rate.
     Free(u64),
     /// A queue with tail drop, in which packets of one size may wait.
     Queued(EqualPackets),
@@ -136,7 +136,7 @@ impl Kind {
         if is_lost {
             return Verdict::Lost;
         }
-        // Lost packets take no time on the line, since losses come before the queue.
+        // Lost packets take no time to transmit, since losses come before the queue.
         let leaves = match &self.line {
             Line::Free(nanos) => now.saturating_add_nanos(*nanos),
             Line::Queued(queue) => match queue.offer(now, &mut link.departure) {
@@ -161,8 +161,8 @@ impl Remembered {
 }
 
 impl Line {
-    /// Makes the line of a link for packets of this load. Returns `None` if departures depend on more than [`EqualPackets`] knows, or if the line comes after
-    /// the delay (the layout of netem).
+    /// Makes the transmitter of a link for packets of this load. Returns `None` if departures depend on more than [`EqualPackets`] knows, or if the transmitter
+    /// comes after the delay (the layout of netem).
     pub(super) fn new(config: &LinkConfig, load: Load) -> Option<Self> {
         let Some(bottleneck) = &config.bottleneck else { return Some(Self::Free(0)) };
         if config.layout == Layout::Netem {

@@ -20,9 +20,9 @@ use crate::random::Stream;
 use crate::stages::config::LinkConfig;
 use crate::stages::queue::Load;
 
-/// Links that know the arrival of a packet when the packet is offered. Possible parts are outages, loss, a tail-drop queue before a line of constant rate, a
-/// queue of any discipline in which no packet waits, delay with jitter, and order. Each link is a function from a packet to its arrival, with the state that
-/// bursts of loss, correlated delays and the line need. All links have one [`Load`].
+/// Links that know the arrival of a packet when the packet is offered. Possible parts are outages, loss, a tail-drop queue before a transmitter of constant
+/// rate, a queue of any discipline in which no packet waits, delay with jitter, and order. Each link is a function from a packet to its arrival, with the state
+/// that bursts of loss, correlated delays and the transmitter need. All links have one [`Load`].
 ///
 /// Random numbers, their addresses and the counters are those of [`crate::Network`] with the same links. The queue of packets on the way is left to the
 /// driver, since a driver that looks at arrivals on a lattice of its own can use a simpler queue. The driver says until when it will look, so that a packet

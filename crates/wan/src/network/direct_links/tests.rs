@@ -18,7 +18,7 @@ fn model(words: &str) -> LinkModel {
     Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap().into()
 }
 
-/// Returns a model of these words of netem, with a queue of this limit before a line of 100 kbit/s, on which 64 bytes take 5.12 ms.
+/// Returns a model of these words of netem, with a queue of this limit before a transmitter of 100 kbit/s, at which 64 bytes take 5.12 ms.
 fn queued(words: &str, limit: Option<QueueLimit>) -> LinkModel {
     let bottleneck = Bottleneck { limit, ..Bottleneck::at_rate(Rate::bits_per_sec(100_000).unwrap()) };
     let config = Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap();
@@ -47,7 +47,7 @@ fn they_decide_what_whole_links_decide() {
     }
 }
 
-/// Packets come every 8 ms, so that the line is idle, or every 4 ms, so that its queue fills.
+/// Packets come every 8 ms, so that the transmitter is idle, or every 4 ms, so that its queue fills.
 #[test]
 fn queues_decide_what_whole_links_decide() {
     let limits = [None, Some(QueueLimit::Packets(3)), Some(QueueLimit::Bytes(Bytes::new(200))), Some(QueueLimit::Time(Duration::from_millis(9)))];
@@ -61,8 +61,8 @@ fn queues_decide_what_whole_links_decide() {
     }
 }
 
-/// The line of 100 kbit/s under a load whose packets are at least 5.12 ms apart, with every discipline and a token bucket that holds one packet. No packet
-/// waits, whatever the limit.
+/// The transmitter of 100 kbit/s under a load whose packets are at least 5.12 ms apart, with every discipline and a token bucket that holds one packet. No
+/// packet waits, whatever the limit.
 #[test]
 fn lines_without_wait_decide_what_whole_links_decide() {
     let load = Load { gap: Duration::from_micros(5_120), ..OF_TESTS };

@@ -44,7 +44,7 @@ pub struct SteppedLinks<T> {
 #[derive(Clone, Debug)]
 #[expect(clippy::large_enum_variant, reason = "most links are queued, and lie together: a box for each would be one more place to look at")]
 enum Stepped<T> {
-    /// A link with one queue before one line of constant rate at most: the index of its kind in `kinds`, and its own state.
+    /// A link with at most one queue, before a transmitter of constant rate: the index of its kind in `kinds`, and its own state.
     Queued(u8, QueuedLink<T>),
     Other(Box<Other<T>>),
 }
@@ -150,7 +150,7 @@ impl<T: Clone> SteppedLinks<T> {
         let fate = match line.offer(now, None) {
             Outcome::Arrives(at) => Some(Ok(at)),
             Outcome::Dropped(cause) => Some(Err(cause)),
-            // Most packets find an idle line. Their fate is computed here without a pass through the stages.
+            // Most packets find an idle transmitter. Their fate is computed here without a pass through the stages.
             Outcome::Enters => line.enter_at_once(now, *info, next),
         };
         let number = line.offered() - 1;
@@ -308,7 +308,7 @@ struct Arriving<'a, T> {
 impl<T> Sink<Sent<T>> for Arriving<'_, T> {
     fn arrives(&mut self, at: Instant, packet: Sent<T>, _copy: u8, marks: Marks) {
         if marks.congestion {
-            // Only the line from which the packet leaves now can have marked it, so that the instant of the wake is the instant of the mark.
+            // Only the queue from which the packet leaves now can have marked the packet, so that the instant of the wake is the instant of the mark.
             self.ahead.note(self.span, None);
         }
         self.arrivals.push((at, packet));

@@ -1,6 +1,6 @@
-//! Links in which packets wait before one line of constant rate only, for packets of one size.
+//! Links in which packets wait for one transmitter of constant rate only, for packets of one size.
 //!
-//! A link keeps the stages that decide at once, the packet on the line, and the waiting packets. Its answers are those of [`BottleneckStage`] between the
+//! A link keeps the stages that decide at once, the packet in transmission, and the waiting packets. Its answers are those of [`BottleneckStage`] between the
 //! stages of [`Staged`](crate::line::staged::Staged), with less memory per link: equal packet sizes make the waiting bytes and bits multiples of the number
 //! of packets.
 //!
@@ -35,14 +35,14 @@ pub(super) struct QueuedKind {
     line: Option<LineKind>,
 }
 
-/// A line of constant rate and the queue before the line, for packets of one size.
+/// A transmitter of constant rate and its queue, for packets of one size.
 #[derive(Clone, Debug)]
 struct LineKind {
     bottleneck: Bottleneck,
     rate: Rate,
     /// Size of each packet.
     size: Bytes,
-    /// Size of a packet on the line, framing included \[10⁻⁹ bit\].
+    /// Size of a packet in transmission, framing included \[10⁻⁹ bit\].
     bits: u128,
     /// Transmission time of a packet.
     time: Duration,
@@ -52,7 +52,7 @@ struct LineKind {
 
 impl QueuedKind {
     /// Returns the kind of queued links of this model, for packets of `size`. Returns `None` if the model needs further stages, has the layout of netem, has
-    /// a line without a constant rate, or marks packets.
+    /// a transmitter without a constant rate, or marks packets.
     pub(super) fn new(model: &LinkModel, size: Bytes) -> Option<Self> {
         let config = model.as_fixed()?;
         if config.layout == Layout::Netem || !config.is_direct_but_for_queue(Load::of(size)) {
@@ -86,14 +86,14 @@ impl LineKind {
     }
 }
 
-/// A queued link, with the packets on the line and before the line.
+/// A queued link, with the packet in transmission and the waiting packets.
 #[derive(Clone, Debug)]
 pub(super) struct QueuedLink<T> {
     direct: Direct,
     flow: Flow,
     /// Latest arrival of a packet so far.
     latest: Instant,
-    /// The line and its queue; `None` if the kind has no line.
+    /// The transmitter and its queue; `None` if the kind has no rate.
     line: Option<LineState<T>>,
     /// Boxed, because few packets are dropped.
     drops: Option<Box<Drops>>,
@@ -106,17 +106,17 @@ struct Drops {
     ahead: Ahead,
 }
 
-/// The packets on a line and before the line.
+/// The packet in transmission and the waiting packets.
 #[derive(Clone, Debug)]
 struct LineState<T> {
     on_line: Option<OnLine<T>>,
-    /// Instant since which the line has had nothing to send. Meaningful while `on_line` is empty.
+    /// Instant since which the transmitter has had nothing to send. Meaningful while `on_line` is empty.
     idle_since: Instant,
     waiting: VecDeque<Offered<T>>,
     discipline: DisciplineState,
 }
 
-/// A packet on the line: at `since`, `left` of it was still to be sent \[10⁻⁹ bit\], and it leaves the line at `leaves`.
+/// A packet in transmission: at `since`, `left` of the packet was still to be sent \[10⁻⁹ bit\]; its transmission ends at `leaves`.
 #[derive(Clone, Debug)]
 struct OnLine<T> {
     packet: Offered<T>,
@@ -226,7 +226,7 @@ impl<T> QueuedLink<T> {
                 Some(line)
             }
             (line, _, kind) => {
-                // Without a queue after the change, packets on the line and before the line go on to the delay at once.
+                // Without a queue after the change, packets in transmission and in the queue go on to the delay at once.
                 let given_up = line.into_iter().flat_map(LineState::dismantle);
                 given_up.for_each(|packet| self.propagate((now, until), packet, arrives));
                 kind.as_ref().map(LineState::new)
@@ -273,8 +273,8 @@ impl<T> LineState<T> {
         Self { on_line: None, idle_since: Instant::ZERO, waiting: VecDeque::new(), discipline }
     }
 
-    /// Drops a packet, sends it on an idle line, or lets it wait; with head drop, waiting packets may be dropped in its place. `word` gives the packet's
-    /// random word for queues, and is called by RED only.
+    /// Drops a packet, sends it if the transmitter is idle, or lets it wait; with head drop, waiting packets may be dropped in its place. `word` gives the
+    /// packet's random word for queues, and is called by RED only.
     #[inline(always)]
     fn take(&mut self, now: Instant, kind: &LineKind, packet: Offered<T>, word: impl FnOnce() -> u64, mut dropped: impl FnMut(DropCause)) {
         if let (DisciplineState::Red(state), Discipline::Red(red)) = (&mut self.discipline, &kind.bottleneck.discipline) {
@@ -304,7 +304,7 @@ impl<T> LineState<T> {
         let Some(limit) = kind.bottleneck.limit else { return true };
         let (packets, bytes) = (self.waiting.len(), kind.bytes(self.waiting.len()));
         let time = match (limit, &self.on_line) {
-            // The waiting time is that of the rest of the packet on the line plus that of all waiting packets.
+            // The waiting time is that of the rest of the packet in transmission plus that of all waiting packets.
             (QueueLimit::Time(_), Some(on_line)) => {
                 let sent = kind.rate.bits_sent(now.saturating_duration_since(on_line.since));
                 kind.rate.transmission_time(on_line.left.saturating_sub(sent) + packets as u128 * kind.bits)
@@ -314,7 +314,7 @@ impl<T> LineState<T> {
         limit.admits(Waiting { packets: packets as u64, bytes, time }, kind.size)
     }
 
-    /// Removes the packet that leaves the line by `next`, and returns the packet and its instant. The first waiting packet is on the line afterwards.
+    /// Removes the packet whose transmission ends by `next`, and returns the packet and its instant. The first waiting packet is in transmission afterwards.
     #[inline(always)]
     fn leave(&mut self, next: Instant, kind: &LineKind, mut dropped: impl FnMut(Instant, DropCause)) -> Option<(Instant, Offered<T>)> {
         let OnLine { packet, leaves, .. } = self.on_line.take_if(|on_line| on_line.leaves <= next)?;
@@ -339,10 +339,10 @@ impl<T> LineState<T> {
             }
         }
         self.on_line = Some(OnLine { packet, since: now, left: kind.bits, leaves: now.saturating_add(kind.time) });
-        // Without waiting packets the line runs empty, as if the dropped packet had left.
+        // Without waiting packets the transmitter becomes idle, as if the dropped packet had left.
     }
 
-    /// Notes that the line has nothing to send from `now` on.
+    /// Notes that the transmitter has nothing to send from `now` on.
     fn run_empty(&mut self, now: Instant) {
         self.idle_since = now;
         if let DisciplineState::CoDel(state) = &mut self.discipline {
@@ -350,7 +350,7 @@ impl<T> LineState<T> {
         }
     }
 
-    /// Changes the kind of the line; see [`BottleneckStage::reconfigure`].
+    /// Changes the kind of the transmitter; see [`BottleneckStage::reconfigure`].
     fn reconfigure(&mut self, now: Instant, before: &LineKind, kind: &LineKind) {
         if let Some(OnLine { since, left, leaves, .. }) = &mut self.on_line {
             // Bits sent so far count at the rate before the change, and the rest of the packet takes the time of the new rate.
@@ -363,12 +363,12 @@ impl<T> LineState<T> {
         }
     }
 
-    /// Returns the packet on the line, then the waiting packets in their order.
+    /// Returns the packet in transmission, then the waiting packets in their order.
     fn dismantle(self) -> impl Iterator<Item = Offered<T>> {
         self.on_line.into_iter().map(|on_line| on_line.packet).chain(self.waiting)
     }
 
-    /// Converts the line to the stage that takes packets of any size.
+    /// Converts the transmitter to the stage that takes packets of any size.
     fn into_stage(self, kind: &LineKind, info: PacketInfo) -> BottleneckStage<Sent<T>> {
         let Self { on_line, idle_since, waiting, discipline } = self;
         let packet = |Offered { at, number, item }| -> (Instant, Carried<Sent<T>>) {

@@ -65,7 +65,7 @@ fn compare(model: &LinkModel, then: &[(usize, &LinkModel)], (instants, until): (
 }
 
 /// Two bursts of 160 packets of 64 bytes. At 100 kbit/s a packet takes 5.12 ms. The first 40 packets of a burst are 3 ms apart and form a queue, the other
-/// 120 are 8 ms apart, of which most find an idle line. At 64 kbit/s packets leave just when the next one comes.
+/// 120 are 8 ms apart, of which most find an idle transmitter. At 64 kbit/s packets leave just when the next one comes.
 fn bursts() -> Vec<Instant> {
     (0..320).map(|n: u64| millis(n / 160 * 1_500 + (n % 160).min(40) * 3 + (n % 160).saturating_sub(40) * 8)).collect()
 }
@@ -126,7 +126,7 @@ fn what_is_ahead_of_a_driver_that_stops_is_taken_back() {
     }
 }
 
-/// A link changes at a packet that finds other packets on the line and before the line. The new link has another rate, discipline or limit, or no queue, or a
+/// A link changes at a packet that finds other packets in transmission and in the queue. The new link has another rate, discipline or limit, or no queue, or a
 /// stage that needs an engine. A second change leads back.
 #[test]
 fn what_is_inside_stays_when_links_change() {
@@ -152,11 +152,11 @@ fn what_is_inside_stays_when_links_change() {
         .chain([with(Discipline::TailDrop, 100_000, Layout::Netem)])
         .collect();
     for (from, to) in models.iter().flat_map(|from| models.iter().map(move |to| (from, to))) {
-        // At these packets the line is busy, has just sent its last packet, or has been idle for long.
+        // At these packets the transmitter is busy, has just sent its last packet, or has been idle for long.
         for at in [1, 17, 30, 44, 52, 60, 68, 100] {
             compare(from, &[(at, to)], (&bursts(), millis(2_900)));
         }
-        // A second change follows while one packet is on the line, to a discipline that needs an engine.
+        // A second change follows while one packet is in transmission, to a discipline that needs an engine.
         compare(from, &[(16, to), (17, &models[3])], (&bursts(), millis(2_900)));
     }
 }

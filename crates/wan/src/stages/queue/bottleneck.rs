@@ -1,7 +1,7 @@
 //! Bottleneck: a first-in-first-out queue before a serialiser.
 //!
 //! ```text
-//! offered ──► [ waiting … ] ──► serialiser, 8·(size on the line)/R per packet ──► propagation
+//! offered ──► [ waiting … ] ──► transmitter, 8·(size with framing)/R per packet ──► propagation
 //!             limit counts these    the packet in service is not counted
 //! ```
 //!
@@ -32,7 +32,7 @@ use crate::parameters::{Form, Key, NONE, Table, UNLIMITED, optional, required, u
 pub struct Bottleneck {
     /// Speed of the serialiser.
     pub service: Service,
-    /// Bytes that a packet takes on the line beyond its own bytes.
+    /// Bytes that are transmitted with a packet beyond its own bytes.
     pub framing: Framing,
     /// Limit of the queue. `None` sets no limit.
     pub limit: Option<QueueLimit>,
@@ -40,7 +40,7 @@ pub struct Bottleneck {
     pub discipline: Discipline,
 }
 
-/// Speed of a line.
+/// Speed of the transmitter.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Service {
     /// Constant rate.
@@ -64,13 +64,13 @@ pub enum Discipline {
 }
 
 impl Bottleneck {
-    /// Returns a line of the given rate with an unlimited queue.
+    /// Returns a bottleneck of the given rate with an unlimited queue.
     #[must_use]
     pub fn at_rate(rate: Rate) -> Self {
         Self { service: Service::Rate(rate), framing: Framing::default(), limit: None, discipline: Discipline::default() }
     }
 
-    /// Returns the time of RED's mean packet on the line \[s\], which is the unit of the decay of RED's average.
+    /// Returns the transmission time of RED's mean packet \[s\], which is the unit of the decay of RED's average.
     pub(crate) fn time_of_mean_packet(&self, red: &Red) -> f64 {
         match &self.service {
             Service::Rate(rate) => rate.serialisation_time(self.framing.on_the_line(red.mean_packet())).as_secs_f64(),
@@ -80,7 +80,7 @@ impl Bottleneck {
     }
 }
 
-/// Returns an idle span of the line as a number of mean packets, each of which takes `mean_packet` \[s\]. Returns zero if a mean packet takes no time.
+/// Returns an idle span of the transmitter as a number of mean packets, each of which takes `mean_packet` \[s\]. Returns zero if a mean packet takes no time.
 pub(crate) fn idle_packets(idle: Duration, mean_packet: f64) -> f64 {
     if mean_packet > 0.0 { idle.as_secs_f64() / mean_packet } else { 0.0 }
 }
@@ -90,7 +90,7 @@ pub(crate) fn giga_bits(bytes: Bytes) -> u128 {
     u128::from(bytes.get()) * 8_000_000_000
 }
 
-/// Stage with the waiting packets and the packet on the line.
+/// Stage with the waiting packets and the packet in transmission.
 #[derive(Clone, Debug)]
 pub(crate) struct BottleneckStage<T> {
     config: Bottleneck,
@@ -98,18 +98,18 @@ pub(crate) struct BottleneckStage<T> {
     waiting: VecDeque<(Instant, Carried<T>)>,
     /// Bytes of the waiting packets, framing not counted. Wider than [`Bytes`], whose sum would saturate and then be wrong after a departure.
     waiting_bytes: u128,
-    /// Bits that the waiting packets take on the line, in 10⁻⁹ bit.
+    /// Bits to transmit for the waiting packets, in 10⁻⁹ bit.
     waiting_bits: u128,
     in_service: Option<InService<T>>,
-    /// Instant since which the line is idle, or, with RED, up to which idle time has been counted. Meaningless while a packet is on the line.
+    /// Instant since which the transmitter is idle, or, with RED, up to which idle time has been counted. Meaningless during a transmission.
     idle_since: Instant,
-    /// Size of the latest packet that found the line idle, with its time on the line. Cached, because the time is a division of 128 bits.
+    /// Size of the latest packet that found the transmitter idle, with its transmission time. Cached, because the time is a division of 128 bits.
     latest_service: Option<(Bytes, Duration)>,
     red: RedState,
     codel: CoDelState,
 }
 
-/// Packet on the line.
+/// Packet in transmission.
 #[derive(Clone, Debug)]
 pub(crate) struct InService<T> {
     pub(crate) packet: Carried<T>,
@@ -124,7 +124,7 @@ pub(crate) struct InService<T> {
 }
 
 impl<T> BottleneckStage<T> {
-    /// Returns an idle line.
+    /// Returns an idle bottleneck.
     pub(crate) fn new(config: Bottleneck) -> Self {
         Self {
             config,
@@ -139,8 +139,8 @@ impl<T> BottleneckStage<T> {
         }
     }
 
-    /// Returns a line with a packet in service, waiting packets with the instants at which they were offered, the instant since which the line is idle, and
-    /// the state of the disciplines.
+    /// Returns a bottleneck with a packet in transmission, waiting packets with the instants at which they were offered, the instant since which the
+    /// transmitter is idle, and the state of the disciplines.
     pub(crate) fn resumed(
         config: Bottleneck,
         in_service: Option<InService<T>>,
@@ -153,12 +153,13 @@ impl<T> BottleneckStage<T> {
         stage
     }
 
-    /// Returns the departure of a packet of `size` that is offered `now` to an idle line, or `None` if the line is busy, is recorded, or has the discipline
-    /// RED, which draws random numbers even for an idle line. No other discipline affects a packet that finds an idle line.
+    /// Returns the departure of a packet of `size` that is offered `now` to an idle transmitter. Returns `None` if the transmitter is busy or follows a
+    /// recording, or if the discipline is RED, which draws random numbers even for an idle transmitter. No other discipline affects a packet that finds the
+    /// transmitter idle.
     #[inline]
     pub(crate) fn departure_if_idle(&mut self, now: Instant, size: Bytes) -> Option<Instant> {
         let Service::Rate(rate) = &self.config.service else { return None };
-        // A waiting packet implies a packet on the line, so that the queue is empty here.
+        // A waiting packet implies a packet in transmission, so that the queue is empty here.
         if self.in_service.is_some() || matches!(self.config.discipline, Discipline::Red(_)) {
             return None;
         }
@@ -190,7 +191,7 @@ impl<T> BottleneckStage<T> {
                 red::Verdict::Drop => return drop(outputs, now, DropCause::Red, packet),
             }
         }
-        // An idle line implies an empty queue, so no limit applies.
+        // An idle transmitter implies an empty queue, so no limit applies.
         if self.in_service.is_none() {
             self.serve(now, now, packet, outputs);
             return;
@@ -209,12 +210,12 @@ impl<T> BottleneckStage<T> {
         self.waiting.push_back((now, packet));
     }
 
-    /// Returns the instant at which [`BottleneckStage::release`] must be called next, or `None` if the line is idle.
+    /// Returns the instant at which [`BottleneckStage::release`] must be called next, or `None` if the transmitter is idle.
     pub(crate) fn next_at(&self) -> Option<Instant> {
         self.in_service.as_ref().map(|service| service.next)
     }
 
-    /// Appends the packets that leave the line `now` to `released`, and dropped packets to `outputs`. `now` is the instant returned by
+    /// Appends the packets that leave the bottleneck `now` to `released`, and dropped packets to `outputs`. `now` is the instant returned by
     /// [`next_at`](Self::next_at).
     pub(crate) fn release(&mut self, now: Instant, released: &mut VecDeque<Carried<T>>, outputs: &mut Outputs<T>) {
         let Some(service) = self.in_service.take() else { return };
@@ -244,7 +245,7 @@ impl<T> BottleneckStage<T> {
         }
     }
 
-    /// Changes rate, framing, limit and discipline. A waiting packet keeps its place even if a smaller limit is exceeded. The packet on the line keeps the
+    /// Changes rate, framing, limit and discipline. A waiting packet keeps its place even if a smaller limit is exceeded. The packet in transmission keeps the
     /// bits already sent.
     pub(crate) fn reconfigure(&mut self, now: Instant, config: Bottleneck) {
         if let (Some(service), Service::Rate(rate)) = (&mut self.in_service, &self.config.service) {
@@ -259,17 +260,17 @@ impl<T> BottleneckStage<T> {
         self.announce(now);
     }
 
-    /// Returns the packet on the line and all waiting packets, in order, when a link loses its bottleneck.
+    /// Returns the packet in transmission and all waiting packets, in order, when a link loses its bottleneck.
     pub(crate) fn dismantle(self) -> impl Iterator<Item = Carried<T>> {
         self.in_service.into_iter().map(|service| service.packet).chain(self.waiting.into_iter().map(|(_, packet)| packet))
     }
 
-    /// Returns the bits that all waiting packets take on the line, in 10⁻⁹ bit.
+    /// Returns the bits to transmit for all waiting packets, in 10⁻⁹ bit.
     fn bits_of_waiting(&self) -> u128 {
         self.waiting.iter().map(|(_, packet)| self.on_the_line(packet)).sum()
     }
 
-    /// Returns the bits that a packet takes on the line, in 10⁻⁹ bit.
+    /// Returns the bits to transmit for a packet, in 10⁻⁹ bit.
     fn on_the_line(&self, packet: &Carried<T>) -> u128 {
         giga_bits(self.config.framing.on_the_line(packet.info.size))
     }
@@ -281,7 +282,7 @@ impl<T> BottleneckStage<T> {
         limit.admits(Waiting { packets: self.waiting.len() as u64, bytes: self.waiting_bytes, time }, size)
     }
 
-    /// Returns the time after which the line will have sent all its packets, which is the wait of the newest packet.
+    /// Returns the time after which the transmitter will have sent all its packets, which is the wait of the newest packet.
     fn time_to_send_all(&self, now: Instant) -> Duration {
         let Some(service) = &self.in_service else { return Duration::ZERO };
         match &self.config.service {
@@ -300,7 +301,7 @@ impl<T> BottleneckStage<T> {
     /// Returns RED's verdict about an offered packet.
     fn red_verdict(&mut self, red: &Red, now: Instant, ecn_capable: bool, word: u64) -> red::Verdict {
         let idle = if self.in_service.is_none() { now.saturating_duration_since(self.idle_since) } else { Duration::ZERO };
-        // A packet that RED drops leaves the line idle. Moving `idle_since` keeps the next packet from counting the same idle time again.
+        // A packet that RED drops leaves the transmitter idle. Moving `idle_since` keeps the next packet from counting the same idle time again.
         self.idle_since = now;
         let idle_packets = idle_packets(idle, self.config.time_of_mean_packet(red));
         self.red.verdict(red, self.waiting_bytes, idle_packets, ecn_capable, word)
@@ -314,7 +315,7 @@ impl<T> BottleneckStage<T> {
         Some((since, packet))
     }
 
-    /// Begins to send the oldest waiting packet, or marks the line idle if no packet waits.
+    /// Begins to send the oldest waiting packet, or marks the transmitter idle if no packet waits.
     fn serve_next(&mut self, now: Instant, outputs: &mut Outputs<T>) {
         match self.take_head() {
             Some((since, packet)) => self.serve(now, since, packet, outputs),
@@ -353,7 +354,7 @@ impl<T> BottleneckStage<T> {
         self.announce(now);
     }
 
-    /// Sets the next event of the packet on the line, whose remaining bits are those at `now`.
+    /// Sets the next event of the packet in transmission, whose remaining bits are those at `now`.
     fn announce(&mut self, now: Instant) {
         let Some(service) = &mut self.in_service else { return };
         service.since = now;
@@ -369,7 +370,7 @@ fn drop<T>(outputs: &mut Outputs<T>, now: Instant, cause: DropCause, packet: Car
     outputs.push(Output { packet, exit: Exit::Dropped(now, cause) });
 }
 
-/// Parameters of the line and of the queue before it.
+/// Parameters of the transmitter and of the queue before the transmitter.
 pub(crate) const KEYS: [Key; 4] = [
     usual("rate", Form::AnyOf(&[Form::Rate, UNLIMITED]), "\"unlimited\"", "How fast packets are sent, in bits per second"),
     optional("queue", Form::Table(&QUEUE), "How much may wait for the line, and which packets are dropped. Needs rate or a recorded line"),
@@ -392,7 +393,7 @@ static DISCIPLINE: Table = Table::of(&[&[
 ]]);
 
 impl Bottleneck {
-    /// Returns the queue and the line in words.
+    /// Returns the queue and the transmitter in words.
     pub(crate) fn words(&self) -> String {
         let discipline = match self.discipline {
             Discipline::TailDrop => String::new(),
@@ -413,7 +414,7 @@ mod tests {
     use super::*;
     use crate::packet::{Marks, Packet};
 
-    /// Returns a line of 1 Mbit/s, on which 64 bytes take 512 µs.
+    /// Returns a bottleneck of 1 Mbit/s, at which 64 bytes take 512 µs.
     fn megabit(limit: Option<QueueLimit>, discipline: Discipline) -> BottleneckStage<char> {
         BottleneckStage::new(Bottleneck { limit, discipline, ..Bottleneck::at_rate(Rate::bits_per_sec(1_000_000).unwrap()) })
     }

@@ -123,7 +123,7 @@ impl CoDelState {
 
     /// Returns whether waits have exceeded the target for an interval, and tracks since when they exceed it.
     fn should_drop(&mut self, codel: &CoDel, now: Instant, sojourn: Duration, left_bytes: u128) -> bool {
-        // A queue of at most one packet of the largest size cannot be shortened without leaving the line idle.
+        // A queue of at most one packet of the largest size cannot be shortened without leaving the transmitter idle.
         if sojourn < codel.target || left_bytes <= u128::from(codel.mtu.get()) {
             self.first_above = None;
             return false;

@@ -1,7 +1,7 @@
 //! Queue of packets of one size that drops the newest packet, without keeping packets: the departure of each packet, and whether there is room for it.
 //!
-//! A packet leaves at D(n) = max(a(n), D(n−1)) + S, where a is the instant at which it is offered and S its time on the line (Lindley 1952). Packets of one
-//! size leave at distances of S as long as the line is busy, so that the latest departure tells the number of waiting packets.
+//! A packet leaves at D(n) = max(a(n), D(n−1)) + S, where a is the instant at which it is offered and S its transmission time (Lindley 1952). Packets of one
+//! size leave at distances of S as long as the transmitter is busy, so that the latest departure tells the number of waiting packets.
 
 use core::time::Duration;
 
@@ -10,10 +10,10 @@ use cohaptic_units::{Bytes, Instant, Rate};
 use super::bottleneck::giga_bits;
 use super::{Bottleneck, Discipline, QueueLimit, Service};
 
-/// Queue and line for packets of one size \[ns\].
+/// Queue and transmitter for packets of one size \[ns\].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct EqualPackets {
-    /// Time of a packet on the line \[ns\].
+    /// Transmission time of a packet \[ns\].
     service: u64,
     /// Most work \[ns\] that an admitted packet may find. A packet that finds more is dropped.
     most: u64,
@@ -53,7 +53,7 @@ impl EqualPackets {
 /// Half of the time that an instant can count \[ns\].
 const END: u64 = u64::MAX / 2;
 
-/// Rate of a line, and the bits of a packet on the line in 10⁻⁹ bit.
+/// Rate of a transmitter, and the bits of a packet in transmission, in 10⁻⁹ bit.
 #[derive(Clone, Copy)]
 struct Line {
     rate: Rate,
@@ -61,7 +61,7 @@ struct Line {
 }
 
 impl Line {
-    /// Returns the time of a packet on the line \[ns\].
+    /// Returns the transmission time of a packet \[ns\].
     fn service(self) -> u64 {
         nanos(self.rate.transmission_time(self.bits))
     }
@@ -88,11 +88,11 @@ impl Line {
     /// from the sum of the bits and rounded once, as the stage that keeps packets does.
     fn turn(self, work: u64) -> Duration {
         let service = self.service();
-        // A packet that takes no time on the line leaves no work, so that no packet waits for it.
+        // A packet that takes no time to transmit leaves no work, so that no packet waits for it.
         if service == 0 || work == 0 {
             return Duration::ZERO;
         }
-        // `inside` packets wait. The packet on the line has been sent for `since`, and `first` of its bits remain.
+        // `inside` packets wait. The packet in transmission has been sent for `since`, and `first` of its bits remain.
         let inside = work.div_ceil(service) - 1;
         let since = (inside + 1) * service - work;
         let first = self.bits.saturating_sub(self.rate.bits_sent(Duration::from_nanos(since)));
@@ -138,7 +138,7 @@ mod tests {
         fates
     }
 
-    /// With a limit of zero time and packets without bits the line is free at once, and no packet is dropped.
+    /// With a limit of zero time and packets without bits the transmitter is free at once, and no packet is dropped.
     #[test]
     fn packets_of_no_bits_never_wait() {
         let rate = Rate::bits_per_sec(8_000_000).unwrap();

@@ -1,16 +1,16 @@
-//! Framing: bytes that a packet takes on the line beyond its own bytes.
+//! Framing: bytes that are transmitted with a packet beyond its own bytes.
 
 use crate::parameters::{Form, Table, required, usual};
 use alloc::format;
 use alloc::string::String;
 use cohaptic_units::Bytes;
 
-/// Framing of packets on the line. The default adds nothing.
+/// Framing of packets in transmission. The default adds nothing.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Framing {
     /// Bytes added to every packet, such as 28 for IPv4 and UDP. A negative number is subtracted, down to an empty packet.
     pub overhead: i32,
-    /// Cells of a fixed size that the line carries. `None` means that packets are sent whole.
+    /// Cells of a fixed size in which packets are transmitted. `None` means that packets are sent whole.
     pub cells: Option<Cells>,
 }
 
@@ -24,7 +24,7 @@ pub struct Cells {
 }
 
 impl Framing {
-    /// Returns the number of bytes that a packet of `size` takes on the line.
+    /// Returns the number of bytes that are transmitted for a packet of `size`.
     #[must_use]
     pub fn on_the_line(&self, size: Bytes) -> Bytes {
         let packet = size.get().saturating_add_signed(self.overhead.into());

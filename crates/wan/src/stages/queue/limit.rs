@@ -8,10 +8,10 @@ use core::time::Duration;
 use crate::parameters::Form;
 use cohaptic_units::Bytes;
 
-/// Limit of the packets that wait in a queue. A packet on the line does not count.
+/// Limit of the packets that wait in a queue. A packet in transmission does not count.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum QueueLimit {
-    /// Largest number of waiting packets. With 0, a packet that finds the line busy is dropped.
+    /// Largest number of waiting packets. With 0, a packet that finds another packet in transmission is dropped.
     Packets(u64),
     /// Largest number of bytes of all waiting packets, framing not counted.
     Bytes(Bytes),

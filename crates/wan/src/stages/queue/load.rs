@@ -26,7 +26,7 @@ impl Load {
 }
 
 impl Bottleneck {
-    /// Returns the time of each packet of the load on the line, if each packet leaves before the next one is offered. No packet then waits, and no discipline
+    /// Returns the transmission time of each packet of the load, if each packet leaves before the next one is offered. No packet then waits, and no discipline
     /// and no limit has any effect. Returns `None` if a packet may wait.
     pub(crate) fn time_without_wait(&self, load: Load) -> Option<Duration> {
         let Self { service: Service::Rate(rate), framing, limit: _, discipline } = self else { return None };

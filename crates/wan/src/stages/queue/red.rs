@@ -46,8 +46,8 @@ impl core::error::Error for RedError {}
 
 impl Red {
     /// Returns checked parameters. `weight` is the weight of the newest queue length in the average, usually 0.002. `mean_packet` sets the decay of the
-    /// average while the line is idle: a factor of (1−weight)^m in the time of m mean packets. With `ecn`, a packet that supports ECN is marked instead of
-    /// dropped while the average is below `max`.
+    /// average while the transmitter is idle: a factor of (1−weight)^m in the time of m mean packets. With `ecn`, a packet that supports ECN is marked instead
+    /// of dropped while the average is below `max`.
     ///
     /// # Errors
     ///
@@ -75,7 +75,7 @@ impl Red {
         self.ecn
     }
 
-    /// Returns the size of the mean packet, whose time on the line is the unit of the decay while the line is idle.
+    /// Returns the size of the mean packet, whose transmission time is the unit of the decay while the transmitter is idle.
     #[must_use]
     pub const fn mean_packet(&self) -> Bytes {
         self.mean_packet
@@ -100,12 +100,12 @@ pub(crate) struct RedState {
 }
 
 impl RedState {
-    /// Decides about a packet that finds `queued` bytes waiting, after the line was idle for the time of `idle_packets` mean packets. `word` is the packet's
-    /// random word for queues.
+    /// Decides about a packet that finds `queued` bytes waiting, after the transmitter was idle for the time of `idle_packets` mean packets. `word` is the
+    /// packet's random word for queues.
     pub(crate) fn verdict(&mut self, red: &Red, queued: u128, idle_packets: f64, ecn_capable: bool, word: u64) -> Verdict {
         #[expect(clippy::cast_precision_loss, reason = "an average")]
         let queued = queued as f64;
-        // While the line is idle the average decays as if empty queues had been observed at the rate of mean packets.
+        // While the transmitter is idle the average decays as if empty queues had been observed at the rate of mean packets.
         self.average *= libm::pow(1.0 - red.weight, idle_packets);
         self.average += red.weight * (queued - self.average);
         #[expect(clippy::cast_precision_loss, reason = "thresholds of an average")]

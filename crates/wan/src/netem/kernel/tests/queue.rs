@@ -79,7 +79,7 @@ fn the_line_stands_behind_the_delay_and_undoes_jitter() {
     }
 }
 
-/// The kernel compares with the latest time to leave only while a packet is held. A line that has just become free serves the next packet at once.
+/// The kernel compares with the latest time to leave only while a packet is held. A transmitter that has just become free serves the next packet at once.
 #[test]
 fn a_rate_limits_throughput_to_itself() {
     let run = run("rate 8mbit limit 100000", 1, 1000, 1000);
@@ -107,7 +107,7 @@ fn a_gap_makes_reordering_rarer_than_said() {
     assert!((share - 1.0 / 8.0).abs() < 0.0025, "{share}");
 }
 
-/// A copy that is about to leave counts as the last packet. The line does not begin before the copy, although the delay may be below zero.
+/// A copy that is about to leave counts as the last packet. The transmission does not begin before the copy, although the delay may be below zero.
 #[test]
 fn a_reordered_copy_holds_the_line() {
     let now = at(1000 * MILLISECOND);
