@@ -8,9 +8,10 @@ use crate::pages::prose::links;
 use crate::pages::{PAGES, markdown, root};
 
 /// Pictures that no page draws, and what does. A name that ends in `/` is that of a folder.
-const DRAWN_ELSEWHERE: [(&str, &str); 4] = [
+const DRAWN_ELSEWHERE: [(&str, &str); 5] = [
     ("docs/images/campaign.svg", "crates/cli/tests/integration/page_pictures.rs, with more runs than its page has time for"),
     ("docs/images/live-control.png", "a browser, by hand"),
+    ("docs/images/matplotlib.svg", "python/examples/paper_figure.py with coordination/n3.toml; the bytes depend on the version of matplotlib"),
     ("docs/images/play.png", "crates/cli/tests/integration/live/play_page.rs, with COHAPTIC_SCREENSHOTS"),
     ("docs/images/measured/", "benches/measure"),
 ];
