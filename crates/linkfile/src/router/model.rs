@@ -45,7 +45,7 @@ pub struct NamedLink {
     pub name: String,
     /// Keys of the link, to be shown and changed.
     pub keys: LinkKeys,
-    /// Model of the link for both directions. Each direction has a queue, a state and random numbers of its own.
+    /// Model of the two links of this name, one in each direction. Each link has a queue, a state and random numbers of its own.
     pub model: LinkModel,
 }
 

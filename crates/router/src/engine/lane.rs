@@ -1,4 +1,4 @@
-//! Lane: one direction of a link, with the counters of the router.
+//! Lane: a link, which is one direction of a name of the file, with the counters of the router.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::packet::Packet;
 
 const IN_ORDER: &str = "the engine gives no instant before the last one it gave";
 
-/// One direction of a link, with counters beyond those of the link.
+/// A link in one direction, with the counters that the router keeps beside those of the link.
 #[derive(Clone, Debug)]
 pub(super) struct Lane {
     pub(super) link: Link<Arc<Packet>>,

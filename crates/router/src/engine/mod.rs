@@ -6,8 +6,8 @@
 //!             └        └─ pass ──────────────────────┘
 //! ```
 //!
-//! Every link has a state machine for each direction, with a queue and random numbers of its own. The random streams of the link `wan` are named
-//! `wan.left->wan.right` and `wan.right->wan.left`. Rules that name the same link share the link.
+//! A name of the file, such as `wan`, stands for two links, one in each direction. Each link is a state machine with a queue and random numbers of its own,
+//! whose streams are named `wan.left->wan.right` and `wan.right->wan.left`. Rules with the same name share these links.
 
 mod lane;
 mod snapshot;
@@ -166,7 +166,7 @@ impl Engine {
         self.departures.pop_front()
     }
 
-    /// Changes the model of a link from `now` on, in one direction or, with `None`, in both: see [`cohaptic_wan::Link::set_model`]. `from` is the side from
+    /// Changes the model of a named link from `now` on, in one direction or, with `None`, in both: see [`cohaptic_wan::Link::set_model`]. `from` is the side from
     /// which the packets of the direction come.
     ///
     /// # Errors

@@ -39,7 +39,7 @@ pub struct Received {
     pub dropped: u64,
 }
 
-/// Counters of one direction of a link.
+/// Counters of a link: of one direction of a name of the file.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct LaneSnapshot {
     /// Name of the link.
@@ -72,7 +72,7 @@ pub struct Counters {
 }
 
 impl Counters {
-    /// Returns one direction of a link, or `None` if no link has this name.
+    /// Returns the counters of the link in one direction, or `None` if no link has this name.
     #[must_use]
     pub fn lane(&self, link: &str, from: Side) -> Option<&LaneSnapshot> {
         self.lanes.iter().find(|lane| lane.link == link && lane.from == from)

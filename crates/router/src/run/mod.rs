@@ -113,7 +113,7 @@ impl<D: Device, C: Clock> Router<D, C> {
         Ok(())
     }
 
-    /// Changes the model of a link from now on, in one direction or, with `None`, in both: see [`Engine::set_link`].
+    /// Changes the model of a named link from now on, in one direction or, with `None`, in both: see [`Engine::set_link`].
     ///
     /// # Errors
     ///
