@@ -166,8 +166,8 @@ impl Engine {
         self.departures.pop_front()
     }
 
-    /// Changes the model of a named link from `now` on, in one direction or, with `None`, in both: see [`cohaptic_wan::Link::set_model`]. `from` is the side from
-    /// which the packets of the direction come.
+    /// Changes the model of a named link from `now` on, in one direction or, with `None`, in both: see [`cohaptic_wan::Link::set_model`]. `from` is the side
+    /// from which the packets of the direction come.
     ///
     /// # Errors
     ///
