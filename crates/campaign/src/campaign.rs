@@ -1,4 +1,4 @@
-//! A campaign bound to its folder: opening, judging, running, merging and comparing; and the trait of its watcher.
+//! A campaign bound to its folder: opening, judging, running, merging and comparing.
 //!
 //! The module decides the order of these steps. The files are read and written by `folder`, `kept`, `table` and `verdicts`; the runs are made by `work`.
 
@@ -14,6 +14,7 @@ use crate::report::{Report, Tally};
 use crate::shard::Missing;
 use crate::table::{Column, Head, TableError, columns};
 use crate::verdicts::{Journal, Judge, Judgement, Lines, judge, read_whole, write_all};
+use crate::watch::{NoWatch, Watch};
 use crate::work::{Keep, Work};
 
 /// Most attempts of one call to merge the parts. After each attempt but the last, a part found damaged is computed again.
@@ -416,35 +417,3 @@ pub(crate) fn unread(path: &Path, error: TableError, way_out: &'static str) -> C
         }
     }
 }
-
-/// An observer of a campaign, which can also stop it. The methods are called from many threads.
-pub trait Watch: Sync {
-    /// Returns whether to go on. Asked before every few checked combinations, before each judged combination, and before every few runs.
-    fn keep_going(&self) -> bool {
-        true
-    }
-
-    /// Called when all runs are done and the merge of the parts begins. [`Watch::keep_going`] is not asked any more.
-    fn puts_together(&self) {}
-
-    /// Reports the number of combinations checked since the last call.
-    fn checked(&self, _combinations: u64) {}
-
-    /// Reports the number of combinations judged since the last call.
-    fn judged(&self, _combinations: u64) {}
-
-    /// Reports the number of runs done since the last call.
-    fn ran(&self, _runs: u64) {}
-
-    /// Reports a damaged file, which the campaign does not continue from. `fault` describes the difference and the work to be repeated, in words.
-    fn damaged(&self, _file: &Path, _fault: &str) {}
-
-    /// Reports a stored part with its number of runs.
-    fn kept(&self, _part: u64, _runs: u64) {}
-}
-
-/// A watch without any effect: the campaign runs to its end.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct NoWatch;
-
-impl Watch for NoWatch {}

@@ -8,10 +8,11 @@ use std::path::Path;
 use cohaptic_files::{WholeFile, write_whole, write_whole_by};
 use rayon::prelude::*;
 
-use crate::campaign::{Campaign, Watch, unread, unwritten};
+use crate::campaign::{Campaign, unread, unwritten};
 use crate::error::CampaignError;
 use crate::folder::{Fault, HashingWriter, Label, write_digest};
 use crate::table::{OpenPart, Row, TableError};
+use crate::watch::Watch;
 
 impl Campaign {
     /// Returns the number of stored runs, counted by the names of parts with a digest. The bytes of the parts are not read; [`Campaign::run`] checks them.

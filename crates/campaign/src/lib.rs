@@ -54,9 +54,10 @@ mod spread;
 mod table;
 mod vary;
 mod verdicts;
+mod watch;
 mod work;
 
-pub use campaign::{Campaign, NoWatch, Outcome, Watch};
+pub use campaign::{Campaign, Outcome};
 pub use compare::{Cell, Comparison, Estimate, Figures, MOST_NUMBERS_COMPARED, MeasuredColumn, Share, Strategies, StrategiesError};
 pub use error::CampaignError;
 pub use plan::{CampaignPlan, MOST_COMBINATIONS, MOST_RUNS, PlanSpec, Refused};
@@ -67,3 +68,4 @@ pub use spread::SpreadCampaign;
 pub use table::{Column, Format, Kind, Row, Value};
 pub use vary::{MOST_VALUES, Variation, VaryError, split_at_commas};
 pub use verdicts::{Judge, Judgement, Verdict};
+pub use watch::{NoWatch, Watch};

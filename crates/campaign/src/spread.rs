@@ -6,7 +6,6 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::campaign::Watch;
 use crate::compare::{Comparison, compared};
 use crate::error::CampaignError;
 use crate::plan::{Accepted, CHUNK, CampaignPlan, Parts, Refused};
@@ -14,6 +13,7 @@ use crate::report::{Report, Tally};
 use crate::table::{Column, Roster, Row, TableError, columns, gists, run_columns};
 use crate::vary::Variation;
 use crate::verdicts::{Judge, Judgement};
+use crate::watch::Watch;
 use crate::work::{Chunk, Scenes, Work};
 
 /// The rows of a plan, computed on demand in any process. They equal the rows of the table of [`Campaign::run`](crate::Campaign::run).

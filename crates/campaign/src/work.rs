@@ -11,11 +11,11 @@ use cohaptic_harness::measures::{MeasuredValue, Measures};
 use cohaptic_harness::{Model, Summary, run_side_by_side};
 use cohaptic_scene::Scene;
 
-use crate::campaign::Watch;
 use crate::error::CampaignError;
 use crate::plan::{Accepted, CHUNK, CampaignPlan, Parts};
 use crate::table::{Roster, Row, RunId, row};
 use crate::verdicts::Judgement;
+use crate::watch::Watch;
 
 /// Stores the rows of the part with this number.
 pub(crate) type Keep<'a> = dyn Fn(u64, &[Row]) -> Result<(), CampaignError> + Sync + 'a;

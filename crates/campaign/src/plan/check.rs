@@ -7,9 +7,9 @@ use cohaptic_scene::{Fingerprint, Scene};
 use rayon::prelude::*;
 
 use super::{CampaignPlan, Refused};
-use crate::campaign::Watch;
 use crate::error::CampaignError;
 use crate::table::Roster;
+use crate::watch::Watch;
 
 /// Number of combinations checked between two questions to the watch.
 const BLOCK: u64 = 64;

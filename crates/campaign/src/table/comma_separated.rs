@@ -5,7 +5,7 @@ use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom, Write};
 
 use cohaptic_files::WholeFile;
 
-use super::format::{COMPLETE, DIVERGED, GIST, Gist, Gists, OpenPart, RunColumns, TableError};
+use super::content::{COMPLETE, DIVERGED, GIST, Gist, Gists, OpenPart, RunColumns, TableError};
 use super::{Column, Row, Value};
 
 pub(super) fn write(to: &mut impl Write, columns: &[Column], rows: &[Row]) -> io::Result<()> {

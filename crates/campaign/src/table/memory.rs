@@ -1,6 +1,6 @@
 //! Figures from rows in memory, equal to the figures read from a file with these rows.
 
-use super::format::{COMPLETE, DIVERGED, GIST, Gist, RunColumns};
+use super::content::{COMPLETE, DIVERGED, GIST, Gist, RunColumns};
 use super::{Column, Row, TableError, Value};
 
 /// Returns the index of a column.

@@ -2,6 +2,7 @@
 
 mod columns;
 mod comma_separated;
+mod content;
 mod format;
 mod memory;
 mod parquet_file;
@@ -11,8 +12,8 @@ use std::sync::Arc;
 
 pub(crate) use columns::{Roster, columns};
 pub(crate) use comma_separated::{number_text, text as value_text};
+pub(crate) use content::{Gist, Head, OpenPart, RunColumns, TableError};
 pub use format::Format;
-pub(crate) use format::{Gist, Head, OpenPart, RunColumns, TableError};
 pub(crate) use memory::{gists, run_columns};
 pub(crate) use row::{RunId, row};
 

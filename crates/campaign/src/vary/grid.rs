@@ -2,7 +2,8 @@
 
 use cohaptic_linkfile::{number_and_unit, text_of_quantity};
 
-use super::{MOST_VALUES, Varied, VaryError};
+use super::error::{MOST_VALUES, VaryError};
+use super::varied::Varied;
 use crate::table::Value;
 
 /// A range of `count` values, including both ends.

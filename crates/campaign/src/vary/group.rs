@@ -1,6 +1,6 @@
 //! A strategy with settings, `NAME{KEY=VALUE,…}`, as one value of `coordination.strategy`.
 
-use super::list::split_at_commas;
+use super::commas::split_at_commas;
 
 /// A name with settings: one value of a list.
 #[derive(Clone, PartialEq, Eq, Debug)]

@@ -4,8 +4,10 @@ use std::sync::Arc;
 
 use cohaptic_linkfile::number_and_unit;
 
+use super::commas::split_at_commas;
+use super::error::{MOST_VALUES, VaryError};
 use super::group::Group;
-use super::{MOST_VALUES, Varied, VaryError};
+use super::varied::Varied;
 use crate::table::{Kind, Value};
 
 /// A list of values with their common unit and type.
@@ -67,29 +69,4 @@ fn typed(texts: &[String]) -> (String, Kind, Vec<Value>) {
 fn unquoted(text: &str) -> &str {
     let within = |quote: char| text.strip_prefix(quote).and_then(|rest| rest.strip_suffix(quote)).filter(|inner| !inner.contains(quote));
     within('"').or_else(|| within('\'')).unwrap_or(text)
-}
-
-/// Splits a text at commas, except within brackets, braces and quotes, because values may be lists, tables and texts. Space around the parts is removed.
-#[must_use]
-pub fn split_at_commas(text: &str) -> Vec<String> {
-    let (mut parts, mut depth, mut quote) = (vec![String::new()], 0_u32, None);
-    for letter in text.chars() {
-        match (quote, letter) {
-            // Only the same kind of quote ends a quoted text.
-            (Some(open), _) if open == letter => quote = None,
-            (None, '"' | '\'') => quote = Some(letter),
-            (None, '[' | '{') => depth += 1,
-            // A closing bracket too many is left to the reader of the value, which reports it.
-            (None, ']' | '}') => depth = depth.saturating_sub(1),
-            (None, ',') if depth == 0 => {
-                parts.push(String::new());
-                continue;
-            }
-            _ => {}
-        }
-        if let Some(part) = parts.last_mut() {
-            part.push(letter);
-        }
-    }
-    parts.into_iter().map(|part| part.trim().to_owned()).collect()
 }

@@ -8,9 +8,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use cohaptic_scene::Scene;
 
-use crate::campaign::Watch;
 use crate::error::CampaignError;
 use crate::plan::CampaignPlan;
+use crate::watch::Watch;
 
 pub(crate) use file::{Journal, Lines, read_whole, write_all};
 

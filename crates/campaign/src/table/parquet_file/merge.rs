@@ -15,7 +15,7 @@ use parquet::schema::types::SchemaDescriptor;
 use super::index::{IndexWriter, MAGIC};
 use super::{about, properties, schema};
 use crate::table::Column;
-use crate::table::format::{Head, OpenPart, TableError, rows_missing};
+use crate::table::content::{Head, OpenPart, TableError, rows_missing};
 
 /// Writes the table. The bytes equal the bytes of the library's file writer for the same row groups.
 pub(in crate::table) fn merge(

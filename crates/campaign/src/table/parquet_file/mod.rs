@@ -20,7 +20,7 @@ use parquet::file::properties::{EnabledStatistics, WriterProperties, WriterPrope
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::{Type, TypePtr};
 
-use super::format::{Head, TableError};
+use super::content::{Head, TableError};
 use super::{Column, Kind, Row, Value};
 
 pub(super) use merge::merge;

@@ -14,7 +14,7 @@ use parquet::file::statistics::Statistics;
 use parquet::schema::types::SchemaDescriptor;
 
 use super::index::IndexReader;
-use crate::table::format::{COMPLETE, DIVERGED, GIST, Gist, Gists, RunColumns, TableError};
+use crate::table::content::{COMPLETE, DIVERGED, GIST, Gist, Gists, RunColumns, TableError};
 
 /// Returns the reader of a row group's columns.
 fn row_group<'a>(file: &Arc<File>, group: &'a RowGroupMetaData) -> Result<SerializedRowGroupReader<'a, File>, ParquetError> {

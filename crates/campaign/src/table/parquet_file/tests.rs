@@ -7,7 +7,7 @@ use cohaptic_files::{WholeFile, write_whole};
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
 
 use super::*;
-use crate::table::format::{Gist, OpenPart};
+use crate::table::content::{Gist, OpenPart};
 
 fn columns() -> Vec<Column> {
     let column = |name: &str, kind: Kind, optional: bool| Column { name: name.to_owned(), kind, optional };
