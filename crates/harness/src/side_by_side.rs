@@ -1,11 +1,8 @@
 //! Runs many scenes, those of one shape at the same time.
 
-use cohaptic_peer::EXACT_FROM;
 use cohaptic_scene::{Change, FromScene, Scene};
 
-use super::Shape;
-use super::lanes::WIDTH;
-use super::shape::Way;
+use crate::arrays::{self, Shape, WIDTH};
 use crate::plan::{Model, Plan};
 use crate::{NoObserver, Simulation, Summary};
 
@@ -25,7 +22,7 @@ pub fn run_side_by_side(scenes: &[Scene]) -> Vec<Summary> {
         let shape = shape(first);
         // Only neighbours are combined, so the results keep the order of the scenes.
         let alike = rest.iter().take(WIDTH).take_while(|scene| shape.is_some() && self::shape(scene) == shape).count();
-        if let Some((shape, _)) = shape.filter(|(shape, _)| pays(shape, alike)) {
+        if let Some((shape, _)) = shape.filter(|(shape, _)| shape.pays_side_by_side(alike)) {
             let (now, later) = rest.split_at(alike);
             summaries.extend(run_eight(now, shape));
             rest = later;
@@ -36,15 +33,6 @@ pub fn run_side_by_side(scenes: &[Scene]) -> Vec<Summary> {
         }
     }
     summaries
-}
-
-/// Returns whether `alike` scenes of a shape run faster in eight lanes than one after the other.
-///
-/// Unused lanes cost as much as used lanes, so a minimum of scenes is needed. If all samples travel together, lanes share all work up to the number of peers
-/// from which means are exact; exact means are computed for a single run. If each packet has an arrival of its own, packets are most of the work and are
-/// computed for each run by itself. With many peers, the samples in flight of eight runs then no longer fit into the nearest cache.
-fn pays(shape: &Shape, alike: usize) -> bool {
-    if shape.delay.is_some() { alike >= 5 && shape.peers <= EXACT_FROM } else { alike >= 7 && shape.peers <= 12 && shape.way == Way::Direct }
 }
 
 /// Returns whether two scenes can run side by side.
@@ -62,6 +50,6 @@ fn shape(scene: &Scene) -> Option<(Shape, &[Change])> {
 fn run_eight(scenes: &[Scene], shape: Shape) -> Vec<Summary> {
     let lanes: [&Scene; WIDTH] = std::array::from_fn(|lane| &scenes[lane.min(scenes.len() - 1)]);
     let laws = lanes.map(|scene| scene.law(0).expect("scenes of a shape have a law"));
-    let summaries = super::run_lanes(lanes, shape, laws, &mut |_| true);
+    let summaries = arrays::run_lanes(lanes, shape, laws, &mut |_| true);
     summaries.into_iter().take(scenes.len()).collect()
 }

@@ -7,9 +7,10 @@ use cohaptic_units::Instant;
 
 use crate::arrays::{self, Onlooker, Shape, Ticks};
 use crate::disturbance::Disturbance;
-use crate::measures::Measures;
-use crate::observer::{AnyObserver, Ended, Erased, InstantRow, Observer, instants_between_questions};
+use crate::observer::{AnyObserver, Ended, Erased, Observer};
 use crate::plan::{Model, Plan};
+use crate::questions::instants_between_questions;
+use crate::rows::InstantRow;
 use crate::summary::{Ending, Summary};
 use crate::world::{NoRemote, Remote, Step, Watch, World};
 
@@ -39,12 +40,10 @@ impl<'a> Simulation<'a> {
         Self { scene, model, disturbance: Some(disturbance), threads: 1, strategies: FromScene }
     }
 
-    /// Like [`Simulation::run`], with an event loop compiled for measures.
-    pub(crate) fn run_measured(&self, measures: &mut Measures) -> Summary {
-        let plan = Plan::new(self.scene, self.model, measures.wants_ticks());
-        let run = |observer: &mut Erased<'_, Measures>| self.run_in_arrays(&plan, observer).unwrap_or_else(|| self.run_with_events(&plan, observer));
-        let Ok(summary) = Erased::run_as_itself(measures, run);
-        summary
+    /// Like [`Simulation::run`], with an event loop compiled for this type of observer.
+    pub(crate) fn run_compiled<O: Observer>(&self, observer: &mut O) -> Result<Summary, O::Error> {
+        let plan = Plan::new(self.scene, self.model, observer.wants_ticks());
+        Erased::run_as_itself(observer, |observer| self.run_in_arrays(&plan, observer).unwrap_or_else(|| self.run_with_events(&plan, observer)))
     }
 }
 

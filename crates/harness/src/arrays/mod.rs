@@ -14,7 +14,6 @@ mod processor;
 mod run_watch;
 mod samples;
 mod shape;
-mod side_by_side;
 mod threads;
 mod ticks;
 
@@ -42,7 +41,6 @@ pub(crate) use run_watch::Onlooker;
 use run_watch::{RunWatch, Unwatched, WatchedTicks};
 use samples::{Broadcast, PerPacket, Sample};
 pub(crate) use shape::Shape;
-pub use side_by_side::{run_side_by_side, same_shape};
 pub use ticks::Ticks;
 
 /// Runs a scene of the given shape and law to its end. `keep_going` is called as [`crate::Observer::keep_going`] is.
@@ -52,7 +50,12 @@ pub(crate) fn run(scene: &Scene, shape: Shape, law: BuiltIn, keep_going: &mut dy
 }
 
 /// Runs L scenes of the given shape to their ends, each with its law.
-fn run_lanes<const L: usize>(scenes: [&Scene; L], shape: Shape, laws: [BuiltIn; L], keep_going: &mut dyn FnMut(Instant) -> bool) -> [Summary; L] {
+pub(crate) fn run_lanes<const L: usize>(
+    scenes: [&Scene; L],
+    shape: Shape,
+    laws: [BuiltIn; L],
+    keep_going: &mut dyn FnMut(Instant) -> bool,
+) -> [Summary; L] {
     let watch = Unwatched(keep_going);
     match scenes[0].axes {
         Axes::One => Arrays::<1, L>::new(scenes, shape, laws, None).run(watch),

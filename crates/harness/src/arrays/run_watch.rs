@@ -8,7 +8,7 @@ use super::blocks::{Seen, lane_of};
 use super::bodies::Bodies;
 use super::lanes::{Lanes, WIDTH};
 use super::ticks::{Source, Ticks};
-use crate::observer::{InstantRow, StateRow, TickRow};
+use crate::rows::{InstantRow, StateRow, TickRow};
 
 /// Observer of a run in arrays. The loop over ticks is compiled for each implementation, so an unwatched run makes no rows.
 pub(super) trait RunWatch<const A: usize> {

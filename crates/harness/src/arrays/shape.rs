@@ -3,17 +3,17 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use cohaptic_peer::Coordination;
 use cohaptic_peer::coordination::{BuiltIn, Law};
 use cohaptic_peer::wire::SampleKind;
+use cohaptic_peer::{Coordination, EXACT_FROM};
 use cohaptic_scene::{Change, ChangeKind, Scene, Strategies, Topology};
 use cohaptic_units::print::Span;
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{DirectLinks, LinkConfig, LinkModel, Load, SteppedLinks};
 
-use super::{nanos, threads};
-use crate::observer::instants_between_questions;
+use super::nanos;
 use crate::plan::{Plan, Ticking};
+use crate::questions::instants_between_questions;
 
 /// Properties that scenes must have in common to run side by side. Made only for a scene that can run in arrays.
 #[derive(Clone, PartialEq, Debug)]
@@ -100,14 +100,13 @@ impl Shape {
         })
     }
 
-    /// Returns the largest number of threads that shortens a run, and the reason why more threads do not.
-    pub(crate) fn threads(&self) -> (usize, &'static str) {
-        threads::that_pay(self)
-    }
-
-    /// Returns whether a run on one thread is faster with its peers in groups.
-    pub(crate) fn pays_in_groups(&self) -> bool {
-        threads::groups_pay(self)
+    /// Returns whether `alike` scenes of this shape run faster in eight lanes than one after the other.
+    ///
+    /// Unused lanes cost as much as used lanes, so a minimum of scenes is needed. If all samples travel together, lanes share all work up to the number of
+    /// peers from which means are exact; exact means are computed for a single run. If each packet has an arrival of its own, packets are most of the work and
+    /// are computed for each run by itself. With many peers, the samples in flight of eight runs then no longer fit into the nearest cache.
+    pub(crate) fn pays_side_by_side(&self, alike: usize) -> bool {
+        if self.delay.is_some() { alike >= 5 && self.peers <= EXACT_FROM } else { alike >= 7 && self.peers <= 12 && self.way == Way::Direct }
     }
 
     /// Returns whether links have queues that must be advanced as time passes.

@@ -31,14 +31,21 @@ const PEERS_A_THREAD: usize = 8;
 /// Memory of the samples that a group holds \[bytes\]: half of a typical second-level cache, which links and packets share.
 const HELD_BY_A_GROUP: usize = 1 << 20;
 
-/// Returns the largest number of threads that shortens a run of the given shape, and the reason why more threads do not.
-pub(super) fn that_pay(shape: &Shape) -> (usize, &'static str) {
-    match why_together(shape) {
-        Some(why) => (1, why),
-        None => (
-            (shape.peers / PEERS_A_THREAD).max(1),
-            "eight peers a thread; threads meet where samples are sent, and the number of threads changes no bit",
-        ),
+impl Shape {
+    /// Returns the largest number of threads that shortens a run, and the reason why more threads do not.
+    pub(crate) fn threads(&self) -> (usize, &'static str) {
+        match why_together(self) {
+            Some(why) => (1, why),
+            None => (
+                (self.peers / PEERS_A_THREAD).max(1),
+                "eight peers a thread; threads meet where samples are sent, and the number of threads changes no bit",
+            ),
+        }
+    }
+
+    /// Returns whether a run on one thread is faster with its peers in groups.
+    pub(crate) fn pays_in_groups(&self) -> bool {
+        why_together(self).is_none() && groups(self, &(0..self.peers), HELD_BY_A_GROUP).len() > 1
     }
 }
 
@@ -46,11 +53,6 @@ pub(super) fn that_pay(shape: &Shape) -> (usize, &'static str) {
 fn why_together(shape: &Shape) -> Option<&'static str> {
     let whys = [(shape.delay.is_some(), "all samples travel together: a tick takes less time than threads take to meet")];
     whys.into_iter().find_map(|(is_so, why)| is_so.then_some(why))
-}
-
-/// Returns whether a run on one thread is faster with its peers in groups.
-pub(super) fn groups_pay(shape: &Shape) -> bool {
-    why_together(shape).is_none() && groups(shape, &(0..shape.peers), HELD_BY_A_GROUP).len() > 1
 }
 
 /// Divides the peers of a thread into groups of whole registers. The held samples of a group take at most `held_by_a_group` bytes, unless one register of peers
@@ -320,6 +322,6 @@ mod tests {
             assert_eq!(groups[0], 0..size, "{held}");
             assert!(groups.iter().map(|group| group.start).eq((0..1000).step_by(size)) && groups[groups.len() - 1].end == 1000, "{held}");
         }
-        assert!(groups_pay(&shape));
+        assert!(shape.pays_in_groups());
     }
 }

@@ -4,7 +4,7 @@ use cohaptic_units::Instant;
 
 use super::blocks::Block;
 use super::lanes::WIDTH;
-use crate::observer::TickRow;
+use crate::rows::TickRow;
 
 /// All peers of a scene whose object does not turn, at an instant at which all of them tick, with the forces of that instant and before any peer moves.
 ///

@@ -7,49 +7,8 @@ use cohaptic_scene::LinkKeys;
 use cohaptic_units::Instant;
 use cohaptic_wan::LinkModel;
 
-use crate::observer::StateRow;
-
 /// First line of a record of inputs.
 pub const HEADER: &str = "at_ns,input,peer,to,value";
-
-/// Input of a session and the instant at which it takes effect.
-#[derive(Clone, Copy, Debug)]
-pub struct InputRow<'a> {
-    /// Instant of the input, at or after the instant of the previous row.
-    pub at: Instant,
-    /// The input.
-    pub what: Input<'a>,
-}
-
-/// Input of a session. Peers are indices of [`Scene::peers`](cohaptic_scene::Scene::peers).
-#[derive(Clone, Copy, Debug)]
-pub enum Input<'a> {
-    /// Datagram from the process of a peer.
-    Sample {
-        /// Index of the peer.
-        peer: usize,
-        /// Bytes as received.
-        datagram: &'a [u8],
-    },
-    /// Reading of the device in a person's hand at a tick.
-    Device {
-        /// Index of the peer.
-        peer: usize,
-        /// Position and velocity along each axis of the scene; `None` if there was no reading.
-        state: Option<StateRow<'a>>,
-    },
-    /// Change of a link.
-    Link {
-        /// Index of the sender.
-        from: usize,
-        /// Index of the receiver.
-        to: usize,
-        /// Complete keys of the link after the change.
-        keys: &'a LinkKeys,
-    },
-    /// End of the session by a person, after everything at this instant. A session that reaches the end of its scene has no such row.
-    End,
-}
 
 /// Recorded inputs of a session, in the order of time.
 #[derive(Clone, PartialEq, Debug, Default)]

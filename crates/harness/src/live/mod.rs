@@ -22,8 +22,9 @@ pub(crate) use presence::RemotePeers;
 pub(crate) use pulled::PulledDevice;
 pub(crate) use seat::Seat;
 
+pub use crate::rows::{Input, InputRow};
 pub use device::LiveDevice;
-pub use inputs::{HEADER, Input, InputRow, Inputs, InputsError};
+pub use inputs::{HEADER, Inputs, InputsError};
 pub use presence::{Datagram, Transmit};
 pub use recorded::{RecordedScene, SceneDifference};
 pub use replay::replay;

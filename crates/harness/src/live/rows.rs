@@ -23,9 +23,10 @@ use cohaptic_scene::{LinkKeys, PeerKind, Scene};
 use cohaptic_units::Instant;
 use cohaptic_units::print::csv_quoted;
 
-use super::inputs::{HEADER, Input, InputRow, Inputs, InputsError, Recorded, shorten};
+use super::inputs::{HEADER, Inputs, InputsError, Recorded, shorten};
 use super::recorded::is_about_the_scene;
 use crate::record::parts;
+use crate::rows::{Input, InputRow};
 
 /// An input as a line without the newline.
 #[derive(Clone, Copy, Debug)]

@@ -11,11 +11,11 @@ use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{LinkModel, LinkStats};
 
 use super::device::LiveDevice;
-use super::inputs::{Input, InputRow};
 use super::presence::{RemotePeers, Transmit};
 use super::seat::{Presence, SampleError, SeatStats};
-use crate::observer::{AnyObserver, Ended, Erased, Observer, SendRow};
+use crate::observer::{AnyObserver, Ended, Erased, Observer};
 use crate::plan::{Model, Plan};
+use crate::rows::{Input, InputRow, SendRow};
 use crate::simulation::Simulation;
 use crate::summary::{Ending, Summary};
 use crate::world::{Step, Watch, World};

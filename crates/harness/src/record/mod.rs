@@ -30,4 +30,5 @@ pub use file::{RecordError, RecordFile};
 pub use inputs::InputRecorder;
 pub use links::links_csv;
 pub use pictures::{Pictures, RecordedPicture};
-pub use recorder::{Recorder, SANE_POSITION};
+pub use plot::SANE_POSITION;
+pub use recorder::Recorder;

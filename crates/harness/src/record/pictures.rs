@@ -5,10 +5,9 @@ use std::convert::Infallible;
 use cohaptic_picture::{Axis, Size};
 use cohaptic_scene::Scene;
 
-use super::SANE_POSITION;
 use super::band::Bands;
 use super::network::Network;
-use super::plot::{Panel, Plot};
+use super::plot::{Panel, Plot, SANE_POSITION};
 use super::views::Views;
 use crate::{Observer, PacketRow, TickRow};
 

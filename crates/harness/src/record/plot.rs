@@ -8,6 +8,9 @@ use super::band::Bands;
 use super::file::RecordFile;
 use crate::record::RecordError;
 
+/// Distance from its initial position beyond which no person at a desktop device moves a copy \[m\].
+pub const SANE_POSITION: f64 = 1.0;
+
 /// A plot: panels below one another with a common axis of time.
 pub(crate) struct Plot<'a> {
     pub(crate) title: String,

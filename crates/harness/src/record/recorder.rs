@@ -23,9 +23,6 @@ pub struct Recorder {
     size: Size,
 }
 
-/// Distance from its initial position beyond which no person at a desktop device moves a copy \[m\].
-pub const SANE_POSITION: f64 = 1.0;
-
 impl Recorder {
     /// Creates the folder if needed and begins the records. Records of an earlier run in the folder are replaced by [`Recorder::finish`].
     ///

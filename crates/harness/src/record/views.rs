@@ -7,8 +7,7 @@ use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
 use super::band::Bands;
-use super::plot::{CUT, MOST_NAMED};
-use super::recorder::SANE_POSITION;
+use super::plot::{CUT, MOST_NAMED, SANE_POSITION};
 
 /// Poses of all copies: at the first tick in each of a fixed number of spans of time, and at the last tick.
 #[derive(Debug)]

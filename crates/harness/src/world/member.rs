@@ -10,8 +10,9 @@ use cohaptic_units::Instant;
 
 use super::row;
 use crate::disturbance::Disturbance;
-use crate::observer::{Ended, Observer, StepRow, TurnStepRow};
+use crate::observer::{Ended, Observer};
 use crate::plan::{DeviceChoice, Plan};
+use crate::rows::{StepRow, TurnStepRow};
 
 /// A peer with a clock and the counters of ticks and samples.
 pub(super) struct Member<const A: usize, S, D> {

@@ -23,8 +23,9 @@ use cohaptic_wan::{AccessLine, Fate, LinkModel, Network, NetworkConfig, NodeId, 
 
 use crate::disturbance::Disturbance;
 use crate::in_flight::{Handle, SamplesInFlight};
-use crate::observer::{Ended, HoldRow, InstantRow, Observer, SendRow, StateRow, TickRow};
+use crate::observer::{Ended, Observer};
 use crate::plan::Plan;
+use crate::rows::{HoldRow, InstantRow, SendRow, StateRow, TickRow};
 use crate::schedule::Schedule;
 use crate::summary::{AccessSummary, Ending, LinkSummaries, PeerSummary, Summary};
 

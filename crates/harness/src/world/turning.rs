@@ -4,7 +4,8 @@ use cohaptic_peer::Gains;
 use cohaptic_peer::rotation::{Attitude, Rotation, Triple};
 use cohaptic_scene::Scene;
 
-use crate::observer::{Ended, Observer, TickRow, TurnRow};
+use crate::observer::{Ended, Observer};
+use crate::rows::{TickRow, TurnRow};
 use crate::spread::Spread;
 
 /// Attitudes of all copies, their spread, and the coming changes of the rotational gains.
