@@ -14,7 +14,7 @@ use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
 use super::probe::{Asked, Probe, probe};
-use super::verdict::Account;
+use super::verdict::{Account, nanos};
 use super::{PEERS, TICK, VISITOR};
 use crate::visitor::Visits;
 
@@ -207,8 +207,4 @@ pub(super) fn fault(report: &Report) -> Option<String> {
         Ending::Complete => Some("the scene came to its end".to_owned()),
         Ending::Diverged(at) => Some(format!("the scene diverged at {at}")),
     }
-}
-
-pub(super) fn nanos(span: Duration) -> i128 {
-    i128::try_from(span.as_nanos()).unwrap_or(i128::MAX)
 }

@@ -1,8 +1,8 @@
 //! What an outcome is worth.
 
 use core::fmt;
+use core::time::Duration;
 
-use super::live::nanos;
 use super::{Outcome, Row, TICK};
 
 /// The additional memory that may be held in the last quarter than in the first \[kB\].
@@ -32,6 +32,11 @@ pub struct Judgement {
     pub verdict: Verdict,
     /// The numbers.
     pub why: String,
+}
+
+/// Returns a span in nanoseconds, signed for differences of spans.
+pub(super) fn nanos(span: Duration) -> i128 {
+    i128::try_from(span.as_nanos()).unwrap_or(i128::MAX)
 }
 
 /// Judges an outcome by every rule.

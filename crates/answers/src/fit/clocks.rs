@@ -3,7 +3,7 @@
 use cohaptic_measure::fit::{Measurements, Skew, Step};
 use serde::Serialize;
 
-use super::words::milliseconds;
+use super::milliseconds::milliseconds;
 use super::{Corrections, FitFailure};
 
 /// Largest plausible mean delay \[s\]. A longer mean delay is more likely an offset between two clocks.

@@ -3,6 +3,7 @@
 mod clocks;
 mod document;
 mod ends;
+mod milliseconds;
 mod scene_link;
 mod source;
 mod words;

@@ -6,6 +6,7 @@ use cohaptic_measure::fit::{LossFit, LossModel};
 use cohaptic_units::print::{Counted, Span};
 
 use super::ends::Ends;
+use super::milliseconds::milliseconds;
 use super::{Answered, clocks};
 
 /// Returns the text about a fitted link: the link, the read packets, and the goodness of each law.
@@ -86,8 +87,4 @@ fn model(loss: &LossFit) -> String {
 /// Returns the resolution of a clock as a span. The resolution is a round number of seconds, which `f64` may miss by a nanosecond.
 fn step(seconds: f64) -> Span {
     Span(Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX))
-}
-
-pub(super) fn milliseconds(seconds: f64) -> String {
-    format!("{:.5} ms", seconds * 1e3)
 }

@@ -2,6 +2,7 @@
 //! and without a network. The answer has the curves of all three runs, for the page.
 
 use std::convert::Infallible;
+use std::path::PathBuf;
 use std::thread;
 use std::time::{Duration, Instant as Clock};
 
@@ -11,14 +12,20 @@ use cohaptic_scene::{PeerKind, link_keys_of_text};
 use cohaptic_units::Instant;
 use serde_json::{Value, json};
 
-use super::scene::PlayedScene;
-use super::stage::{Finished, said};
+use super::scene::{PlayedScene, said};
 
 /// Number of steps into which a record is divided, unless a step would then be shorter than 1 ms. Each curve has one value per step.
 const VALUES: u64 = 600;
 
 const AP: &str = "average-position";
 const PD: &str = "proportional-derivative";
+
+/// A part that has ended, with the file of its recorded inputs.
+pub(super) struct Finished {
+    pub(super) number: usize,
+    pub(super) scene: PlayedScene,
+    pub(super) inputs: PathBuf,
+}
 
 /// A variant of the part to replay.
 struct Variant {

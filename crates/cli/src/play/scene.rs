@@ -31,6 +31,13 @@ pub(super) struct PlayedScene {
 /// Keys of each link, with the indices of sender and receiver.
 pub(super) type Links = Vec<((usize, usize), LinkKeys)>;
 
+/// Returns the message of an error for a page: the key and what is wrong, without lines of a file.
+pub(super) fn said(error: &SceneError) -> String {
+    // People at a page may name a file in a change of links, but must not see the file's content in an error.
+    let message = error.bare_message();
+    error.diagnostic().map_or_else(|| message.clone(), |diagnostic| format!("{}: {message}", diagnostic.key()))
+}
+
 impl PlayedScene {
     /// Reads a scene for play: applies the overrides, sets the duration to [`DURATION`], and removes the expectations, which hold for the file's own duration.
     pub(super) fn read(text: &str, file: &Path, overrides: &[String]) -> Result<Self, SceneError> {

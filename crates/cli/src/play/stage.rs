@@ -14,12 +14,12 @@ use cohaptic_harness::live::LiveDevice;
 use cohaptic_live::pointers::Pointer;
 use cohaptic_live::session::PeerStatus;
 use cohaptic_peer::Coordination;
-use cohaptic_scene::{PeerKind, Scene, SceneError};
+use cohaptic_scene::{PeerKind, Scene};
 use serde_json::{Value, json};
 
-use super::compare;
+use super::compare::{Finished, compare};
 use super::frames::Frames;
-use super::scene::{Links, PEERS, PlayedScene};
+use super::scene::{Links, PEERS, PlayedScene, said};
 use crate::live::onlookers::pairs;
 use crate::realtime::{ControlFiles, KeyedLinks};
 
@@ -62,13 +62,6 @@ pub(super) struct Part {
     pub(super) scene: Scene,
 }
 
-/// A part that has ended, with the file of its recorded inputs.
-pub(super) struct Finished {
-    pub(super) number: usize,
-    pub(super) scene: PlayedScene,
-    pub(super) inputs: PathBuf,
-}
-
 /// The stage of `cohaptic play`.
 pub(super) struct PlayStage {
     pub(super) frames: Frames,
@@ -95,13 +88,6 @@ pub(super) struct PlayStage {
 /// Locks the mutex, also if another thread panicked while it held the lock.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Returns the message of an error for a page: the key and what is wrong, without lines of a file.
-pub(super) fn said(error: &SceneError) -> String {
-    // People at a page may name a file in a change of links, but must not see the file's content in an error.
-    let message = error.bare_message();
-    error.diagnostic().map_or_else(|| message.clone(), |diagnostic| format!("{}: {message}", diagnostic.key()))
 }
 
 impl PlayStage {
@@ -256,7 +242,7 @@ impl Stage for PlayStage {
             }
             thread::sleep(Duration::from_millis(5));
         };
-        compare::compare(&finished)
+        compare(&finished)
     }
 
     fn file(&self, name: &str) -> Option<StageFile> {

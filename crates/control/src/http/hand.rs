@@ -21,7 +21,6 @@ use tokio_tungstenite::tungstenite::{Error, Message};
 
 use super::frames::Counted;
 use super::places::Seat;
-use super::play::stage;
 use super::{App, Refusal};
 use crate::Stage;
 
@@ -46,7 +45,7 @@ fn read(text: &str) -> Option<Place> {
 /// `GET /api/hand`: takes a hand for a page, and switches to a WebSocket. The query `hand=NUMBER` asks for a hand, `hand=none` only watches, and a missing
 /// `hand` takes any free hand.
 pub(super) async fn connect(State(app): State<Arc<App>>, mut request: Request) -> Result<Response, Refusal> {
-    let stage = stage(&app)?;
+    let stage = app.stage()?;
     check_origin(request.headers())?;
     let wanted = wanted(request.uri())?;
     let seat = request.extensions().get::<Arc<Seat>>().cloned();

@@ -65,6 +65,11 @@ impl App {
         Arc::clone(&self.editor).lock_owned().await
     }
 
+    /// Returns the run in which people take part; refuses a request to any other run.
+    fn stage(&self) -> Result<Arc<dyn Stage>, Refusal> {
+        self.stage.clone().ok_or_else(|| Refusal::new(StatusCode::NOT_FOUND, "nobody takes part from a page here"))
+    }
+
     /// Parses the number of a link; `None` if no link has the number.
     fn link(&self, text: &str) -> Option<usize> {
         // Each link has a single address: signs and leading zeros are refused.

@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use super::apart::apart;
 use super::{App, Refusal, body as bodies, hand, json as answer, page};
-use crate::{Role, Stage};
+use crate::Role;
 
 /// Length of the longest accepted wish \[byte\]: a small JSON object.
 const LARGEST_WISH: usize = 4096;
@@ -29,19 +29,15 @@ pub(super) fn routes() -> Router<Arc<App>> {
         .route("/api/files/{name}", get(file))
 }
 
-pub(super) fn stage(app: &App) -> Result<Arc<dyn Stage>, Refusal> {
-    app.stage.clone().ok_or_else(|| Refusal::new(StatusCode::NOT_FOUND, "nobody takes part from a page here"))
-}
-
 async fn facts(State(app): State<Arc<App>>, axum::Extension(role): axum::Extension<Role>) -> Result<Response, Refusal> {
-    Ok(answer(&stage(&app)?.facts(role)))
+    Ok(answer(&app.stage()?.facts(role)))
 }
 
 async fn begin_anew(State(app): State<Arc<App>>, body: Body) -> Result<Response, Refusal> {
     let unprocessable = |reason: String| Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, reason);
     let body = bodies::read(&app, body, LARGEST_WISH).await?;
     let wish: Value = serde_json::from_slice(&body).map_err(|error| unprocessable(format!("expected a JSON object: {error}")))?;
-    let stage = stage(&app)?;
+    let stage = app.stage()?;
     // The restart reads the scene and its files, which may take long.
     let begun = apart(move || stage.begin_anew(&wish).map(|()| stage.facts(Role::Host))).await;
     let begun = begun.map_err(|_| Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, "the new part broke off"))?;
@@ -50,7 +46,7 @@ async fn begin_anew(State(app): State<Arc<App>>, body: Body) -> Result<Response,
 
 /// `POST /api/compare`: runs the comparison on another thread, because a comparison takes a while. A second comparison at the same time is refused.
 async fn compare(State(app): State<Arc<App>>) -> Result<Response, Refusal> {
-    let stage = stage(&app)?;
+    let stage = app.stage()?;
     // The permit ends with this request, also if the client goes away before the comparison has ended.
     let _one = app.comparing.try_acquire().map_err(|_| Refusal::new(StatusCode::CONFLICT, "a comparison is running: wait for its result"))?;
     let compared = apart(move || stage.compare()).await;
@@ -63,7 +59,7 @@ async fn file(State(app): State<Arc<App>>, axum::Extension(role): axum::Extensio
     if role != Role::Host {
         return Err(Refusal::new(StatusCode::FORBIDDEN, "only the person who started the run may have its record: this token is that of a guest"));
     }
-    let stage = stage(&app)?;
+    let stage = app.stage()?;
     let read = apart(move || stage.file(&name)).await;
     let Ok(Some(file)) = read else { return Err(Refusal::new(StatusCode::NOT_FOUND, "there is no such file: compare first")) };
     let headers =

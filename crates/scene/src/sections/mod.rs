@@ -16,6 +16,7 @@ mod peers;
 mod rotation;
 mod timeline;
 mod topology;
+mod turning;
 
 pub(crate) use coordination::{COORDINATION, read_coordination};
 pub(crate) use expect::{EXPECT, read_expect};
@@ -24,9 +25,10 @@ pub(crate) use measure::{MEASURE, Measured, read_measure, read_measure_name};
 pub(crate) use object::{OBJECT, read_object};
 pub(crate) use peer::{PEER, PEERS};
 pub(crate) use peers::{PeerSources, check_enough, read_names, read_peers};
-pub(crate) use rotation::{refuse_rotational_keys, rotation};
+pub(crate) use rotation::refuse_rotational_keys;
 pub(crate) use timeline::{TIMELINE, read_timeline};
 pub(crate) use topology::{TOPOLOGY, Ways, read_topology, refuse_unlinked};
+pub(crate) use turning::rotation;
 
 /// Largest integer of TOML.
 const MOST: u64 = i64::MAX.unsigned_abs();

@@ -4,10 +4,12 @@ use cohaptic_units::Instant;
 
 use super::{Connection, Timer};
 use crate::connection::parts::Phase;
-use crate::connection::recovery::DUPLICATES;
 use crate::scoreboard::News;
 use crate::segment::{Flags, Segment};
 use crate::sequence::{Position, extend};
+
+/// Number of duplicates, or of segments out of order, at which a loss is assumed (RFC 5681, section 3.2).
+pub(super) const DUPLICATES: u32 = 3;
 
 /// Content of an acknowledgement.
 #[derive(Clone, Default, Debug)]

@@ -5,8 +5,8 @@ use core::time::Duration;
 use cohaptic_units::Instant;
 
 use super::acknowledge::Ack;
+use super::acknowledge::DUPLICATES;
 use super::parts::Phase;
-use super::recovery::DUPLICATES;
 use super::{Connection, Timer};
 use crate::sequence::Position;
 

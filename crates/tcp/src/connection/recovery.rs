@@ -7,9 +7,6 @@ use super::acknowledge::Ack;
 use super::parts::Phase;
 use crate::congestion::{Reduction, UNBOUNDED};
 
-/// Number of duplicates, or of segments out of order, at which a loss is assumed (RFC 5681, section 3.2).
-pub(super) const DUPLICATES: u32 = 3;
-
 impl Connection {
     /// Finds losses, changes the phase and sets the timer after the acknowledgement `ack`. `has_widened` says that the acknowledgement changed the peer's
     /// window, `has_data` means data, SYN or FIN in the same segment.

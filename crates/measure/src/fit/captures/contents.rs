@@ -4,13 +4,12 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::hash::{DefaultHasher, Hash, Hasher};
-use std::io::Read;
 use std::ops::Range;
 
 use cohaptic_units::print::Counted;
 use serde::Serialize;
 
-use super::{CaptureError, End, frame, reader, views};
+use super::{frame, reader};
 
 /// Counts of the frames of a capture.
 #[derive(Clone, PartialEq, Eq, Debug, Default, Serialize)]
@@ -86,23 +85,13 @@ pub(super) struct Capture {
 }
 
 impl Capture {
-    /// Reads a file. With a `port`, only datagrams to this UDP port are used.
-    pub(super) fn read(end: End, from: impl Read, port: Option<u16>) -> Result<Self, CaptureError> {
-        let mut capture = Self { datagrams: Vec::new(), bytes: Vec::new(), ran: (i128::MAX, i128::MIN), contents: Contents::default() };
-        let ending = reader::for_each_frame(from, |frame| capture.add(&frame, port));
-        let frames = capture.contents.frames;
-        let ending = ending.map_err(|problem| CaptureError::Unreadable { end, frames, problem })?;
-        capture.contents.cut_off = ending == reader::Ending::CutOff;
-        if capture.datagrams.is_empty() {
-            return Err(CaptureError::NoDatagrams { end, port, contents: Box::new(capture.contents) });
-        }
-        capture.datagrams.sort_by_key(|datagram| datagram.nanos);
-        capture.contents.seen_again = views::merge(&mut capture);
-        Ok(capture)
+    /// Returns a capture without frames.
+    pub(super) fn empty() -> Self {
+        Self { datagrams: Vec::new(), bytes: Vec::new(), ran: (i128::MAX, i128::MIN), contents: Contents::default() }
     }
 
     /// Adds a frame: a datagram to the list, and any frame to the counts.
-    fn add(&mut self, frame: &reader::Frame<'_>, port: Option<u16>) {
+    pub(super) fn add(&mut self, frame: &reader::Frame<'_>, port: Option<u16>) {
         self.contents.frames += 1;
         if let Some(nanos) = frame.nanos {
             self.ran = (self.ran.0.min(nanos), self.ran.1.max(nanos));
@@ -149,6 +138,13 @@ impl Capture {
         };
         (0..=u16::MAX).zip(datagram.range.clone().step_by(octets)).map(piece).collect()
     }
+}
+
+/// Returns whether two datagrams have the same length, and equal payloads as far as both were captured.
+pub(super) fn agree(one: &Capture, number: usize, other: &Capture, other_number: usize) -> bool {
+    let (first, second) = (&one.datagrams[number], &other.datagrams[other_number]);
+    let octets = first.captured().min(second.captured());
+    first.length == second.length && one.payload(first)[..octets] == other.payload(second)[..octets]
 }
 
 /// Returns a hash of octets. Of 10⁶ datagrams, two different ones have the same hash with probability 3·10⁻⁸. Payloads are compared before a match.

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use super::contents::{Capture, Datagram, hash};
+use super::contents::{Capture, Datagram, agree, hash};
 use super::views;
 
 /// Matched datagrams of both captures.
@@ -91,11 +91,4 @@ impl Pairs {
         octets.retain(|length, octets| *octets < *length);
         octets
     }
-}
-
-/// Returns whether two datagrams have the same length, and equal payloads as far as both were captured.
-pub(super) fn agree(one: &Capture, number: usize, other: &Capture, other_number: usize) -> bool {
-    let (first, second) = (&one.datagrams[number], &other.datagrams[other_number]);
-    let octets = first.captured().min(second.captured());
-    first.length == second.length && one.payload(first)[..octets] == other.payload(second)[..octets]
 }

@@ -26,10 +26,12 @@
 //! MPLS, 802.2; IPv4, and IPv6 with extension headers. A frame check sequence announced by the file is removed from the frame.
 
 mod contents;
+mod doubled;
 mod ends;
 mod frame;
 mod hidden;
 mod matching;
+mod open;
 mod reader;
 mod segments;
 mod views;
@@ -171,7 +173,7 @@ pub fn between(sender: impl Read, receiver: impl Read, port: Option<u16>) -> Res
     if segments::split(&mut sent, &mut arrived, &pairs) {
         pairs = Pairs::of(&sent, &arrived);
     }
-    let doubled = views::merge_doubled(&mut sent, &pairs);
+    let doubled = doubled::merge_doubled(&mut sent, &pairs);
     if doubled > 0 {
         sent.contents.seen_again += doubled;
         pairs = Pairs::of(&sent, &arrived);

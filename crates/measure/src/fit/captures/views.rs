@@ -5,11 +5,10 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use super::contents::Capture;
-use super::matching::{Pairs, agree};
+use super::contents::{Capture, agree};
 
 /// Longest time between two views of a packet \[ns\].
-const WINDOW: i128 = 100_000_000;
+pub(super) const WINDOW: i128 = 100_000_000;
 /// Largest number of open packets of equal content compared per frame.
 const MOST_OPEN: usize = 64;
 /// Number of octets of the payload in the grouping key. A view may have fewer octets than another, but rarely fewer than this number.
@@ -45,34 +44,8 @@ pub(super) fn merge(capture: &mut Capture) -> usize {
     retain(capture, &keep)
 }
 
-/// Keeps the first of each group of equal datagrams without an identification, if the other capture proves that this capture doubles packets: for nearly
-/// all arrived packets, an equal datagram within a tenth of a second did not arrive. Returns the number of datagrams dropped.
-pub(super) fn merge_doubled(capture: &mut Capture, pairs: &Pairs) -> usize {
-    const FEWEST: usize = 20;
-    const SHARE: f64 = 0.9;
-    // A payload in more datagrams than this is repeated by the sender.
-    const MOST_VIEWS: usize = 4;
-    let mut groups: BTreeMap<(usize, u64), Vec<usize>> = BTreeMap::new();
-    for (number, datagram) in capture.datagrams.iter().enumerate().filter(|(_, datagram)| datagram.own_identification().is_none()) {
-        groups.entry((datagram.length, datagram.hash)).or_default().push(number);
-    }
-    let mut keep = vec![true; capture.datagrams.len()];
-    let (mut matched, mut doubled) = (0, 0);
-    for group in groups.values() {
-        let arrived = group.iter().filter(|number| pairs.arrival_of[**number].is_some()).count();
-        matched += arrived;
-        let lasts = capture.datagrams[group[group.len() - 1]].nanos - capture.datagrams[group[0]].nanos;
-        if (2..=MOST_VIEWS).contains(&group.len()) && lasts <= WINDOW {
-            doubled += usize::from(arrived == 1);
-            group[1..].iter().for_each(|number| keep[*number] = false);
-        }
-    }
-    let is_rule = doubled >= FEWEST && crate::series::count(doubled) >= SHARE * crate::series::count(matched);
-    if is_rule { retain(capture, &keep) } else { 0 }
-}
-
 /// Keeps the marked datagrams, and returns the number of the dropped ones.
-fn retain(capture: &mut Capture, keep: &[bool]) -> usize {
+pub(super) fn retain(capture: &mut Capture, keep: &[bool]) -> usize {
     let mut marks = keep.iter();
     capture.datagrams.retain(|_| marks.next().copied().unwrap_or(true));
     keep.len() - capture.datagrams.len()

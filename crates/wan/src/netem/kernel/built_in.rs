@@ -3,7 +3,8 @@
 use alloc::boxed::Box;
 use core::f64::consts::SQRT_2;
 
-use super::correlated::TABLE_SCALE;
+/// Scale of table entries: an entry of 8192 is one standard deviation.
+pub(super) const TABLE_SCALE: i32 = 8192;
 
 const ENTRIES: i32 = 4096;
 

@@ -1,5 +1,6 @@
 //! The kernel's correlated random numbers, and the delays made from them.
 
+use super::built_in::TABLE_SCALE;
 use super::prng::{Prng, Unseeded};
 use super::table::Table;
 
@@ -36,9 +37,6 @@ impl Correlated {
         probability != 0 && probability >= self.next(prng)
     }
 }
-
-/// Scale of table entries: an entry of 8192 is one standard deviation.
-pub(super) const TABLE_SCALE: i32 = 8192;
 
 /// Returns a time around `mean` \[ns\] made from 32 random bits, which are not drawn if `sigma` is 0.
 ///

@@ -35,6 +35,7 @@
 mod airtime;
 mod built_in;
 mod correlated;
+mod error;
 mod loss;
 mod parameters;
 mod prng;
@@ -43,8 +44,9 @@ mod slot;
 mod table;
 mod time_fifo;
 
+pub use error::QdiscError;
 pub use prng::Prng;
-pub use qdisc::{Dequeued, DropReason, FlippedBit, Output, Qdisc, QdiscError};
+pub use qdisc::{Dequeued, DropReason, FlippedBit, Output, Qdisc};
 pub use table::Table;
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use core::num::NonZeroU32;
 use core::time::Duration;
 
 use super::airtime::Airtime;
-use super::qdisc::QdiscError;
+use super::error::QdiscError;
 use crate::netem::{ChanceSpec, LossSpec, Netem, Percent};
 
 /// The kernel's parameters of a netem, except for the loss model, the tables and the slots.

@@ -1,19 +1,18 @@
 //! The queueing discipline of the kernel's netem.
 
 use alloc::vec::Vec;
-use core::fmt;
-use core::time::Duration;
 
 use cohaptic_units::Instant;
 
 use super::correlated::{Correlated, distributed};
+use super::error::QdiscError;
 use super::loss::LossModel;
 use super::parameters::Parameters;
 use super::prng::{Prng, Unseeded};
 use super::slot::Slots;
 use super::table::Table;
 use super::time_fifo::TimeFifo;
-use crate::netem::{Contradiction, Distribution, Netem, SlotGap, TableName};
+use crate::netem::{Distribution, Netem, SlotGap, TableName};
 
 /// The netem of Linux 6.6, on a device of infinite speed.
 ///
@@ -47,47 +46,6 @@ struct Packet<T> {
     ect: bool,
     marked: bool,
     corrupted: Option<FlippedBit>,
-}
-
-/// Why no qdisc can be made of a netem.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub enum QdiscError {
-    /// The options contradict each other.
-    Contradiction(Contradiction),
-    /// A distribution has no table.
-    UnknownTable {
-        /// Name of the distribution.
-        name: TableName,
-    },
-    /// A delay that does not fit into the 2³² ticks of 64 ns of `tc`.
-    DelayTooLong {
-        /// The delay or the jitter.
-        delay: Duration,
-    },
-}
-
-impl fmt::Display for QdiscError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Contradiction(error) => fmt::Display::fmt(error, f),
-            Self::UnknownTable { name } => write!(
-                f,
-                "no table for the distribution \"{}\": expected uniform, normal, pareto, paretonormal or a table that was given",
-                name.as_str()
-            ),
-            Self::DelayTooLong { delay } => {
-                write!(f, "a delay of {}: expected less than 274.877907s, which is what 32 bits of ticks hold", cohaptic_units::print::Span(*delay))
-            }
-        }
-    }
-}
-
-impl core::error::Error for QdiscError {}
-
-impl From<Contradiction> for QdiscError {
-    fn from(error: Contradiction) -> Self {
-        Self::Contradiction(error)
-    }
 }
 
 /// An event of a packet in the call that offers the packet.

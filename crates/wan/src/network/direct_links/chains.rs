@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 
 use cohaptic_units::{Instant, Probability};
 
-use super::kind::{Losses, Verdict};
+use super::losses::{Losses, Verdict};
 use super::{Arrivals, DirectLinks, LinkState};
 use crate::laws::delay::GammaCubics;
 use crate::line::direct::Words;

@@ -1,13 +1,14 @@
 //! Data that links of one configuration share, and the state of each link.
 
-use cohaptic_units::{Instant, Probability};
+use cohaptic_units::Instant;
 
 use super::chains::Chains;
+use super::losses::{Losses, Verdict};
 use crate::line::direct::Words;
 use crate::random::{PacketDraws, Purpose, Stream};
 use crate::stages::config::{Layout, LinkConfig};
 use crate::stages::delay::{CorrelatedDelays, DelayStage};
-use crate::stages::loss::{GilbertElliott, GilbertElliottState, Loss};
+use crate::stages::loss::{GilbertElliottState, Loss};
 use crate::stages::order::Order;
 use crate::stages::queue::{EqualPackets, Load, nanos};
 
@@ -21,13 +22,6 @@ pub(super) struct Kind {
     line: Line,
     /// Computation for eight links at once; `None` without correlated delays, with a rate, or where [`Chains::new`] returns `None`.
     pub(super) chains: Option<Chains>,
-}
-
-#[derive(Clone, Debug)]
-pub(super) enum Losses {
-    None,
-    Independent(Probability),
-    GilbertElliott(GilbertElliott),
 }
 
 /// The transmitter of a link and its queue, for packets of one size.
@@ -55,15 +49,6 @@ pub(super) struct Remembered {
     state: GilbertElliottState,
     /// Packets that found no room in the queue.
     pub(super) found_full: u64,
-}
-
-/// Fate of a packet.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Verdict {
-    Arrives(Instant),
-    Lost,
-    /// Dropped for a cause other than loss. The function that returns this value has counted the drop.
-    Dropped,
 }
 
 impl Kind {

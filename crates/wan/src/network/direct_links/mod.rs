@@ -2,13 +2,15 @@
 
 mod chains;
 mod kind;
+mod losses;
 
 use alloc::vec::Vec;
 
 use cohaptic_units::Instant;
 
 use chains::ChainStates;
-use kind::{Kind, Line, Remembered, Verdict};
+use kind::{Kind, Line, Remembered};
+use losses::Verdict;
 
 use super::id::LinkId;
 use crate::fates::fate::DropCause;

@@ -1,6 +1,7 @@
 //! Finds the UDP datagram in a frame, or names the frame's content.
 
 mod internet;
+mod layers;
 mod link;
 mod wireless;
 

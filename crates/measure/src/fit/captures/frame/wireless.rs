@@ -1,6 +1,6 @@
 //! Frames of IEEE 802.11, with or without the radiotap header.
 
-use super::{CUT, Kind, link};
+use super::{CUT, Kind, layers};
 
 /// Returns whether frames of a link type begin with a header that differs from frame to frame.
 pub(super) const fn is_wireless(link_type: u16) -> bool {
@@ -56,5 +56,5 @@ pub(super) fn packet(frame: &[u8], padded: bool) -> Result<&[u8], Kind> {
         (true, false) => addresses + 2,
         (true, true) => addresses + 6,
     };
-    link::llc(frame.get(if padded { header.next_multiple_of(4) } else { header }..).ok_or(CUT)?)
+    layers::llc(frame.get(if padded { header.next_multiple_of(4) } else { header }..).ok_or(CUT)?)
 }
