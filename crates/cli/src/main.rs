@@ -12,6 +12,7 @@ mod arguments;
 mod campaign;
 mod check;
 mod compare;
+mod completions;
 mod document_schema;
 mod documents;
 #[cfg(not(target_os = "linux"))]
@@ -84,7 +85,7 @@ fn main() -> ExitCode {
         Command::Paper(arguments) => paper::paper(&arguments),
         Command::Init(arguments) => init::init(&arguments),
         Command::Schema(arguments) => texts::schema(&arguments),
-        Command::Completions(arguments) => texts::completions(&arguments),
+        Command::Completions(arguments) => completions::completions(&arguments),
         Command::Man(arguments) => texts::man(&arguments),
     };
     match done {

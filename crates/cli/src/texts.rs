@@ -1,5 +1,4 @@
-//! Texts for other programs: manual pages (`cohaptic man`) and completions of shells (`cohaptic completions`), both generated from the definitions of the
-//! arguments, and JSON Schemas of files (`cohaptic schema`).
+//! Texts for other programs: manual pages (`cohaptic man`), generated from the definitions of the arguments, and JSON Schemas of files (`cohaptic schema`).
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -8,7 +7,7 @@ use clap::Command;
 use clap_mangen::Man;
 use cohaptic_scene::schema::FileSchema;
 
-use crate::arguments::{Arguments, CompletionsArguments, FileKind, ManArguments, SchemaArguments};
+use crate::arguments::{Arguments, FileKind, ManArguments, SchemaArguments};
 use crate::failure::Failure;
 use crate::file::{own_folder, write_file};
 use crate::output;
@@ -61,12 +60,4 @@ fn page(command: &Command) -> Result<Vec<u8>, Failure> {
     let mut page = Vec::new();
     Man::new(command.clone()).render(&mut page).map_err(Failure::StandardOutput)?;
     Ok(page)
-}
-
-/// Prints the script with which a shell completes commands and options.
-pub(crate) fn completions(arguments: &CompletionsArguments) -> Result<ExitCode, Failure> {
-    let mut script = Vec::new();
-    clap_complete::generate(arguments.shell, &mut Arguments::program(), "cohaptic", &mut script);
-    output::raw(&script)?;
-    Ok(ExitCode::SUCCESS)
 }

@@ -1,5 +1,6 @@
 //! `init`, `schema`, `completions` and `man`: files for authors of scenes, their shells and their editors.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
@@ -14,7 +15,7 @@ pub(crate) struct InitArguments {
     #[arg(value_name = "FILE", default_value = "scene.toml")]
     pub(crate) file: PathBuf,
     /// The scene to begin with, such as paper/5-1 or network/jitter-normal; --list names all
-    #[arg(long, value_name = "NAME", default_value = "coordination/two-people")]
+    #[arg(long, value_name = "SCENE", default_value = "coordination/two-people")]
     pub(crate) from: String,
     /// How many peers [default: as many as the scene has]. With another number what the scene expects is left out
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000))]
@@ -52,6 +53,9 @@ pub(crate) struct CompletionsArguments {
     /// The shell whose completions are printed
     #[arg(value_enum, value_name = "SHELL")]
     pub(crate) shell: Shell,
+    /// The words that follow cohaptic in a command line: print what completes the last one, if that is a key, a peer or a scene. The script asks so
+    #[arg(value_name = "WORD", last = true)]
+    pub(crate) words: Vec<OsString>,
 }
 
 #[derive(Debug, Args)]

@@ -263,7 +263,7 @@ pub(crate) struct AdmittanceArguments {
     #[command(flatten)]
     pub(crate) scene: SceneArguments,
     /// The peer whose device is pushed
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "PEER")]
     pub(crate) peer: String,
     /// The axis of the push, or of the twist of a device that turns [default: that of its own one-sided contact, or x]
     #[arg(long, value_enum, value_name = "AXIS")]

@@ -7,6 +7,8 @@ mod shipped;
 mod tests;
 mod write;
 
+pub(crate) use shipped::names as shipped_names;
+
 use std::fmt::Write as _;
 use std::path::Path;
 use std::process::ExitCode;

@@ -10,7 +10,7 @@ pub(super) fn find(name: &str) -> Option<(&'static str, &'static str)> {
 }
 
 /// Returns the names of all shipped scenes, aliases first.
-pub(super) fn names() -> impl Iterator<Item = &'static str> {
+pub(crate) fn names() -> impl Iterator<Item = &'static str> {
     OTHER_NAMES.iter().map(|(other, _)| *other).chain(SCENES.iter().map(|(own, _)| *own))
 }
 

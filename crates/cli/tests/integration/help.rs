@@ -91,7 +91,7 @@ fn help_of_a_command_names_its_options_and_the_exit_status() {
         (
             "admittance",
             &[
-                "--peer <NAME>",
+                "--peer <PEER>",
                 "--from <HZ>",
                 "--to <HZ>",
                 "--points <N>",

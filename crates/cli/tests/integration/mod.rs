@@ -13,6 +13,7 @@ mod certificate_checker;
 mod check;
 mod check_page;
 mod compare;
+mod completions;
 mod desk;
 mod documents;
 mod errors;

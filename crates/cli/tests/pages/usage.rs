@@ -75,8 +75,13 @@ pub(crate) fn of_cohaptic(words: &[String]) -> Result<(), String> {
 
 fn known_in(command: &[String], words: &[&String], line: &str) -> Result<(), String> {
     let known = help(command).ok_or_else(|| format!("there is no command `{}`: {line}", command.join(" ")))?;
+    // Words after `--` are no options of this command; after `completions` they are a command line of their own.
+    let end = words.iter().position(|word| word.trim_start_matches('[') == "--").unwrap_or(words.len());
+    if let (["completions"], Some(others)) = (command.iter().map(String::as_str).collect::<Vec<_>>().as_slice(), words.get(end + 1..)) {
+        of_cohaptic(&std::iter::once("cohaptic".to_owned()).chain(others.iter().map(|word| (*word).clone())).collect::<Vec<_>>())?;
+    }
     // Words in brackets are those of a line of usage.
-    let used = words.iter().map(|word| word.trim_matches(['[', ']'])).filter(|word| word.starts_with("--"));
+    let used = words[..end].iter().map(|word| word.trim_matches(['[', ']'])).filter(|word| word.starts_with("--"));
     for option in used.map(|word| word.split('=').next().unwrap_or_default()) {
         if !known.options.contains(option) {
             return Err(format!("`cohaptic {}` has no option `{option}`: {line}", command.join(" ")));
@@ -117,7 +122,14 @@ fn what_is_no_option_is_found() {
     {
         assert_eq!(check(line), Ok(()));
     }
-    for line in ["cohaptic run SCENE --grid 2x2", "cohaptic stability areas SCENE", "cohaptic walk SCENE", "cohaptic check --outs=x"] {
+    assert_eq!(check("cohaptic completions bash -- run SCENE --set"), Ok(()));
+    for line in [
+        "cohaptic completions bash -- run SCENE --grid",
+        "cohaptic run SCENE --grid 2x2",
+        "cohaptic stability areas SCENE",
+        "cohaptic walk SCENE",
+        "cohaptic check --outs=x",
+    ] {
         assert!(check(line).is_err(), "{line}");
     }
     assert_eq!((of_some_command("--losses-in-a-row 2"), of_some_command("--losses").is_err()), (Ok(()), true));

@@ -1,0 +1,115 @@
+//! `cohaptic completions`: scripts with which shells complete a command line, and the answers that these scripts ask the program for.
+//!
+//! Commands and options stand in a script, generated from the definitions of the arguments. Keys, peers and scenes depend on files, so that the scripts for
+//! bash, fish and zsh run the program with the words typed so far, and show what the program prints.
+
+mod keys;
+mod paths;
+mod shells;
+#[cfg(test)]
+mod tests;
+mod words;
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use clap::Arg;
+use clap_complete::Shell;
+use cohaptic_linkfile::document::{BEGINNING, Node, Sources};
+use cohaptic_linkfile::reading::{file_text, parse};
+use cohaptic_scene::schema::FileSchema;
+
+use crate::arguments::{Arguments, CompletionsArguments};
+use crate::failure::Failure;
+use crate::init::shipped_names;
+use crate::output;
+use words::Asked;
+
+/// Text that can stand in place of what was typed, and its meaning, which may be empty.
+#[derive(Clone, PartialEq, Eq, Debug)]
+struct Offer {
+    text: String,
+    about: &'static str,
+}
+
+/// Prints the script of a shell or, if words of a command line are given, what can complete the last word.
+pub(crate) fn completions(arguments: &CompletionsArguments) -> Result<ExitCode, Failure> {
+    if arguments.words.is_empty() {
+        output::raw(shells::script(arguments.shell).as_bytes())?;
+    } else {
+        let words: Vec<String> = arguments.words.iter().map(|word| word.to_string_lossy().into_owned()).collect();
+        output::raw(answer(arguments.shell, &words).as_bytes())?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Returns a line for each text that can stand in place of the last word, in the form that the script of `shell` expects. Empty if the script itself knows
+/// what completes the word.
+fn answer(shell: Shell, words: &[String]) -> String {
+    let split = shells::Split::of(shell, words);
+    let mut program = Arguments::program();
+    // `build` puts global options into the subcommands and counts positional arguments.
+    program.build();
+    let Some(asked) = words::asked(&program, &split.words) else { return String::new() };
+    let mut offers = offers(&asked);
+    offers.retain(|offer| offer.text.starts_with(&asked.typed));
+    offers.iter().map(|offer| split.line(&asked.option, offer)).collect()
+}
+
+/// Kind of values that depend on files.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Kind {
+    /// `KEY=VALUE`, or several of them with commas between them.
+    Keys { many: bool },
+    /// Name of a peer of the scene.
+    Peer,
+    /// Name of a shipped scene.
+    Shipped,
+    /// File that the command reads.
+    File,
+}
+
+impl Kind {
+    /// Returns the kind of the values of an argument of `command`; `None` if they do not depend on files. The name of the value, which the help shows, says so.
+    fn of(arg: &Arg, command: &str) -> Option<Self> {
+        let name = arg.get_value_names()?.first()?.as_str();
+        match (name, arg.is_positional()) {
+            ("PEER", _) => Some(Self::Peer),
+            ("SCENE", false) => Some(Self::Shipped),
+            ("SCENE", true) => Some(Self::File),
+            (_, true) if matches!(command, "relay" | "router") => Some(Self::File),
+            _ => name.starts_with("KEY=").then(|| Self::Keys { many: name.ends_with(",...") }),
+        }
+    }
+}
+
+/// Returns what can stand in place of the value that is asked for.
+fn offers(asked: &Asked<'_>) -> Vec<Offer> {
+    let named = |text: String| Offer { text, about: "" };
+    match Kind::of(asked.arg, asked.command) {
+        None => Vec::new(),
+        Some(Kind::Shipped) => shipped_names().map(|name| named(name.to_owned())).collect(),
+        Some(Kind::File) => paths::offers(&asked.typed),
+        Some(Kind::Peer) => keys::ends(&document(asked.file)).into_iter().map(named).collect(),
+        Some(Kind::Keys { many }) => {
+            let done = if many { asked.typed.rfind(',').map_or(0, |comma| comma + 1) } else { 0 };
+            let (done, typed) = asked.typed.split_at(done);
+            let kind = match asked.command {
+                "relay" => FileSchema::Relay,
+                "router" => FileSchema::Router,
+                _ => FileSchema::Scene,
+            };
+            let offers = keys::offers(kind.root(), &document(asked.file), typed);
+            offers.into_iter().map(|Offer { text, about }| Offer { text: format!("{done}{text}"), about }).collect()
+        }
+    }
+}
+
+/// Returns the document of a file. An unreadable file, which may be half written at this time, counts as an empty one: keys are known without it.
+fn document(file: Option<&str>) -> Node {
+    let path = Path::new(file.unwrap_or_default());
+    // A pipe is not read: its writer means the text for the command that is being typed.
+    let text = if path.is_file() { file_text(path).unwrap_or_default() } else { String::new() };
+    let parsed = parse(Sources { file: path, text: &text, overrides: &[] }, |document, _| Some(document.clone()));
+    parsed.map_or_else(|_| Node::empty_table(BEGINNING, String::new()), |parsed| parsed.document)
+}

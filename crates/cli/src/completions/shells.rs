@@ -1,0 +1,143 @@
+//! What differs between shells: the scripts, how words reach the program, and how answers reach the shell.
+
+use clap::{Arg, Command};
+use clap_complete::Shell;
+
+use super::{Kind, Offer};
+use crate::arguments::Arguments;
+
+/// First line of the function that completes, in the generated scripts for bash and zsh.
+const FUNCTION: &str = "_cohaptic() {\n";
+
+/// Beginning of the function for bash. Without an answer the generated part goes on. `compopt` came with bash 4; without it a space follows each completion.
+const BASH: &str = r#"    local answer
+    COMPREPLY=()
+    while IFS= read -r answer; do
+        COMPREPLY+=("$answer")
+        [[ "$answer" == *[=./] ]] && compopt -o nospace 2>/dev/null
+    done < <("$1" completions bash -- "${COMP_WORDS[@]:1:COMP_CWORD}" 2>/dev/null)
+    (( ${#COMPREPLY[@]} )) && return 0
+"#;
+
+/// Beginning of the function for zsh.
+const ZSH: &str = r#"    local answer tab=$'\t'
+    local -a texts suffix
+    for answer in ${(f)"$("${(Q)words[1]}" completions zsh -- "${(@Q)words[2,CURRENT]}" 2>/dev/null)"}; do
+        texts=("${answer/$tab/  -- }")
+        answer="${answer%%$tab*}"
+        suffix=()
+        [[ "$answer" == *[=./] ]] && suffix=(-S '')
+        compadd "${(@)suffix}" -l -d texts -- "$answer"
+    done
+    (( compstate[nmatches] )) && return 0
+"#;
+
+/// End of the script for fish: positional arguments. The options follow, a line each, because fish asks for the values of each option apart.
+const FISH: &str = r#"
+function __cohaptic_answers
+    set -l words (commandline -opc)
+    set -l last (commandline -ct)
+    set -l program $words[1]
+    set -e words[1]
+    $program completions fish -- $words "$last" 2>/dev/null
+end
+
+function __cohaptic_has_answers
+    set -l answers (__cohaptic_answers)
+    test (count $answers) -gt 0
+end
+
+complete -c cohaptic -n __cohaptic_has_answers -f -a "(__cohaptic_answers)"
+"#;
+
+/// Returns the script with which a shell completes commands, options and, in bash, fish and zsh, the values that depend on files.
+pub(super) fn script(shell: Shell) -> String {
+    let mut generated = Vec::new();
+    let mut program = Arguments::program();
+    clap_complete::generate(shell, &mut program, "cohaptic", &mut generated);
+    let generated = String::from_utf8_lossy(&generated);
+    match shell {
+        Shell::Bash => generated.replacen(FUNCTION, &format!("{FUNCTION}{BASH}"), 1),
+        Shell::Zsh => generated.replacen(FUNCTION, &format!("{FUNCTION}{ZSH}"), 1),
+        Shell::Fish => format!("{generated}{FISH}{}", fish_options(&program)),
+        Shell::Elvish | Shell::PowerShell | _ => generated.into_owned(),
+    }
+}
+
+/// Returns a line for each option whose values depend on files.
+fn fish_options(program: &Command) -> String {
+    let mut lines: Vec<String> = Vec::new();
+    let mut commands = vec![program];
+    while let Some(command) = commands.pop() {
+        commands.extend(command.get_subcommands());
+        for arg in command.get_opts().filter(|arg| Kind::of(arg, command.get_name()).is_some()) {
+            let line = format!("complete -c cohaptic -n __cohaptic_has_answers {} -x -a \"(__cohaptic_answers)\"\n", names(arg));
+            if !lines.contains(&line) {
+                lines.push(line);
+            }
+        }
+    }
+    lines.sort();
+    lines.concat()
+}
+
+/// Returns the names of an option as fish writes them: `-s s -l set`.
+fn names(arg: &Arg) -> String {
+    let short = arg.get_short().map(|letter| format!("-s {letter}"));
+    let long = arg.get_long().map(|long| format!("-l {long}"));
+    short.into_iter().chain(long).collect::<Vec<_>>().join(" ")
+}
+
+/// Words of a command line as the program reads them, and the form in which the shell expects an answer.
+pub(super) struct Split {
+    pub(super) words: Vec<String>,
+    shell: Shell,
+    /// Bytes of the last word that the shell takes for other words and does not replace.
+    kept: usize,
+}
+
+impl Split {
+    /// Returns the words that a script passed on. Bash splits words at `=` and `:`, and passes these characters on as words of their own.
+    pub(super) fn of(shell: Shell, words: &[String]) -> Self {
+        if shell != Shell::Bash {
+            return Self { words: words.to_vec(), shell, kept: 0 };
+        }
+        let is_break = |word: &str| !word.is_empty() && word.chars().all(|c| matches!(c, '=' | ':'));
+        let mut joined: Vec<String> = Vec::new();
+        let mut kept = 0;
+        let mut after_break = false;
+        for word in words {
+            match joined.last_mut() {
+                Some(last) if after_break || is_break(word) => {
+                    kept = if is_break(word) { last.len() + word.len() } else { last.len() };
+                    last.push_str(word);
+                }
+                _ => {
+                    kept = 0;
+                    joined.push(word.clone());
+                }
+            }
+            after_break = is_break(word);
+        }
+        Self { words: joined, shell, kept }
+    }
+
+    /// Returns the line of an answer. `option` is the part of the last word before the value.
+    pub(super) fn line(&self, option: &str, offer: &Offer) -> String {
+        let Offer { text, about } = offer;
+        let meaning = if about.is_empty() { String::new() } else { format!("\t{about}") };
+        match self.shell {
+            // Bash replaces the text after the last `=` or `:`, as it is: what the shell would read as more than a word is quoted here.
+            Shell::Bash => format!("{}\n", quoted(format!("{option}{text}").get(self.kept..).unwrap_or_default())),
+            // Zsh replaces the whole word, fish the value.
+            Shell::Zsh => format!("{option}{text}{meaning}\n"),
+            Shell::Fish | Shell::Elvish | Shell::PowerShell | _ => format!("{text}{meaning}\n"),
+        }
+    }
+}
+
+/// Returns a word with a backslash before each character that has a meaning in bash.
+fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_alphanumeric() || matches!(c, '.' | '/' | '-' | '_' | '=' | ',' | '+' | '@' | '%');
+    word.chars().flat_map(|c| (!is_plain(c)).then_some('\\').into_iter().chain([c])).collect()
+}
