@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
-use cohaptic_paper::{Options, PaperError, Reproduction, Watch, page, reproduce, steps};
+use cohaptic_paper::{Options, PaperError, Reproduction, Table, Watch, page, reproduce, steps};
 use serde::Serialize;
 
 use crate::arguments::PaperArguments;
@@ -62,10 +62,14 @@ fn document(reproduction: &Reproduction, has_files: bool, wall_s: Option<f64>) -
             id: claim.id,
             claim: claim.claim,
             paper: claim.paper,
+            says: claim.says,
             ours: claim.ours.as_str(),
+            tables: claim.tables.iter().map(table).collect::<Vec<_>>(),
             verdict: claim.verdict.to_string(),
-            scene: claim.scene.as_deref(),
-            how: claim.how.as_deref(),
+            why: claim.why,
+            scene: claim.scene.as_str(),
+            how: claim.how.as_str(),
+            commands: claim.commands.as_str(),
         }
     });
     let figures = reproduction.figures.iter().map(|figure| {
@@ -80,15 +84,22 @@ fn document(reproduction: &Reproduction, has_files: bool, wall_s: Option<f64>) -
     }
 }
 
+fn table(table: &Table) -> impl Serialize + use<> {
+    document! {
+        title: table.title.clone(),
+        groups: table.groups.iter().map(|(name, columns)| document! { name: name.clone(), columns: *columns }).collect::<Vec<_>>(),
+        head: table.head.clone(),
+        rows: table.rows.clone(),
+    }
+}
+
 fn write_files(folder: &Path, reproduction: &Reproduction) -> Result<(), Failure> {
     for figure in &reproduction.figures {
         write_file(&folder.join(format!("{}.svg", figure.id)), figure.svg.as_bytes())?;
         write_file(&folder.join(format!("{}.csv", figure.id)), figure.csv.as_bytes())?;
     }
     for claim in &reproduction.claims {
-        if let Some(scene) = &claim.scene {
-            write_file(&folder.join(format!("{}.toml", claim.id)), scene.as_bytes())?;
-        }
+        write_file(&folder.join(format!("{}.toml", claim.id)), claim.scene.as_bytes())?;
     }
     // The document leaves out the wall time, so that every reproduction writes the same bytes.
     let mut claims = serde_json::to_vec_pretty(&DocumentSchema::PAPER.of(&document(reproduction, true, None))).unwrap_or_default();
@@ -104,12 +115,28 @@ fn describe(reproduction: &Reproduction) -> String {
     let mut text = String::new();
     for claim in &reproduction.claims {
         let _ = writeln!(text, "{}", claim.id);
-        for (name, value) in [("claim", claim.claim), ("paper", claim.paper), ("ours", &claim.ours), ("verdict", &claim.verdict.to_string())] {
+        let paper = format!("{} ({})", claim.says, claim.paper);
+        for (name, value) in [("claim", claim.claim), ("paper", &paper), ("ours", &claim.ours), ("verdict", &claim.verdict.to_string())] {
             wrap(&mut text, name, value);
         }
+        claim.tables.iter().for_each(|table| draw(&mut text, table));
         text.push('\n');
     }
     text
+}
+
+/// Appends a table to `text`, with columns as wide as their cells.
+fn draw(text: &mut String, table: &Table) {
+    let groups: Vec<String> = table.groups.iter().flat_map(|(name, columns)| std::iter::repeat_n(name.clone(), *columns)).collect();
+    let rows = [&groups, &table.head].into_iter().filter(|row| !row.is_empty()).chain(&table.rows);
+    let width = |place: usize| rows.clone().filter_map(|row| row.get(place)).map(|cell| cell.chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..table.head.len()).map(width).collect();
+    let _ = writeln!(text, "\n    {}", table.title);
+    for row in rows.clone() {
+        // Padding counts characters. A last column without text leaves no spaces at the end of the line.
+        let line = row.iter().zip(&widths).fold(String::new(), |line, (cell, width)| format!("{line}  {cell:>width$}"));
+        let _ = writeln!(text, "    {}", line.trim_end());
+    }
 }
 
 /// Appends a name and its value to `text`. The value is broken between words at [`WIDTH`] and indented.

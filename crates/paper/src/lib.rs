@@ -24,13 +24,15 @@ mod experiment;
 mod figures;
 pub mod page;
 mod region;
+mod table;
 
 use cohaptic_picture::Size;
 use cohaptic_scene::SceneError;
 use cohaptic_stability::{AdmittanceError, AnalysisError, FamilyError, KeyRangeError, MapError};
 
-pub use claims::{Claim, Verdict};
-pub use figures::{Figure, Table};
+pub use claims::{Claim, Topic, Verdict};
+pub use figures::Figure;
+pub use table::{FAILS, Table};
 
 /// Resolution of the computation, and size of the drawings.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]

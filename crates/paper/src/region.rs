@@ -58,7 +58,8 @@ impl Setting {
         format!("BT = BC = {} N·s/m, {}, {} ms one way", self.damping, self.mass.words(), self.delay_us / 1000)
     }
 
-    fn case(&self, strategy: Strategy, peers: usize) -> Case {
+    /// Returns the scene of a strategy and a number of peers, with the paper's gains.
+    pub(crate) fn case(&self, strategy: Strategy, peers: usize) -> Case {
         let Self { damping, mass, delay_us } = *self;
         Case { damping, coupling_damping: damping, mass, delay_us, ..Case::paper(strategy, peers) }
     }

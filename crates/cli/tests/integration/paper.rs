@@ -26,10 +26,12 @@ fn the_page_the_figures_and_the_data_lie_in_the_folder() {
     let claims = document["claims"].as_array().unwrap();
     assert!(claims.len() > 10 && document["wall_s"].as_f64().unwrap() > 0.0);
     for claim in claims {
-        assert!(["id", "claim", "paper", "ours", "verdict"].iter().all(|key| claim[*key].as_str().is_some_and(|text| !text.is_empty())), "{claim}");
-        if claim["scene"].is_string() {
-            let scene = format!("again/{}.toml", claim["id"].as_str().unwrap());
-            desk.text(&format!("explain {scene}"));
+        let keys = ["id", "claim", "paper", "says", "ours", "verdict", "scene", "how", "commands"];
+        assert!(keys.iter().all(|key| claim[*key].as_str().is_some_and(|text| !text.is_empty())), "{claim}");
+        // Each command runs as it stands on the page, in the folder of the page.
+        let file = format!("{}.toml", claim["id"].as_str().unwrap());
+        for command in claim["commands"].as_str().unwrap().lines() {
+            desk.text(&command.strip_prefix("cohaptic ").unwrap().replace(&file, &format!("again/{file}")));
         }
     }
     for figure in document["figures"].as_array().unwrap() {

@@ -12,6 +12,7 @@ use crate::case::{Case, Strategy};
 use crate::experiment::{StabilityTest, Travel};
 use crate::figures::admittance::Responses;
 use crate::region::Atlas;
+use crate::table::Table;
 use crate::{Options, PaperError};
 
 /// A claim of the paper with the computed result.
@@ -21,16 +22,61 @@ pub struct Claim {
     pub id: &'static str,
     /// The claim in words.
     pub claim: &'static str,
+    /// The claim for somebody who does not know the symbols, as a part of a sentence.
+    pub short: &'static str,
+    /// Part of the paper that the claim belongs to.
+    pub topic: Topic,
+    /// `true` for a statement of this program, which the paper does not make.
+    pub is_own: bool,
     /// Place in the paper: a figure, an equation or a section.
     pub paper: &'static str,
+    /// What the paper says there, as a sentence.
+    pub says: &'static str,
     /// Computed result in words.
     pub ours: String,
-    /// Whether the claim holds.
+    /// Computed numbers, beside those of the paper where it prints numbers.
+    pub tables: Vec<Table>,
+    /// Names of the figures that show the result.
+    pub figures: &'static [&'static str],
+    /// Verdict on the claim.
     pub verdict: Verdict,
-    /// Scene file of the smallest counterexample found; `None` if the claim holds or no scene shows the failure.
-    pub scene: Option<String>,
-    /// How to run `scene`, and the result; present if `scene` is.
-    pub how: Option<String>,
+    /// Why the result differs from the paper, as far as it is known; empty if the result does not differ.
+    pub why: &'static str,
+    /// Scene file that shows the result: the smallest counterexample found, if the claim fails in a scene.
+    pub scene: String,
+    /// What `commands` show.
+    pub how: String,
+    /// Commands for the scene, each a line. The scene is in a file with the name of the claim, such as `any-number.toml`.
+    pub commands: String,
+}
+
+/// Part of the paper.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Topic {
+    /// Section 2: stiffness of the coordination.
+    Stiffness,
+    /// Section 3: stability regions.
+    Regions,
+    /// Section 4: admittance.
+    Feel,
+    /// Section 5: experiments.
+    Experiments,
+    /// Not in the paper.
+    Beyond,
+}
+
+impl Topic {
+    /// Returns a heading.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Stiffness => "How stiffly the copies are held together (Section 2)",
+            Self::Regions => "Which gains are stable (Section 3, Figures 3 and 4)",
+            Self::Feel => "What a hand feels (Section 4, Figure 5)",
+            Self::Experiments => "The experiments (Section 5, Figures 7 and 8)",
+            Self::Beyond => "Beyond the paper",
+        }
+    }
 }
 
 /// Verdict on a claim.
@@ -55,13 +101,32 @@ impl std::fmt::Display for Verdict {
 }
 
 impl Claim {
-    const fn new(id: &'static str, claim: &'static str, paper: &'static str, ours: String, verdict: Verdict) -> Self {
-        Self { id, claim, paper, ours, verdict, scene: None, how: None }
+    /// Returns a claim that holds, with nothing said about it yet.
+    const fn blank(id: &'static str, topic: Topic) -> Self {
+        Self {
+            id,
+            claim: "",
+            short: "",
+            topic,
+            is_own: false,
+            paper: "",
+            says: "",
+            ours: String::new(),
+            tables: Vec::new(),
+            figures: &[],
+            verdict: Verdict::Holds,
+            why: "",
+            scene: String::new(),
+            how: String::new(),
+            commands: String::new(),
+        }
     }
 
-    /// Adds the smallest counterexample.
-    fn with_scene(self, case: &Case, how: String) -> Self {
-        Self { scene: Some(case.text()), how: Some(how), ..self }
+    /// Adds the scene that shows the result. `commands` are the arguments of `cohaptic`, in which `FILE` stands for the scene's file.
+    fn shown_by(self, scene: String, how: impl Into<String>, commands: &[&str]) -> Self {
+        let file = format!("{}.toml", self.id);
+        let commands: Vec<String> = commands.iter().map(|command| format!("cohaptic {}", command.replace("FILE", &file))).collect();
+        Self { scene, how: how.into(), commands: commands.join("\n"), ..self }
     }
 }
 
@@ -86,31 +151,54 @@ pub(crate) fn all(
 /// Numbers of peers in [`many_peers`].
 const PEERS: [usize; 4] = [3, 5, 50, 1000];
 
+/// Arguments that run a scene with PD in place of AP.
+const WITH_PD: &str = "--set coordination.strategy=proportional-derivative";
+
 /// Computes the claim beyond the paper: the cost of an analysis does not grow with the number of peers.
 fn many_peers() -> Result<Vec<Claim>, PaperError> {
-    let mut lines = Vec::new();
+    let mut rows: Vec<Vec<String>> = PEERS.iter().map(|peers| vec![peers.to_string()]).collect();
+    let mut largest = Vec::new();
     let mut same = true;
-    for strategy in Strategy::BOTH {
-        for scaled in [false, true] {
-            let mut radii = Vec::new();
+    for scaled in [false, true] {
+        for strategy in Strategy::BOTH {
             let mut sizes = Vec::new();
-            for peers in PEERS {
+            for (row, peers) in rows.iter_mut().zip(PEERS) {
                 let case = Case { touching: 1, scaled, ..Case::paper(strategy, peers) };
                 let analysis = analyse(&case.scene()?, Method::Reduced)?;
                 // The cost is set by the largest block, and must be the same for all numbers of peers.
-                let largest = analysis.modes.iter().flat_map(|mode| &mode.parts).map(|part| part.size).max().unwrap_or(0);
-                sizes.push(largest);
-                radii.push(format!("{} (N = {peers}, {} states)", short(analysis.radius.value), analysis.dimension));
+                sizes.push(analysis.modes.iter().flat_map(|mode| &mode.parts).map(|part| part.size).max().unwrap_or(0));
+                row.push(short(analysis.radius.value));
+                // The number of states does not depend on strategy and gains, so it is a column of its own.
+                if !scaled && strategy == Strategy::Ap {
+                    row.insert(1, analysis.dimension.to_string());
+                }
             }
             same &= sizes.iter().all(|size| *size == sizes[0]);
-            let gains = if scaled { "all gains scaled with N" } else { "gains as they are" };
-            lines.push(format!("{}, {gains}: {}; the largest block has {} states", strategy.word(), radii.join(", "), sizes[0]));
+            largest.extend(sizes);
         }
     }
-    let ours = format!("Spectral radius, one touching, Td = Tn = 8 ms. {}.", lines.join(". "));
-    let verdict = if same { Verdict::Holds } else { Verdict::FailsAt("a block that grows with N".to_owned()) };
-    let claim = "Stability of any number of equal peers is known at the cost of a few";
-    Ok(vec![Claim::new("any-number", claim, "beyond the paper: up to five users, “arbitrary N” is future work", ours, verdict)])
+    let largest = largest.iter().max().copied().unwrap_or(0);
+    let ours = format!(
+        "The analysis splits a scene of equal users into blocks. The largest has at most {largest} states, for {} users as for {}, whatever the scene has in all.",
+        PEERS[0],
+        PEERS[PEERS.len() - 1]
+    );
+    let table = Table::new("Spectral radius over 8 ms, one user touching, 8 ms one way", &["N", "states", "AP", "PD", "AP", "PD"])
+        .grouped([("", 2), ("gains as they are", 2), ("gains scaled with N", 2)])
+        .all(rows);
+    let claim = Claim {
+        claim: "Stability of any number of equal peers is known at the cost of a few",
+        short: "the stability of any number of equal users is known at the cost of a few",
+        is_own: true,
+        paper: "beyond the paper",
+        says: "The paper analyses up to five users, and eight in its figures; an arbitrary number is its future work.",
+        ours,
+        tables: vec![table],
+        verdict: if same { Verdict::Holds } else { Verdict::FailsAt("a block that grows with N".to_owned()) },
+        ..Claim::blank("any-number", Topic::Beyond)
+    };
+    let scene = Case { touching: 1, ..Case::paper(Strategy::Ap, 3) }.text();
+    Ok(vec![claim.shown_by(scene, "A thousand users, judged in a moment.", &["stability point FILE --set scene.count=1000"])])
 }
 
 /// Writes a spectral radius in few characters.

@@ -1,16 +1,37 @@
 //! Claims about the admittance of the object: Figure 5 and the viscosity.
 
 use super::regions::without_strategy;
-use super::{Claim, Verdict};
+use super::{Claim, Topic, Verdict};
 use crate::Watch;
 use crate::case::{Case, Mass, Strategy};
 use crate::counter::smallest;
 use crate::figures::admittance::{Fit, Responses};
 use crate::page::percent;
+use crate::table::{Table, cell};
 use crate::{Options, PaperError};
 
 pub(super) fn claims(responses: &Responses, _options: Options, watch: &dyn Watch) -> Result<Vec<Claim>, PaperError> {
     Ok(vec![less_viscous(responses, watch)?, law(responses), grows(responses), nearer(responses)])
+}
+
+/// Numbers of peers in the tables of viscosities.
+const PEERS: [usize; 6] = [2, 3, 4, 5, 8, 16];
+
+/// Returns the scene of Figure 5 with one user touching.
+const fn of_figure_5(strategy: Strategy, peers: usize) -> Case {
+    Case { touching: 1, ..Case::paper(strategy, peers) }
+}
+
+/// Returns the viscosities in the scenes of Figure 5, with a row per number of peers of `peers`.
+fn viscosities(responses: &Responses, peers: &[usize], fails: impl Fn(&Fit, &Fit) -> bool) -> Table {
+    let of = |strategy, peers| responses.fits.iter().find(|fit| fit.case == of_figure_5(strategy, peers));
+    let number = |fit: &Fit| format!("{:.1}{}", fit.viscosity, if fit.is_stable { "" } else { " (unstable)" });
+    let row = |peers: &usize| {
+        let (ap, pd) = (of(Strategy::Ap, *peers)?, of(Strategy::Pd, *peers)?);
+        Some(vec![peers.to_string(), cell(number(ap), fails(ap, pd)), number(pd)])
+    };
+    Table::new("Viscosity that a slow hand feels [N·s/m], KT = 1000 N/m, 8 ms one way, one user touching", &["N", "AP", "PD"])
+        .all(peers.iter().filter_map(row))
 }
 
 /// Returns pairs of AP and PD fits of otherwise equal scenes. Both scenes must be stable, because nobody can feel a diverging scene; with two peers AP and
@@ -31,18 +52,6 @@ fn felt(case: &Case) -> Result<Option<f64>, PaperError> {
 fn less_viscous(responses: &Responses, watch: &dyn Watch) -> Result<Claim, PaperError> {
     let all: Vec<_> = pairs(responses).collect();
     let less = all.iter().filter(|(ap, pd)| ap.viscosity < pd.viscosity).count();
-    let printed = |peers: usize| {
-        let pair = all.iter().find(|(ap, _)| ap.case == Case { touching: 1, ..Case::paper(Strategy::Ap, peers) });
-        pair.map_or_else(
-            || format!("N = {peers}: one of the two is unstable"),
-            |(ap, pd)| format!("N = {peers}: AP {:.1}, PD {:.1}", ap.viscosity, pd.viscosity),
-        )
-    };
-    let ours = format!(
-        "KT = 1000 N/m, 8 ms one way, one touching, in N·s/m: {}. AP's is the lower one in {less} of {} pairs of stable scenes (N up to 16, three delays, three gains).",
-        [3, 4, 5].map(printed).join("; "),
-        all.len()
-    );
     // A difference below a millionth counts as equal.
     let found = smallest(watch, |case| {
         if case.peers < 3 || case.touching == 0 || case.mass == Mass::Whole && case.damping == 0.0 {
@@ -57,13 +66,33 @@ fn less_viscous(responses: &Responses, watch: &dyn Watch) -> Result<Claim, Paper
         None if less < all.len() => format!("{} of {} pairs of scenes", all.len() - less, all.len()),
         None => String::new(),
     };
-    let claim = "AP renders less viscous dynamics than PD";
-    let claim = Claim::new("less-viscous", claim, "Fig. 5; Section 5.2", ours, verdict(place));
-    Ok(match found {
-        None => claim,
-        Some(case) => claim.with_scene(&case, "AP renders the more viscous object.".to_owned()),
-    })
+    let is_felt = |ap: &Fit, pd: &Fit| ap.is_stable && pd.is_stable;
+    let table = viscosities(responses, &PEERS[1..], |ap, pd| is_felt(ap, pd) && ap.viscosity >= pd.viscosity);
+    let claim = Claim {
+        claim: "AP renders less viscous dynamics than PD",
+        short: "a slowly moved object feels less viscous with AP than with PD",
+        paper: "Fig. 5; Section 5.2",
+        says: "AP injects less damping into the loop, so the object that users feel is less viscous.",
+        ours: format!(
+            "AP's viscosity is the lower one in {less} of {} pairs of scenes that are stable with both: up to 16 users, three delays, three gains, one or all touching.",
+            all.len()
+        ),
+        tables: vec![table],
+        verdict: verdict(place),
+        ..Claim::blank("less-viscous", Topic::Feel)
+    };
+    let how = if found.is_some() {
+        "The simplest scene found in which AP's object is the more viscous one."
+    } else {
+        "Three users, one of whom touches the object."
+    };
+    let case = found.unwrap_or_else(|| of_figure_5(Strategy::Ap, 3));
+    Ok(claim.shown_by(case.text(), how, &FELT))
 }
+
+/// Commands that compare what the first user feels with AP and with PD.
+const FELT: [&str; 2] =
+    ["admittance FILE --peer peer1 --at 0.1", "admittance FILE --peer peer1 --at 0.1 --set coordination.strategy=proportional-derivative"];
 
 fn law(responses: &Responses) -> Claim {
     let worst = |strategy: Strategy, most: usize, law: fn(&Fit) -> f64| {
@@ -73,25 +102,29 @@ fn law(responses: &Responses) -> Claim {
     let plain: fn(&Fit) -> f64 = |fit| fit.law;
     let whole: fn(&Fit) -> f64 = |fit| fit.law_with_damping;
     let of = |most, law| [worst(Strategy::Ap, most, law), worst(Strategy::Pd, most, law)];
-    let (five, sixteen) = (of(5, plain), of(16, plain));
-    let exact = of(16, whole);
-    let ours = format!(
-        "Largest error of the law in stable scenes up to N = 5: AP {}, PD {}; up to N = 16: {}, {}. With the part of the damping, N = 16 included: {}, {}.",
-        percent(five[0]),
-        percent(five[1]),
-        percent(sixteen[0]),
-        percent(sixteen[1]),
-        percent(exact[0]),
-        percent(exact[1])
-    );
+    let five = of(5, plain);
+    let rows = [("the law, N to 5", five), ("the law, N to 16", of(16, plain)), ("with the part of BT, N to 16", of(16, whole))];
+    let table = Table::new("Largest error of the law in stable scenes", &["", "AP", "PD"])
+        .all(rows.into_iter().map(|(name, [ap, pd])| vec![name.to_owned(), percent(ap), percent(pd)]));
     let verdict = if five[0] < 0.05 && five[1] < 0.12 {
         Verdict::Holds
     } else {
         Verdict::FailsAt(format!("{} with AP, {} with PD", percent(five[0]), percent(five[1])))
     };
-    let claim =
-        "The viscosity comes from the delay: b = bH + σ·KT·(Td + (M−1)·Tc/2), σ = N for AP and N(N−1) for PD, within 5 % and 12 % up to N = 5";
-    Claim::new("viscosity-law", claim, "no formula; “low packet update rate, delays … and the damping”", ours, verdict)
+    let claim = Claim {
+        claim: "The viscosity comes from the delay: b = bH + σ·KT·(Td + (M−1)·Tc/2), σ = N for AP and N(N−1) for PD, within 5 % and 12 % up to N = 5",
+        short: "the viscosity follows from the delay by a formula",
+        is_own: true,
+        paper: "no formula there",
+        says: "The object is viscous due to the low packet update rate, the delays, and the damping of the coordination.",
+        ours:
+            "bH is the damping of all devices that touch, Td the delay one way, Tc the tick, and M the number of ticks from one sample to the next."
+                .to_owned(),
+        tables: vec![table],
+        verdict,
+        ..Claim::blank("viscosity-law", Topic::Feel)
+    };
+    claim.shown_by(of_figure_5(Strategy::Ap, 3).text(), "The law gives 39.5 N·s/m for AP: 5 + 3·1000·(0.008 + 0.0035).", &FELT[..1])
 }
 
 fn grows(responses: &Responses) -> Claim {
@@ -111,58 +144,65 @@ fn grows(responses: &Responses) -> Claim {
             }
         }
     }
-    let of = |strategy| {
-        let one = responses.fits.iter().filter(|fit| fit.case == Case { touching: 1, ..Case::paper(strategy, fit.case.peers) });
-        one.map(|fit| format!("{:.0}{}", fit.viscosity, if fit.is_stable { "" } else { " (unstable)" })).collect::<Vec<_>>().join(", ")
+    let claim = Claim {
+        claim: "The damping rendered to users increases with the number of peers",
+        short: "each user more makes the object feel more viscous",
+        paper: "Fig. 5",
+        says: "Damping of the object increases with peer count, since each link introduces additional damping.",
+        ours: format!("More users feel more viscosity in {} of {looked_at} steps of N between stable scenes.", looked_at - shrinks.len()),
+        tables: vec![viscosities(responses, &PEERS, |_, _| false)],
+        verdict: shrinks.first().map_or(Verdict::Holds, |first| Verdict::FailsAt(first.clone())),
+        ..Claim::blank("damping-grows", Topic::Feel)
     };
-    let ours = format!(
-        "N = 2, 3, 4, 5, 8, 16 with KT = 1000 N/m, 8 ms one way, one touching: AP {} N·s/m, PD {}. More peers render more in {} of {looked_at} steps between stable scenes.",
-        of(Strategy::Ap),
-        of(Strategy::Pd),
-        looked_at - shrinks.len()
-    );
-    let verdict = shrinks.first().map_or(Verdict::Holds, |first| Verdict::FailsAt(first.clone()));
-    Claim::new("damping-grows", "The damping rendered to users increases with the number of peers", "Fig. 5", ours, verdict)
+    let commands = [FELT[0], "admittance FILE --peer peer1 --at 0.1 --set scene.count=4"];
+    claim.shown_by(of_figure_5(Strategy::Ap, 3).text(), "Three users, and four.", &commands)
 }
 
 fn nearer(responses: &Responses) -> Claim {
-    let mut lines = Vec::new();
     let mut below = f64::INFINITY;
-    let mut fails = false;
-    let mut unstable = Vec::new();
-    for (one, word) in [(true, "one touching"), (false, "all touching")] {
-        for peers in [3, 4, 5] {
-            let touching = if one { 1 } else { peers };
+    let mut rows = Vec::new();
+    for peers in [3, 4, 5] {
+        let mut row = vec![peers.to_string()];
+        for touching in [1, peers] {
             let curve = |strategy| responses.curve(strategy, peers, touching);
             let Some((ap, pd)) = curve(Strategy::Ap).zip(curve(Strategy::Pd)) else { continue };
-            unstable.extend(
-                [ap, pd].into_iter().filter(|curve| !curve.is_stable).map(|curve| format!("{} N = {peers}, {word}", curve.case.strategy.word())),
-            );
             let nearer: Vec<bool> = ap.distances.iter().zip(&pd.distances).map(|(ap, pd)| ap < pd).collect();
             let count = nearer.iter().filter(|nearer| **nearer).count();
-            let first = nearer.iter().position(|nearer| !nearer).and_then(|first| responses.frequencies.get(first));
-            let until = first.map_or_else(String::new, |hz| format!(", at all below {hz:.2} Hz"));
-            if let Some(hz) = first {
-                fails = true;
-                below = below.min(*hz);
-            }
-            lines.push(format!("N = {peers}, {word}: at {} of frequencies{until}", percent(crate::region::share(count, nearer.len()))));
+            let first = nearer.iter().position(|nearer| !nearer).and_then(|first| responses.frequencies.get(first)).copied();
+            below = below.min(first.unwrap_or(f64::INFINITY));
+            let unstable: Vec<&str> = [ap, pd].into_iter().filter(|curve| !curve.is_stable).map(|curve| curve.case.strategy.word()).collect();
+            row.push(cell(percent(crate::region::share(count, nearer.len())), first.is_some()));
+            row.push(first.map_or_else(|| "all".to_owned(), |hz| format!("{hz:.2} Hz")));
+            row.push(if unstable.is_empty() { "none".to_owned() } else { unstable.join(", ") });
         }
+        rows.push(row);
     }
-    let of = |strategy, peers| {
-        let curve = responses.curve(strategy, peers, 1).and_then(|curve| curve.decibels.first().copied());
-        curve.map_or_else(String::new, |decibels| format!("{decibels:.2} dB"))
+    let first = |strategy, peers| responses.curve(strategy, peers, 1).and_then(|curve| curve.decibels.first().copied()).unwrap_or(f64::NAN);
+    let decibels = Table::new("Admittance at 0.01 Hz [dB re 1 m/(N·s)], one user touching; a free mass has the ideal", &["N", "AP", "PD", "ideal"])
+        .all([2, 3, 4, 5].map(|peers| {
+            let ideal = responses.ideal().first().copied().unwrap_or(f64::NAN);
+            // With two peers the strategies are the same, and only AP was computed.
+            let pd = first(if peers == 2 { Strategy::Ap } else { Strategy::Pd }, peers);
+            vec![peers.to_string(), format!("{:.2}", first(Strategy::Ap, peers)), format!("{pd:.2}"), format!("{ideal:.2}")]
+        }));
+    let head = ["N", "of frequencies", "always below", "unstable", "of frequencies", "always below", "unstable"];
+    let table = Table::new("Where AP is the nearer one, of the frequencies from 0.01 to 40 Hz", &head)
+        .grouped([("", 1), ("one user touching", 3), ("all touching", 3)])
+        .all(rows);
+    let claim = Claim {
+        claim: "AP's admittance is closer to that of a pure mass than PD's",
+        short: "AP's object feels more like a pure mass than PD's",
+        paper: "Fig. 5",
+        says: "AP's admittance is closer to that of a pure mass than PD's.",
+        ours: "AP is the nearer one at low frequencies. Nearness is the distance |ln(Y/Y0)| from the admittance Y0 of 0.45 kg. Both are far from a mass at low frequencies, where \
+               a hand feels a damper. Nobody could measure the curves of unstable scenes."
+            .to_owned(),
+        tables: vec![table, decibels],
+        figures: &["fig-5"],
+        why: "The paper judges by its curves, which leave open the device and the coupling. At high frequencies these two are felt in place of the object.",
+        verdict: if below.is_finite() { Verdict::HoldsWhere(format!("the frequency is below {below:.2} Hz")) } else { Verdict::Holds },
+        ..Claim::blank("nearer-to-mass", Topic::Feel)
     };
-    let ours = format!(
-        "Distance |ln(Y/Y0)| from the ideal 0.45 kg, 0.01 to 40 Hz; AP is the nearer one: {}. At 0.01 Hz, one touching: N = 2 {}, AP N = 3 {}, PD N = 3 {}, ideal {:.2} dB: both are far from a mass there, \
-         a damper. Curves of unstable scenes, which nobody could measure: {}.",
-        lines.join("; "),
-        of(Strategy::Ap, 2),
-        of(Strategy::Ap, 3),
-        of(Strategy::Pd, 3),
-        responses.ideal().first().copied().unwrap_or(f64::NAN),
-        if unstable.is_empty() { "none".to_owned() } else { unstable.join("; ") }
-    );
-    let verdict = if fails { Verdict::HoldsWhere(format!("the frequency is below {below:.2} Hz")) } else { Verdict::Holds };
-    Claim::new("nearer-to-mass", "AP's admittance is closer to that of a pure mass than PD's", "Fig. 5", ours, verdict)
+    let bode = "admittance FILE --peer peer1 --to 40 --curve coordination.strategy=proportional-derivative --out admittance";
+    claim.shown_by(of_figure_5(Strategy::Ap, 3).text(), "Draws both curves for three users, one of whom touches the object.", &[bode])
 }

@@ -1,20 +1,21 @@
 //! Claims about stability regions: Figures 3 and 4.
 
-use super::{Claim, Verdict};
+use super::{Claim, Topic, Verdict, WITH_PD};
 use crate::case::{Case, Strategy};
 use crate::counter::{is_stable, is_unstable, one_more_peer, smallest};
-use crate::page::{percent, percents};
+use crate::page::percent;
 use crate::region::{Atlas, PEERS, Setting};
+use crate::table::{Table, cell};
 use crate::{PaperError, Watch};
 
 /// Relative change of the area, compared with two peers, up to which the area counts as "largely unaffected".
 const UNAFFECTED: f64 = 0.2;
 
+/// Figures with the regions.
+const FIGURES: [&str; 2] = ["fig-3", "fig-4"];
+
 pub(super) fn claims(atlas: &Atlas, watch: &dyn Watch) -> Result<Vec<Claim>, PaperError> {
-    let mut claims = vec![larger(atlas), contains(atlas, watch)?];
-    claims.extend(unaffected(atlas, watch)?);
-    claims.push(decreases(atlas, watch)?);
-    Ok(claims)
+    Ok(vec![larger(atlas), contains(atlas, watch)?, unaffected(atlas, watch)?, decreases(atlas, watch)?])
 }
 
 /// Joins settings in words.
@@ -37,19 +38,78 @@ fn verdict(holds: &[Setting], fails: &[Setting]) -> Verdict {
     }
 }
 
-fn larger(atlas: &Atlas) -> Claim {
-    let (holds, fails) = split(|setting| {
-        let (ap, pd) = (atlas.areas(setting, Strategy::Ap), atlas.areas(setting, Strategy::Pd));
-        ap.iter().zip(&pd).zip(PEERS).all(|((ap, pd), peers)| peers == 2 || ap > pd)
-    });
-    let line = |setting: Setting| {
-        let (ap, pd) = (atlas.areas(setting, Strategy::Ap), atlas.areas(setting, Strategy::Pd));
-        format!("{}: AP {}, PD {}", setting.words(), percents(&ap), percents(&pd))
+/// Returns a table per damping, with a row per number of peers and a column per reading of the figures. `number` gives a cell of a reading, given the index in
+/// [`PEERS`].
+fn by_reading(what: &str, number: impl Fn(Setting, usize) -> String) -> Vec<Table> {
+    let all = Setting::all();
+    let of_damping = |settings: &[Setting]| {
+        let damping = settings.first().map_or(0.0, |setting| setting.damping);
+        // The settings of a damping come in pairs of equal masses.
+        let groups = settings.chunks(2).filter_map(|pair| Some((pair.first()?.mass.words(), pair.len())));
+        let delays: Vec<String> = settings.iter().map(|setting| format!("{} ms", setting.delay_us / 1000)).collect();
+        let head: Vec<&str> = std::iter::once("N").chain(delays.iter().map(String::as_str)).collect();
+        Table::new(format!("{what}, BT = BC = {damping} N·s/m"), &head).grouped(std::iter::once(("", 1)).chain(groups)).all(
+            PEERS.iter().enumerate().map(|(place, peers)| {
+                std::iter::once(peers.to_string()).chain(settings.iter().map(|setting| number(*setting, place))).collect::<Vec<_>>()
+            }),
+        )
     };
-    let lines: Vec<String> = Setting::all().into_iter().map(line).collect();
-    let ours = format!("Stable share of 0..6000 N/m × 0..6000 N/m for N = 2, 3, 4, 5, 8. {}.", lines.join(". "));
-    let claim = "AP increases the stability region compared with PD";
-    Claim::new("region-larger", claim, "Figs. 3, 4", ours, verdict(&holds, &fails))
+    all.chunks(all.len() / 2).map(of_damping).collect()
+}
+
+fn larger(atlas: &Atlas) -> Claim {
+    let areas = |setting: Setting| (atlas.areas(setting, Strategy::Ap), atlas.areas(setting, Strategy::Pd));
+    // With two peers the strategies are the same.
+    let is_larger = |ap: f64, pd: f64, peers: usize| peers == 2 || ap > pd;
+    let (holds, fails) = split(|setting| {
+        let (ap, pd) = areas(setting);
+        ap.iter().zip(&pd).zip(PEERS).all(|((ap, pd), peers)| is_larger(*ap, *pd, peers))
+    });
+    let all = Setting::all();
+    let table = |pair: &[Setting]| {
+        let Some(Setting { damping, mass, .. }) = pair.first() else { return Table::default() };
+        let delays: Vec<String> = pair.iter().map(|setting| format!("{} ms one way", setting.delay_us / 1000)).collect();
+        let strategies = pair.iter().flat_map(|_| Strategy::BOTH.map(Strategy::word));
+        let head: Vec<&str> = std::iter::once("N").chain(strategies).collect();
+        Table::new(format!("Stable share of the square [%], BT = BC = {damping} N·s/m, {}", mass.words()), &head)
+            .grouped(std::iter::once(("", 1)).chain(delays.iter().map(|delay| (delay.as_str(), 2))))
+            .all(PEERS.iter().enumerate().map(|(place, peers)| {
+                let cells = pair.iter().flat_map(|setting| {
+                    let (ap, pd) = areas(*setting);
+                    let number = |areas: &[f64]| 100.0 * areas.get(place).copied().unwrap_or(f64::NAN);
+                    let (ap, pd) = (number(&ap), number(&pd));
+                    [cell(format!("{ap:.1}"), !is_larger(ap, pd, *peers)), format!("{pd:.1}")]
+                });
+                std::iter::once(peers.to_string()).chain(cells).collect::<Vec<_>>()
+            }))
+    };
+    let shown = fails.first().or_else(|| holds.first()).copied();
+    let claim = Claim {
+        claim: "AP increases the stability region compared with PD",
+        short: "more gains are stable with AP than with PD",
+        paper: "Figs. 3, 4",
+        says: "AP has the larger stability region, with and without damping: PD is drawn for up to five users, AP for up to eight.",
+        ours: format!(
+            "AP's region is the larger one for each of N = 3, 4, 5 and 8 in {} of the {} readings of the figures. The square is 0 to 6000 N/m of KT and of KC; all users touch.",
+            holds.len(),
+            all.len()
+        ),
+        tables: all.chunks(2).map(table).collect(),
+        figures: &FIGURES,
+        why: "The paper prints no areas, and does not say which mass a copy has in the figures, nor whether 8 ms are one way. PD has N−1 springs and dampers per copy: it is the \
+              stiffer and the more damped coordination at the same KT and BT.",
+        verdict: verdict(&holds, &fails),
+        ..Claim::blank("region-larger", Topic::Regions)
+    };
+    let scene = shown.map_or_else(String::new, |setting| setting.case(Strategy::Ap, 8).text());
+    let how = if fails.is_empty() {
+        "A map of the gains that are stable for eight users, with AP and with PD."
+    } else {
+        "A map of the gains that are stable for eight users, with AP and with PD, for the first reading in which the claim fails."
+    };
+    let map = "stability map FILE --x coordination.stiffness=100..5900 --y peer.coupling.stiffness=100..5900 --grid 30x30 --curve \
+               coordination.strategy=proportional-derivative";
+    claim.shown_by(scene, how, &[map])
 }
 
 /// Returns whether PD is clearly stable and AP clearly unstable: a point of PD's region outside AP's.
@@ -60,29 +120,47 @@ fn only_pd_is_stable(case: &Case) -> Result<bool, PaperError> {
 fn contains(atlas: &Atlas, watch: &dyn Watch) -> Result<Claim, PaperError> {
     let most = |setting: Setting| PEERS.map(|peers| atlas.only_pd(setting, peers)).into_iter().fold(0.0, f64::max);
     let (inside, outside) = split(|setting| most(setting) == 0.0);
-    let shares: Vec<String> = outside.iter().map(|setting| format!("up to {} ({})", percent(most(*setting)), setting.words())).collect();
-    let shares = if shares.is_empty() { "none".to_owned() } else { shares.join("; ") };
     let found = smallest(watch, only_pd_is_stable)?;
     // Section 5 without arms: two of three peers touching, and 48 ms read as a round trip.
     let section_5 = Case { delay_us: 24_000, touching: 2, ..Case::paper(Strategy::Ap, 3) };
     let ours = format!(
-        "Of the square of Figs. 3 and 4, all touching, stable with PD and not with AP: {shares}. In Section 5, two of three touching without arms, 24 ms one way, KT = 1000 N/m: \
-         AP ρ = {:.4}, PD ρ = {:.4}.",
+        "Up to {} of the square of Figs. 3 and 4 is stable with PD and not with AP, depending on the reading. In Section 5 without arms, at KT = 1000 N/m and 24 ms one way, AP \
+         has ρ = {:.4} and PD ρ = {:.4}.",
+        percent(Setting::all().into_iter().map(most).fold(0.0, f64::max)),
         section_5.radius()?.value,
         section_5.with(Strategy::Pd).radius()?.value
     );
-    let claim = "Gains that are stable with PD are stable with AP: AP's region contains PD's";
-    let claim = |verdict| Claim::new("region-contains", claim, "Figs. 3, 4; “can keep … stable for stiffer coordination”", ours, verdict);
-    Ok(match found {
-        None if outside.is_empty() => claim(Verdict::Holds),
-        None => claim(Verdict::HoldsWhere(list(&inside))),
-        Some(case) => {
-            let radii = format!("AP ρ = {:.4}, PD ρ = {:.4}", case.radius()?.value, case.with(Strategy::Pd).radius()?.value);
-            let place = format!("{}: {radii}", without_strategy(&case));
-            let how = format!("Run it as it is and with --against coordination.strategy=proportional-derivative. {radii} over a frame of 8 ms.");
-            claim(Verdict::FailsAt(place)).with_scene(&case, how)
-        }
-    })
+    let tables = by_reading("Stable with PD and not with AP [% of the square]", |setting, place| {
+        let share = atlas.only_pd(setting, PEERS[place]);
+        cell(format!("{:.1}", 100.0 * share), share > 0.0)
+    });
+    let radii = match &found {
+        Some(case) => format!("AP has ρ = {:.4}, PD ρ = {:.4}", case.radius()?.value, case.with(Strategy::Pd).radius()?.value),
+        None => String::new(),
+    };
+    let verdict = match &found {
+        None if outside.is_empty() => Verdict::Holds,
+        None => Verdict::HoldsWhere(list(&inside)),
+        Some(case) => Verdict::FailsAt(format!("{}: {radii}", without_strategy(case))),
+    };
+    let claim = Claim {
+        claim: "Gains that are stable with PD are stable with AP: AP's region contains PD's",
+        short: "AP is stable wherever PD is",
+        paper: "Figs. 3, 4",
+        says: "AP can keep the cooperation stable for stiffer coordination than PD.",
+        ours,
+        tables,
+        figures: &FIGURES,
+        why: "The paper compares how large the regions are, and does not ask whether one lies within the other. KT stands for two stiffnesses: a copy is held by KT with AP and by \
+              (N−1)·KT with PD.",
+        verdict,
+        ..Claim::blank("region-contains", Topic::Regions)
+    };
+    let (case, how) = match found {
+        Some(case) => (case, format!("The simplest scene found: {radii}. Below 1 a disturbance dies out.")),
+        None => (section_5, "A scene in which both can be compared.".to_owned()),
+    };
+    Ok(claim.shown_by(case.text(), how, &["stability point FILE", &format!("stability point FILE {WITH_PD}")]))
 }
 
 /// Describes a case without its strategy, for statements about both strategies.
@@ -91,59 +169,79 @@ pub(super) fn without_strategy(case: &Case) -> String {
     words.strip_prefix("AP, ").or_else(|| words.strip_prefix("PD, ")).unwrap_or(&words).to_owned()
 }
 
-fn unaffected(atlas: &Atlas, watch: &dyn Watch) -> Result<Vec<Claim>, PaperError> {
-    // The change of largest size, with its sign.
-    let change = |setting: Setting, strategy: Strategy| {
-        let areas = atlas.areas(setting, strategy);
-        let two = areas.first().copied().unwrap_or(f64::NAN);
-        areas.iter().map(|area| area / two - 1.0).fold(0.0, |most: f64, change| if change.abs() > most.abs() { change } else { most })
+/// Returns a claim with the scene in which one peer more changes the verdict; `fallback` if the search has found no such scene.
+fn with_one_more(claim: Claim, found: Option<Case>, fallback: Case, becomes: &str) -> Result<Claim, PaperError> {
+    let case = found.unwrap_or(fallback);
+    let more = one_more_peer(&case);
+    let radii = format!("ρ = {:.4}, and {:.4} with N = {}", case.radius()?.value, more.radius()?.value, more.peers);
+    let how = match found {
+        Some(_) => format!("The simplest scene found in which one user more makes {} {becomes}: {radii}.", case.strategy.word()),
+        None => format!("A scene and the same with one user more: {radii}."),
     };
-    let (holds, fails) = split(|setting| change(setting, Strategy::Ap).abs() <= UNAFFECTED);
-    let line = |setting: Setting| format!("{}: {:+.0} %", setting.words(), 100.0 * change(setting, Strategy::Ap));
-    let lines: Vec<String> = Setting::all().into_iter().map(line).collect();
-    let ours = format!(
-        "Largest change of AP's area from that of N = 2, up to N = 8; at most {:.0} % counts as unaffected. {}.",
-        100.0 * UNAFFECTED,
-        lines.join(". ")
-    );
-    let claim = "AP's stability region is largely unaffected by N, whatever the damping";
-    let areas = Claim::new("ap-unaffected", claim, "Figs. 3, 4", ours, verdict(&holds, &fails));
-    let one_more = smallest(watch, |case| Ok(is_stable(case)? && is_unstable(&one_more_peer(case))?))?;
-    let areas = match one_more {
-        None => areas,
-        Some(case) => {
-            let more = one_more_peer(&case);
-            let radii = format!("ρ = {:.4}, and {:.4} with N = {}", case.radius()?.value, more.radius()?.value, more.peers);
-            let how = format!(
-                "The simplest scene found in which one peer more makes AP unstable: {radii}. Run it as it is and with --set scene.count={}.",
-                more.peers
-            );
-            areas.with_scene(&case, how)
-        }
+    Ok(claim.shown_by(case.text(), how, &["stability point FILE", &format!("stability point FILE --set scene.count={}", more.peers)]))
+}
+
+fn unaffected(atlas: &Atlas, watch: &dyn Watch) -> Result<Claim, PaperError> {
+    let change = |setting: Setting, place: usize| {
+        let areas = atlas.areas(setting, Strategy::Ap);
+        areas.get(place).zip(areas.first()).map_or(f64::NAN, |(area, two)| area / two - 1.0)
     };
-    Ok(vec![areas])
+    let is_unaffected = |setting: Setting, place: usize| change(setting, place).abs() <= UNAFFECTED;
+    let (holds, fails) = split(|setting| (0..PEERS.len()).all(|place| is_unaffected(setting, place)));
+    let tables = by_reading("AP's region compared with that of N = 2 [%]", |setting, place| {
+        cell(format!("{:+.0}", 100.0 * change(setting, place)), !is_unaffected(setting, place))
+    });
+    let all = Setting::all().into_iter().flat_map(|setting| (0..PEERS.len()).map(move |place| change(setting, place)));
+    let claim = Claim {
+        claim: "AP's stability region is largely unaffected by N, whatever the damping",
+        short: "the number of users hardly changes which gains are stable with AP",
+        paper: "Section 3, Figs. 3, 4",
+        says: "AP maintains the stability region largely unaffected by the number of users, regardless of damping.",
+        ours: format!(
+            "Compared with N = 2 the area changes by {:+.0} to {:+.0} %. Counting changes up to {:.0} % as unaffected, the claim holds in {} of the {} readings.",
+            100.0 * all.clone().fold(0.0, f64::min),
+            100.0 * all.fold(0.0, f64::max),
+            100.0 * UNAFFECTED,
+            holds.len(),
+            holds.len() + fails.len()
+        ),
+        tables,
+        figures: &FIGURES,
+        why: "N changes two things at once: the mass of a copy, mO/N, and the stiffness N/(N−1)·KT. Without damping, copies of mO/N get lighter with each user and the region \
+              shrinks; copies that have the whole mass each keep it, and the region grows.",
+        verdict: verdict(&holds, &fails),
+        ..Claim::blank("ap-unaffected", Topic::Regions)
+    };
+    let found = smallest(watch, |case| Ok(is_stable(case)? && is_unstable(&one_more_peer(case))?))?;
+    with_one_more(claim, found, Case::paper(Strategy::Ap, 3), "unstable")
 }
 
 fn decreases(atlas: &Atlas, watch: &dyn Watch) -> Result<Claim, PaperError> {
-    let (holds, fails) = split(|setting| atlas.areas(setting, Strategy::Pd).windows(2).all(|pair| pair[1] < pair[0]));
-    let line = |setting: Setting| format!("{}: {}", setting.words(), percents(&atlas.areas(setting, Strategy::Pd)));
-    let lines: Vec<String> = Setting::all().into_iter().map(line).collect();
-    let ours = format!("PD's stable share for N = 2, 3, 4, 5, 8. {}.", lines.join(". "));
+    let areas = |setting: Setting| atlas.areas(setting, Strategy::Pd);
+    let falls = |areas: &[f64], place: usize| place == 0 || areas[place] < areas[place - 1];
+    let (holds, fails) = split(|setting| {
+        let areas = areas(setting);
+        (0..areas.len()).all(|place| falls(&areas, place))
+    });
+    let tables = by_reading("PD's stable share of the square [%]", |setting, place| {
+        let areas = areas(setting);
+        cell(format!("{:.1}", 100.0 * areas[place]), !falls(&areas, place))
+    });
     let found = smallest(watch, |case| {
         let pd = case.with(Strategy::Pd);
         Ok(is_unstable(&pd)? && is_stable(&one_more_peer(&pd))?)
     })?;
-    let claim = Claim::new("pd-decreases", "PD's stability region decreases as N grows", "Figs. 3, 4", ours, verdict(&holds, &fails));
-    Ok(match found {
-        None => claim,
-        Some(case) => {
-            let (pd, more) = (case.with(Strategy::Pd), one_more_peer(&case.with(Strategy::Pd)));
-            let radii = format!("ρ = {:.4}, and {:.4} with N = {}", pd.radius()?.value, more.radius()?.value, more.peers);
-            let how = format!(
-                "The simplest scene found in which one peer more makes PD stable: {radii}. Run it as it is and with --set scene.count={}.",
-                more.peers
-            );
-            claim.with_scene(&pd, how)
-        }
-    })
+    let claim = Claim {
+        claim: "PD's stability region decreases as N grows",
+        short: "each user more leaves fewer gains stable with PD",
+        paper: "Section 3, Figs. 3, 4",
+        says: "PD's stability region decreases as the number of peers grows.",
+        ours: format!("PD's region gets smaller at each step of N in {} of the {} readings.", holds.len(), holds.len() + fails.len()),
+        tables,
+        figures: &FIGURES,
+        why: "PD's damping adds up with N as its stiffness does, to (N−1)·BT beside (N−1)·KT, and copies of mO/N get lighter. Which of these counts for more depends on the gains.",
+        verdict: verdict(&holds, &fails),
+        ..Claim::blank("pd-decreases", Topic::Regions)
+    };
+    with_one_more(claim, found.map(|case| case.with(Strategy::Pd)), Case::paper(Strategy::Pd, 3), "stable")
 }

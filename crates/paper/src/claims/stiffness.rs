@@ -7,8 +7,9 @@ use cohaptic_harness::{Model, Observer, Simulation, TickRow};
 use cohaptic_scene::Scene;
 use cohaptic_stability::{Matrix, eigenvalues};
 
-use super::{Claim, Verdict};
+use super::{Claim, Topic, Verdict};
 use crate::case::{Case, Strategy};
+use crate::table::Table;
 use crate::{PaperError, Watch};
 
 /// Numbers of peers computed.
@@ -35,40 +36,81 @@ pub(super) fn claims(watch: &dyn Watch) -> Result<Vec<Claim>, PaperError> {
     Ok(vec![bounded(&ap, &pd), frequency(&ap, &scaled)])
 }
 
+/// Arguments that make the scene of [`swing`] of a scene of the paper, for the command line.
+const SWING: &str =
+    "run FILE --set coordination.update=0.1ms --set peer.tick=0.1ms --set scene.duration=0.1s --set peers.peer1.position=0.001 --against";
+
 fn bounded(ap: &[Found], pd: &[Found]) -> Claim {
     // The bound must hold by the formula and in the simulated scenes.
     let falls = ap.windows(2).all(|pair| pair[1].matrix < pair[0].matrix && pair[1].scene < pair[0].scene);
     let rises = pd.windows(2).all(|pair| pair[1].matrix > pair[0].matrix && pair[1].scene > pair[0].scene);
     let is_bounded = ap.iter().all(|found| found.matrix <= 2.0 + 1e-9 && found.scene <= 2.0 + 1e-6);
     let apart = ap.iter().chain(pd).map(|found| (found.matrix - found.scene).abs() / found.matrix).fold(0.0, f64::max);
-    let list = |all: &[Found]| all.iter().map(|found| format!("{:.3} (N = {})", found.scene, found.peers)).collect::<Vec<_>>().join(", ");
+    let ends = |all: &[Found]| all.first().zip(all.last()).map_or((f64::NAN, f64::NAN), |(first, last)| (first.scene, last.scene));
+    let ((ap_first, ap_last), (pd_first, pd_last)) = (ends(ap), ends(pd));
     let verdict = if falls && rises && is_bounded && apart < 1e-6 {
         Verdict::Holds
     } else {
-        Verdict::FailsAt(format!("a bound of 2·KT: AP has {}", list(ap)))
+        Verdict::FailsAt(format!("a bound of 2·KT: AP has {ap_first:.3} to {ap_last:.3}"))
     };
-    let ours = format!(
-        "In units of KT, as copies of a scene swing on an ideal network: AP {}; PD {}. Eigenvalues of the matrices differ from it by at most {apart:.0e}.",
-        list(ap),
-        list(pd)
-    );
-    let claim = "AP has a bounded effective coordination stiffness, which falls to KT as N grows; that of PD grows with N";
-    Claim::new("bounded-stiffness", claim, "AP N/(N−1)·KT (eq. 6), PD N·KT (eq. 3)", ours, verdict)
+    let table = Table::new("Effective stiffness, in units of KT", &["N", "paper", "here", "paper", "here"])
+        .grouped([("", 1), ("AP", 2), ("PD", 2)])
+        .all(ap.iter().zip(pd).map(|(ap, pd)| {
+            let number = |value: f64| format!("{value:.3}");
+            vec![ap.peers.to_string(), number(ap.matrix), number(ap.scene), number(pd.matrix), number(pd.scene)]
+        }));
+    let claim = Claim {
+        claim: "AP has a bounded effective coordination stiffness, which falls to KT as N grows; that of PD grows with N",
+        short: "AP bounds the stiffness that holds the copies together, however many users there are",
+        paper: "eqs. (3) and (6)",
+        says: "The stiffness matrix has the eigenvalue N/(N−1)·KT with AP, and N·KT with PD.",
+        ours: format!(
+            "On an ideal network, copies that are moved apart swing with these stiffnesses: AP's falls from {ap_first:.3} to {ap_last:.3} KT, PD's grows from {pd_first:.3} to \
+             {pd_last:.3} KT. The largest relative difference from the eigenvalue is {apart:.0e}."
+        ),
+        tables: vec![table],
+        verdict,
+        ..Claim::blank("bounded-stiffness", Topic::Stiffness)
+    };
+    let how = "One copy begins 1 mm away from the others. Its swing is slower with AP than with PD.";
+    claim.shown_by(case(Strategy::Ap, 8, false).text(), how, &[&format!("{SWING} coordination.strategy=proportional-derivative")])
 }
 
 fn frequency(ap: &[Found], scaled: &[Found]) -> Claim {
-    let hz = |all: &[Found]| all.iter().map(|found| format!("{:.2}", found.hz)).collect::<Vec<_>>().join(", ");
     let grows = ap.windows(2).all(|pair| pair[1].hz > pair[0].hz);
     let stays = scaled.iter().all(|found| (found.hz / scaled[0].hz - 1.0).abs() < 1e-6);
-    let ours = format!(
-        "The copies swing apart at {} Hz for N = {} with the gains as they are, and at {} Hz with `scaling = \"inverse-n\"`.",
-        hz(ap),
-        PEERS.map(|peers| peers.to_string()).join(", "),
-        hz(scaled)
-    );
-    let verdict = if grows && stays { Verdict::Holds } else { Verdict::FailsAt(format!("{} Hz unscaled, {} Hz scaled", hz(ap), hz(scaled))) };
-    let claim = "The copies are governed by (N/mO)·K_AP, so that a bounded stiffness is not enough for any N: gains have to be scaled with N";
-    Claim::new("frequency-needs-scaling", claim, "Section 2, not used there", ours, verdict)
+    let ends = |all: &[Found]| all.first().zip(all.last()).map_or((f64::NAN, f64::NAN), |(first, last)| (first.hz, last.hz));
+    let ((first, last), (scaled_first, scaled_last)) = (ends(ap), ends(scaled));
+    let table = Table::new("Frequency at which the copies swing apart, AP [Hz]", &["N", "gains as they are", "gains scaled with N"])
+        .all(ap.iter().zip(scaled).map(|(ap, scaled)| vec![ap.peers.to_string(), format!("{:.2}", ap.hz), format!("{:.2}", scaled.hz)]));
+    let verdict = if grows && stays {
+        Verdict::Holds
+    } else {
+        Verdict::FailsAt(format!("{first:.2} to {last:.2} Hz unscaled, {scaled_first:.2} to {scaled_last:.2} Hz scaled"))
+    };
+    let claim = Claim {
+        claim: "The copies are governed by (N/mO)·K_AP, so that a bounded stiffness is not enough for any N: gains have to be scaled with N",
+        short: "a bounded stiffness is not enough for any number of users: the gains have to be scaled too",
+        paper: "Section 2, not used there",
+        says: "Each copy has the mass mO/N, so AP has to be coupled with a scaling of KT to guarantee stability for arbitrary N.",
+        ours: format!(
+            "The swing gets faster with each user under AP too, from {first:.2} to {last:.2} Hz, because each copy gets lighter. With scaling = \"inverse-n\" it stays at \
+             {scaled_first:.2} Hz."
+        ),
+        tables: vec![table],
+        verdict,
+        ..Claim::blank("frequency-needs-scaling", Topic::Stiffness)
+    };
+    claim.shown_by(
+        case(Strategy::Ap, 8, false).text(),
+        "The second run has scaled gains and swings more slowly.",
+        &[&format!("{SWING} coordination.scaling=inverse-n")],
+    )
+}
+
+/// Returns the scene in which copies swing without delay, damping and touch.
+const fn case(strategy: Strategy, peers: usize, scaled: bool) -> Case {
+    Case { strategy, stiffness: STIFFNESS, damping: 0.0, delay_us: 0, touching: 0, scaled, ..Case::paper(strategy, peers) }
 }
 
 fn one(strategy: Strategy, peers: usize, scaled: bool, watch: &dyn Watch) -> Result<Found, PaperError> {
@@ -95,9 +137,8 @@ fn one(strategy: Strategy, peers: usize, scaled: bool, watch: &dyn Watch) -> Res
 /// With forces held over a tick T, the distance d of two copies of mass m obeys exactly d₂ − 2d₁ + d₀ = −q·(d₁ + d₀) with q = κT²/2m. The function fits q
 /// to all ticks by least squares.
 fn swing(strategy: Strategy, peers: usize, scaled: bool) -> Result<f64, PaperError> {
-    let case = Case { strategy, stiffness: STIFFNESS, damping: 0.0, delay_us: 0, touching: 0, scaled, ..Case::paper(strategy, peers) };
     let overrides = ["coordination.update=0.1ms", "peer.tick=0.1ms", "scene.duration=0.1s", "peers.peer1.position=0.001"].map(str::to_owned);
-    let scene = Scene::parse(&case.text(), Path::new("swing.toml"), &overrides)?;
+    let scene = Scene::parse(&case(strategy, peers, scaled).text(), Path::new("swing.toml"), &overrides)?;
     let mut distances = Distances::default();
     let Ok(_) = Simulation::new(&scene, Model::Least).run(&mut distances);
     let (mut above, mut below) = (0.0, 0.0);

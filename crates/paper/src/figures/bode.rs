@@ -4,24 +4,23 @@ use std::fmt::Write as _;
 
 use cohaptic_picture::{Axis, Line, Look, Panel, Picture, Size};
 
+use super::Figure;
 use super::admittance::{Curve, MASS, Responses};
-use super::{Figure, Table};
 use crate::case::{Case, Strategy};
 
 pub(super) fn figure(responses: &Responses, size: Size) -> Figure {
     let title = "Figure 5: admittance of the object, KT = 1000 N/m, BT = 5 N·s/m, Td = Tn = 8 ms".to_owned();
     let panels = [panel(responses, true, true), panel(responses, false, true), panel(responses, true, false), panel(responses, false, false)];
     let caption = format!(
-        "Velocity over force of the first peer's device, KC = 3500 N/m and BC = 5 N·s/m as in Section 5 (Section 4 gives none), with the {MASS} kg of an ideal object. Agrees: a damper at \
-         low frequencies where the ideal is a mass, more of it with more peers, and with PD more than with AP. The paper does not say whether the others touch the object; both are \
-         shown. At high frequencies the device's own mass and coupling show, which the paper's ordinate does not tell from the object's. The paper prints no numbers."
+        "Velocity of the first user's device over the force on it, beside that of a free mass of {MASS} kg. KC = 3500 N/m and BC = 5 N·s/m are those of Section 5, because \
+         Section 4 gives none. The paper does not say whether the other users touch the object, so both are drawn. At low frequencies the device meets a damper where the ideal \
+         is a mass. At high frequencies the device's own mass and its coupling show, which the paper's axis does not tell from the object's."
     );
     Figure {
         id: "fig-5".to_owned(),
         svg: Picture::new(title.as_str()).columns(2).panels(panels).size(size).svg(),
         title,
         caption,
-        table: table(responses),
         csv: csv(responses),
     }
 }
@@ -61,22 +60,6 @@ fn panel(responses: &Responses, one: bool, magnitude: bool) -> Panel {
         .titled(format!("{quantity}, {word}"))
         .with_all(curves)
         .with(Line::new(points(&ideal), Look::reference()).named("ideal mass"))
-}
-
-fn table(responses: &Responses) -> Table {
-    let mut table = Table::new(&["curve", "the paper", "ours: the loop is", "at 0.01 Hz", "at low frequency, viscosity"]);
-    for curve in &responses.curves {
-        let Curve { case, is_stable, decibels, .. } = curve;
-        let stable = if *is_stable { "stable" } else { "unstable" };
-        let fit = responses.fits.iter().find(|fit| fit.case == *case);
-        let viscosity = fit.map_or_else(String::new, |fit| format!("{:.2} N·s/m", fit.viscosity));
-        let first = decibels.first().map_or_else(String::new, |first| format!("{first:.2} dB"));
-        let touch = if is_one(case) { "one touches" } else { "all touch" };
-        table.rows.push(vec![format!("{}, {touch}", name(case)), "curve only".to_owned(), stable.to_owned(), first, viscosity]);
-    }
-    let ideal = responses.ideal().first().map_or_else(String::new, |first| format!("{first:.2} dB"));
-    table.rows.push(vec!["ideal mass".to_owned(), "curve only".to_owned(), "stable".to_owned(), ideal, "0 N·s/m".to_owned()]);
-    table
 }
 
 fn csv(responses: &Responses) -> String {

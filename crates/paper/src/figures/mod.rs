@@ -19,29 +19,12 @@ pub struct Figure {
     pub id: String,
     /// Title of the figure.
     pub title: String,
-    /// Caption: agreement and differences with the paper.
+    /// Caption: what is drawn, and how it differs from the paper's drawing. The numbers stand in the tables of the claims.
     pub caption: String,
-    /// Numbers of the paper and computed numbers.
-    pub table: Table,
     /// Drawing as an SVG document with its own background, light or dark by the reader's preference.
     pub svg: String,
     /// Data of the drawing as CSV.
     pub csv: String,
-}
-
-/// A small table of text.
-#[derive(Clone, PartialEq, Eq, Debug, Default)]
-pub struct Table {
-    /// Names of the columns.
-    pub head: Vec<String>,
-    /// Rows, each as long as `head`.
-    pub rows: Vec<Vec<String>>,
-}
-
-impl Table {
-    fn new(head: &[&str]) -> Self {
-        Self { head: head.iter().map(|cell| (*cell).to_owned()).collect(), rows: Vec::new() }
-    }
 }
 
 /// Draws all figures in the given size, in the order of the paper.

@@ -4,9 +4,8 @@ use std::fmt::Write as _;
 
 use cohaptic_picture::{Axis, Line, Look, Panel, Picture, Size};
 
-use super::{Figure, Table};
+use super::Figure;
 use crate::case::Strategy;
-use crate::page::{percent, percents};
 use crate::region::{Atlas, HIGHEST, PEERS, Setting};
 
 pub(super) fn figures(atlas: &Atlas, size: Size) -> Vec<Figure> {
@@ -18,8 +17,7 @@ pub(super) fn figures(atlas: &Atlas, size: Size) -> Vec<Figure> {
             id: id.to_owned(),
             svg: Picture::new(title.as_str()).columns(2).aspect(1.0).panels(panels).size(size).svg(),
             title,
-            caption: caption(atlas, &settings),
-            table: table(atlas, &settings),
+            caption: caption(),
             csv: csv(atlas, &settings),
         }
     };
@@ -44,37 +42,10 @@ fn panel(atlas: &Atlas, setting: Setting, strategy: Strategy) -> Panel {
         .with_all(lines)
 }
 
-fn caption(atlas: &Atlas, settings: &[Setting]) -> String {
-    let mut text = "Lines are where the spectral radius is 1: gains that cross one change from stable to unstable or back. The shares below say how much is stable. \
-                    The paper has one panel and prints no areas; it leaves open whether Td is one way, and its Section 2 gives each copy mO/N."
-        .to_owned();
-    for setting in settings {
-        let (ap, pd) = (atlas.areas(*setting, Strategy::Ap), atlas.areas(*setting, Strategy::Pd));
-        let end = |areas: &[f64]| areas.last().copied().unwrap_or(f64::NAN) / areas.first().copied().unwrap_or(f64::NAN) - 1.0;
-        let only = PEERS.map(|peers| atlas.only_pd(*setting, peers)).into_iter().fold(0.0, f64::max);
-        let _ = write!(
-            text,
-            " With {}, {} ms one way, from N = 2 to 8 AP's area changes by {:+.0} % and PD's by {:+.0} %; up to {} of the square is stable with PD alone.",
-            setting.mass.words(),
-            setting.delay_us / 1000,
-            100.0 * end(&ap),
-            100.0 * end(&pd),
-            percent(only)
-        );
-    }
-    text
-}
-
-fn table(atlas: &Atlas, settings: &[Setting]) -> Table {
-    let mut table = Table::new(&["region", "the paper", "ours: stable share, N = 2, 3, 4, 5, 8"]);
-    for setting in settings {
-        for strategy in Strategy::BOTH {
-            let paper = if strategy == Strategy::Ap { "largely unaffected by N" } else { "decreases with N" };
-            let name = format!("{}, {}, {} ms one way", strategy.word(), setting.mass.words(), setting.delay_us / 1000);
-            table.rows.push(vec![name, paper.to_owned(), percents(&atlas.areas(*setting, strategy))]);
-        }
-    }
-    table
+fn caption() -> String {
+    "Lines are where the spectral radius is 1: gains that cross one change from stable to unstable or back. The paper has one panel for all numbers of users. It leaves open \
+     whether its delay of 8 ms is one way, and whether a copy has the mass mO/N of its Section 2, so each reading has panels of its own."
+        .to_owned()
 }
 
 fn csv(atlas: &Atlas, settings: &[Setting]) -> String {

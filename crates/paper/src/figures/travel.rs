@@ -4,46 +4,27 @@ use std::fmt::Write as _;
 
 use cohaptic_picture::{Axis, Line, Look, Panel, Picture, Size};
 
-use super::{Figure, Table};
+use super::Figure;
 use crate::case::Strategy;
 use crate::experiment::{DISTANCE, PeerTrace, Travel};
-use crate::page::seconds;
-
-/// Times for 20 mm in the paper.
-const PAPER: [(Strategy, &str); 2] = [(Strategy::Pd, "1.514 s"), (Strategy::Ap, "1.22 s")];
 
 pub(super) fn figure(travels: &[Travel], delay_ms: u32, size: Size) -> Figure {
     let title = format!("Figure 8: pushed with 1.5 N, KT = 1000 N/m, {delay_ms} ms one way");
     let find = |strategy| travels.iter().find(|travel| travel.strategy == strategy && travel.delay_ms == delay_ms);
-    let shown: Vec<(&Travel, &str)> = PAPER.iter().filter_map(|(strategy, paper)| Some((find(*strategy)?, *paper))).collect();
+    // PD stands to the left, as in the paper.
+    let shown: Vec<&Travel> = [Strategy::Pd, Strategy::Ap].into_iter().filter_map(find).collect();
     let mut panels = Vec::new();
     for quantity in &QUANTITIES {
-        panels.extend(shown.iter().map(|(travel, _)| panel(travel, quantity)));
+        panels.extend(shown.iter().map(|travel| panel(travel, quantity)));
     }
-    let mut table = Table::new(&["", "the paper: 20 mm", "ours: 20 mm", "ours: ρ over 8 ms", "ours: viscosity"]);
-    let mut text = String::new();
-    for (travel, paper) in &shown {
-        let viscosity = format!("{:.1} N·s/m", travel.viscosity);
-        let radius = format!("{:.4} ({})", travel.radius.value, travel.radius.verdict().word());
-        table.rows.push(vec![travel.strategy.word().to_owned(), (*paper).to_owned(), seconds(travel.time), radius, viscosity]);
-        let _ = write!(
-            text,
-            " {}: {}{}, the paper {paper}.",
-            travel.strategy.word(),
-            seconds(travel.time),
-            if travel.diverges() { " while it diverges" } else { "" }
-        );
-    }
-    let caption = format!(
-        "The grey line is where the object has gone 20 mm. Agrees where the loop is stable: the velocity saturates, sooner with PD, and AP is the less viscous.{text} The printed \
-         parameters do not give both of the paper's times. A symmetric push does not excite how the two untouched copies swing against each other, which is what may be unstable."
-    );
+    let caption = "The grey line is where the object has moved 20 mm. Where the loop is stable the velocity saturates, sooner with PD: both objects feel viscous, that of PD more so. A push from rest moves \
+                   the two untouched copies alike, so it does not show how they swing against each other."
+        .to_owned();
     Figure {
         id: format!("fig-8-{delay_ms}ms"),
         svg: Picture::new(title.as_str()).columns(2).panels(panels).size(size).svg(),
         title,
         caption,
-        table,
         csv: csv(&shown),
     }
 }
@@ -89,9 +70,9 @@ fn panel(travel: &Travel, quantity: &Quantity) -> Panel {
     panel
 }
 
-fn csv(travels: &[(&Travel, &str)]) -> String {
+fn csv(travels: &[&Travel]) -> String {
     let mut csv = "strategy,delay_ms,t,peer,position,velocity,coordination_force\n".to_owned();
-    for (travel, _) in travels {
+    for travel in travels {
         for (tick, t) in travel.trace.times.iter().enumerate() {
             for (place, peer) in travel.trace.peers.iter().enumerate() {
                 let at = |values: &[f64]| values.get(tick).copied().unwrap_or(f64::NAN);

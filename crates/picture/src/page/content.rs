@@ -115,6 +115,19 @@ impl Html {
         Self { text: lines.into_iter().map(|line| format!("<div>{}</div>", line.text)).collect() }
     }
 
+    /// Makes words that stand out.
+    #[must_use]
+    pub fn strong(words: &str) -> Self {
+        Self { text: format!("<strong>{}</strong>", escape(words)) }
+    }
+
+    /// Places parts beside each other, as many as the screen has room for, and the others below.
+    #[must_use]
+    pub fn beside(parts: impl IntoIterator<Item = Self>) -> Self {
+        let parts: String = parts.into_iter().map(|part| format!("<div>\n{}</div>\n", part.text)).collect();
+        Self { text: format!("<div class=\"beside\">\n{parts}</div>\n") }
+    }
+
     /// Makes lines of a file or a command.
     #[must_use]
     pub fn preformatted(text: &str) -> Self {
@@ -157,8 +170,23 @@ impl Html {
     /// Makes a table, scrollable if wider than the page.
     #[must_use]
     pub fn table(table: &Table) -> Self {
-        let mut text = "<div class=\"wide\">\n<table>\n<thead><tr>".to_owned();
+        let mut text = "<div class=\"wide\">\n<table>\n".to_owned();
+        if !table.title.is_empty() {
+            let _ = writeln!(text, "<caption>{}</caption>", escape(&table.title));
+        }
+        text.push_str("<thead>");
         let class = |number: bool| if number { " class=\"number\"" } else { "" };
+        if !table.groups.is_empty() {
+            text.push_str("<tr>");
+            for (name, columns) in &table.groups {
+                // A cell without a name is no heading.
+                let element = if name.is_empty() { "td" } else { "th scope=\"colgroup\"" };
+                let end = if name.is_empty() { "td" } else { "th" };
+                let _ = write!(text, "<{element} class=\"group\" colspan=\"{columns}\">{}</{end}>", escape(name));
+            }
+            text.push_str("</tr>\n");
+        }
+        text.push_str("<tr>");
         for (name, number) in &table.columns {
             let _ = write!(text, "<th scope=\"col\"{}>{}</th>", class(*number), escape(name));
         }

@@ -71,9 +71,12 @@ mod tests {
         let table = Table::new()
             .column(HOSTILE)
             .number("value")
+            .group(HOSTILE, 2)
+            .titled(HOSTILE)
             .row([Html::text(HOSTILE), Html::gauge(&Gauge { low: None, high: Some(1.0), measured: Some(2.0), passed: false })]);
         let content = Html::paragraph(HOSTILE)
             .and(Html::warning(HOSTILE))
+            .and(Html::beside([Html::text(HOSTILE), Html::strong(HOSTILE)]))
             .and(Html::heading(2, HOSTILE))
             .and(Html::list([Html::link(HOSTILE, HOSTILE), Html::mark(Mark::Bad, HOSTILE)]))
             .and(Html::facts([(HOSTILE, Html::code(HOSTILE))]))
@@ -88,7 +91,7 @@ mod tests {
         assert!(!page.contains("<script") && !page.contains('\u{202e}'), "{page}");
         assert_eq!(page, everything().html());
         // Each insertion once, the title of the page twice, and the title of the picture in its `<title>` too.
-        assert!(page.matches("&lt;script&gt;").count() >= 16, "{page}");
+        assert!(page.matches("&lt;script&gt;").count() >= 20, "{page}");
     }
 
     #[test]

@@ -43,7 +43,7 @@ pub fn faults(svg: &str) -> Vec<String> {
                 }
             }
             if ["NaN", "inf"].iter().any(|word| attribute.value().contains(word)) {
-                faults.push(format!("{} of <{}> is no number: {}", attribute.name(), node.tag_name().name(), attribute.value()));
+                faults.push(format!("{} of <{}> is not a number: {}", attribute.name(), node.tag_name().name(), attribute.value()));
             }
         }
     }
