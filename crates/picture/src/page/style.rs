@@ -1,9 +1,9 @@
-//! Style sheet of pages, for light and dark, wide and narrow screens. The background is the background of pictures.
+//! Style sheet of pages, for light and dark, wide and narrow screens, and for paper. The background is the background of pictures.
 
 pub(crate) const STYLE: &str = "\
 :root { color-scheme: light dark; --ground: #fff; --ink: #1b1f24; --line: #c3c8ce; --good: #00603f; --partly: #7a4b00; --bad: #9b1c1c; }
 @media (prefers-color-scheme: dark) { :root { --ground: #14181d; --ink: #e6e9ec; --line: #454d57; --good: #5fd3a6; --partly: #f0b84a; --bad: #ff8f8f; } }
-body { margin: 0; background: var(--ground); color: var(--ink); font: 1rem/1.5 system-ui, sans-serif; }
+body { margin: 0; background: var(--ground); color: var(--ink); font: 1rem/1.5 system-ui, sans-serif; overflow-wrap: break-word; }
 main { max-width: 64rem; margin: 0 auto; padding: 1rem; }
 h1, h2, h3 { line-height: 1.25; overflow-wrap: anywhere; }
 a { color: inherit; }
@@ -27,4 +27,17 @@ caption { text-align: left; font-weight: 600; padding-bottom: .25rem; }
 .beside { display: grid; gap: 0 2rem; grid-template-columns: repeat(auto-fit, minmax(min(22rem, 100%), 1fr)); }
 .beside > div { min-width: 0; }
 pre { overflow-x: auto; padding: .5rem; border: 1px solid var(--line); white-space: pre-wrap; overflow-wrap: anywhere; }
+@media (max-width: 40rem) { h1 { font-size: 1.4rem; } h2 { font-size: 1.2rem; } }
+@media print {
+main { max-width: none; padding: 0; }
+.wide { overflow: visible; }
+.wide svg { max-width: 100%; }
+table { font-size: .7rem; }
+th, td { padding-right: .4rem; }
+tbody th, td { overflow-wrap: anywhere; }
+tbody th.number, td.number { overflow-wrap: normal; }
+h2, h3 { break-after: avoid; }
+figure, tr { break-inside: avoid; }
+details::details-content { display: block; content-visibility: visible; }
+}
 ";
