@@ -72,6 +72,8 @@ fn a_feature_that_is_off_compiles_nothing() {
     assert_eq!(added("tcp"), ["cohaptic-tcp"]);
     assert_eq!(added("pcapng"), ["cohaptic-capture"]);
     assert_eq!(added("tokio"), ["pin-project-lite", "tokio"]);
+    // The package `tokio` that stands in for tokio depends on `cohaptic-sockets` too, so that a dependency of that crate would be one of every program under test.
+    assert_eq!(added("facade"), ["cohaptic-sockets", "cohaptic-tcp", "pin-project-lite", "tokio"]);
     assert!(added("strategies").contains(&"proptest".to_owned()));
     // The sockets of the system come with the types of tokio's `net`.
     assert!(added("tokio-net").contains(&"mio".to_owned()));

@@ -7,7 +7,8 @@ use crate::house::metadata::{Tree, metadata};
 use crate::house::{files, name, root};
 
 /// Packages that use nothing of Linux.
-const PORTABLE: [&str; 16] = [
+const PORTABLE: [&str; 17] = [
+    "sockets",
     "units",
     "files",
     "wan",
@@ -40,7 +41,7 @@ const SYSTEM: [&str; 9] = ["rustix", "linux-raw-sys", "nix", "tun-rs", "thread-p
 const RIGHT: [(&str, &str, &str); 3] = [("files", "rustix", "apple"), ("cli", "rustix", "apple"), ("cli", "nix", "apple")];
 
 /// Features of the test kit that are for programs of others. No package of the workspace needs them, and they build on each system all the same.
-const OPTIONS: &str = "cohaptic-testkit/axum,cohaptic-testkit/hyper,cohaptic-testkit/quinn,cohaptic-testkit/tonic";
+const OPTIONS: &str = "cohaptic-testkit/axum,cohaptic-testkit/facade,cohaptic-testkit/hyper,cohaptic-testkit/quinn,cohaptic-testkit/tonic";
 
 const TARGETS: [&str; 3] = ["x86_64-apple-darwin", "aarch64-apple-darwin", "x86_64-pc-windows-msvc"];
 

@@ -24,7 +24,10 @@ pub(crate) struct Running {
 }
 
 /// Guard: a test bed runs on this thread until the guard is dropped.
-pub(crate) struct Entered(());
+pub(crate) struct Entered {
+    #[cfg(feature = "facade")]
+    _registered: cohaptic_sockets::Entered,
+}
 
 impl Running {
     /// Makes this test bed the one that runs on this thread.
@@ -34,6 +37,8 @@ impl Running {
     /// If another test bed runs on this thread.
     #[expect(clippy::panic, reason = "a misuse, and the way out")]
     pub(crate) fn enter(self) -> Entered {
+        #[cfg(feature = "facade")]
+        let bed = Arc::new(crate::facade::BedOfThread { shared: Arc::clone(&self.shared), others: Arc::clone(&self.tasks.others) });
         RUNNING.with_borrow_mut(|running| {
             if running.is_some() {
                 panic!("a test bed runs inside another one: the time of both cannot pass. Give both programs hosts of one test bed, or run one after the other");
@@ -42,7 +47,10 @@ impl Running {
             current::begin(shared.run(), Rc::new(move || tasks.current(shared.names())));
             *running = Some(self);
         });
-        Entered(())
+        Entered {
+            #[cfg(feature = "facade")]
+            _registered: cohaptic_sockets::enter(bed),
+        }
     }
 }
 
@@ -133,6 +141,13 @@ impl Call {
     #[expect(clippy::panic, reason = "a misuse, and the way out")]
     fn is_outside(self) -> ! {
         panic!("`{}` at {} is called outside of a test bed: call it within `Testbed::run`, on its thread", self.name, self.place);
+    }
+}
+
+#[cfg(feature = "facade")]
+impl From<cohaptic_sockets::Call> for Call {
+    fn from(call: cohaptic_sockets::Call) -> Self {
+        Self { name: call.name, place: call.place }
     }
 }
 

@@ -49,6 +49,7 @@
 //! | programs without sockets: state machines | [`node`] |
 #![cfg_attr(feature = "strategies", doc = "| links and networks at random, which shrink to the least impaired | [`strategies`] |")]
 #![cfg_attr(not(feature = "strategies"), doc = "| links and networks at random, which shrink to the least impaired | feature `strategies` |")]
+//! | programs whose sockets are tokio's, unchanged, with their dependencies | feature `facade`, `docs/how-to-existing-program.md` in the repository |
 #![cfg_attr(feature = "quinn", doc = "| unmodified QUIC endpoints | [`quinn`](mod@quinn) |")]
 #![cfg_attr(not(feature = "quinn"), doc = "| unmodified QUIC endpoints | feature `quinn` |")]
 #![cfg_attr(feature = "hyper", doc = "| unmodified programs of hyper and axum | [`hyper`](mod@hyper), feature `axum` |")]
@@ -68,6 +69,7 @@
 //! | `tokio` | yes | `Testbed::on_tokio`, for programs that use tokio's timers and tasks, and the traits and methods of sockets that are of tokio's types |
 //! | `pcapng` | yes | captures among what a failed test leaves behind, by `cohaptic-capture` |
 //! | `strategies` | | strategies of proptest for links, networks and hits, and `proptest` itself |
+//! | `facade` | | programs that use tokio's own sockets, on a test bed unchanged, through the package that `cohaptic tokio` generates; brings `tcp` and `tokio` |
 //! | `tokio-net` | | the methods `ready`, `try_io` and `async_io` of sockets, whose types tokio has only with its own feature `net`; brings `tokio` |
 //! | `files` | | relay files (TOML) as hosts and links; files of plain words need no feature |
 //! | `scenes` | | scene files as hosts and links and as tests, and strategies for scenes of coordination; brings `files` and `strategies` |
@@ -94,6 +96,8 @@ mod bed;
 mod context;
 mod core;
 mod current;
+#[cfg(feature = "facade")]
+mod facade;
 mod failure;
 mod fault;
 mod file;

@@ -306,6 +306,8 @@ impl Testbed {
         let run = || {
             #[cfg(feature = "tokio")]
             if self.is_tokio {
+                #[cfg(feature = "facade")]
+                cohaptic_sockets::seed_next_runtime(seed.value);
                 return crate::runtime::on_tokio::run(core, names.len(), |shared| program(Bed::new(shared)), origin, &watched, &mut recorded);
             }
             crate::runtime::own::run(core, names.len(), |shared| program(Bed::new(shared)), origin, &watched, &mut recorded)

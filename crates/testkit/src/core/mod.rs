@@ -7,6 +7,8 @@ mod ends;
 #[cfg(any(feature = "quinn", feature = "tcp"))]
 mod entropy;
 mod face;
+#[cfg(feature = "facade")]
+mod holds;
 mod passing;
 mod shared;
 mod socket_name;

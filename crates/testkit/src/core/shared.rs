@@ -49,6 +49,9 @@ pub(crate) struct Shared {
     is_synced: AtomicBool,
     clock: Clock,
     face: Arc<Face>,
+    /// Pieces of work on other threads for which time waits.
+    #[cfg(feature = "facade")]
+    pub(super) holds: Arc<std::sync::atomic::AtomicUsize>,
 }
 
 /// Source of the time.
@@ -79,6 +82,8 @@ impl Shared {
             is_synced: AtomicBool::new(matches!(clock, Clock::Own)),
             clock,
             face,
+            #[cfg(feature = "facade")]
+            holds: Arc::default(),
         }
     }
 

@@ -107,6 +107,11 @@ impl Idle {
 
     /// Called when tokio is about to park its thread, because all tasks wait.
     fn notice(&self, shared: &Shared) {
+        // Work on another thread takes no time. Its end wakes a task, and tokio parks again after that task.
+        #[cfg(feature = "facade")]
+        if shared.is_held() {
+            return;
+        }
         let is_left_something = shared.is_left_something();
         if let Some(now) = shared.with(|core| self.move_clock(core, is_left_something)) {
             self.wake(now);

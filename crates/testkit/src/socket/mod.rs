@@ -1,5 +1,7 @@
 //! Virtual UDP socket.
 
+#[cfg(feature = "facade")]
+mod facade;
 mod options;
 mod receiving;
 mod sending;
@@ -111,7 +113,11 @@ impl UdpSocket {
     #[expect(clippy::unused_async, reason = "as tokio's")]
     pub async fn connect(&self, peer: impl ToSocketAddrs) -> io::Result<()> {
         self.shared.check_open(self.host, KIND)?;
-        let peer = peer.to_socket_addr()?;
+        self.connect_now(peer.to_socket_addr()?)
+    }
+
+    fn connect_now(&self, peer: SocketAddr) -> io::Result<()> {
+        self.shared.check_open(self.host, KIND)?;
         self.shared.with(|core| core.connect(self.id, peer))
     }
 

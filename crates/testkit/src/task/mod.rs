@@ -131,11 +131,21 @@ pub(crate) struct Tasks {
     known: RefCell<Vec<Weak<Task>>>,
     /// Program of each host with the place where it was given, indexed by host.
     factories: RefCell<Vec<Option<(Factory, &'static Location<'static>)>>>,
+    /// Tasks that tokio polls.
+    #[cfg(feature = "facade")]
+    pub(crate) others: Arc<crate::facade::OtherTasks>,
 }
 
 impl Tasks {
     pub(crate) fn new(spawner: Box<dyn Spawner>, hosts: usize, pulse: Arc<Pulse>) -> Self {
-        Self { pulse, spawner, known: RefCell::new(Vec::new()), factories: RefCell::new(vec![None; hosts]) }
+        Self {
+            pulse,
+            spawner,
+            known: RefCell::new(Vec::new()),
+            factories: RefCell::new(vec![None; hosts]),
+            #[cfg(feature = "facade")]
+            others: Arc::default(),
+        }
     }
 
     /// Starts a task on `host`, or on no host.
@@ -183,6 +193,8 @@ impl Tasks {
         // The tasks are collected first, because dropping a program may spawn and stop tasks, which borrows the list.
         let of_host: Vec<Rc<Task>> = self.known.borrow().iter().filter_map(Weak::upgrade).filter(|task| task.runner.host == Some(host)).collect();
         of_host.iter().for_each(|task| task.stop());
+        #[cfg(feature = "facade")]
+        self.others.stop_all_of(host);
     }
 
     /// Stops all tasks, and the tasks that are spawned while others are dropped.

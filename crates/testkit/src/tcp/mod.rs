@@ -4,6 +4,8 @@
 //! emulated links. The size of such a packet on its link is its whole length, headers of IP and TCP included; a UDP datagram counts with its content only. The
 //! module [`net`](crate::net) has the names of `tokio::net`, so that a program runs here after changing one import.
 
+#[cfg(feature = "facade")]
+mod facade;
 mod listener;
 mod options;
 #[cfg(feature = "tokio")]

@@ -79,6 +79,10 @@ impl TcpSocket {
     #[track_caller]
     fn new(call: Call, is_six: bool) -> io::Result<Self> {
         let (shared, host) = call.host("wrap the call in `Host::scope`");
+        Self::new_on(shared, host, is_six)
+    }
+
+    pub(crate) fn new_on(shared: Arc<Shared>, host: NodeId, is_six: bool) -> io::Result<Self> {
         let config = shared.with(|core| {
             core.check_up(host)?;
             io::Result::Ok(core.tcp_config(host).clone())

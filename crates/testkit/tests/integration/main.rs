@@ -10,6 +10,7 @@ mod chapter;
 #[cfg(feature = "tcp")]
 mod ended;
 mod equivalence;
+mod facade;
 mod faults;
 mod hits;
 mod like_tokio;

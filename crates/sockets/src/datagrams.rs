@@ -1,0 +1,91 @@
+//! UDP sockets.
+
+use std::fmt;
+use std::io;
+use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
+use std::task::{Context, Poll};
+
+/// Option of a UDP socket. Flags are 0 or 1.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum DatagramOption {
+    /// `SO_BROADCAST`, a flag.
+    Broadcast,
+    /// Time to live.
+    Ttl,
+    /// Type of service of IPv4.
+    TypeOfService,
+    /// Traffic class of IPv6.
+    TrafficClass,
+    /// Time to live of multicast over IPv4.
+    MulticastTtl,
+    /// Whether the socket receives its own multicast over IPv4, a flag.
+    MulticastLoop4,
+    /// Whether the socket receives its own multicast over IPv6, a flag.
+    MulticastLoop6,
+}
+
+/// Change of the membership in a multicast group.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Membership {
+    /// Join a group of IPv4.
+    Join4 {
+        /// Address of the group.
+        group: Ipv4Addr,
+        /// Address of the interface.
+        interface: Ipv4Addr,
+    },
+    /// Leave a group of IPv4.
+    Leave4 {
+        /// Address of the group.
+        group: Ipv4Addr,
+        /// Address of the interface.
+        interface: Ipv4Addr,
+    },
+    /// Join a group of IPv6.
+    Join6 {
+        /// Address of the group.
+        group: Ipv6Addr,
+        /// Number of the interface; 0 for any.
+        interface: u32,
+    },
+    /// Leave a group of IPv6.
+    Leave6 {
+        /// Address of the group.
+        group: Ipv6Addr,
+        /// Number of the interface; 0 for any.
+        interface: u32,
+    },
+}
+
+/// UDP socket.
+///
+/// [`Datagrams::poll_receive`] and [`Datagrams::poll_readable`] register the waker of the context if they return [`Poll::Pending`]; `try_receive` returns
+/// [`io::ErrorKind::WouldBlock`] instead. Sending never waits. All methods fail after the host of the socket has crashed, after the run of the test bed, and on
+/// other threads than the one of the run.
+#[expect(clippy::missing_errors_doc, reason = "the documentation of the trait names the errors of all methods")]
+pub trait Datagrams: fmt::Debug + Send + Sync {
+    /// Hands the next datagram and its sender to `take`. The datagram stays in the buffer if `peek` is set.
+    fn poll_receive(&self, cx: &mut Context<'_>, peek: bool, take: &mut dyn FnMut(&[u8], SocketAddr)) -> Poll<io::Result<()>>;
+    /// Like [`Datagrams::poll_receive`], but does not wait.
+    fn try_receive(&self, peek: bool, take: &mut dyn FnMut(&[u8], SocketAddr)) -> io::Result<()>;
+    /// Waits until a datagram or an error can be received.
+    fn poll_readable(&self, cx: &mut Context<'_>) -> Poll<io::Result<()>>;
+    /// Returns whether a datagram or an error can be received.
+    fn is_readable(&self) -> io::Result<bool>;
+    /// Sends a datagram to `to`, or to the peer if the socket is connected. Returns the number of bytes.
+    fn send(&self, bytes: &[u8], to: Option<SocketAddr>) -> io::Result<usize>;
+    /// Connects the socket to a peer.
+    fn connect(&self, to: SocketAddr) -> io::Result<()>;
+    /// Returns the address to which the socket is bound.
+    fn local_addr(&self) -> io::Result<SocketAddr>;
+    /// Returns the peer to which the socket is connected.
+    fn peer_addr(&self) -> io::Result<SocketAddr>;
+    /// Takes the error that the next call would otherwise return.
+    fn take_error(&self) -> io::Result<Option<io::Error>>;
+    /// Returns an option.
+    fn option(&self, option: DatagramOption) -> io::Result<u32>;
+    /// Sets an option.
+    fn set_option(&self, option: DatagramOption, value: u32) -> io::Result<()>;
+    /// Joins or leaves a multicast group.
+    fn change_membership(&self, membership: Membership) -> io::Result<()>;
+}

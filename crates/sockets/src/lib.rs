@@ -1,0 +1,178 @@
+//! Sockets and tasks of a test bed, as traits, and the test bed of the present thread.
+//!
+//! A package `tokio` made by `cohaptic tokio` stands in for tokio in existing programs. Each of its sockets holds a real socket, or a socket of the test bed that
+//! runs on the thread. That package asks [`bed`] which of the two a program gets. The test kit implements the traits of this crate with its own sockets, and
+//! registers each running test bed with [`enter`].
+//!
+//! The crate depends on nothing, so that the test kit and the package `tokio` can both depend on it without a cycle: the test kit itself is compiled against the
+//! package `tokio`.
+//!
+//! ```
+//! // Outside of a test bed sockets are real, and tasks live on no host.
+//! assert!(cohaptic_sockets::bed().is_none());
+//! assert!(cohaptic_sockets::host().is_none());
+//! ```
+
+mod datagrams;
+mod streams;
+mod tasks;
+
+use std::cell::{Cell, RefCell};
+use std::fmt;
+use std::io;
+use std::net::SocketAddr;
+use std::panic::Location;
+use std::sync::Arc;
+
+pub use datagrams::{DatagramOption, Datagrams, Membership};
+pub use streams::{Connecting, Flag, Listener, Number, Ready, Socket, Stream};
+pub use tasks::{Hold, Host, OnHost, Stop, host, on_host};
+
+thread_local! {
+    static BED: RefCell<Option<Arc<dyn Bed>>> = const { RefCell::new(None) };
+    /// Seed of the runtime of tokio that the test kit builds next on this thread.
+    static RUNTIME_SEED: Cell<Option<u64>> = const { Cell::new(None) };
+}
+
+/// Sets the seed of the runtime of tokio that is built next on this thread, from which `tokio::select!` chooses where it begins.
+pub fn seed_next_runtime(seed: u64) {
+    RUNTIME_SEED.set(Some(seed));
+}
+
+/// Returns the seed that [`seed_next_runtime`] has set, and forgets the seed.
+#[must_use]
+pub fn take_runtime_seed() -> Option<u64> {
+    RUNTIME_SEED.take()
+}
+
+/// Call of a program that makes a socket or looks up a name, for messages.
+#[derive(Clone, Copy, Debug)]
+pub struct Call {
+    /// Name of the function, such as `TcpStream::connect`.
+    pub name: &'static str,
+    /// Place of the call in the program.
+    pub place: &'static Location<'static>,
+}
+
+impl Call {
+    /// Describes the call `name` at the place of the caller.
+    #[track_caller]
+    #[must_use]
+    pub fn here(name: &'static str) -> Self {
+        Self { name, place: Location::caller() }
+    }
+}
+
+/// Version of IP.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Version {
+    /// IPv4.
+    Four,
+    /// IPv6.
+    Six,
+}
+
+/// A running test bed.
+///
+/// Methods that make a socket make the socket on the host of the task that is being polled. They panic if that task lives on no host: an error would be
+/// swallowed by a program that tries again.
+pub trait Bed: Send + Sync {
+    /// Returns the addresses of `name`, a host's name or a literal address without port.
+    ///
+    /// # Errors
+    ///
+    /// [`io::ErrorKind::NotFound`] if no host has that name.
+    fn look_up(&self, name: &str, port: u16) -> io::Result<Vec<SocketAddr>>;
+
+    /// Returns the addresses that `text` describes, such as `server:80`.
+    ///
+    /// # Errors
+    ///
+    /// As [`Bed::look_up`]; [`io::ErrorKind::InvalidInput`] if the text is no address with a port.
+    fn look_up_text(&self, text: &str) -> io::Result<Vec<SocketAddr>>;
+
+    /// Opens a TCP connection. The returned future waits until the connection is established.
+    ///
+    /// # Panics
+    ///
+    /// If the running task lives on no host.
+    fn connect(&self, call: Call, to: SocketAddr) -> Connecting;
+
+    /// Listens for TCP connections.
+    ///
+    /// # Errors
+    ///
+    /// If the address is taken, or is no address of the host.
+    ///
+    /// # Panics
+    ///
+    /// If the running task lives on no host.
+    fn listen(&self, call: Call, at: SocketAddr) -> io::Result<Box<dyn Listener>>;
+
+    /// Creates a TCP socket that is neither connected nor listening.
+    ///
+    /// # Errors
+    ///
+    /// If the host is down.
+    ///
+    /// # Panics
+    ///
+    /// If the running task lives on no host.
+    fn socket(&self, call: Call, version: Version) -> io::Result<Box<dyn Socket>>;
+
+    /// Binds a UDP socket.
+    ///
+    /// # Errors
+    ///
+    /// If the address is taken, or is no address of the host.
+    ///
+    /// # Panics
+    ///
+    /// If the running task lives on no host.
+    fn bind(&self, call: Call, at: SocketAddr) -> io::Result<Box<dyn Datagrams>>;
+
+    /// Returns the host of the task that is being polled, or `None` if that task lives on no host.
+    fn host(&self) -> Option<Arc<dyn Host>>;
+
+    /// Holds the virtual time until the value is dropped: work on another thread, which takes no virtual time, is under way.
+    fn hold(&self) -> Box<dyn Hold>;
+}
+
+impl fmt::Debug for dyn Bed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Bed").finish_non_exhaustive()
+    }
+}
+
+/// Guard: a test bed runs on this thread until the guard is dropped.
+#[derive(Debug)]
+#[must_use = "the test bed is left when the guard is dropped"]
+pub struct Entered {
+    before: Option<Arc<dyn Bed>>,
+}
+
+/// Declares that `bed` runs on this thread until the returned guard is dropped.
+pub fn enter(bed: Arc<dyn Bed>) -> Entered {
+    Entered { before: BED.with_borrow_mut(|here| here.replace(bed)) }
+}
+
+impl Drop for Entered {
+    fn drop(&mut self) {
+        let before = self.before.take();
+        // The value is dropped after the borrow has ended, because destructors of a test bed may ask for the test bed.
+        let left = BED.try_with(|bed| bed.replace(before));
+        drop(left);
+    }
+}
+
+/// Returns the test bed that runs on this thread, or `None` if there is none or the thread ends.
+#[must_use]
+pub fn bed() -> Option<Arc<dyn Bed>> {
+    BED.try_with(|bed| bed.borrow().clone()).ok().flatten()
+}
+
+/// Returns whether a test bed runs on this thread.
+#[must_use]
+pub fn is_in_bed() -> bool {
+    BED.try_with(|bed| bed.borrow().is_some()).unwrap_or_default()
+}

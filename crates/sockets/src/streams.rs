@@ -1,0 +1,137 @@
+//! TCP: streams, listeners, and sockets that are neither.
+
+use std::fmt;
+use std::future::Future;
+use std::io::{self, IoSlice, IoSliceMut};
+use std::net::SocketAddr;
+use std::pin::Pin;
+use std::task::{Context, Poll};
+use std::time::Duration;
+
+/// Future of a connection that is being opened.
+pub type Connecting = Pin<Box<dyn Future<Output = io::Result<Box<dyn Stream>>> + Send>>;
+
+/// Readiness of a socket.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub struct Ready {
+    /// `true` if a read would not block.
+    pub readable: bool,
+    /// `true` if a write would not block.
+    pub writable: bool,
+    /// `true` if the peer sends nothing any more.
+    pub read_closed: bool,
+    /// `true` if nothing can be written any more.
+    pub write_closed: bool,
+}
+
+/// TCP connection. Dropping the connection closes it, as dropping a stream of tokio does.
+///
+/// Methods named `poll_…` register the waker of the context if they return [`Poll::Pending`]. Methods named `try_…` return [`io::ErrorKind::WouldBlock`] instead.
+/// All methods fail after the host of the connection has crashed, after the run of the test bed, and on other threads than the one of the run.
+#[expect(clippy::missing_errors_doc, reason = "the documentation of the trait names the errors of all methods")]
+pub trait Stream: fmt::Debug + Send + Sync {
+    /// Waits until bytes can be read, or the connection is over.
+    fn poll_readable(&self, cx: &mut Context<'_>) -> Poll<io::Result<()>>;
+    /// Waits until bytes can be written, or the connection is over.
+    fn poll_writable(&self, cx: &mut Context<'_>) -> Poll<io::Result<()>>;
+    /// Returns what would not block now.
+    fn ready(&self) -> io::Result<Ready>;
+    /// Reads received bytes, and returns their number; 0 is the end of the stream.
+    fn poll_read(&self, cx: &mut Context<'_>, buffer: &mut [u8]) -> Poll<io::Result<usize>>;
+    /// Like [`Stream::poll_read`], but leaves the bytes in the stream.
+    fn poll_peek(&self, cx: &mut Context<'_>, buffer: &mut [u8]) -> Poll<io::Result<usize>>;
+    /// Writes bytes, and returns how many the send buffer has taken.
+    fn poll_write(&self, cx: &mut Context<'_>, buffers: &[IoSlice<'_>]) -> Poll<io::Result<usize>>;
+    /// Reads received bytes into one buffer after the other.
+    fn try_read(&self, buffers: &mut [IoSliceMut<'_>]) -> io::Result<usize>;
+    /// Writes one buffer after the other.
+    fn try_write(&self, buffers: &[IoSlice<'_>]) -> io::Result<usize>;
+    /// Sends FIN after the bytes written so far.
+    fn shut_down(&self) -> io::Result<()>;
+    /// Sends FIN for a half that is dropped. Also works on another thread.
+    fn let_write_half_go(&self);
+    /// Returns the address of this end.
+    fn local_addr(&self) -> io::Result<SocketAddr>;
+    /// Returns the address of the other end.
+    fn peer_addr(&self) -> io::Result<SocketAddr>;
+    /// Takes the error that the next call would otherwise return.
+    fn take_error(&self) -> io::Result<Option<io::Error>>;
+    /// Returns whether small segments leave while earlier segments are not acknowledged.
+    fn nodelay(&self) -> io::Result<bool>;
+    /// Sets whether small segments leave while earlier segments are not acknowledged.
+    fn set_nodelay(&self, nodelay: bool) -> io::Result<()>;
+    /// Returns whether acknowledgements leave at once.
+    fn quickack(&self) -> io::Result<bool>;
+    /// Sets whether acknowledgements leave at once.
+    fn set_quickack(&self, quickack: bool) -> io::Result<()>;
+    /// Returns the time to linger.
+    fn linger(&self) -> io::Result<Option<Duration>>;
+    /// Sets the time to linger.
+    fn set_linger(&self, linger: Option<Duration>) -> io::Result<()>;
+    /// Returns the time to live of packets, from 1 to 255.
+    fn ttl(&self) -> io::Result<u32>;
+    /// Sets the time to live of packets, from 1 to 255.
+    fn set_ttl(&self, ttl: u32) -> io::Result<()>;
+}
+
+/// TCP listener. All methods fail as those of [`Stream`] do.
+#[expect(clippy::missing_errors_doc, reason = "the documentation of the trait names the errors of all methods")]
+pub trait Listener: fmt::Debug + Send + Sync {
+    /// Accepts a connection, and returns the address of its other end.
+    fn poll_accept(&self, cx: &mut Context<'_>) -> Poll<io::Result<(Box<dyn Stream>, SocketAddr)>>;
+    /// Returns the address at which the listener listens.
+    fn local_addr(&self) -> io::Result<SocketAddr>;
+    /// Returns the time to live of packets of accepted connections.
+    fn ttl(&self) -> io::Result<u32>;
+    /// Sets the time to live of packets of accepted connections.
+    fn set_ttl(&self, ttl: u32) -> io::Result<()>;
+}
+
+/// Option of a [`Socket`] that is on or off.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Flag {
+    /// `SO_KEEPALIVE`.
+    KeepAlive,
+    /// `SO_REUSEADDR`.
+    ReuseAddress,
+    /// `SO_REUSEPORT`.
+    ReusePort,
+    /// `TCP_NODELAY`.
+    NoDelay,
+}
+
+/// Option of a [`Socket`] that is a number.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Number {
+    /// Size of the send buffer \[byte\].
+    SendBuffer,
+    /// Size of the receive buffer \[byte\].
+    ReceiveBuffer,
+    /// Type of service of IPv4 and traffic class of IPv6.
+    TypeOfService,
+}
+
+/// TCP socket that is neither connected nor listening. All methods fail as those of [`Stream`] do.
+#[expect(clippy::missing_errors_doc, reason = "the documentation of the trait names the errors of all methods")]
+pub trait Socket: fmt::Debug + Send + Sync {
+    /// Binds the socket.
+    fn bind(&self, at: SocketAddr) -> io::Result<()>;
+    /// Opens a connection.
+    fn connect(self: Box<Self>, to: SocketAddr) -> Connecting;
+    /// Listens. `backlog` + 1 connections may wait to be accepted.
+    fn listen(self: Box<Self>, backlog: u32) -> io::Result<Box<dyn Listener>>;
+    /// Returns the address to which the socket is bound.
+    fn local_addr(&self) -> io::Result<SocketAddr>;
+    /// Returns an option that is on or off.
+    fn flag(&self, flag: Flag) -> io::Result<bool>;
+    /// Sets an option on or off.
+    fn set_flag(&self, flag: Flag, on: bool) -> io::Result<()>;
+    /// Returns an option that is a number.
+    fn number(&self, number: Number) -> io::Result<u32>;
+    /// Sets an option that is a number.
+    fn set_number(&self, number: Number, value: u32) -> io::Result<()>;
+    /// Returns the time to linger.
+    fn linger(&self) -> io::Result<Option<Duration>>;
+    /// Sets the time to linger.
+    fn set_linger(&self, linger: Option<Duration>) -> io::Result<()>;
+}

@@ -1,0 +1,67 @@
+//! Tasks of other executors that live on hosts of a test bed.
+
+use std::cell::RefCell;
+use std::fmt;
+use std::sync::Arc;
+
+thread_local! {
+    /// Host for which this thread works outside of the run, as a thread of `spawn_blocking` does.
+    static HOST: RefCell<Option<Arc<dyn Host>>> = const { RefCell::new(None) };
+}
+
+/// A host of a test bed, for tasks that the test bed does not poll itself.
+pub trait Host: Send + Sync {
+    /// Calls `act` as a task of this host: sockets that `act` makes belong to this host.
+    fn within(&self, act: &mut dyn FnMut());
+
+    /// Keeps `stop`, and calls it when the program of the host ends: by a crash, or because the program is killed.
+    fn keep(&self, stop: Box<dyn Stop>);
+}
+
+impl fmt::Debug for dyn Host {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Host").finish_non_exhaustive()
+    }
+}
+
+/// The way to stop a task.
+pub trait Stop: Send {
+    /// Stops the task: its future is dropped.
+    fn stop(&self);
+
+    /// Returns whether the task is over, so that `stop` need not be kept any more.
+    fn is_over(&self) -> bool;
+}
+
+/// Guard that holds the virtual time of a test bed.
+pub trait Hold: Send {}
+
+/// Returns the host of the present task: that of the task which the test bed polls, or the host for which this thread works.
+#[must_use]
+pub fn host() -> Option<Arc<dyn Host>> {
+    match crate::bed() {
+        Some(bed) => bed.host(),
+        None => HOST.try_with(|host| host.borrow().clone()).ok().flatten(),
+    }
+}
+
+/// Guard: this thread works for a host until the guard is dropped.
+#[derive(Debug)]
+#[must_use = "the thread works for the host until the guard is dropped"]
+pub struct OnHost {
+    before: Option<Arc<dyn Host>>,
+}
+
+/// Declares that this thread, which runs no test bed, works for `host` until the returned guard is dropped. Tasks that the thread starts live on that host.
+pub fn on_host(host: Arc<dyn Host>) -> OnHost {
+    OnHost { before: HOST.with_borrow_mut(|here| here.replace(host)) }
+}
+
+impl Drop for OnHost {
+    fn drop(&mut self) {
+        let before = self.before.take();
+        // The value is dropped after the borrow has ended, because its destructor is foreign.
+        let left = HOST.try_with(|host| host.replace(before));
+        drop(left);
+    }
+}

@@ -1,0 +1,73 @@
+//! The test bed of the present thread for a package `tokio` that stands in for tokio: implements the traits of `cohaptic-sockets`.
+//!
+//! `cohaptic tokio` generates that package. Programs that use tokio's sockets and tasks then run on a test bed unchanged: the package asks `cohaptic-sockets`
+//! for the test bed of the thread, which [`crate::context`] registers for each run.
+
+mod tasks;
+
+use std::io;
+use std::net::SocketAddr;
+use std::sync::Arc;
+
+use cohaptic_sockets::{Bed, Call, Connecting, Datagrams, Hold, Host, Listener, Socket, Stream, Version};
+
+pub(crate) use tasks::{Kept, OtherTasks};
+
+use crate::context;
+use crate::core::Shared;
+use crate::current;
+use crate::resolve::ToSocketAddrs;
+use crate::socket::UdpSocket;
+use crate::tcp::{TcpListener, TcpSocket, TcpStream};
+
+/// What a task without a host must do. The `tokio` of the program is the package that stands in, and the task was started outside of all hosts.
+const HOW: &str = "wrap the call, or the task that `tokio::spawn` started on no host, in `Host::scope`";
+
+/// A run, as `cohaptic-sockets` sees it.
+pub(crate) struct BedOfThread {
+    pub(crate) shared: Arc<Shared>,
+    pub(crate) others: Arc<OtherTasks>,
+}
+
+impl Bed for BedOfThread {
+    fn look_up(&self, name: &str, port: u16) -> io::Result<Vec<SocketAddr>> {
+        Ok(vec![(name, port).to_socket_addr()?])
+    }
+
+    fn look_up_text(&self, text: &str) -> io::Result<Vec<SocketAddr>> {
+        Ok(vec![text.to_socket_addr()?])
+    }
+
+    fn connect(&self, call: Call, to: SocketAddr) -> Connecting {
+        let (shared, host) = context::Call::from(call).host(HOW);
+        let begun = shared.check_open(host, "a connection").and_then(|()| {
+            let config = shared.with(|core| core.tcp_config(host).clone());
+            TcpStream::connect_on(shared, host, None, to, config)
+        });
+        Box::pin(async move { Ok(Box::new(begun?.established().await?) as Box<dyn Stream>) })
+    }
+
+    fn listen(&self, call: Call, at: SocketAddr) -> io::Result<Box<dyn Listener>> {
+        let (shared, host) = context::Call::from(call).host(HOW);
+        Ok(Box::new(TcpListener::bind_on(shared, host, at)?))
+    }
+
+    fn socket(&self, call: Call, version: Version) -> io::Result<Box<dyn Socket>> {
+        let (shared, host) = context::Call::from(call).host(HOW);
+        Ok(Box::new(TcpSocket::new_on(shared, host, version == Version::Six)?))
+    }
+
+    fn bind(&self, call: Call, at: SocketAddr) -> io::Result<Box<dyn Datagrams>> {
+        let (shared, host) = context::Call::from(call).host(HOW);
+        Ok(Box::new(UdpSocket::bind_on(shared, host, at)?))
+    }
+
+    fn host(&self) -> Option<Arc<dyn Host>> {
+        let host = current::host()?;
+        Some(Arc::new(Kept { host, others: Arc::clone(&self.others) }))
+    }
+
+    fn hold(&self) -> Box<dyn Hold> {
+        Box::new(self.shared.hold())
+    }
+}

@@ -1,0 +1,49 @@
+//! Tasks of tokio that live on hosts. The test bed does not poll them, but stops them with their host.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use cohaptic_sockets::{Host, Stop};
+use cohaptic_wan::NodeId;
+
+use crate::current;
+
+/// The ways to stop the tasks that tokio polls for hosts of a run.
+#[derive(Default)]
+pub(crate) struct OtherTasks(Mutex<Vec<(NodeId, Box<dyn Stop>)>>);
+
+impl OtherTasks {
+    fn keep(&self, host: NodeId, stop: Box<dyn Stop>) {
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        // Tasks that are over are forgotten whenever the array is full, so that the array stays proportional to the number of live tasks.
+        if kept.len() == kept.capacity() {
+            kept.retain(|(_, stop)| !stop.is_over());
+        }
+        kept.push((host, stop));
+    }
+
+    /// Stops all tasks of a host.
+    pub(crate) fn stop_all_of(&self, host: NodeId) {
+        // The lock ends before tasks are stopped: a destructor may start a task, which takes the lock.
+        let of_host: Vec<Box<dyn Stop>> = {
+            let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            kept.extract_if(.., |(of, _)| *of == host).map(|(_, stop)| stop).collect()
+        };
+        of_host.iter().for_each(|stop| stop.stop());
+    }
+}
+
+/// A host for tasks that tokio polls.
+pub(crate) struct Kept {
+    pub(crate) host: NodeId,
+    pub(crate) others: Arc<OtherTasks>,
+}
+
+impl Host for Kept {
+    fn within(&self, act: &mut dyn FnMut()) {
+        current::on_host(Some(self.host), act);
+    }
+
+    fn keep(&self, stop: Box<dyn Stop>) {
+        self.others.keep(self.host, stop);
+    }
+}

@@ -1,0 +1,83 @@
+//! Implementation of the trait of UDP sockets of `cohaptic-sockets`: see [`crate::facade`].
+
+use std::io;
+use std::net::SocketAddr;
+use std::task::{Context, Poll};
+
+use cohaptic_sockets::{DatagramOption, Datagrams, Membership};
+
+use super::{KIND, UdpSocket};
+use crate::core::Parcel;
+
+impl Datagrams for UdpSocket {
+    fn poll_receive(&self, cx: &mut Context<'_>, peek: bool, take: &mut dyn FnMut(&[u8], SocketAddr)) -> Poll<io::Result<()>> {
+        let look = |datagram: &Parcel| take(&datagram.bytes, datagram.from());
+        if peek { self.poll_look::<true, _>(cx, look) } else { self.poll_look::<false, _>(cx, look) }
+    }
+
+    fn try_receive(&self, peek: bool, take: &mut dyn FnMut(&[u8], SocketAddr)) -> io::Result<()> {
+        let look = |datagram: &Parcel| take(&datagram.bytes, datagram.from());
+        if peek { self.try_look::<true, _>(look) } else { self.try_look::<false, _>(look) }
+    }
+
+    fn poll_readable(&self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        self.poll_recv_ready(cx)
+    }
+
+    fn is_readable(&self) -> io::Result<bool> {
+        self.shared.open(self.host, KIND, |core| core.is_readable(self.id))
+    }
+
+    fn send(&self, bytes: &[u8], to: Option<SocketAddr>) -> io::Result<usize> {
+        self.send_now(to.as_ref(), bytes, false)
+    }
+
+    fn connect(&self, to: SocketAddr) -> io::Result<()> {
+        self.connect_now(to)
+    }
+
+    fn local_addr(&self) -> io::Result<SocketAddr> {
+        Self::local_addr(self)
+    }
+
+    fn peer_addr(&self) -> io::Result<SocketAddr> {
+        Self::peer_addr(self)
+    }
+
+    fn take_error(&self) -> io::Result<Option<io::Error>> {
+        Self::take_error(self)
+    }
+
+    fn option(&self, option: DatagramOption) -> io::Result<u32> {
+        match option {
+            DatagramOption::Broadcast => self.broadcast().map(u32::from),
+            DatagramOption::Ttl => self.ttl(),
+            DatagramOption::TypeOfService => self.tos_v4(),
+            DatagramOption::TrafficClass => self.tclass_v6(),
+            DatagramOption::MulticastTtl => self.multicast_ttl_v4(),
+            DatagramOption::MulticastLoop4 => self.multicast_loop_v4().map(u32::from),
+            DatagramOption::MulticastLoop6 => self.multicast_loop_v6().map(u32::from),
+        }
+    }
+
+    fn set_option(&self, option: DatagramOption, value: u32) -> io::Result<()> {
+        match option {
+            DatagramOption::Broadcast => self.set_broadcast(value != 0),
+            DatagramOption::Ttl => self.set_ttl(value),
+            DatagramOption::TypeOfService => self.set_tos_v4(value),
+            DatagramOption::TrafficClass => self.set_tclass_v6(value),
+            DatagramOption::MulticastTtl => self.set_multicast_ttl_v4(value),
+            DatagramOption::MulticastLoop4 => self.set_multicast_loop_v4(value != 0),
+            DatagramOption::MulticastLoop6 => self.set_multicast_loop_v6(value != 0),
+        }
+    }
+
+    fn change_membership(&self, membership: Membership) -> io::Result<()> {
+        match membership {
+            Membership::Join4 { group, interface } => self.join_multicast_v4(group, interface),
+            Membership::Leave4 { group, interface } => self.leave_multicast_v4(group, interface),
+            Membership::Join6 { group, interface } => self.join_multicast_v6(&group, interface),
+            Membership::Leave6 { group, interface } => self.leave_multicast_v6(&group, interface),
+        }
+    }
+}
