@@ -19,6 +19,7 @@ mod documents;
 mod elsewhere;
 mod expectations;
 mod explain;
+mod facade;
 mod failure;
 #[cfg(target_os = "linux")]
 mod falcon;
@@ -79,6 +80,8 @@ fn main() -> ExitCode {
         Command::Play(arguments) => play::play(&arguments),
         Command::Relay(arguments) => relay::relay(&arguments),
         Command::Router(arguments) => router::router(&arguments),
+        Command::Tokio(arguments) => facade::tokio(&arguments),
+        Command::Test(arguments) => facade::test(&arguments),
         Command::Falcon(arguments) => falcon::falcon(&arguments),
         Command::Link(arguments) => link::link(&arguments),
         Command::Fit(arguments) => fit::fit(&arguments),

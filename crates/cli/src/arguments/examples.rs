@@ -100,6 +100,10 @@ pub(super) const RELAY: &[&str] = &[
 pub(super) const ROUTER: &[&str] =
     &["cohaptic router router.toml --control", "cohaptic router router.toml --set links.wan.delay=8ms --set router.seed=7 --for 1min"];
 
+pub(super) const TOKIO: &[&str] = &["cohaptic tokio", "cohaptic tokio --sim tests/network"];
+
+pub(super) const TEST: &[&str] = &["cohaptic test", "cohaptic test -p server --test network -- --nocapture"];
+
 pub(super) const FALCON: &[&str] = &["cohaptic falcon probe", "cohaptic falcon watch --simulated --for 2s"];
 
 pub(super) const FALCON_PROBE: &[&str] = &["cohaptic falcon probe", "cohaptic falcon probe --serial FALCON01 --for 5s --json"];

@@ -2,6 +2,7 @@
 
 mod compare;
 mod examples;
+mod existing;
 mod falcon;
 mod links;
 mod numbers;
@@ -21,6 +22,7 @@ use clap::{Args, Parser, Subcommand};
 use cohaptic_picture::{Size, SizeError};
 
 pub(crate) use compare::{CompareArguments, PresetName};
+pub(crate) use existing::{TestArguments, TokioArguments};
 pub(crate) use falcon::{
     FalconArguments, FalconCommand, Force, HandName, HomeArguments, ProbeArguments, SimulateArguments, WatchArguments, WhichFalcon,
 };
@@ -71,6 +73,10 @@ pub(crate) enum Command {
     Relay(RelayArguments),
     /// Puts the emulator between two network devices: any IP traffic
     Router(RouterArguments),
+    /// Writes a package that stands in for tokio, so that programs run on the test kit unchanged, with their dependencies
+    Tokio(TokioArguments),
+    /// Runs cargo test with that package in the place of tokio, and leaves Cargo.lock as it was
+    Test(TestArguments),
     /// Looks at a Novint Falcon, homes it, watches and pushes it, or simulates one
     Falcon(FalconArguments),
     /// Sends a steady stream over one link and compares the result with the configuration

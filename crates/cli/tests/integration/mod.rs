@@ -17,6 +17,8 @@ mod completions;
 mod desk;
 mod documents;
 mod errors;
+#[cfg(unix)]
+mod existing;
 mod explain;
 mod falcon;
 mod fit;

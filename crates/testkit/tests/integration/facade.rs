@@ -134,6 +134,7 @@ fn a_socket_on_no_host_is_refused_with_the_place_of_the_call() {
 }
 
 #[test]
+#[expect(clippy::disallowed_methods, reason = "other threads take real time")]
 fn time_waits_for_work_on_another_thread() {
     two().on_tokio().run(|bed| async move {
         bed.host("server").spawn(echo_once());

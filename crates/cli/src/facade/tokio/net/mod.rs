@@ -1,0 +1,77 @@
+//! Sockets. In a test bed they are those of the test bed.
+
+pub use real::net::*;
+
+mod addr;
+
+pub use addr::ToSocketAddrs;
+
+#[cfg(feature = "net")]
+mod descriptors;
+#[cfg(feature = "net")]
+mod listener;
+#[cfg(feature = "net")]
+mod lookup;
+#[cfg(feature = "net")]
+mod ready;
+#[cfg(feature = "net")]
+mod socket;
+#[cfg(feature = "net")]
+mod stream;
+#[cfg(feature = "net")]
+pub mod tcp;
+#[cfg(feature = "net")]
+mod udp;
+
+#[cfg(feature = "net")]
+pub use {listener::TcpListener, lookup::lookup_host, socket::TcpSocket, stream::TcpStream, udp::UdpSocket};
+
+/// Calls a method of the real socket, or of the socket of the test bed.
+#[cfg(feature = "net")]
+macro_rules! either {
+    ($either:expr, |$socket:ident| $real:expr, $bed:expr) => {
+        match $either {
+            $crate::net::Either::Real($socket) => $real,
+            $crate::net::Either::Bed($socket) => $bed,
+        }
+    };
+    ($either:expr, |$socket:ident| $same:expr) => {
+        match $either {
+            $crate::net::Either::Real($socket) => $same,
+            $crate::net::Either::Bed($socket) => $same,
+        }
+    };
+}
+#[cfg(feature = "net")]
+use either;
+
+/// A real socket, or a socket of a test bed.
+#[cfg(feature = "net")]
+enum Either<R, B> {
+    Real(R),
+    Bed(B),
+}
+
+#[cfg(feature = "net")]
+impl<R: std::fmt::Debug, B: std::fmt::Debug> std::fmt::Debug for Either<R, B> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        either!(self, |socket| socket.fmt(f))
+    }
+}
+
+/// Returns the test bed in which the present thread makes a socket, or `None` if the socket is real.
+///
+/// # Errors
+///
+/// On a thread that works for a host of a test bed: the sockets of a test bed belong to the thread that runs it.
+#[cfg(feature = "net")]
+fn bed() -> std::io::Result<Option<std::sync::Arc<dyn cohaptic_sockets::Bed>>> {
+    let bed = cohaptic_sockets::bed();
+    if bed.is_none() && cohaptic_sockets::host().is_some() {
+        return Err(std::io::Error::new(
+            std::io::ErrorKind::Unsupported,
+            "a function of `spawn_blocking` makes a socket: the sockets of a test bed belong to the thread that runs it. Make the socket in a task",
+        ));
+    }
+    Ok(bed)
+}

@@ -1,0 +1,20 @@
+//! Tasks, which keep the host of a test bed on which they were started, and end with it.
+
+pub use real::task::*;
+
+#[cfg(feature = "rt")]
+mod join_set;
+#[cfg(feature = "rt")]
+mod local;
+#[cfg(feature = "rt")]
+mod spawn;
+
+#[cfg(feature = "rt")]
+pub use {
+    join_set::JoinSet,
+    local::{LocalSet, spawn_local},
+    spawn::{spawn, spawn_blocking},
+};
+
+#[cfg(feature = "rt-multi-thread")]
+pub use spawn::block_in_place;

@@ -1,0 +1,151 @@
+//! Workspace of the user: its version of tokio, and where its tests get the test kit from.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use super::cargo::metadata;
+use crate::failure::Failure;
+use crate::file::read_text;
+
+/// Name of the folder below `target` that holds everything that these commands write.
+const FOLDER: &str = "target/cohaptic";
+
+/// Folder in which the workspace with the tests is looked for.
+const SIM: &str = "sim";
+
+/// Workspace whose programs are tested.
+#[derive(Debug)]
+pub(super) struct Workspace {
+    /// Folder of the workspace.
+    pub(super) root: PathBuf,
+    /// Folder of the workspace with the tests, which may be the same.
+    sim: PathBuf,
+    /// Dependency on `cohaptic-sockets` as a value of TOML, from the same source as the test kit.
+    pub(super) sockets: String,
+}
+
+impl Workspace {
+    /// Finds the workspace of the current folder. `sim` is the folder of the workspace with the tests, below the current folder.
+    pub(super) fn here(sim: Option<&Path>) -> Result<Self, Failure> {
+        let here = std::env::current_dir().map_err(|error| Failure::System(format!("the current folder cannot be found: {error}")))?;
+        let own = metadata(&here, &["--no-deps"], "the workspace cannot be read")?;
+        let root = PathBuf::from(own["workspace_root"].as_str().unwrap_or_default());
+        let sim = match sim {
+            Some(sim) => here.join(sim),
+            None if root.join(SIM).join("Cargo.toml").exists() => root.join(SIM),
+            None => root.clone(),
+        };
+        let tests = if sim == root { own } else { metadata(&sim, &["--no-deps"], "the workspace with the tests cannot be read")? };
+        let sim = PathBuf::from(tests["workspace_root"].as_str().unwrap_or_default());
+        let Some(kit) = dependency(&tests, "cohaptic-testkit") else {
+            return Err(Failure::Input(format!(
+                "no package of {} depends on cohaptic-testkit: expected it among the [dev-dependencies] of the package with the tests, with features = [\"facade\"]; \
+                 --sim FOLDER names another workspace",
+                sim.display()
+            )));
+        };
+        if !kit["features"].as_array().is_some_and(|features| features.iter().any(|feature| feature == "facade")) {
+            return Err(Failure::Input(format!(
+                "the dependency on cohaptic-testkit in {} lacks its feature `facade`: expected features = [\"facade\"]",
+                sim.display()
+            )));
+        }
+        let sockets = sockets(kit)?;
+        Ok(Self { root, sim, sockets })
+    }
+
+    /// Returns the folder below which everything is written.
+    pub(super) fn folder(&self) -> PathBuf {
+        self.root.join(FOLDER)
+    }
+
+    /// Returns the path of the package as the workspace with the tests must name it.
+    pub(super) fn patch(&self, package: &Path) -> String {
+        match (self.sim.strip_prefix(&self.root), package.strip_prefix(&self.root)) {
+            (Ok(down), Ok(package)) => down.components().map(|_| PathBuf::from("..")).collect::<PathBuf>().join(package),
+            _ => package.to_owned(),
+        }
+        .display()
+        .to_string()
+        .replace('\\', "/")
+    }
+
+    pub(super) fn lock_file(&self) -> PathBuf {
+        self.root.join("Cargo.lock")
+    }
+
+    /// Returns the version of tokio that `Cargo.lock` names, or `None` if there is no `Cargo.lock`.
+    pub(super) fn tokio(&self) -> Result<Option<String>, Failure> {
+        let path = self.lock_file();
+        if !path.exists() {
+            return Ok(None);
+        }
+        let lock: toml::Table = read_text(&path)?.parse().map_err(|error| Failure::Input(format!("{} cannot be read: {error}", path.display())))?;
+        let text = |package: &toml::Value, key: &str| package.get(key).and_then(toml::Value::as_str).map(str::to_owned);
+        let packages = lock.get("package").and_then(toml::Value::as_array).map_or(&[][..], Vec::as_slice);
+        let found = packages.iter().find(|package| {
+            text(package, "name").as_deref() == Some("tokio") && text(package, "version").is_some_and(|version| version.starts_with("1."))
+        });
+        let Some(found) = found else {
+            return Err(Failure::Input(format!("{} names no tokio 1: expected a program that depends on it", path.display())));
+        };
+        // A package without a source is the one that this program has generated.
+        if let Some(source) = text(found, "source").filter(|source| !source.starts_with("registry+") && !source.starts_with("sparse+")) {
+            return Err(Failure::Input(format!("tokio comes from {source}: expected a version of a registry")));
+        }
+        Ok(text(found, "version"))
+    }
+}
+
+/// Returns the dependency of a package of a workspace on the package `name`.
+fn dependency<'a>(workspace: &'a Value, name: &str) -> Option<&'a Value> {
+    let packages = workspace["packages"].as_array()?;
+    packages.iter().filter_map(|package| package["dependencies"].as_array()).flatten().find(|dependency| dependency["name"] == name)
+}
+
+/// Returns the dependency on `cohaptic-sockets` that comes from the same source as the test kit. Two copies of that package would not know of each other.
+fn sockets(kit: &Value) -> Result<String, Failure> {
+    let quoted = |text: &str| toml::Value::String(text.to_owned()).to_string();
+    if let Some(path) = kit["path"].as_str() {
+        let sockets = Path::new(path).join("../sockets");
+        let sockets = sockets
+            .canonicalize()
+            .map_err(|error| Failure::Input(format!("cohaptic-testkit lies in {path}, but {} cannot be found: {error}", sockets.display())))?;
+        return Ok(format!("{{ path = {} }}", quoted(&sockets.display().to_string())));
+    }
+    match kit["source"].as_str().and_then(|source| source.strip_prefix("git+")) {
+        Some(git) => {
+            let (url, which) = git.split_once('?').unwrap_or((git, ""));
+            let which = which.split_once('=').map_or_else(String::new, |(key, value)| format!(", {key} = {}", quoted(value)));
+            Ok(format!("{{ git = {}{which} }}", quoted(url)))
+        }
+        None => Ok(quoted(kit["req"].as_str().unwrap_or("*"))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn sockets_come_from_where_the_test_kit_comes_from() {
+        assert_eq!(sockets(&json!({ "source": "git+https://example.org/c?rev=abc" })).unwrap(), r#"{ git = "https://example.org/c", rev = "abc" }"#);
+        assert_eq!(sockets(&json!({ "source": "git+https://example.org/c" })).unwrap(), r#"{ git = "https://example.org/c" }"#);
+        assert_eq!(sockets(&json!({ "source": "registry+https://github.com/rust-lang/crates.io-index", "req": "^0.1" })).unwrap(), r#""^0.1""#);
+        let kit = Path::new(env!("CARGO_MANIFEST_DIR")).join("../testkit");
+        assert!(sockets(&json!({ "path": kit })).unwrap().ends_with("sockets\" }"));
+        assert!(sockets(&json!({ "path": "/nowhere/testkit" })).is_err());
+    }
+
+    #[test]
+    fn the_path_of_the_patch_begins_in_the_workspace_with_the_tests() {
+        let workspace = |sim: &str| Workspace { root: "/work".into(), sim: sim.into(), sockets: String::new() };
+        let package = Path::new("/work/target/cohaptic/tokio");
+        assert_eq!(workspace("/work/sim").patch(package), "../target/cohaptic/tokio");
+        assert_eq!(workspace("/work").patch(package), "target/cohaptic/tokio");
+        assert_eq!(workspace("/elsewhere").patch(package), "/work/target/cohaptic/tokio");
+    }
+}

@@ -1,0 +1,186 @@
+//! `cohaptic tokio` and `cohaptic test`, with a stand-in for cargo that does not compile.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use crate::integration::desk::{Desk, Outcome};
+use crate::integration::running::PATIENCE;
+
+/// Version of tokio that the project is built from, whose sources cargo has.
+fn version() -> String {
+    let lock = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../Cargo.lock")).unwrap();
+    lock.split_once("name = \"tokio\"\nversion = \"").unwrap().1.split('"').next().unwrap().to_owned()
+}
+
+fn lock() -> String {
+    format!(
+        "version = 4\n\n[[package]]\nname = \"tokio\"\nversion = \"{}\"\nsource = \"registry+https://github.com/rust-lang/crates.io-index\"\n",
+        version()
+    )
+}
+
+/// A program with a test over the test kit. The test kit has the features `features`.
+fn program(features: &str) -> Desk {
+    let kit = Path::new(env!("CARGO_MANIFEST_DIR")).join("../testkit");
+    let desk = Desk::new();
+    let manifest = format!(
+        "[package]\nname = \"program\"\nversion = \"0.1.0\"\nedition = \"2024\"\n\n[dependencies]\ntokio = \"1\"\n\n[dev-dependencies]\n\
+         cohaptic-testkit = {{ path = {kit:?}, features = [{features}] }}\n\n[workspace]\n"
+    );
+    desk.write("Cargo.toml", manifest);
+    desk.write("src/lib.rs", "");
+    desk.write("Cargo.lock", lock());
+    desk
+}
+
+/// Puts a cargo in the place of the real one, which passes questions on, and for tests changes `Cargo.lock` and then does `then`.
+fn stand_in(desk: &Desk, then: &str) {
+    let real = env!("CARGO");
+    desk.write(
+        "cargo",
+        format!(
+            "#!/bin/sh\n[ \"$1\" = metadata ] && exec '{real}' \"$@\"\nprintf '%s\\n' \"$CARGO_TARGET_DIR\" \"$@\" >said\n\
+             echo $$ >number\necho 'name = \"cohaptic-real-tokio\"' >>Cargo.lock\n{then}\n"
+        ),
+    );
+    desk.set_mode("cargo", 0o755);
+}
+
+fn command(desk: &Desk, line: &str) -> Command {
+    let mut command = desk.command(line);
+    command.env("CARGO", desk.path("cargo"));
+    command
+}
+
+fn run(desk: &Desk, line: &str) -> Outcome {
+    Outcome::of(command(desk, line).output().unwrap())
+}
+
+#[test]
+fn the_package_has_the_version_and_the_features_of_tokio() {
+    let desk = program("\"facade\"");
+    let said = desk.text("tokio");
+    assert!(said.contains("\n[patch.crates-io]\ntokio = { path = \"target/cohaptic/tokio\" }\n"), "{said}");
+    assert!(said.starts_with(&format!("tokio {} for tests: ", version())), "{said}");
+    let manifest = |name: &str| -> toml::Table { desk.read(&format!("target/cohaptic/{name}/Cargo.toml")).parse().unwrap() };
+    let (own, real) = (manifest("tokio"), manifest("real-tokio"));
+    assert_eq!(own["package"]["version"], real["package"]["version"]);
+    assert_eq!((own["package"]["name"].as_str(), real["package"]["name"].as_str()), (Some("tokio"), Some("cohaptic-real-tokio")));
+    for (feature, parts) in real["features"].as_table().unwrap() {
+        let own = own["features"][feature].as_array().unwrap();
+        assert_eq!(own[0].as_str(), Some(&*format!("real/{feature}")));
+        for part in parts.as_array().unwrap().iter().filter(|part| real["features"].get(part.as_str().unwrap()).is_some()) {
+            assert!(own.contains(part), "{feature} lacks {part}");
+        }
+    }
+    // Optional dependencies are features as well, as those of the real tokio are.
+    assert!(own["features"].get("parking_lot").is_some() && own["features"].get("slab").is_none());
+    assert!(own["dependencies"]["cohaptic-sockets"]["path"].as_str().unwrap().ends_with("crates/sockets"));
+
+    // What is the same is not written again, so that cargo compiles nothing again.
+    let written = || fs::metadata(desk.path("target/cohaptic/tokio/src/lib.rs")).unwrap().modified().unwrap();
+    let first = written();
+    // A file of another version goes.
+    desk.write("target/cohaptic/tokio/src/old.rs", "");
+    desk.text("tokio");
+    assert_eq!(written(), first);
+    assert!(!desk.path("target/cohaptic/tokio/src/old.rs").exists());
+}
+
+#[test]
+fn tests_in_a_workspace_of_their_own_name_the_test_kit() {
+    let desk = program("\"facade\"");
+    let manifest = desk.read("Cargo.toml");
+    let (own, kit) = manifest.split_once("[dev-dependencies]").unwrap();
+    desk.write(
+        "sim/Cargo.toml",
+        format!(
+            "[package]\nname = \"program-sim\"\n\n[dev-dependencies]{kit}\n[patch.crates-io]\ntokio = {{ path = \"../target/cohaptic/tokio\" }}\n"
+        ),
+    );
+    desk.write("sim/src/lib.rs", "");
+    desk.write("Cargo.toml", format!("{own}[workspace]\nexclude = [\"sim\"]\n"));
+    let said = desk.text("tokio");
+    assert!(said.contains("\ntokio = { path = \"../target/cohaptic/tokio\" }\n"), "{said}");
+    assert!(desk.path("target/cohaptic/tokio/src/net/stream.rs").exists());
+    assert_eq!(desk.text("tokio --sim sim"), said);
+}
+
+#[test]
+fn what_is_missing_is_named() {
+    let none = program("");
+    none.cohaptic("tokio").assert_refused(2, &["lacks its feature `facade`"]);
+    none.write("Cargo.toml", none.read("Cargo.toml").replace("cohaptic-testkit", "another"));
+    none.cohaptic("tokio").assert_refused(2, &["depends on cohaptic-testkit", "--sim FOLDER"]);
+
+    let desk = program("\"facade\"");
+    desk.write("Cargo.lock", "version = 4\n");
+    desk.cohaptic("tokio").assert_refused(2, &["names no tokio 1"]);
+    desk.write("Cargo.lock", lock().replace("registry+", "git+"));
+    desk.cohaptic("tokio").assert_refused(2, &["tokio comes from git+"]);
+    desk.write("Cargo.lock", lock().replace(&version(), "1.0.999"));
+    Outcome::of(desk.command("tokio").env("CARGO_NET_OFFLINE", "true").output().unwrap())
+        .assert_refused(2, &["cargo has no sources of tokio 1.0.999"]);
+    Outcome::of(desk.command("tokio").env("CARGO", desk.path("nothing")).output().unwrap()).assert_refused(3, &["cargo cannot be called"]);
+    Desk::new().cohaptic("tokio").assert_refused(2, &["the workspace cannot be read", "Cargo.toml"]);
+}
+
+#[test]
+fn cargo_gets_the_arguments_and_cargo_lock_is_put_back() {
+    let desk = program("\"facade\"");
+    stand_in(&desk, "exit 7");
+    let outcome = run(&desk, "test -p program --test network -- --nocapture --locked");
+    assert_eq!(outcome.status, Some(7), "{outcome:?}");
+    assert_eq!(desk.read("Cargo.lock"), lock());
+    let folder = desk.path("target/cohaptic").canonicalize().unwrap();
+    let said = desk.read("said");
+    let said: Vec<&str> = said.lines().collect();
+    assert_eq!(said[0], folder.join("build").display().to_string());
+    assert_eq!(said[1..3], ["--config", &format!("patch.crates-io.tokio.path=\"{}\"", folder.join("tokio").display())]);
+    assert_eq!(said[3..], ["test", "-p", "program", "--test", "network", "--", "--nocapture", "--locked"]);
+    assert!(!desk.path("target/cohaptic/Cargo.lock.saved").exists());
+
+    run(&desk, "test --locked").assert_refused(2, &["--locked cannot be"]);
+}
+
+/// Waits until cargo has changed the file.
+fn wait_for_change(desk: &Desk, child: &mut Child) {
+    let begin = Instant::now();
+    while desk.read("Cargo.lock") == lock() {
+        assert!(begin.elapsed() < PATIENCE && child.try_wait().unwrap().is_none(), "cargo does not begin");
+        sleep(Duration::from_millis(5));
+    }
+}
+
+#[test]
+fn after_ctrl_c_cargo_lock_is_put_back() {
+    let desk = program("\"facade\"");
+    // It does not heed the signal, which comes to the program alone.
+    stand_in(&desk, "exec sleep 600");
+    for signal in ["-INT", "-TERM"] {
+        let mut child = command(&desk, "test").stderr(Stdio::null()).spawn().unwrap();
+        wait_for_change(&desk, &mut child);
+        assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+        assert_eq!(child.wait().unwrap().code(), Some(130));
+        assert_eq!(desk.read("Cargo.lock"), lock());
+    }
+}
+
+#[test]
+fn after_a_kill_the_next_call_puts_cargo_lock_back() {
+    let desk = program("\"facade\"");
+    stand_in(&desk, "exec sleep 600");
+    let mut child = command(&desk, "test").stderr(Stdio::null()).spawn().unwrap();
+    wait_for_change(&desk, &mut child);
+    // Killed, the program cannot end its cargo, which has written its number before it changed the file.
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(Command::new("kill").arg(desk.read("number").trim()).status().unwrap().success());
+    assert_ne!(desk.read("Cargo.lock"), lock());
+    stand_in(&desk, "exit 0");
+    let outcome = run(&desk, "test");
+    assert_eq!((outcome.status, desk.read("Cargo.lock")), (Some(0), lock()));
+}

@@ -1,0 +1,1 @@
+//! The tests are copied from the sources of tokio: see `run`.

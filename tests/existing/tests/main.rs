@@ -1,0 +1,29 @@
+//! Programs of others whose sockets are tokio's, unchanged on the test kit. The package `tokio` of this workspace is the one that `cohaptic tokio` generates.
+
+use cohaptic_testkit::{Bed, Testbed};
+
+mod axum;
+mod beds;
+mod h2;
+mod mini_redis;
+mod ping_pong;
+mod refused;
+mod sockets;
+mod tasks;
+mod websocket;
+
+/// Seeds with which each program runs.
+const SEEDS: u64 = 20;
+
+/// Runs a program of a client and a server with several seeds over a lossy link, each twice, and checks that both runs are the same. `prepare` changes the test bed.
+fn over_lossy_links<F: Future<Output = ()> + 'static>(prepare: impl Fn(Testbed) -> Testbed, program: impl Fn(Bed) -> F) {
+    let mut lost = 0;
+    for seed in 0..SEEDS {
+        let bed = prepare(Testbed::new(["client", "server"]).links("delay 30ms loss 3%").seed(seed).on_tokio());
+        let ((), record) = bed.clone().run_recorded(&program);
+        lost += record.trace().events().iter().filter(|event| record.trace().words(event).to_string().contains(" lost")).count();
+        bed.run_twice(&program);
+    }
+    // Otherwise the links would have tested nothing.
+    assert!(lost > 0);
+}

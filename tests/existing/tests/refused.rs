@@ -1,0 +1,52 @@
+//! What a test bed refuses, with a sentence that says what to do.
+
+use std::os::fd::AsRawFd;
+
+use cohaptic_testkit::{Bed, Testbed};
+use tokio::net::{TcpListener, UdpSocket};
+
+fn on_one_host<F: Future<Output = ()> + 'static>(program: impl FnOnce() -> F + 'static) {
+    Testbed::new(["host"]).on_tokio().run(|bed: Bed| async move {
+        bed.host("host").spawn(program()).await.unwrap();
+    });
+}
+
+#[test]
+#[should_panic(expected = "builds a runtime of tokio inside a test bed")]
+fn a_further_runtime() {
+    on_one_host(async || drop(tokio::runtime::Builder::new_multi_thread().build()));
+}
+
+#[test]
+#[should_panic(expected = "`UdpSocket::bind` at tests/refused.rs:")]
+fn a_socket_on_no_host() {
+    Testbed::new(["host"]).on_tokio().run(async |_: Bed| drop(UdpSocket::bind("0.0.0.0:0").await));
+}
+
+#[test]
+fn descriptors_and_real_sockets() {
+    on_one_host(async || {
+        let listener = TcpListener::bind("0.0.0.0:0").await.unwrap();
+        assert!(listener.into_std().unwrap_err().to_string().contains("have no descriptors. Make the socket with the functions of `tokio::net`"));
+        let real = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
+        real.set_nonblocking(true).unwrap();
+        assert!(UdpSocket::from_std(real).unwrap_err().to_string().contains("`UdpSocket::from_std` in a test bed"));
+    });
+}
+
+#[test]
+#[should_panic(expected = "`UdpSocket::as_raw_fd` in a test bed")]
+fn a_number_of_a_descriptor() {
+    on_one_host(async || {
+        UdpSocket::bind("0.0.0.0:0").await.unwrap().as_raw_fd();
+    });
+}
+
+#[test]
+fn a_socket_on_a_thread_for_blocking_work() {
+    on_one_host(async || {
+        let handle = tokio::runtime::Handle::current();
+        let error = tokio::task::spawn_blocking(move || handle.block_on(UdpSocket::bind("0.0.0.0:0"))).await.unwrap().unwrap_err();
+        assert!(error.to_string().contains("Make the socket in a task"), "{error}");
+    });
+}
