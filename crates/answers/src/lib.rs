@@ -7,7 +7,8 @@
 //! [`map_picture()`], [`boundary_picture()`] and [`admittance_picture()`] draw analyses. [`document!`] makes a document.
 //!
 //! The other commands have a module each, with a function `document` for the JSON document and a function `words` for the text: [`campaign`], [`compare`],
-//! [`mod@link`], [`fit`], [`point`], [`map`], [`boundary`] and [`admittance`]. [`shards`] has the answers about work shared by several processes.
+//! [`mod@link`], [`fit`], [`point`], [`map`], [`boundary`] and [`admittance`]. Five of these have a function `html` for a [page](page) too. [`shards`] has the
+//! answers about work shared by several processes.
 //!
 //! The crate reads no clock and prints nothing: [`measure()`] takes the clock as an argument.
 //!
@@ -42,6 +43,7 @@ pub mod link;
 pub mod map;
 mod methods;
 mod notes;
+pub mod page;
 mod parts;
 mod pictures;
 pub mod point;

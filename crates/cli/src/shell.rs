@@ -1,8 +1,9 @@
-//! Quotes words of a command for POSIX shells.
+//! Quotes words of a command for POSIX shells, and makes the commands that pages show.
 
+use std::fmt::Display;
 use std::path::Path;
 
-use crate::output;
+use crate::{input, output};
 
 /// Returns a path as one word, quoted if necessary.
 pub(crate) fn path(path: &Path) -> String {
@@ -15,9 +16,58 @@ pub(crate) fn quoted(word: &str) -> String {
     if !word.is_empty() && word.chars().all(plain) { word.to_owned() } else { format!("'{}'", word.replace('\'', "'\\''")) }
 }
 
+/// Placeholder for the folder of `--out` in a [`CommandLine`]. The content of a page must not depend on the folder that the page is written to.
+const FOLDER: &str = "DIR";
+
+/// Command that makes the files of a folder again, as a line for a POSIX shell. Options that change no file, such as `--json`, are left out.
+pub(crate) struct CommandLine {
+    words: Vec<String>,
+    reads_standard_input: bool,
+}
+
+impl CommandLine {
+    /// Begins a command on a scene, with the overrides of `--set`.
+    pub(crate) fn new(command: &str, scene: &Path, set: &[String]) -> Self {
+        let line = Self { words: vec![format!("cohaptic {command}"), path(scene)], reads_standard_input: input::is_standard_input(scene) };
+        line.option("--set", set)
+    }
+
+    /// Appends an option once for each of its values, so that an option without a value is left out.
+    pub(crate) fn option(mut self, name: &str, values: impl IntoIterator<Item = impl Display>) -> Self {
+        self.words.extend(values.into_iter().map(|value| format!("{name} {}", quoted(&value.to_string()))));
+        self
+    }
+
+    /// Appends an option without a value, if `is_given`.
+    pub(crate) fn flag(mut self, name: &str, is_given: bool) -> Self {
+        self.words.extend(is_given.then(|| name.to_owned()));
+        self
+    }
+
+    /// Appends `--out` with a placeholder for the folder.
+    pub(crate) fn out(self) -> Self {
+        self.option("--out", [FOLDER])
+    }
+
+    /// Returns the line. A scene from standard input gets a placeholder for its file.
+    pub(crate) fn text(mut self) -> String {
+        self.words.extend(self.reads_standard_input.then(|| "< scene.toml".to_owned()));
+        self.words.join(" ")
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_command_has_each_option_as_often_as_it_was_given() {
+        let none: Option<u64> = None;
+        let line = CommandLine::new("run", Path::new("a b.toml"), &["x=1".to_owned(), "y=\"z\"".to_owned()]);
+        let text = line.option("--seed", Some(7)).option("--grid", none).flag("--force", true).flag("--general", false).out().text();
+        assert_eq!(text, "cohaptic run 'a b.toml' --set x=1 --set 'y=\"z\"' --seed 7 --force --out DIR");
+        assert_eq!(CommandLine::new("run", Path::new("-"), &[]).out().text(), "cohaptic run - --out DIR < scene.toml");
+    }
 
     #[test]
     fn words_are_quoted_where_a_shell_would_read_them_otherwise() {

@@ -1,6 +1,7 @@
 //! The answers about admittances: document, words and table of the curves.
 
 mod document;
+mod page;
 mod words;
 
 use cohaptic_stability::{Admittance, AnalysisError, FrequencyResponse, LowFrequencyFit, MeanSquare, Verdict, ideal};
@@ -8,6 +9,7 @@ use cohaptic_units::print::csv_field;
 
 use crate::{AdmittanceWords, admittance_words};
 pub use document::document;
+pub use page::html;
 pub use words::words;
 
 /// The admittance of a scene or of a variant.

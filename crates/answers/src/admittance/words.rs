@@ -17,9 +17,7 @@ pub fn words(peer: &str, curves: &[Curve]) -> String {
         if let Some(warning) = curve.warning() {
             let _ = writeln!(text, "  WARNING: {warning}");
         }
-        let AdmittanceWords { what, free, inertia, .. } = curve.words();
-        let mass = cohaptic_units::print::Number(curve.mass);
-        let _ = writeln!(text, "\n  {what} at the device of {peer}, compared with that of a {free} of {mass} {inertia}");
+        let _ = writeln!(text, "\n  {}", subject(peer, curve));
         table(&mut text, curve);
         let [axis, seen] = curve.admittance.axes();
         if axis == seen {
@@ -28,12 +26,19 @@ pub fn words(peer: &str, curves: &[Curve]) -> String {
         } else {
             text.push('\n');
         }
-        let _ = writeln!(text, "  {}", verdict(curve));
+        verdicts(curve).iter().for_each(|line| text.push_str(&format!("  {line}\n")));
         for note in curve.notes() {
             let _ = writeln!(text, "  note: {note}");
         }
     }
     text
+}
+
+/// Returns what a curve shows, in words.
+pub(super) fn subject(peer: &str, curve: &Curve) -> String {
+    let AdmittanceWords { what, free, inertia, .. } = curve.words();
+    let mass = cohaptic_units::print::Number(curve.mass);
+    format!("{what} at the device of {peer}, compared with that of a {free} of {mass} {inertia}")
 }
 
 fn table(text: &mut String, curve: &Curve) {
@@ -45,7 +50,7 @@ fn table(text: &mut String, curve: &Curve) {
 }
 
 /// Returns a frequency with five significant digits, without trailing zeros.
-fn significant(hz: f64) -> String {
+pub(super) fn significant(hz: f64) -> String {
     if !(1e-4..1e6).contains(&hz) {
         return format!("{hz:.4e}");
     }
@@ -60,19 +65,21 @@ fn units(curve: &Curve) -> [&'static str; 3] {
     if curve.admittance.axes()[0].is_turn() { ["N·m/rad", "N·m·s/rad", "kg·m²"] } else { ["N/m", "N·s/m", "kg"] }
 }
 
-/// Adds the lines about the feeling of a slow hand. The spring is listed only if the object is tied to the ground.
+/// Adds the lines about the feeling of a slow hand.
 fn felt(text: &mut String, curve: &Curve) {
+    for (what, size) in felt_sizes(curve) {
+        let _ = writeln!(text, "    {:<16}{size}", format!("{what} of"));
+    }
+}
+
+/// Returns what a slow hand feels: names, each with a size in words. The spring is listed only if the object is tied to the ground.
+pub(super) fn felt_sizes(curve: &Curve) -> Vec<(&'static str, String)> {
     let fit = curve.fit;
     let [spring, viscosity, inertia] = units(curve);
     let tied = fit.stiffness.value != 0.0 || fit.stiffness.error != 0.0;
-    let rows = [
-        ("a spring of", fit.stiffness, spring, tied),
-        ("a viscosity of", fit.viscosity, viscosity, true),
-        ("an inertia of", fit.inertia, inertia, true),
-    ];
-    for (what, estimate, unit, _) in rows.into_iter().filter(|(.., shown)| *shown) {
-        let _ = writeln!(text, "    {what:<16}{}", limit(estimate, unit));
-    }
+    let rows =
+        [("a spring", fit.stiffness, spring, tied), ("a viscosity", fit.viscosity, viscosity, true), ("an inertia", fit.inertia, inertia, true)];
+    rows.into_iter().filter(|(.., shown)| *shown).map(|(what, estimate, unit, _)| (what, limit(estimate, unit))).collect()
 }
 
 fn limit(Estimate { value, error }: Estimate, unit: &str) -> String {
@@ -89,19 +96,23 @@ fn shown(verdict: Verdict) -> &'static str {
     }
 }
 
-fn verdict(curve: &Curve) -> String {
+/// Returns the verdict on the scene, one line per radius.
+pub(super) fn verdicts(curve: &Curve) -> Vec<String> {
     let radius = curve.admittance.radius();
     let word = shown(radius.verdict());
     let nominal = format!("spectral radius {} +- {:.1e}", figure(radius.value, 12), radius.error);
     match &curve.chance {
-        None => format!("the scene is {word}: {nominal}"),
-        Some(Err(_)) => format!("with nothing left to chance the scene is {word}: {nominal}"),
-        Some(Ok(moment)) => format!(
-            "in the mean square the scene is {}: mean-square radius {} +- {:.1e}\n  with nothing left to chance it is {word}: {nominal}",
-            shown(moment.verdict()),
-            figure(moment.radius.value, 12),
-            moment.radius.error
-        ),
+        None => vec![format!("the scene is {word}: {nominal}")],
+        Some(Err(_)) => vec![format!("with nothing left to chance the scene is {word}: {nominal}")],
+        Some(Ok(moment)) => vec![
+            format!(
+                "in the mean square the scene is {}: mean-square radius {} +- {:.1e}",
+                shown(moment.verdict()),
+                figure(moment.radius.value, 12),
+                moment.radius.error
+            ),
+            format!("with nothing left to chance it is {word}: {nominal}"),
+        ],
     }
 }
 

@@ -1,6 +1,7 @@
 //! The answers of a search along a key: document, words and tables of a boundary of stability.
 
 mod document;
+mod page;
 mod tables;
 mod words;
 
@@ -8,6 +9,7 @@ use cohaptic_stability::{Boundary, BoundaryOptions, Cell, Family, KeyRange, Kind
 
 use crate::nominal;
 pub use document::document;
+pub use page::html;
 pub use tables::{crossings_csv, samples_csv};
 pub use words::words;
 

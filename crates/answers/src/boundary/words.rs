@@ -1,6 +1,6 @@
 //! The text about a boundary.
 
-use cohaptic_stability::{VerdictKind, nominal_head};
+use cohaptic_stability::{Crossing, VerdictKind, nominal_head};
 use cohaptic_units::print::Counted;
 
 use super::Searched;
@@ -9,10 +9,21 @@ use crate::crossing_in_words;
 /// Returns the text about a boundary. `is_ended`: whether the user stopped the search.
 #[must_use]
 pub fn words(searched: &Searched<'_>, is_ended: bool) -> String {
+    let notes = searched.notes().into_iter().map(|note| format!("note: {note}"));
+    let mut text = format!("{}\n\n", searched.title);
+    for line in verdicts(searched, |value| value).into_iter().chain(limits(searched, is_ended)).chain(notes) {
+        text.push_str(&format!("  {line}\n"));
+    }
+    text
+}
+
+/// Returns a line for the verdict at the lower end, for each crossing, and for each stretch without a verdict. `rounded` rounds the values of
+/// the crossings.
+pub(super) fn verdicts(searched: &Searched<'_>, rounded: fn(f64) -> f64) -> Vec<String> {
     let found = searched.found;
     let range = searched.range;
-    let mut text = format!("{}\n\n", searched.title);
-    let mut line = |line: String| text.push_str(&format!("  {line}\n"));
+    let mut lines = Vec::new();
+    let mut line = |line: String| lines.push(line);
     let kinds = searched.kinds();
     // If the values are of several kinds, the first line has the kind of the value at the lower end.
     let lowest = found.known.iter().min_by(|one, other| one.0.total_cmp(&other.0)).map(|(_, cell)| searched.family.criterion().kind(cell.is_nominal));
@@ -23,7 +34,7 @@ pub fn words(searched: &Searched<'_>, is_ended: bool) -> String {
     }
     line(format!("{} from {}", kind.says(found.first.word()), range.text(range.low)));
     for crossing in &found.crossings {
-        line(crossing_in_words(range, crossing));
+        line(crossing_in_words(range, &Crossing { value: rounded(crossing.value), ..*crossing }));
     }
     if found.crossings.is_empty() {
         line(format!("no crossing up to {}", range.text(range.high)));
@@ -36,7 +47,15 @@ pub fn words(searched: &Searched<'_>, is_ended: bool) -> String {
             line(format!("touches 1, or comes closer than can be told, at {}", range.text(stretch.low)));
         }
     }
-    let unit = &range.unit;
+    lines
+}
+
+/// Returns a line about the resolution of the search, and a second line if the search ended before the resolution was reached.
+pub(super) fn limits(searched: &Searched<'_>, is_ended: bool) -> Vec<String> {
+    let found = searched.found;
+    let mut lines = Vec::new();
+    let mut line = |line: String| lines.push(line);
+    let unit = &searched.range.unit;
     line(format!(
         "{} looked at, {:.3e}{unit} to {:.3e}{unit} apart; crossings to {:.1e}{unit}. What comes and goes between two of them without a trace is not seen",
         Counted(found.samples, "value"),
@@ -53,6 +72,5 @@ pub fn words(searched: &Searched<'_>, is_ended: bool) -> String {
                 .to_owned()
         });
     }
-    searched.notes().iter().for_each(|note| line(format!("note: {note}")));
-    text
+    lines
 }

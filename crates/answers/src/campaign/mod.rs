@@ -2,6 +2,7 @@
 
 mod document;
 mod judge;
+mod page;
 mod pictures;
 mod words;
 
@@ -9,6 +10,7 @@ use cohaptic_campaign::{CampaignPlan, Report};
 
 pub use document::document;
 pub use judge::{ByAnalysis, notes};
+pub use page::html;
 pub(crate) use pictures::Along;
 pub use pictures::{Drawn, pictures};
 pub use words::words;

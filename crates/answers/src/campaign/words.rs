@@ -15,13 +15,12 @@ const MOST_COMBINATIONS: usize = 20;
 #[must_use]
 pub fn words(finished: &Finished, wall_s: f64) -> String {
     let Finished { plan, title, report, notes } = finished;
-    let (combinations, each) = (plan.combinations(), plan.runs_of_each());
     let mut text = format!("{title}\n");
     // Writing to a string cannot fail.
     let mut line = |line: &str| {
         let _ = writeln!(text, "{line}");
     };
-    line(&format!("  {} of {}, {each} of each", Counted(report.runs, "run"), Counted(combinations, "combination")));
+    line(&format!("  {}", amount(finished)));
     if report.computed == 0 {
         line("  all of them were there already: nothing was run");
     } else {
@@ -29,14 +28,7 @@ pub fn words(finished: &Finished, wall_s: f64) -> String {
         let kept = if before > 0 { format!(", {before} {} there already", if before == 1 { "was" } else { "were" }) } else { String::new() };
         line(&format!("  {} run in {wall_s:.3} s: {:.0} a second{kept}", report.computed, finished.runs_per_s(wall_s)));
     }
-    match report.worst() {
-        Some(CombinationReport { largest_discrepancy: Some(largest), worst_run: Some(run), .. }) => {
-            let others = if report.diverged() > 0 { " of the others" } else { "" };
-            line(&format!("  {} diverged; the largest discrepancy{others} is {}, in run {run}", report.diverged(), length(*largest)));
-        }
-        // `worst` is `None` only if no run came to its end.
-        Some(_) | None => line(&format!("  all {} diverged", report.runs)),
-    }
+    line(&format!("  {}", outcome(finished)));
     if !plan.variations().is_empty() || !report.judgements.is_empty() {
         line("");
         table(finished).iter().for_each(|row| line(row));
@@ -48,24 +40,47 @@ pub fn words(finished: &Finished, wall_s: f64) -> String {
     text
 }
 
+/// Returns the numbers of runs and combinations, in words.
+pub(super) fn amount(Finished { plan, report, .. }: &Finished) -> String {
+    format!("{} of {}, {} of each", Counted(report.runs, "run"), Counted(plan.combinations(), "combination"), plan.runs_of_each())
+}
+
+/// Returns the number of diverged runs and the largest discrepancy of the others, in words.
+pub(super) fn outcome(Finished { report, .. }: &Finished) -> String {
+    match report.worst() {
+        Some(CombinationReport { largest_discrepancy: Some(largest), worst_run: Some(run), .. }) => {
+            let others = if report.diverged() > 0 { " of the others" } else { "" };
+            format!("{} diverged; the largest discrepancy{others} is {}, in run {run}", report.diverged(), length(*largest))
+        }
+        // `worst` is `None` only if no run came to its end.
+        Some(_) | None => format!("all {} diverged", report.runs),
+    }
+}
+
 /// Returns the rows of a text table with aligned columns: a head, then a row per combination with its values and figures.
 fn table(finished: &Finished) -> Vec<String> {
+    let rows = cells(finished, MOST_COMBINATIONS);
+    // Characters and not bytes, because keys and names may be in any script.
+    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..rows[0].len()).map(width).collect();
+    rows.iter().map(|row| row.iter().zip(&widths).map(|(cell, width)| format!("  {cell:>width$}")).collect()).collect()
+}
+
+/// Returns the cells of a table: a head, then a row for each of the first `most` combinations with its values and figures.
+pub(super) fn cells(finished: &Finished, most: usize) -> Vec<Vec<String>> {
     let keys: Vec<String> = finished.plan.variations().iter().map(|vary| vary.key().to_owned()).collect();
     let judgements = &finished.report.judgements;
     let heads: &[&str] = if judgements.is_empty() { &[] } else { &["verdict", "judged", "radius"] };
     let heads = heads.iter().chain(&["diverged", "mean discrepancy", "largest"]).map(|head| (*head).to_owned());
     let mut rows: Vec<Vec<String>> = vec![keys.iter().cloned().chain(heads).collect()];
-    for (number, combination) in finished.report.combinations.iter().enumerate().take(MOST_COMBINATIONS) {
+    for (number, combination) in finished.report.combinations.iter().enumerate().take(most) {
         let places = finished.plan.places(number as u64);
         let values = finished.plan.variations().iter().zip(places).map(|(vary, place)| vary.value_text(place).to_owned());
         let metres = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), length);
         let figures = [combination.diverged.to_string(), metres(combination.mean_discrepancy), metres(combination.largest_discrepancy)];
         rows.push(values.chain(judgements.get(number).into_iter().flat_map(judged)).chain(figures).collect());
     }
-    // Characters and not bytes, because keys and names may be in any script.
-    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
-    let widths: Vec<usize> = (0..rows[0].len()).map(width).collect();
-    rows.iter().map(|row| row.iter().zip(&widths).map(|(cell, width)| format!("  {cell:>width$}")).collect()).collect()
+    rows
 }
 
 /// Returns the cells of a judgement: verdict, kind and radius, or dashes.

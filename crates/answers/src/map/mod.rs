@@ -2,6 +2,7 @@
 
 mod document;
 mod glance;
+mod page;
 mod words;
 
 use cohaptic_stability::{Criterion, KeyRange, Kinds, Map, Verdict, VerdictKind};
@@ -9,6 +10,7 @@ use cohaptic_units::print::csv_field;
 
 use crate::nominal;
 pub use document::document;
+pub use page::html;
 pub use words::words;
 
 /// Maps of one scene over the same keys.
@@ -75,11 +77,25 @@ impl VariantMap {
         Kinds::of(self.criterion, self.map.nominal.iter().flatten().copied())
     }
 
+    /// Returns the verdicts of the cells of a kind.
+    fn verdicts_of(&self, kind: VerdictKind) -> impl Iterator<Item = Verdict> {
+        let all = self.verdicts.iter().flatten().zip(self.map.nominal.iter().flatten());
+        all.filter(move |(_, nominal)| self.criterion.kind(**nominal) == kind).map(|(verdict, _)| *verdict)
+    }
+
     /// Returns the share of stable cells among the cells of a kind.
     fn stable_fraction_of(&self, kind: VerdictKind) -> f64 {
-        let all = self.verdicts.iter().flatten().zip(self.map.nominal.iter().flatten());
-        let of_kind: Vec<Verdict> = all.filter(|(_, nominal)| self.criterion.kind(**nominal) == kind).map(|(verdict, _)| *verdict).collect();
-        share(of_kind.iter().filter(|verdict| **verdict == Verdict::Stable).count(), of_kind.len())
+        share(self.verdicts_of(kind).filter(|verdict| *verdict == Verdict::Stable).count(), self.verdicts_of(kind).count())
+    }
+
+    /// Returns the least finite radius of the cells of a kind, with the values of x and y there; `None` if no radius is finite.
+    fn least(&self, kind: VerdictKind) -> Option<[f64; 3]> {
+        let rows = self.map.y.iter().zip(self.map.radius.iter().zip(&self.map.nominal));
+        let cells = rows.flat_map(|(y, (row, nominal))| self.map.x.iter().zip(row.iter().zip(nominal)).map(move |(x, cell)| (*x, *y, cell)));
+        // The radii of an overflow are not finite and have no least.
+        let of_kind = cells.filter(|(_, _, (radius, nominal))| radius.is_finite() && self.criterion.kind(**nominal) == kind);
+        let least = of_kind.min_by(|(_, _, (one, _)), (_, _, (other, _))| one.total_cmp(other));
+        least.map(|(x, y, (radius, _))| [*radius, x, y])
     }
 
     /// Returns the share of stable cells among all cells.

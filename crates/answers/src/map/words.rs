@@ -27,7 +27,7 @@ pub fn words(filled: &Filled<'_>, speed: Speed, pictures: bool) -> String {
             let shown = (glance::Axis { label: &x, values: &map.map.x }, glance::Axis { label: &y, values: &map.map.y });
             text.push_str(&glance::draw(&shown.0, &shown.1, |column, row| map.verdicts[row][column] == Verdict::Stable));
         }
-        text.push_str(&headline(axes, map));
+        headlines(axes, map, |value| value).iter().for_each(|line| text.push_str(&format!("  {line}\n")));
     }
     let _ = writeln!(text, "\n{} computed in {:.3} s: {:.0} a second", Counted(speed.cells, "cell"), speed.wall_s, speed.cells_per_s());
     for note in filled.notes() {
@@ -37,12 +37,13 @@ pub fn words(filled: &Filled<'_>, speed: Speed, pictures: bool) -> String {
 }
 
 /// Returns a line with the share of stable cells per kind of verdict. A share over cells of several kinds would answer no question.
-fn headline(axes: [&KeyRange; 2], map: &VariantMap) -> String {
+/// `rounded` rounds the values of the keys.
+pub(super) fn headlines(axes: [&KeyRange; 2], map: &VariantMap, rounded: fn(f64) -> f64) -> Vec<String> {
     let is_mixed = map.kinds().only().is_none();
     let line = |(kind, count): (VerdictKind, usize)| {
         let cells = if is_mixed { format!("{} judged {} {}", Counted(count, "cell"), kind.manner(), verb(count)) } else { are(count, "cell") };
         let head = if kind == VerdictKind::Nominal { format!("{}: ", nominal_head(&map.left_out)) } else { String::new() };
-        format!("  {head}{:.2} % of {cells} {}{}\n", 100.0 * map.stable_fraction_of(kind), kind.says("stable"), least(axes, map, kind))
+        format!("{head}{:.2} % of {cells} {}{}", 100.0 * map.stable_fraction_of(kind), kind.says("stable"), least(axes, map, kind, rounded))
     };
     map.kinds().present().map(line).collect()
 }
@@ -51,15 +52,9 @@ const fn verb(count: usize) -> &'static str {
     if count == 1 { "is" } else { "are" }
 }
 
-/// Returns the least radius of the cells of a kind, and its place; empty if no radius is finite.
-fn least([x_range, y_range]: [&KeyRange; 2], VariantMap { map, criterion, .. }: &VariantMap, kind: VerdictKind) -> String {
-    let rows = map.y.iter().zip(map.radius.iter().zip(&map.nominal));
-    let cells =
-        rows.flat_map(|(y, (row, nominal))| map.x.iter().zip(row.iter().zip(nominal)).map(move |(x, (radius, nominal))| (*radius, *x, *y, *nominal)));
-    // The radii of an overflow are not finite and have no least.
-    let of_kind = cells.filter(|(radius, _, _, nominal)| radius.is_finite() && criterion.kind(*nominal) == kind);
-    let least = of_kind.min_by(|one, other| one.0.total_cmp(&other.0));
-    least.map_or_else(String::new, |(radius, x, y, _)| {
-        format!("; the least {} is {}, at {} and {}", kind.radius_name(), figure(radius, 6), x_range.text(x), y_range.text(y))
+/// Returns the least radius of the cells of a kind and its place, in words; empty if no radius is finite.
+fn least([x_range, y_range]: [&KeyRange; 2], map: &VariantMap, kind: VerdictKind, rounded: fn(f64) -> f64) -> String {
+    map.least(kind).map_or_else(String::new, |[radius, x, y]| {
+        format!("; the least {} is {}, at {} and {}", kind.radius_name(), figure(radius, 6), x_range.text(rounded(x)), y_range.text(rounded(y)))
     })
 }

@@ -119,8 +119,9 @@ impl CampaignPlan {
         Self { fallback: Some(fallback), ..self }
     }
 
-    /// Returns the file of the scene.
-    pub(crate) fn file(&self) -> &Path {
+    /// Returns the file of the scene, for messages.
+    #[must_use]
+    pub fn file(&self) -> &Path {
         &self.file
     }
 
@@ -226,7 +227,9 @@ impl CampaignPlan {
         Ok(scene)
     }
 
-    pub(crate) const fn format(&self) -> Format {
+    /// Returns the format of the table.
+    #[must_use]
+    pub const fn format(&self) -> Format {
         self.format
     }
 
@@ -234,11 +237,15 @@ impl CampaignPlan {
         &self.program
     }
 
-    pub(crate) fn text(&self) -> &str {
+    /// Returns the text of the scene.
+    #[must_use]
+    pub fn text(&self) -> &str {
         &self.text
     }
 
-    pub(crate) fn set(&self) -> &[String] {
+    /// Returns the overrides `KEY=VALUE` of every run.
+    #[must_use]
+    pub fn set(&self) -> &[String] {
         &self.set
     }
 

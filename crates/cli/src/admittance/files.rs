@@ -1,26 +1,52 @@
-//! The files that `cohaptic admittance --out` writes: one table of all curves, and one Bode plot of all curves.
+//! The files that `cohaptic admittance --out` writes: one table and one Bode plot of all curves, and the page.
 
 use std::path::Path;
 
-use cohaptic_answers::admittance::{Curve, csv};
+use cohaptic_answers::admittance::{Curve, csv, html};
+use cohaptic_answers::page::Origin;
 use cohaptic_answers::{AdmittanceCurve, admittance_picture};
-use cohaptic_picture::Size;
+use cohaptic_stability::PushedAxis;
 
+use crate::arguments::AdmittanceArguments;
 use crate::failure::Failure;
 use crate::file::write_into;
+use crate::shell::CommandLine;
+use crate::{input, output};
 
-/// Writes `admittance.csv` and, if `is_whole`, `admittance.svg` into `folder`, and returns the paths of the written files.
+/// Writes `admittance.csv` and, if `is_whole`, `admittance.svg` and `admittance.html` into `folder`, and returns the paths of the written files.
 ///
-/// An interrupted analysis gets only the table: drawing the picture takes longer than users wait after Ctrl-C.
-pub(super) fn write(folder: &Path, peer: &str, curves: &[Curve], is_whole: bool, size: Size) -> Result<Vec<String>, Failure> {
+/// An interrupted analysis gets only the table: drawing the picture takes longer than users wait after Ctrl-C. `text`: text of the scene.
+pub(super) fn write(folder: &Path, arguments: &AdmittanceArguments, text: &str, curves: &[Curve], is_whole: bool) -> Result<Vec<String>, Failure> {
     let mut written = vec![write_into(folder, "admittance.csv", csv(curves))?];
     if is_whole {
         let title = curves.first().map_or("", |curve| curve.title.as_str());
         let named: Vec<AdmittanceCurve<'_>> =
             curves.iter().map(|Curve { name, admittance, response, .. }| AdmittanceCurve { name, admittance, response }).collect();
-        let picture = admittance_picture(title, peer, &named);
+        let picture = admittance_picture(title, &arguments.peer, &named);
         let picture = picture.map_err(|error| Failure::Input(error.to_string()))?;
-        written.push(write_into(folder, "admittance.svg", picture.size(size).svg())?);
+        let svg = picture.size(arguments.pictures.size()).svg();
+        written.push(write_into(folder, "admittance.svg", &svg)?);
+        written.push(write_into(folder, "admittance.html", page(arguments, text, curves, &svg))?);
     }
     Ok(written)
+}
+
+/// Returns the page of the curves with their picture.
+fn page(arguments: &AdmittanceArguments, scene: &str, curves: &[Curve], svg: &str) -> String {
+    let (file, overrides) = (&arguments.scene.scene, &arguments.scene.overrides.set);
+    let frequencies: Vec<String> = arguments.at.iter().map(f64::to_string).collect();
+    let command = CommandLine::new("admittance", file, overrides)
+        .option("--peer", [&arguments.peer])
+        .option("--axis", arguments.axis.map(|axis| PushedAxis::from(axis).word()))
+        .option("--seen", arguments.seen.map(|axis| PushedAxis::from(axis).word()))
+        .option("--from", arguments.from)
+        .option("--to", arguments.to)
+        .option("--points", arguments.points)
+        .option("--at", (!frequencies.is_empty()).then(|| frequencies.join(",")))
+        .option("--curve", &arguments.curve)
+        .out()
+        .option("--size", arguments.pictures.word())
+        .text();
+    let file = output::path(input::named(file));
+    html(&arguments.peer, curves, &Origin { command: &command, file: &file, overrides, scene, pictures: &[("admittance.svg", svg)] })
 }

@@ -15,12 +15,14 @@ use crate::arguments::AdmittanceArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
 use crate::file::own_folder;
-use crate::output;
+use crate::{input, output};
 
 /// Computes the admittance of one peer for the scene and for each `--curve`, and writes the answer.
 ///
 /// An interrupted analysis still answers with the points finished so far; the returned failure then gives their number.
 pub(crate) fn admittance(arguments: &AdmittanceArguments) -> Result<ExitCode, Failure> {
+    // The text is read before the analysis, which may take long, so that the page shows the scene that was analysed.
+    let text = input::text(&arguments.scene.scene)?;
     let watch = AnalysisWatch::new(arguments.memory);
     let subjects = curve::subjects(arguments, &watch);
     if subjects.is_err() {
@@ -45,7 +47,7 @@ pub(crate) fn admittance(arguments: &AdmittanceArguments) -> Result<ExitCode, Fa
     }
     // Files are written only after every curve has been computed without an error.
     let files = match &arguments.out {
-        Some(folder) => files::write(folder, &arguments.peer, &curves, !is_interrupted, arguments.pictures.size())?,
+        Some(folder) => files::write(folder, arguments, &text, &curves, !is_interrupted)?,
         None => Vec::new(),
     };
     output::answer(

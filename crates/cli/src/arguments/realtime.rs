@@ -67,8 +67,8 @@ pub(crate) struct LiveArguments {
     /// The firmware for Falcons that have none yet (docs/falcon.md)
     #[arg(long, value_name = "FILE")]
     pub(crate) firmware: Option<PathBuf>,
-    /// Write the files of run --out into this folder, and inputs.csv (all that came from outside: run --inputs replays it), releases.csv and
-    /// lateness.csv
+    /// Write the files of run --out into this folder, and inputs.csv (all that came from outside: run --inputs replays it), releases.csv,
+    /// lateness.csv and live.html, a page of all
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 }

@@ -108,7 +108,8 @@ pub(crate) struct CampaignArguments {
     pub(crate) runs: u64,
     #[command(flatten)]
     pub(crate) measure: MeasureArguments,
-    /// The folder of the campaign: the table, and until that is there the parts. The same command goes on from there
+    /// The folder of the campaign: the table, pictures and campaign.html, a page of all, and until these are there the parts. The same command goes on
+    /// from there
     #[arg(long, value_name = "DIR", required_unless_present_any = ["merge", "status"])]
     pub(crate) out: Option<PathBuf>,
     #[command(flatten)]
@@ -125,7 +126,7 @@ pub(crate) struct CampaignArguments {
     /// How many runs are kept together, the most that a kill costs each thread [default: some seconds' worth]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<NonZeroU64>(1, u64::MAX))]
     pub(crate) part: Option<NonZeroU64>,
-    /// Do not draw pictures
+    /// Do not draw pictures, and do not write campaign.html
     #[arg(long)]
     pub(crate) no_plot: bool,
     #[command(flatten)]

@@ -181,7 +181,7 @@ pub(crate) struct MapArguments {
     /// Another map in the same picture, with this key overridden too; said again, all for the same map
     #[arg(long, value_name = "KEY=VALUE")]
     pub(crate) against: Vec<String>,
-    /// Write map.csv, map-2.csv ... and map.svg into this folder, and keep the finished part there if it is interrupted
+    /// Write map.csv, map-2.csv ..., map.svg and map.html, a page of all, into this folder, and keep the finished part there if it is interrupted
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     #[command(flatten)]
@@ -214,15 +214,21 @@ pub(crate) struct BoundaryArguments {
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<usize>(0, u64::MAX))]
     pub(crate) samples: Option<usize>,
     /// How many values are looked at at most; the answer then says that it is not settled
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<usize>(2, u64::MAX), default_value_t = 100_000, conflicts_with = "prove")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<usize>(2, u64::MAX), default_value_t = BoundaryArguments::VALUES, conflicts_with = "prove")]
     pub(crate) values: usize,
-    /// Write boundary.csv, samples.csv and boundary.svg into this folder, and keep the finished part there if it is interrupted
+    /// Write boundary.csv, samples.csv, boundary.svg and boundary.html, a page of all, into this folder, and keep the finished part there if it is
+    /// interrupted
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) shards: ShardArguments,
     #[command(flatten)]
     pub(crate) pictures: PictureArguments,
+}
+
+impl BoundaryArguments {
+    /// How many values are looked at at most, unless it is said.
+    pub(crate) const VALUES: usize = 100_000;
 }
 
 /// How many cells a map has along each axis.
@@ -290,7 +296,7 @@ pub(crate) struct AdmittanceArguments {
     /// The most memory that the matrices of a part of the scene may take; what takes more is refused before it is begun
     #[arg(long, value_name = "SIZE", value_parser = memory, default_value = "8GiB")]
     pub(crate) memory: u64,
-    /// Write admittance.csv and a Bode plot, admittance.svg, into this folder
+    /// Write admittance.csv, a Bode plot, admittance.svg, and admittance.html, a page of all, into this folder
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     #[command(flatten)]

@@ -5,11 +5,12 @@ pub(crate) mod sharing;
 
 use std::io::Write as _;
 use std::num::NonZeroU64;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
 use cohaptic_answers::campaign::{ByAnalysis, Drawn, Finished, Written};
+use cohaptic_answers::page::Origin;
 use cohaptic_campaign::{
     Campaign, CampaignError, CampaignPlan, Format, Judge, Judgement, Outcome, PlanSpec, Report, SharedCampaign, Variation, Watch,
 };
@@ -22,6 +23,7 @@ use crate::failure::Failure;
 use crate::file::write_into;
 use crate::progress::Progress;
 use crate::shard::Sharing;
+use crate::shell::CommandLine;
 use crate::{input, interrupt, output, shard};
 
 /// Name and version of the program, which the folder of a campaign records.
@@ -56,16 +58,52 @@ pub(crate) fn campaign(arguments: &CampaignArguments) -> Result<ExitCode, Failur
     let mut files: Vec<String> = paths.iter().map(|file| output::path(file)).collect();
     if !arguments.no_plot {
         let Drawn { pictures, notes } = cohaptic_answers::campaign::pictures(&finished, arguments.pictures.size());
-        for (name, picture) in pictures {
-            files.push(write_into(out, name, picture.svg())?);
+        let pictures: Vec<(&str, String)> = pictures.into_iter().map(|(name, picture)| (name, picture.svg())).collect();
+        for (name, svg) in &pictures {
+            files.push(write_into(out, name, svg)?);
         }
         finished.notes.extend(notes);
+        files.push(write_into(out, "campaign.html", page(arguments, &finished, &pictures))?);
     }
     let written = Written { wall_s, out: output::path(out), files };
     let document = cohaptic_answers::campaign::document(&finished, Some(&written));
     let words = || cohaptic_answers::campaign::words(&finished, wall_s);
     output::answer(arguments.json, DocumentSchema::CAMPAIGN, &document, words, &written.files)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Returns the page of a campaign. Its command does the whole campaign, however many shards did the runs.
+fn page(arguments: &CampaignArguments, finished: &Finished, pictures: &[(&str, String)]) -> String {
+    let plan = &finished.plan;
+    // Without a scene on the command line, the folder of the campaign tells the path of the scene.
+    let scene = arguments.scene.clone().unwrap_or_else(|| shortened(plan.file()));
+    let command = CommandLine::new("campaign", &scene, plan.set())
+        .option("--vary", plan.variations().iter().map(Variation::text))
+        .option("--runs", [plan.runs_of_each()])
+        .flag("--verdicts", plan.has_verdicts())
+        .option("--format", (plan.format() == Format::Csv).then_some("csv"))
+        .out()
+        .option("--size", arguments.pictures.word())
+        .text();
+    let pictures: Vec<(&str, &str)> = pictures.iter().map(|(name, svg)| (*name, svg.as_str())).collect();
+    let file = output::path(input::named(&scene));
+    cohaptic_answers::campaign::html(
+        finished,
+        &Origin { command: &command, file: &file, overrides: plan.set(), scene: plan.text(), pictures: &pictures },
+    )
+}
+
+/// Returns a path in which no folder is entered and left again, such as `scenes/a.toml` for `out/../scenes/a.toml`.
+fn shortened(path: &Path) -> PathBuf {
+    path.components().fold(PathBuf::new(), |mut short, part| {
+        let leaves = part == Component::ParentDir && matches!(short.components().next_back(), Some(Component::Normal(_)));
+        if leaves {
+            short.pop();
+        } else {
+            short.push(part);
+        }
+        short
+    })
 }
 
 /// Does `work` on a new pool of `threads` threads. `None` stands for one thread per processor.

@@ -1,16 +1,14 @@
 //! Origin of the numbers in `compare.html`: the commands, the parameters of the strategies, and the scene.
 
 use cohaptic_answers::compare::{Finished, PageSource};
+use cohaptic_campaign::Variation;
 use cohaptic_scene::scene_content_of_text;
 
 use super::preset::Asked;
 use crate::arguments::{CompareArguments, TableFormat};
 use crate::failure::Failure;
 use crate::input;
-use crate::shell::{path, quoted};
-
-/// Placeholder for the output folder in commands, because the content of the page must not depend on the folder that the page is written to.
-const FOLDER: &str = "FOLDER";
+use crate::shell::CommandLine;
 
 /// Returns the origin of the numbers of a comparison. `scene` is the text of the scene.
 pub(super) fn source<'a>(arguments: &CompareArguments, finished: &Finished, scene: &'a str) -> Result<PageSource<'a>, Failure> {
@@ -44,24 +42,22 @@ fn strategies(arguments: &CompareArguments, finished: &Finished) -> Result<Vec<(
 
 /// Returns the command that makes this page.
 fn command_line(arguments: &CompareArguments) -> String {
-    let scene = &arguments.scene.scene;
-    let mut words = vec!["cohaptic compare".to_owned(), path(scene)];
-    words.extend(arguments.scene.overrides.set.iter().map(|key| format!("--set {}", quoted(key))));
-    words.extend(arguments.preset.iter().map(|_| "--preset field".to_owned()));
-    words.extend(arguments.strategies.iter().map(|strategies| format!("--strategies {}", quoted(strategies))));
-    words.extend(arguments.vary.iter().map(|key| format!("--vary {}", quoted(key))));
-    words.push(format!("--runs {} --out {FOLDER}", arguments.runs));
-    words.extend((arguments.format == TableFormat::Csv).then(|| "--format csv".to_owned()));
-    if input::is_standard_input(scene) {
-        words.push("< scene.toml".to_owned());
-    }
-    words.join(" ")
+    CommandLine::new("compare", &arguments.scene.scene, &arguments.scene.overrides.set)
+        .option("--preset", arguments.preset.map(|_| "field"))
+        .option("--strategies", &arguments.strategies)
+        .option("--vary", &arguments.vary)
+        .option("--runs", [arguments.runs])
+        .out()
+        .option("--format", (arguments.format == TableFormat::Csv).then_some("csv"))
+        .text()
 }
 
 /// Returns the command of the campaign that has the same table of runs as the comparison.
 fn campaign_line(arguments: &CompareArguments, finished: &Finished) -> String {
-    let set = arguments.scene.overrides.set.iter().map(|key| format!("--set {}", quoted(key)));
-    let vary = finished.plan.variations().iter().map(|key| format!("--vary {}", quoted(key.text())));
-    let words: Vec<String> = set.chain(vary).collect();
-    format!("cohaptic campaign {} {} --runs {} --measure all --out {FOLDER}", path(&arguments.scene.scene), words.join(" "), arguments.runs)
+    CommandLine::new("campaign", &arguments.scene.scene, &arguments.scene.overrides.set)
+        .option("--vary", finished.plan.variations().iter().map(Variation::text))
+        .option("--runs", [arguments.runs])
+        .option("--measure", ["all"])
+        .out()
+        .text()
 }

@@ -2,6 +2,7 @@
 
 mod answer;
 pub(crate) mod onlookers;
+mod page;
 
 use std::fmt::Write as _;
 use std::net::SocketAddr;
@@ -23,12 +24,14 @@ use cohaptic_units::print::{Counted, Span};
 use crate::arguments::LiveArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::{self, Failure, INTERRUPTED};
-use crate::file::own_folder;
+use crate::file::{own_folder, write_file};
 use crate::progress::Progress;
 use crate::realtime::{ControlFiles, KeyedLinks, LiveControl, loading, say};
+use crate::run::page::edits;
 use crate::{input, interrupt, output};
 use onlookers::SessionConductor;
 use onlookers::{Elapsed, Planned, TimedLinks};
+use page::Played;
 
 /// Runs a scene by the wall clock with the attached peers and prints the report; or writes a new session key (`--new-key`).
 pub(crate) fn live(arguments: &LiveArguments) -> Result<ExitCode, Failure> {
@@ -54,6 +57,8 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
         overrides.extend([format!("scene.duration={}", Span(length)), "expect={}".to_owned()]);
     }
     let overrides = overrides.as_slice();
+    // The text is read before the session, which may last long, so that the page shows the scene of the session.
+    let text = input::text(path)?;
     let scene = input::with(path, |text, file| Scene::parse_live(text, file, overrides))?;
     if scene.topology.is_some() {
         let message = "in a live session every peer sends to every other: expected a scene without [topology], or kind = \"full\"";
@@ -77,13 +82,19 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
     let editor =
         TimedLinks { links: KeyedLinks { keys, folder, files: ControlFiles::of(&arguments.real_time)?, changes }, planned, elapsed: elapsed.clone() };
     let content = input::with(path, |text, file| scene_content_of_text(text, file, overrides))?;
+    let timeline = edits(&content.keys);
     let _own = arguments.out.as_deref().map(own_folder).transpose()?;
     let session = open(arguments, &scene, content)?;
     let Some(session) = session else { return Ok(ExitCode::from(INTERRUPTED)) };
     announce(&scene, session.address(), arguments.key_file.is_some());
     let control = LiveControl::open(&arguments.real_time, onlookers::description(&scene, &pairs), Box::new(editor))?;
     let host = SessionConductor::new(control.look(), wanted, pairs, elapsed, scene.axes.count());
-    let report = conduct(&scene, session, host, &control)?;
+    let mut report = conduct(&scene, session, host, &control)?;
+    if let Some(folder) = &arguments.out {
+        let file = folder.join("live.html");
+        write_file(&file, page::html(arguments, path, &Played { scene: &scene, text: &text, overrides, timeline: &timeline }, &report))?;
+        report.files.push(file);
+    }
     if arguments.json {
         output::json(DocumentSchema::LIVE, &answer::of(&scene, &report))?;
     } else {

@@ -2,7 +2,7 @@
 
 pub(crate) mod answer;
 mod motion;
-mod page;
+pub(crate) mod page;
 mod replayed;
 
 use std::fmt::Write as _;
@@ -25,7 +25,7 @@ use crate::document_schema::DocumentSchema;
 use crate::failure::{self, Failure, INTERRUPTED};
 use crate::file::{own_folder, unwritten, write_file};
 use crate::progress::Progress;
-use crate::shell::{path, quoted};
+use crate::shell::CommandLine;
 use crate::{input, interrupt, output};
 use answer::describe;
 use motion::Places;
@@ -235,25 +235,17 @@ impl Observer for &mut Watch {
     }
 }
 
-/// Placeholder for the folder of the records in [`command_line`]. The content of records must not depend on their folder.
-const FOLDER: &str = "DIR";
-
 /// Returns the command that repeats a run, as a line for a shell, with the options that affect the records.
 fn command_line(arguments: &RunArguments) -> String {
-    let scene = &arguments.scene.scene;
-    let mut words = vec!["cohaptic run".to_owned(), path(scene)];
-    words.extend(arguments.scene.overrides.set.iter().map(|key| format!("--set {}", quoted(key))));
-    words.extend(arguments.seed.map(|seed| format!("--seed {seed}")));
-    words.extend(arguments.against.iter().map(|key| format!("--against {}", quoted(key))));
-    words.extend(arguments.measure.word().map(|names| format!("--measure {}", quoted(names))));
-    words.extend(arguments.inputs.as_deref().map(|file| format!("--inputs {}", path(file))));
-    words.extend(arguments.force.then(|| "--force".to_owned()));
-    words.extend(arguments.general.then(|| "--general".to_owned()));
     // `--motion`, `--links` and options of the terminal do not change the records and are left out.
-    words.push(format!("--out {FOLDER}"));
-    words.extend(arguments.pictures.word().map(|size| format!("--size {}", quoted(size))));
-    if input::is_standard_input(scene) {
-        words.push("< scene.toml".to_owned());
-    }
-    words.join(" ")
+    CommandLine::new("run", &arguments.scene.scene, &arguments.scene.overrides.set)
+        .option("--seed", arguments.seed)
+        .option("--against", &arguments.against)
+        .option("--measure", arguments.measure.word())
+        .option("--inputs", arguments.inputs.as_deref().map(output::path))
+        .flag("--force", arguments.force)
+        .flag("--general", arguments.general)
+        .out()
+        .option("--size", arguments.pictures.word())
+        .text()
 }

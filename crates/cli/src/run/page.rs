@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use cohaptic_answers::OutcomeDocument;
+use cohaptic_answers::page::{self, MOST_ROWS, made_by, more_rows, scene_text};
 use cohaptic_harness::check::Outcome;
 use cohaptic_harness::measures::MeasuredValue;
 use cohaptic_harness::{Ending, Summary};
@@ -18,9 +19,6 @@ use crate::expectations::{BARS, cells, columns};
 use crate::failure::Failure;
 use crate::{input, output};
 
-/// Largest number of rows of a table on the page. Further rows stand only in the files of the folder.
-const MOST_ROWS: usize = 400;
-
 /// Returns the page as HTML. The text depends only on the scene and on the command line, so that equal runs give equal bytes.
 pub(super) fn html(
     arguments: &RunArguments,
@@ -34,7 +32,7 @@ pub(super) fn html(
     let text = input::text(path)?;
     let content = input::with(path, |text, file| scene_content_of_text(text, file, overrides))?;
     let mut page = Page::new(scene.title.as_str()).with(ending(scene, summary)).with(Html::facts(facts(arguments, scene, overrides, summary)));
-    page = page.with(Html::heading(2, "Made by")).with(Html::preformatted(&command_line(arguments)));
+    page = page.with(made_by(&command_line(arguments)));
     page = page.with(expectations(scene, outcomes)).with(measures(scene, measured)).with(Html::heading(2, "Pictures"));
     for (file, svg) in pictures {
         page = page.with(Html::figure(file, Html::picture(svg)));
@@ -44,9 +42,7 @@ pub(super) fn html(
     if !edits.is_empty() {
         page = page.with(Html::heading(2, "Timeline")).with(Html::table(&edits));
     }
-    let said = "The file as it was read; overrides are not in it.";
-    page = page.with(Html::heading(2, "Scene")).with(Html::details("The text of the scene", Html::paragraph(said).and(Html::preformatted(&text))));
-    Ok(page.html())
+    Ok(page.with(scene_text(&text)).html())
 }
 
 /// Returns a warning if the run diverged or was interrupted, otherwise nothing.
@@ -69,10 +65,7 @@ fn facts<'a>(arguments: &RunArguments, scene: &Scene, overrides: &[String], summ
     if let Some(angle) = summary.max_rotation_discrepancy {
         facts.insert(2, ("Largest angle between two copies", angle_text(angle).into()));
     }
-    if !overrides.is_empty() {
-        let keys = overrides.iter().map(|key| Html::code(key));
-        facts.push(("Overrides", keys.reduce(|before, key| before.and(", ").and(key)).unwrap_or_default()));
-    }
+    facts.extend(page::overrides(overrides));
     facts
 }
 
@@ -92,7 +85,8 @@ fn expectations(scene: &Scene, outcomes: &[Outcome]) -> Html {
     content
 }
 
-fn measures(scene: &Scene, measured: &[MeasuredValue]) -> Html {
+/// Returns the section of measures; empty if the scene measures nothing.
+pub(crate) fn measures(scene: &Scene, measured: &[MeasuredValue]) -> Html {
     if measured.is_empty() {
         return Html::default();
     }
@@ -104,7 +98,8 @@ fn measures(scene: &Scene, measured: &[MeasuredValue]) -> Html {
     Html::heading(2, "Measures").and(Html::table(&table))
 }
 
-fn peers(scene: &Scene, summary: &Summary) -> Html {
+/// Returns the table of the peers at the end of the run.
+pub(crate) fn peers(scene: &Scene, summary: &Summary) -> Html {
     let axes = ["x", "y", "z"].into_iter().take(scene.axes.count());
     let head = axes.clone().fold(Table::new().column("peer"), |table, axis| table.number(format!("{axis} at the end [mm]")));
     let head = axes.fold(head, |table, axis| table.number(format!("velocity along {axis} [mm/s]")));
@@ -115,10 +110,11 @@ fn peers(scene: &Scene, summary: &Summary) -> Html {
         let counts = [peer.stale_samples, peer.refused_samples].map(|count| Html::text(&count.to_string()));
         table.row(std::iter::once(Html::text(&peer.name)).chain(motion).chain(counts))
     });
-    Html::table(&shown).and(more(summary.peers.len() as u64, "peers", "trajectory.csv"))
+    Html::table(&shown).and(more_rows(summary.peers.len() as u64, "peers", "trajectory.csv"))
 }
 
-fn links(summary: &Summary) -> Html {
+/// Returns the table of the links and access lines at the end of the run.
+pub(crate) fn links(summary: &Summary) -> Html {
     let name = |peer: usize| &summary.peers[peer].name;
     let access = summary.access_lines.iter().map(|line| {
         let link = if line.uplink { LinkName::uplink(name(line.peer)) } else { LinkName::downlink(name(line.peer)) };
@@ -139,11 +135,7 @@ fn links(summary: &Summary) -> Html {
         let cells = counts.chain([stats.in_flight()]).map(|count| count.to_string()).chain([delay]);
         table.row(std::iter::once(link.as_str().to_owned()).chain(cells).map(|cell| Html::text(&cell)))
     });
-    Html::table(&table).and(more(summary.links.len() + summary.access_lines.len() as u64, "links", "links.csv"))
-}
-
-fn more(rows: u64, what: &str, file: &str) -> Html {
-    if rows > MOST_ROWS as u64 { Html::paragraph(format!("{MOST_ROWS} of {rows} {what} are shown; {file} has all.")) } else { Html::default() }
+    Html::table(&table).and(more_rows(summary.links.len() + summary.access_lines.len() as u64, "links", "links.csv"))
 }
 
 /// Formats a number with three decimals, or with a power of ten if its magnitude is below 0.001 or at least 10⁷.
@@ -152,7 +144,7 @@ fn number(value: f64) -> String {
 }
 
 /// Returns the table of the changes during the run, taken from keys of the scene such as `timeline.0.set.loss`.
-fn edits(keys: &BTreeMap<String, String>) -> Table {
+pub(crate) fn edits(keys: &BTreeMap<String, String>) -> Table {
     let mut changes: BTreeMap<usize, (String, Vec<String>)> = BTreeMap::new();
     for (key, value) in keys {
         let Some((number, key)) = key.strip_prefix("timeline.").and_then(|rest| rest.split_once('.')) else { continue };

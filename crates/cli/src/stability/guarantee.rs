@@ -52,14 +52,13 @@ pub(super) fn failure(error: ProofError, option: &str, scene: &Path, family: imp
 
 /// Returns the failure of an interrupted proof. The verdicts found before the interruption hold.
 pub(super) fn ended() -> Failure {
-    Failure::Interrupted("the proof was ended; pieces that it had not looked at are undecided, all others hold".to_owned())
+    Failure::Interrupted(UNFINISHED.to_owned())
 }
 
-/// Returns the note about `pieces` pieces that have a verdict but no certificate; empty for no such piece.
-pub(super) fn left_open(pieces: usize) -> String {
-    if pieces == 0 {
-        String::new()
-    } else {
-        format!("    note: the certificate leaves open {} of those that are decided here\n", Counted(pieces, "piece"))
-    }
+/// Returns the note about `pieces` pieces that have a verdict but no certificate; `None` for no such piece.
+pub(super) fn left_open(pieces: usize) -> Option<String> {
+    (pieces > 0).then(|| format!("the certificate leaves open {} of those that are decided here", Counted(pieces, "piece")))
 }
+
+/// What is said of a proof that was ended before all pieces were looked at.
+pub(super) const UNFINISHED: &str = "the proof was ended; pieces that it had not looked at are undecided, all others hold";

@@ -83,8 +83,8 @@ fn several_curves_are_laid_over_each_other() {
     // For two peers both strategies are the same.
     assert_eq!((&document["curves"][0]["points"], &document["curves"][1]["points"]), (&document["points"], &alone["points"]));
     assert_eq!(document["curves"][1]["name"], "link.delay=24ms, coordination.stiffness=200");
-    assert_eq!(document["files"], serde_json::json!(["out/a/admittance.csv", "out/a/admittance.svg"]));
-    assert_eq!(desk.files("out/a"), ["admittance.csv", "admittance.svg"]);
+    assert_eq!(document["files"], serde_json::json!(["out/a/admittance.csv", "out/a/admittance.svg", "out/a/admittance.html"]));
+    assert_eq!(desk.files("out/a"), ["admittance.csv", "admittance.html", "admittance.svg"]);
 
     let csv = desk.read("out/a/admittance.csv");
     let mut rows = csv::Reader::from_reader(csv.as_bytes());

@@ -58,7 +58,7 @@ fn a_run_of_a_campaign_is_the_run_that_a_user_would_do_alone() {
     assert_eq!((document["runs"].as_u64(), document["runs_computed"].as_u64(), &document["out"]), (Some(6), Some(6), &"out".into()));
     assert!(document["wall_s"].as_f64() > Some(0.0) && document["runs_per_s"].as_f64() > Some(0.0));
     assert_eq!((&document["file"], &document["diverged"], &document["title"]), (&"out/runs.csv".into(), &0.into(), &"Three users, far apart".into()));
-    assert_eq!(desk.files("out"), ["campaign.json", "discrepancy.svg", "runs.csv"]);
+    assert_eq!(desk.files("out"), ["campaign.html", "campaign.json", "discrepancy.svg", "runs.csv"]);
     let (header, rows) = table(&desk, "out/runs.csv");
     for (number_of_run, row) in rows.iter().enumerate() {
         let cell = |name: &str| row[header.iter().position(|found| found == name).unwrap_or_else(|| panic!("no {name}"))].clone();
@@ -127,7 +127,7 @@ fn a_campaign_that_is_finished_is_left_as_it_is() {
     assert_eq!((document["runs"].as_u64(), document["runs_computed"].as_u64()), (Some(6), Some(0)));
     assert_eq!(
         (fs::read(desk.path("out/runs.parquet")).unwrap(), desk.files("out")),
-        (before, ["campaign.json", "discrepancy.svg", "runs.parquet"].map(str::to_owned).to_vec())
+        (before, ["campaign.html", "campaign.json", "discrepancy.svg", "runs.parquet"].map(str::to_owned).to_vec())
     );
 }
 
@@ -231,7 +231,7 @@ pub(crate) mod interrupted {
         let document = desk.json(&format!("{line} --out out --json").replace("--threads 1", "--threads 2"));
         assert_eq!((document["runs"].as_u64(), document["runs_computed"].as_u64()), (Some(20_000), Some(20_000 - 500 * kept)));
         desk.text(&format!("{line} --out whole").replace("--threads 1", "--threads 3"));
-        assert_eq!(desk.files("out"), ["campaign.json".to_owned(), "discrepancy.svg".to_owned(), format!("runs.{format}")]);
+        assert_eq!(desk.files("out"), ["campaign.html", "campaign.json", "discrepancy.svg", &format!("runs.{format}")]);
         let [out, whole] = ["out", "whole"].map(|folder| fs::read(desk.path(&format!("{folder}/runs.{format}"))).unwrap());
         assert!(out == whole, "other bytes");
         assert_eq!(desk.read("out/campaign.json"), desk.read("whole/campaign.json"));

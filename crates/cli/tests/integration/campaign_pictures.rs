@@ -127,20 +127,23 @@ fn the_line_is_the_median_of_the_rows() {
 fn pictures_are_the_same_for_any_number_of_threads_and_when_the_command_is_repeated() {
     let desk = desk();
     let command = "campaign random.toml --runs 20 --verdicts --vary link.loss=0%..40%/5 --vary coordination.stiffness=500..2000/4";
-    let read = |folder: &str| ["discrepancy.svg", "verdicts.svg"].map(|file| desk.read(&format!("{folder}/{file}")));
+    let read = |folder: &str| ["discrepancy.svg", "verdicts.svg", "campaign.html"].map(|file| desk.read(&format!("{folder}/{file}")));
     desk.text(&format!("{command} --threads 1 --out one"));
     desk.text(&format!("{command} --threads 3 --out three"));
     let drawn = read("one");
     assert!(drawn == read("three"));
-    for file in ["discrepancy.svg", "verdicts.svg", "verdicts.csv"] {
+    for file in ["discrepancy.svg", "verdicts.svg", "verdicts.csv", "campaign.html"] {
         std::fs::remove_file(desk.path(&format!("one/{file}"))).unwrap();
     }
     let again = desk.cohaptic(&format!("{command} --out one"));
-    assert_eq!(again.stderr, "wrote one/runs.parquet\nwrote one/verdicts.csv\nwrote one/discrepancy.svg\nwrote one/verdicts.svg\n");
+    assert_eq!(
+        again.stderr,
+        "wrote one/runs.parquet\nwrote one/verdicts.csv\nwrote one/discrepancy.svg\nwrote one/verdicts.svg\nwrote one/campaign.html\n"
+    );
     assert!(drawn == read("one") && again.stdout.contains("nothing was run"));
     let document = desk.json(&format!("{command} --out one --json"));
     let files: Vec<&str> = document["files"].as_array().unwrap().iter().map(|file| file.as_str().unwrap()).collect();
-    assert_eq!(files, ["one/runs.parquet", "one/verdicts.csv", "one/discrepancy.svg", "one/verdicts.svg"]);
+    assert_eq!(files, ["one/runs.parquet", "one/verdicts.csv", "one/discrepancy.svg", "one/verdicts.svg", "one/campaign.html"]);
 }
 
 #[test]
@@ -149,11 +152,11 @@ fn what_is_not_drawn_is_said() {
     desk.text("campaign random.toml --runs 2 --vary link.loss=0%,10% --no-plot --out none");
     assert_eq!(desk.files("none"), ["campaign.json", "runs.parquet"]);
     desk.text("campaign random.toml --runs 2 --vary link.loss=10% --out one-value");
-    assert_eq!(desk.files("one-value"), ["campaign.json", "runs.parquet"]);
+    assert_eq!(desk.files("one-value"), ["campaign.html", "campaign.json", "runs.parquet"]);
     let three = "--vary link.loss=0%..10%/2 --vary coordination.stiffness=500,1000 --vary object.mass=0.3..0.6/13 --set scene.duration=50ms";
     let text = desk.text(&format!("campaign random.toml {three} --out three"));
     assert!(text.contains("note: no picture is drawn: a panel for each value of object.mass would be 13 panels, and at most 12 are drawn"), "{text}");
-    assert_eq!(desk.files("three"), ["campaign.json", "runs.parquet"]);
+    assert_eq!(desk.files("three"), ["campaign.html", "campaign.json", "runs.parquet"]);
     let names =
         format!("--vary link.delay={}ms --set scene.duration=50ms", (10..35).map(|n| format!("{n}000us")).collect::<Vec<_>>().join(",") + ",1");
     let text = desk.text(&format!("campaign random.toml {names} --out names"));

@@ -6,6 +6,7 @@
 
 mod admittance;
 mod against;
+mod answer_pages;
 mod campaign;
 mod campaign_pictures;
 mod campaign_verdicts;

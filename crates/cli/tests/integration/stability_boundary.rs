@@ -58,7 +58,7 @@ fn one_strategy_crosses_where_the_law_says() {
 fn files_hold_what_was_found() {
     let desk = Desk::with("paper.toml", PAPER);
     let document = desk.json(&format!("{ALONG} --json --out out --samples 50 --set coordination.damping=1"));
-    assert_eq!(desk.files("out"), ["boundary.csv", "boundary.svg", "samples.csv"]);
+    assert_eq!(desk.files("out"), ["boundary.csv", "boundary.html", "boundary.svg", "samples.csv"]);
     let mut table = csv::Reader::from_path(desk.path("out/boundary.csv")).unwrap();
     assert_eq!(table.headers().unwrap(), vec!["coordination.stiffness", "from", "to"]);
     let values: Vec<f64> = table.records().map(|row| row.unwrap()[0].parse().unwrap()).collect();
@@ -160,7 +160,7 @@ fn an_interrupted_search_goes_on_and_ends_with_the_same_bytes() {
         let outcome = desk.cohaptic(&line);
         assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
     }
-    assert_eq!(desk.files("out"), ["boundary.csv", "boundary.svg", "samples.csv"]);
+    assert_eq!(desk.files("out"), ["boundary.csv", "boundary.html", "boundary.svg", "samples.csv"]);
     for file in desk.files("out") {
         assert_eq!(desk.read(&format!("out/{file}")), desk.read(&format!("whole/{file}")), "{file}");
     }

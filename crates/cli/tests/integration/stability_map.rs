@@ -46,7 +46,7 @@ fn every_cell_is_the_verdict_at_its_place() {
 fn the_table_has_the_numbers_of_the_document() {
     let desk = Desk::with("paper.toml", PAPER);
     let document = desk.json(&format!("{MAP} --grid 7x5 --json --out out"));
-    assert_eq!(desk.files("out"), ["map.csv", "map.svg"]);
+    assert_eq!(desk.files("out"), ["map.csv", "map.html", "map.svg"]);
     let mut table = csv::Reader::from_path(desk.path("out/map.csv")).unwrap();
     assert_eq!(table.headers().unwrap(), vec!["coordination.stiffness", "coordination.damping", "spectral_radius", "verdict"]);
     let rows: Vec<csv::StringRecord> = table.records().map(Result::unwrap).collect();
@@ -86,7 +86,7 @@ fn curves_obey_the_law_of_the_two_strategies() {
 fn every_curve_has_a_table_and_an_entry_in_the_legend() {
     let desk = Desk::with("paper.toml", &format!("{PAPER}\n").replace("duration = ", "title = \"<A> & B\", duration = "));
     let text = desk.text(&format!("{MAP} --grid 20x16 --out a/b --curve scene.count=2 --curve scene.count=5,link.delay=24ms"));
-    assert_eq!(desk.files("a/b"), ["map-2.csv", "map-3.csv", "map.csv", "map.svg"]);
+    assert_eq!(desk.files("a/b"), ["map-2.csv", "map-3.csv", "map.csv", "map.html", "map.svg"]);
     let svg = desk.read("a/b/map.svg");
     assert_eq!(cohaptic_picture::testing::faults(&svg), [""; 0]);
     let words = words(&svg);
@@ -106,7 +106,7 @@ fn every_curve_has_a_table_and_an_entry_in_the_legend() {
     }
     assert!(text.contains(" of 320 cells are stable"), "{text}");
     let alone = desk.cohaptic(&format!("{MAP} --grid 20x16 --out c --set scene.count=2"));
-    assert_eq!(alone.stderr, "wrote c/map.csv\nwrote c/map.svg\n");
+    assert_eq!(alone.stderr, "wrote c/map.csv\nwrote c/map.svg\nwrote c/map.html\n");
     assert_eq!(desk.read("c/map.csv"), desk.read("a/b/map-2.csv"), "a curve is the map with these overrides");
 }
 
@@ -131,7 +131,7 @@ fn threads_change_nothing() {
     let desk = Desk::with("paper.toml", PAPER);
     for jobs in ["1", "2", "5"] {
         desk.text(&format!("{MAP} --grid 40x30 --out {jobs} --jobs {jobs} --curve scene.count=8"));
-        for file in ["map.csv", "map-2.csv", "map.svg"] {
+        for file in ["map.csv", "map-2.csv", "map.svg", "map.html"] {
             assert_eq!(desk.read(&format!("{jobs}/{file}")), desk.read(&format!("1/{file}")));
         }
     }

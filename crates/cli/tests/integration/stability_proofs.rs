@@ -103,7 +103,7 @@ fn a_region_is_written_as_boxes_and_pictures_the_same_on_any_number_of_threads()
         )
     };
     let document = desk.json(&line("out", "--json --threads 1"));
-    assert_eq!(desk.files("out"), ["proof-2.csv", "proof-2.svg", "proof.csv", "proof.svg"]);
+    assert_eq!(desk.files("out"), ["proof-2.csv", "proof-2.svg", "proof.csv", "proof.html", "proof.svg"]);
     desk.text(&line("again", "--threads 3"));
     for file in desk.files("out") {
         assert_eq!(desk.read(&format!("out/{file}")), desk.read(&format!("again/{file}")), "{file}");

@@ -134,9 +134,9 @@ impl Session {
         let behind = self.clock.now().saturating_duration_since(self.live.open());
         let summary = self.live.summary();
         // The record is finished before `driven` is looked at: after an error of the loop, the rows recorded so far are kept.
-        let files = match self.watch.take_recording() {
+        let (files, pictures) = match self.watch.take_recording() {
             Some(recording) => recording.finish(&summary, &self.watch.ticks, &self.watch.releases)?,
-            None => Vec::new(),
+            None => Default::default(),
         };
         driven?;
         Ok(Report {
@@ -149,6 +149,7 @@ impl Session {
             admission: self.outside.as_ref().map(Outside::counts),
             prepared,
             files,
+            pictures,
             measures: self.watch.measured(summary.duration),
             summary,
         })

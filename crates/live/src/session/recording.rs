@@ -8,7 +8,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 
 use cohaptic_harness::live::InputRow;
-use cohaptic_harness::record::{InputRecorder, RecordError, Recorder};
+use cohaptic_harness::record::{InputRecorder, RecordError, RecordedPicture, Recorder};
 use cohaptic_harness::{Observer as _, PacketRow, Summary, TickRow};
 use cohaptic_realtime::Lateness;
 use cohaptic_scene::{Scene, SceneContent};
@@ -69,19 +69,24 @@ impl Recording {
         Ok(Self { folder: folder.to_path_buf(), rows, writer, has_others })
     }
 
-    /// Writes the rows that are still queued, then the summary and the lateness, and gives every file its final name. Returns the paths of the files, or the
-    /// first error of the writer.
-    pub(crate) fn finish(self, summary: &Summary, ticks: &Lateness, releases: &Lateness) -> Result<Vec<PathBuf>, RecordError> {
+    /// Writes the rows that are still queued, then the summary and the lateness, and gives every file its final name. Returns the paths of the files and the
+    /// pictures, or the first error of the writer.
+    pub(crate) fn finish(
+        self,
+        summary: &Summary,
+        ticks: &Lateness,
+        releases: &Lateness,
+    ) -> Result<(Vec<PathBuf>, Vec<RecordedPicture>), RecordError> {
         // The writer ends when the queue is closed and empty, so that the queue must be closed before the thread is joined.
         drop(self.rows);
         // A panic of the writer goes on in this thread: the panic is a fault of the program, and not an error of the disk.
         let files = self.writer.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
-        let Some((recorder, sent)) = files.others else { return Ok(vec![files.inputs.finish()?]) };
-        let mut written = recorder.finish(summary)?;
+        let Some((recorder, sent)) = files.others else { return Ok((vec![files.inputs.finish()?], Vec::new())) };
+        let (mut written, pictures) = recorder.finish_with_pictures(summary)?;
         written.push(files.inputs.finish()?);
         written.push(sent.finish()?);
         written.push(write_lateness(&self.folder, ticks, releases)?);
-        Ok(written)
+        Ok((written, pictures))
     }
 
     pub(crate) fn tick(&self, row: &TickRow<'_>) -> Result<(), Stopped> {

@@ -7,6 +7,7 @@ use std::time::Duration;
 use cohaptic_harness::Summary;
 use cohaptic_harness::live::{PeerState, SeatStats};
 use cohaptic_harness::measures::MeasuredValue;
+use cohaptic_harness::record::RecordedPicture;
 use cohaptic_realtime::udp::EndpointCounts;
 use cohaptic_realtime::{LatenessSummary, Prepared, Validity};
 use cohaptic_wan::LinkStats;
@@ -85,6 +86,8 @@ pub struct Report {
     pub prepared: Prepared,
     /// Paths of the files of the record. Empty if nothing was recorded.
     pub files: Vec<PathBuf>,
+    /// Pictures of the record with the names of their files. Empty if nothing was recorded, or with [`Recorded::Inputs`](super::Recorded::Inputs).
+    pub pictures: Vec<RecordedPicture>,
 }
 
 /// Counts of the socket of a session.

@@ -11,6 +11,7 @@ use cohaptic_units::print::Counted;
 
 use super::figures::Shown;
 use super::{Finished, words};
+use crate::page::{made_by, scene_text};
 use layout::Layout;
 use panels::Sheet;
 use scale::Scale;
@@ -45,13 +46,9 @@ pub fn html(finished: &Finished, source: &PageSource<'_>) -> String {
     page = page.with(Html::heading(2, "Stability")).with(stability(&sheet));
     page = page.with(measures(&sheet));
     page = page.with(Html::heading(2, "How the numbers are made")).with(Html::list(NOTES.map(Html::text)));
-    page = page.with(Html::heading(2, "Made by")).with(Html::preformatted(&source.command));
+    page = page.with(made_by(&source.command));
     page = page.with(Html::paragraph(Html::text("The table of runs is that of ").and(Html::code(&source.campaign)).and(".")));
-    let said = "The file as it was read; overrides are not in it.";
-    page = page
-        .with(Html::heading(2, "Scene"))
-        .with(Html::details("The text of the scene", Html::paragraph(said).and(Html::preformatted(source.scene))));
-    page.html()
+    page.with(scene_text(source.scene)).html()
 }
 
 /// Text above the table of differences.

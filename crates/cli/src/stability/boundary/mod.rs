@@ -86,7 +86,7 @@ pub(crate) fn boundary(arguments: &BoundaryArguments) -> Result<ExitCode, Failur
     }
     let mut written = Vec::new();
     if let Some(folder) = sharing.folder() {
-        written = files::write(folder, &order.searched(&found), arguments.pictures.size())?;
+        written = files::write(folder, &order, arguments, &order.searched(&found))?;
         rows.map_or(Ok(()), RowsFile::remove)?;
     }
     say(&order, arguments, &found, &written)?;

@@ -4,6 +4,8 @@
 use std::fmt::Write as _;
 use std::process::ExitCode;
 
+use cohaptic_answers::page::{AnswerPage, MOST_ROWS, more_rows, range};
+use cohaptic_picture::page::{Html, Table};
 use cohaptic_proofs::{Guarantee, ProofError, ProvenLine, ProvenStretch, SharedProof, TopologyCertificate};
 use cohaptic_stability::BoundaryError;
 use cohaptic_units::print::{Counted, csv_field};
@@ -14,7 +16,7 @@ use crate::arguments::BoundaryArguments;
 use crate::document_schema::{DocumentSchema, document};
 use crate::failure::Failure;
 use crate::file::write_into;
-use crate::output;
+use crate::output::{self, figure};
 use crate::shard::{self, Sharing};
 use crate::stability::certificate::{self, Given};
 use crate::stability::guarantee::{self, PieceWatch};
@@ -57,6 +59,7 @@ pub(super) fn prove(order: &Order, arguments: &BoundaryArguments, sharing: Shari
             let given = Given { title: &order.title, text: &order.text, overrides: &arguments.scene.overrides.set };
             files.push(write_into(folder, "certificate.json", certificate::of_boxes(&given, &[&order.range], None, topology.as_ref(), &pieces)?)?);
         }
+        files.push(write_into(folder, "proof.html", page(order, arguments, &line, uncertified))?);
         if line.is_whole {
             proof_blocks::remove(folder, ROWS)?;
         }
@@ -101,21 +104,72 @@ fn answer(order: &Order, line: &ProvenLine, uncertified: Option<usize>, files: &
 fn describe(order: &Order, line: &ProvenLine, uncertified: Option<usize>) -> String {
     let range = &order.range;
     let mut text = format!("{}\n\n", order.title);
-    for (place, ProvenStretch { low, high, guarantee }) in line.stretches.iter().enumerate() {
+    for (words, ProvenStretch { low, high, .. }) in named(line) {
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "  {:<10} from {} to {}", words, range.text(*low), range.text(*high));
+    }
+    let _ = writeln!(text, "  {}", looked_at(line));
+    if let Some(note) = uncertified.and_then(guarantee::left_open) {
+        let _ = writeln!(text, "    note: {note}");
+    }
+    text
+}
+
+/// Returns the number of pieces that the proof looked at, in words.
+fn looked_at(line: &ProvenLine) -> String {
+    format!("{} looked at; nothing crosses anywhere else", Counted(line.attempts, "piece"))
+}
+
+/// Words before an undecided stretch between different verdicts.
+const CROSSING: &str = "crossing:";
+
+/// Returns each stretch of a proven line after its verdict in words.
+fn named(line: &ProvenLine) -> impl Iterator<Item = (&'static str, &ProvenStretch)> {
+    line.stretches.iter().enumerate().map(|(place, stretch)| {
         let beside = |other: Option<usize>| other.and_then(|other| line.stretches.get(other)).map(|stretch| stretch.guarantee);
         let between = [beside(place.checked_sub(1)), beside(Some(place + 1))];
         // An undecided stretch between different verdicts holds at least one crossing.
-        let words = match (guarantee, between) {
-            (Guarantee::Undecided, [Some(before), Some(after)]) if before != after => "crossing:",
+        let words = match (stretch.guarantee, between) {
+            (Guarantee::Undecided, [Some(before), Some(after)]) if before != after => CROSSING,
             (Guarantee::Undecided, _) => "undecided:",
-            (Guarantee::Stable | Guarantee::Unstable, _) => guarantee.word(),
+            (Guarantee::Stable | Guarantee::Unstable, _) => stretch.guarantee.word(),
         };
-        // Writing to a string does not fail.
-        let _ = writeln!(text, "  {words:<10} from {} to {}", range.text(*low), range.text(*high));
-    }
-    let _ = writeln!(text, "  {} looked at; nothing crosses anywhere else", Counted(line.attempts, "piece"));
-    text += &uncertified.map_or_else(String::new, guarantee::left_open);
-    text
+        (words, stretch)
+    })
+}
+
+/// Returns the page of the proof.
+fn page(order: &Order, arguments: &BoundaryArguments, line: &ProvenLine, uncertified: Option<usize>) -> String {
+    let head = Table::new().column("verdict").column("from").column("to");
+    let stretches = named(line).take(MOST_ROWS).fold(head, |table, (words, ProvenStretch { low, high, .. })| {
+        let verdict = words.trim_end_matches(':').to_owned();
+        table.row([verdict, order.range.text(*low), order.range.text(*high)].map(Html::from))
+    });
+    let of = |guarantee: Guarantee| line.stretches.iter().filter(move |stretch| stretch.guarantee == guarantee);
+    let share = |guarantee: Guarantee| {
+        let length: f64 = of(guarantee).map(|stretch| stretch.high - stretch.low).sum();
+        format!("{} %", figure(100.0 * length / (order.range.high - order.range.low), 4))
+    };
+    let [stable, unstable, undecided] = [Guarantee::Stable, Guarantee::Unstable, Guarantee::Undecided].map(share);
+    let crossings = named(line).filter(|(words, _)| *words == CROSSING).count();
+    let page = AnswerPage {
+        title: format!("{}: proven stability along {}", order.title, order.range.key),
+        warnings: if line.is_whole { Vec::new() } else { vec![guarantee::UNFINISHED.to_owned()] },
+        sentences: vec![
+            format!(
+                "proven stable {stable} of the range, proven unstable {unstable}, undecided {undecided}; {} enclosed",
+                Counted(crossings, "crossing")
+            ),
+            looked_at(line),
+        ],
+        asked: vec![
+            ("Along", range(&order.range)),
+            ("Tolerance of a crossing", format!("{:.1e}{}", order.options.tolerance, order.range.unit).into()),
+        ],
+        tables: Html::heading(2, "Stretches").and(Html::table(&stretches)).and(more_rows(line.stretches.len() as u64, "stretches", "proof.csv")),
+        notes: uncertified.and_then(guarantee::left_open).into_iter().collect(),
+    };
+    super::files::with_origin(order, arguments, &[], |origin| page.html(origin))
 }
 
 /// Returns the CSV table of the stretches, one row per stretch.

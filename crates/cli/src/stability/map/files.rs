@@ -1,18 +1,20 @@
-//! The files of `cohaptic stability map --out`: one table per variant, and one picture with the outline of each variant's region. The region of the first
-//! variant is shaded.
+//! The files of `cohaptic stability map --out`: one table per variant, one picture with the outline of each variant's region, and the page. The region of the
+//! first variant is shaded.
 
 use std::path::Path;
 
-use cohaptic_answers::map::{VariantMap, csv};
+use cohaptic_answers::map::{Filled, VariantMap, csv, html};
+use cohaptic_answers::page::Origin;
 use cohaptic_answers::{NamedMap, map_picture};
-use cohaptic_picture::Size;
 
 use super::Order;
+use crate::arguments::MapArguments;
 use crate::failure::Failure;
 use crate::file::write_into;
+use crate::shell::CommandLine;
 
-/// Writes `map.csv`, `map-2.csv` and so on, and `map.svg` into `folder`, and returns the paths of all files. Each map gets the path of its table.
-pub(super) fn write(folder: &Path, order: &Order, maps: &mut [VariantMap], size: Size) -> Result<Vec<String>, Failure> {
+/// Writes `map.csv`, `map-2.csv` and so on, `map.svg` and `map.html` into `folder`, and returns the paths of all files. Each map gets the path of its table.
+pub(super) fn write(folder: &Path, order: &Order, arguments: &MapArguments, maps: &mut [VariantMap]) -> Result<Vec<String>, Failure> {
     let mut files = Vec::new();
     for (number, map) in maps.iter_mut().enumerate() {
         let name = if number == 0 { "map.csv".to_owned() } else { format!("map-{}.csv", number + 1) };
@@ -23,6 +25,31 @@ pub(super) fn write(folder: &Path, order: &Order, maps: &mut [VariantMap], size:
     let named: Vec<NamedMap<'_>> =
         maps.iter().map(|map| NamedMap { name: &map.name, map: &map.map, criterion: map.criterion, left_out: &map.left_out }).collect();
     let picture = map_picture(&order.title, order.axes(), &named);
-    files.push(write_into(folder, "map.svg", picture.map(|picture| picture.size(size).svg()).unwrap_or_default())?);
+    let svg = picture.map(|picture| picture.size(arguments.pictures.size()).svg()).unwrap_or_default();
+    files.push(write_into(folder, "map.svg", &svg)?);
+    let page =
+        html(&Filled { title: &order.title, axes: order.axes(), maps }, &origin(order, arguments, &command_line(arguments), &[("map.svg", &svg)]));
+    files.push(write_into(folder, "map.html", page)?);
     Ok(files)
+}
+
+/// Returns the command that makes the files, as a line for a shell.
+pub(super) fn command_line(arguments: &MapArguments) -> String {
+    let line = CommandLine::new("stability map", &arguments.scene.scene, &arguments.scene.overrides.set).option("--x", [&arguments.x]);
+    let every = arguments.every_number.map(|(from, to)| format!("{from}..{}", to.map_or_else(String::new, |to| to.to_string())));
+    line.option("--y", [&arguments.y])
+        .option("--grid", arguments.grid)
+        .option("--prove", arguments.prove)
+        .option("--every-number", every)
+        .flag("--certificate", arguments.certificate)
+        .option("--curve", &arguments.curve)
+        .option("--against", &arguments.against)
+        .out()
+        .option("--size", arguments.pictures.word())
+        .text()
+}
+
+/// Returns the origin of the answer, for its page.
+pub(super) fn origin<'a>(order: &'a Order, arguments: &'a MapArguments, command: &'a str, pictures: &'a [(&'a str, &'a str)]) -> Origin<'a> {
+    Origin { command, file: &order.file, overrides: &arguments.scene.overrides.set, scene: &order.text, pictures }
 }

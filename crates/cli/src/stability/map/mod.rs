@@ -1,9 +1,10 @@
 //! `cohaptic stability map`: judges the stability of a scene over a plane of two keys, for one or several variants of the scene.
 //!
-//! `filling` computes the cells of a grid, `files` writes the maps, and `prove` decides whole boxes of the plane without a grid.
+//! `filling` computes the cells of a grid, `files` writes the maps and their page, and `prove` decides whole boxes of the plane without a grid.
 
 mod files;
 mod filling;
+mod proof_page;
 mod prove;
 
 use std::process::ExitCode;
@@ -24,6 +25,8 @@ use filling::Filled;
 /// Checked arguments of the command. Nothing is written before the check has passed.
 struct Order {
     text: String,
+    /// Name of the file of the scene.
+    file: String,
     title: String,
     ranges: [(&'static str, KeyRange); 2],
     grid: Grid,
@@ -56,7 +59,7 @@ pub(crate) fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
     let speed = Speed { wall_s: start.elapsed().as_secs_f64(), cells };
     let mut files = Vec::new();
     if let Some(folder) = sharing.folder() {
-        files = files::write(folder, &order, &mut maps, arguments.pictures.size())?;
+        files = files::write(folder, &order, arguments, &mut maps)?;
         rows.map_or(Ok(()), super::rows_file::RowsFile::remove)?;
     }
     let filled = cohaptic_answers::map::Filled { title: &order.title, axes: order.axes(), maps: &maps };
@@ -93,7 +96,7 @@ impl Order {
             Some(Ok(scene)) => scene.title,
             Some(Err(_)) | None => output::path(input::named(file)),
         };
-        Ok(Self { text, title, ranges, grid, variants, families })
+        Ok(Self { text, file: output::path(input::named(file)), title, ranges, grid, variants, families })
     }
 
     /// Converts an error of the map with index `variant` to a failure that names the user's option.

@@ -11,7 +11,7 @@ use cohaptic_proofs::{Guarantee, ProofError, ProvenBox, ProvenRegion, SharedProo
 use cohaptic_units::print::{Counted, csv_field};
 use serde::Serialize;
 
-use super::{Order, filling};
+use super::{Order, filling, proof_page};
 use crate::arguments::MapArguments;
 use crate::document_schema::{DocumentSchema, document};
 use crate::failure::Failure;
@@ -24,17 +24,17 @@ use crate::stability::proof_blocks::{self, Pieces, Proofs, on_threads};
 use crate::stability::rows_file::Kept;
 
 /// A variant with its proof.
-struct Proof {
-    name: String,
+pub(super) struct Proof {
+    pub(super) name: String,
     overrides: Vec<String>,
-    region: ProvenRegion,
+    pub(super) region: ProvenRegion,
     file: Option<String>,
     /// Number of boxes with a verdict but without a proof in the certificate; `None` without a certificate.
     uncertified: Option<usize>,
 }
 
 /// Verdicts in the order in which an answer gives their shares of the area.
-const GUARANTEES: [Guarantee; 3] = [Guarantee::Stable, Guarantee::Unstable, Guarantee::Undecided];
+pub(super) const GUARANTEES: [Guarantee; 3] = [Guarantee::Stable, Guarantee::Unstable, Guarantee::Undecided];
 
 /// Name of the files of rows in which shards keep their decided pieces.
 const ROWS: &str = "proof.rows";
@@ -86,10 +86,15 @@ pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32, shar
             proof.file = Some(path.clone());
             files.push(path);
         }
-        files.extend(pictures(order, &proofs, folder, arguments)?);
+        let pictures = pictures(order, &proofs, arguments);
+        for (name, svg) in &pictures {
+            files.push(write_into(folder, name, svg)?);
+        }
         if arguments.certificate && proofs.iter().all(|proof| proof.region.is_whole) {
             files.extend(certificates(order, arguments, &mut proofs, folder)?);
         }
+        // The page comes after the certificates, because it says which boxes these leave open.
+        files.push(write_into(folder, "proof.html", proof_page::html(order, arguments, &proofs, &pictures))?);
         if proofs.iter().all(|proof| proof.region.is_whole) {
             proof_blocks::remove(folder, ROWS)?;
         }
@@ -178,39 +183,38 @@ fn answer(order: &Order, arguments: &MapArguments, proofs: &[Proof], wall_s: f64
 }
 
 fn describe(order: &Order, arguments: &MapArguments, proofs: &[Proof], wall_s: f64) -> String {
+    let lines: String = lines(arguments, proofs).iter().map(|line| format!("  {line}\n")).collect();
+    format!("{}\n\n{lines}  {wall_s:.1} s\n", order.title)
+}
+
+/// Returns the lines about the proofs. Lines that belong to the line before them are indented.
+pub(super) fn lines(arguments: &MapArguments, proofs: &[Proof]) -> Vec<String> {
     let percent = |share: f64| format!("{} %", figure(100.0 * share, 4));
-    let mut text = format!("{}\n\n", order.title);
+    let mut lines = Vec::new();
     if let Some((from, to)) = arguments.every_number {
-        let end = to.map_or_else(String::new, |to| format!(" to {to}"));
-        // Writing to a string does not fail.
-        let _ = writeln!(text, "  for every number of equal peers from {from}{}:", if to.is_none() { " on" } else { &end });
+        let end = to.map_or_else(|| " on".to_owned(), |to| format!(" to {to}"));
+        lines.push(format!("for every number of equal peers from {from}{end}:"));
     }
     for (number, proof) in proofs.iter().enumerate() {
         let [stable, unstable, undecided] = GUARANTEES.map(|guarantee| percent(proof.region.share(guarantee)));
         let name = if proofs.len() > 1 { format!("{}: ", proof.name) } else { String::new() };
-        // Writing to a string does not fail.
-        let _ = writeln!(
-            text,
-            "  {name}proven stable {stable} of the area, proven unstable {unstable}, undecided {undecided} ({})",
-            Counted(proof.region.boxes.len(), "piece")
-        );
+        let pieces = Counted(proof.region.boxes.len(), "piece");
+        lines.push(format!("{name}proven stable {stable} of the area, proven unstable {unstable}, undecided {undecided} ({pieces})"));
         let [stable, unstable, undecided] = GUARANTEES.map(|guarantee| proof.region.lines(guarantee));
         if stable + unstable + undecided > 0 {
-            let _ = writeln!(
-                text,
-                "    and without an area, lines at a single delay: {stable} proven stable, {unstable} proven unstable, {undecided} undecided"
-            );
+            lines.push(format!(
+                "  and without an area, lines at a single delay: {stable} proven stable, {unstable} proven unstable, {undecided} undecided"
+            ));
         }
         if number > 0 {
             let first = &proofs[0];
             let here = percent(both(&proof.region, Guarantee::Stable, &first.region, Guarantee::Unstable));
             let there = percent(both(&proof.region, Guarantee::Unstable, &first.region, Guarantee::Stable));
-            let _ = writeln!(text, "    stable where {} is unstable: {here} at least; unstable where it is stable: {there} at least", first.name);
+            lines.push(format!("  stable where {} is unstable: {here} at least; unstable where it is stable: {there} at least", first.name));
         }
-        text += &proof.uncertified.map_or_else(String::new, guarantee::left_open);
+        lines.extend(proof.uncertified.and_then(guarantee::left_open).map(|note| format!("  note: {note}")));
     }
-    let _ = writeln!(text, "  {wall_s:.1} s");
-    text
+    lines
 }
 
 /// Returns the share of the area, from 0 to 1, in which region `one` has the verdict `of_one` and region `other` has the verdict `of_other`.
@@ -233,9 +237,9 @@ fn table(order: &Order, region: &ProvenRegion) -> String {
     text
 }
 
-/// Writes one picture per variant, `proof.svg`, `proof-2.svg` and so on, and returns their paths.
-fn pictures(order: &Order, proofs: &[Proof], folder: &Path, arguments: &MapArguments) -> Result<Vec<String>, Failure> {
-    let mut files = Vec::new();
+/// Draws one picture per variant, `proof.svg`, `proof-2.svg` and so on. Returns the pictures with the names of their files.
+fn pictures(order: &Order, proofs: &[Proof], arguments: &MapArguments) -> Vec<(String, String)> {
+    let mut pictures = Vec::new();
     for (number, proof) in proofs.iter().enumerate() {
         let boxes = |guarantee| {
             let of = proof.region.boxes.iter().filter(move |one| one.guarantee == guarantee);
@@ -250,7 +254,7 @@ fn pictures(order: &Order, proofs: &[Proof], folder: &Path, arguments: &MapArgum
         let title = if proofs.len() > 1 { format!("{}: {}", order.title, proof.name) } else { order.title.clone() };
         let name = if number == 0 { "proof.svg".to_owned() } else { format!("proof-{}.svg", number + 1) };
         let svg = Picture::new(title.as_str()).panel(panel).size(arguments.pictures.size()).svg();
-        files.push(write_into(folder, &name, svg)?);
+        pictures.push((name, svg));
     }
-    Ok(files)
+    pictures
 }

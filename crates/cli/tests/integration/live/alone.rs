@@ -64,9 +64,25 @@ fn its_records_are_those_of_the_run_and_its_document_says_how_late_it_was() {
 #[test]
 fn it_says_in_words_what_the_document_says() {
     let desk = Desk::with("two.toml", TWO);
-    let text = desk.text("live two.toml --for 50ms --out out");
+    let text = desk.text("live two.toml --for 50ms --no-priority --out out");
     for part in ["Two users\n", "  50ms, 50 ticks\n", "  the run is ", "  lateness of ticks: p50 ", "  replay: cohaptic run two.toml --set '"] {
         assert!(text.contains(part), "no {part:?} in {text}");
+    }
+    let page = desk.read("out/live.html");
+    assert_eq!(cohaptic_picture::testing::page_faults(&page), [""; 0]);
+    for part in [
+        "<h1>Two users: live session</h1>",
+        "<p>The session lasted 50ms, 50 ticks",
+        "<pre>cohaptic live two.toml --for 50ms --no-priority --out DIR</pre>",
+        "<th scope=\"row\">ticks</th><td class=\"number\">50</td>",
+        "<th scope=\"row\">left-&gt;right</th>",
+        "<pre>cohaptic run two.toml --set scene.duration=50ms --set 'expect={}' --inputs DIR/inputs.csv</pre>",
+        &cohaptic_picture::escape(TWO),
+    ] {
+        assert!(page.contains(part), "no {part} in {page}");
+    }
+    for picture in ["positions.svg", "forces.svg", "network.svg"] {
+        assert!(page.contains(&desk.read(&format!("out/{picture}"))), "{picture}");
     }
     // What it says of the replay is a command that works.
     let replay = text.lines().find_map(|line| line.trim().strip_prefix("replay: cohaptic ")).unwrap();

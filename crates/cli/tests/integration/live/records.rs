@@ -85,7 +85,7 @@ pub(super) fn releases(desk: &Desk, folder: &str) -> Vec<(String, u64, f64)> {
 }
 
 /// What a session has beside the files of a run.
-const OF_A_SESSION: [&str; 3] = ["inputs.csv", "lateness.csv", "releases.csv"];
+const OF_A_SESSION: [&str; 4] = ["inputs.csv", "lateness.csv", "live.html", "releases.csv"];
 
 /// The record in `out`, replayed in virtual time, is the same record.
 pub(super) fn assert_replays(desk: &Desk, scene: &str, set: &str) {
