@@ -31,10 +31,13 @@ function inUnits(number, units, digits = 3) {
 const span = (s, digits) => (s === 0 ? '0 ms' : inUnits(s, [[1, 's'], [1e-3, 'ms'], [1e-6, 'µs'], [1e-9, 'ns']], digits));
 const bits = (rate, digits) => inUnits(rate, [[1e9, 'Gbit/s'], [1e6, 'Mbit/s'], [1e3, 'kbit/s'], [1, 'bit/s']], digits);
 const signed = (text) => text.replace('-', '\u2212');
+/** Decimals as they are, and from a million on as a power of ten: what falls apart has numbers of any size. */
+const decimals = (number, digits) => signed(Math.abs(number) < 1e6 ? number.toFixed(digits) : number.toExponential(3));
 const place = (position) => {
   const large = position.some((m) => Math.abs(m) >= 1);
-  return position.map((m) => (m === null ? '–' : signed(large ? m.toFixed(3) : (m * 1e3).toFixed(2)))).join(', ') + (large ? ' m' : ' mm');
+  return position.map((m) => (m === null ? '–' : large ? decimals(m, 3) : decimals(m * 1e3, 2))).join(', ') + (large ? ' m' : ' mm');
 };
+const newtons = (force, digits) => (Number.isFinite(force) ? decimals(force, digits) : '–') + ' N';
 const percent = (p) => (p === null || p === undefined || Number.isNaN(p) ? '–' : significant(p * 100, p !== 0 && p < 0.1 ? 2 : 3) + ' %');
 const count = (n) => String(n).replace(/\B(?=(\d{3})+$)/g, '\u202f');
 

@@ -17,7 +17,7 @@ use cohaptic_units::Instant;
 
 use crate::documents::micros;
 use crate::interrupt;
-use crate::realtime::{Edit, KeyedLinks, Look, counters, quantiles, quantiles_of};
+use crate::realtime::{Edit, KeyedLinks, Look, counters, invalid, quantiles, quantiles_of};
 
 /// Conductor of a session. Publishes snapshots and passes the changes of live control on to the session.
 pub(super) struct SessionConductor {
@@ -93,11 +93,9 @@ pub(crate) fn description(scene: &Scene, pairs: &[(usize, usize)]) -> Descriptio
 
 pub(crate) fn snapshot(status: &Status, axes: usize) -> Snapshot {
     let now = Instant::ZERO.saturating_add(status.elapsed);
-    let validity = status.validity.to_string();
     Snapshot {
         elapsed: status.elapsed,
-        // The page writes "not valid" itself and adds this text as the reason.
-        invalid: (!status.validity.is_valid()).then(|| validity.trim_start_matches("not valid: ").to_owned()),
+        invalid: invalid(&status.validity),
         lateness: vec![quantiles(&status.ticks), quantiles(&status.releases)],
         links: status.links.iter().map(link).collect(),
         peers: status.peers.iter().map(|peer| view(peer, axes, now)).collect(),

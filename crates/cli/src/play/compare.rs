@@ -7,7 +7,7 @@ use std::thread;
 use std::time::{Duration, Instant as Clock};
 
 use cohaptic_harness::live::{Inputs, replay};
-use cohaptic_harness::{Ending, Observer, TickRow};
+use cohaptic_harness::{DIVERGED_DISTANCE, Ending, Observer, TickRow};
 use cohaptic_scene::{PeerKind, link_keys_of_text};
 use cohaptic_units::Instant;
 use serde_json::{Value, json};
@@ -84,7 +84,7 @@ pub(super) fn compare(finished: &Finished) -> Result<Value, String> {
 /// Replays one variant, and returns its curves and their largest values as JSON. `lasted` is the length of the record.
 fn curve(variant: &Variant, inputs: &Inputs, hand: usize, step: Duration, lasted: Instant) -> Result<Value, String> {
     let scene = variant.scene.scene().map_err(|error| said(&error))?;
-    let mut curves = Curves { hand, step, at: vec![[f64::NAN; 3]; scene.peers.len()], discrepancy: Vec::new(), force: Vec::new() };
+    let mut curves = Curves::new(hand, step, scene.peers.len());
     let without_links;
     let inputs = if variant.has_network {
         inputs
@@ -93,10 +93,13 @@ fn curve(variant: &Variant, inputs: &Inputs, hand: usize, step: Duration, lasted
         &without_links
     };
     let Ok(summary) = replay(&scene, inputs, &mut curves);
-    let diverged = match summary.ending {
-        Ending::Diverged(at) => Some(at.as_secs_f64()),
+    curves.end_instant();
+    let ended = match summary.ending {
+        Ending::Diverged(at) => Some(at),
         Ending::Complete | Ending::Interrupted(_) => None,
     };
+    // The copies are apart before a number is not finite any more.
+    let diverged = curves.apart.or(ended).map(Instant::as_secs_f64);
     let largest = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
     Ok(json!({
         "name": variant.name,
@@ -114,13 +117,43 @@ struct Curves {
     /// Index of the peer whose force is kept.
     hand: usize,
     step: Duration,
+    /// Instant of the ticks seen last; `None` before the first tick.
+    now: Option<Instant>,
     /// Last position of each copy \[m\], indexed by peer. NaN before the first tick of the peer.
     at: Vec<[f64; 3]>,
     discrepancy: Vec<f64>,
     force: Vec<f64>,
+    /// First instant at which two copies were so far apart that the run counts as diverged.
+    apart: Option<Instant>,
 }
 
 impl Curves {
+    fn new(hand: usize, step: Duration, peers: usize) -> Self {
+        Self { hand, step, now: None, at: vec![[f64::NAN; 3]; peers], discrepancy: Vec::new(), force: Vec::new(), apart: None }
+    }
+
+    /// Returns the index of the step with the instant `at`.
+    fn place(&self, at: Instant) -> usize {
+        usize::try_from(at.as_nanos() / u64::try_from(self.step.as_nanos()).unwrap_or(u64::MAX)).unwrap_or(usize::MAX)
+    }
+
+    /// Takes the distances at the instant whose ticks have all been seen. Called once more after the last tick.
+    ///
+    /// Peers tick one after the other within an instant. Between the ticks of two peers one copy is a tick older than the other, and fast copies would look
+    /// apart that are at one place.
+    fn end_instant(&mut self) {
+        let Some(now) = self.now else { return };
+        let pairs = self.at.iter().enumerate().flat_map(|(place, one)| self.at[..place].iter().map(move |other| (one, other)));
+        let distances = pairs.map(|(one, other)| length(&[one[0] - other[0], one[1] - other[1], one[2] - other[2]]));
+        // Distances to copies without a tick so far are NaN, and are left out.
+        let most = distances.filter(|apart| !apart.is_nan()).fold(0.0, f64::max);
+        if most > DIVERGED_DISTANCE {
+            self.apart.get_or_insert(now);
+        }
+        let place = self.place(now);
+        Self::raise(&mut self.discrepancy, place, most);
+    }
+
     /// Raises the value of step `place` to at least `value`. Steps that do not exist yet begin at zero.
     fn raise(values: &mut Vec<f64>, place: usize, value: f64) {
         if values.len() <= place {
@@ -138,17 +171,67 @@ impl Observer for Curves {
     }
 
     fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Infallible> {
-        let place = usize::try_from(row.at.as_nanos() / u64::try_from(self.step.as_nanos()).unwrap_or(u64::MAX)).unwrap_or(usize::MAX);
-        let length = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>().sqrt();
+        if self.now != Some(row.at) {
+            self.end_instant();
+            self.now = Some(row.at);
+        }
         self.at[row.peer] = core::array::from_fn(|axis| row.object.position.get(axis).copied().unwrap_or(0.0));
         if row.peer == self.hand {
+            let place = self.place(row.at);
             Self::raise(&mut self.force, place, length(row.coupling_force));
         }
-        let here = self.at[row.peer];
-        let apart = |there: &[f64; 3]| length(&[here[0] - there[0], here[1] - there[1], here[2] - there[2]]);
-        // Distances to copies without a tick so far are NaN, and are left out.
-        let most = self.at.iter().map(apart).filter(|apart| apart.is_finite()).fold(0.0, f64::max);
-        Self::raise(&mut self.discrepancy, place, most);
         Ok(())
+    }
+}
+
+/// Returns the length of a vector. The length of a vector with finite components does not overflow before the components do.
+fn length(values: &[f64]) -> f64 {
+    values.iter().copied().fold(0.0, f64::hypot)
+}
+
+#[cfg(test)]
+mod tests {
+    use cohaptic_harness::{Model, Simulation};
+    use cohaptic_scene::Scene;
+
+    use super::*;
+
+    const SCENE: &str = r#"
+        scene = { duration = "1s", count = 3 }
+        object = { mass = 0.45 }
+        coordination = { strategy = "proportional-derivative", stiffness = 2000.0, damping = 5.0, update = "8ms" }
+        peer = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
+    "#;
+
+    fn run(overrides: &[&str]) -> (Curves, cohaptic_harness::Summary) {
+        let overrides: Vec<String> = overrides.iter().map(|key| (*key).to_owned()).collect();
+        let scene = Scene::parse(SCENE, "scene.toml".as_ref(), &overrides).unwrap();
+        let mut curves = Curves::new(0, Duration::from_millis(1), scene.peers.len());
+        let Ok(summary) = Simulation::new(&scene, Model::General).run(&mut curves);
+        curves.end_instant();
+        (curves, summary)
+    }
+
+    fn largest(values: &[f64]) -> f64 {
+        values.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// Three equal peers that are pushed alike are at one place at every instant, however fast they go.
+    #[test]
+    fn copies_that_go_together_are_not_apart() {
+        let (curves, summary) = run(&["peer.hand={ force = 20.0 }", "coordination.stiffness=100", "link.delay=8ms"]);
+        assert!(summary.peers.iter().all(|peer| peer.velocity[0] > 0.5), "{summary:?}");
+        assert_eq!((curves.discrepancy.len(), largest(&curves.discrepancy), curves.apart), (1000, 0.0, None));
+        assert!(largest(&curves.force) > 1.0);
+    }
+
+    /// Along one axis the distance is what every run calls the largest discrepancy. The second spring is so stiff that the copies part.
+    #[test]
+    fn the_largest_distance_is_the_discrepancy_of_the_run() {
+        for (stiffness, diverges) in [("coordination.stiffness=5000", false), ("coordination.stiffness=20000", true)] {
+            let (curves, summary) = run(&["peers.peer1.hand={ force = 2.0 }", "link.delay=24ms", stiffness]);
+            assert_eq!(largest(&curves.discrepancy).to_bits(), summary.max_discrepancy.to_bits(), "{stiffness}");
+            assert_eq!((curves.apart.is_some(), summary.has_diverged()), (diverges, diverges), "{stiffness}: {}", summary.max_discrepancy);
+        }
     }
 }

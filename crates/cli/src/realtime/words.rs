@@ -6,7 +6,7 @@ use std::time::{Duration, Instant as Clock};
 
 use cohaptic_control::Snapshot;
 use cohaptic_falcon::boot::Progress;
-use cohaptic_realtime::{LatenessSummary, Prepared, Wish};
+use cohaptic_realtime::{LatenessSummary, Prepared, Validity, Wish};
 use cohaptic_units::print::{Counted, Span};
 use cohaptic_units::visible_lines;
 use cohaptic_wan::{DropCause, LinkModel, LinkStats};
@@ -23,6 +23,11 @@ pub(crate) fn late(summary: &LatenessSummary) -> String {
         if micros < 1000.0 { format!("{micros:.1} µs") } else { format!("{:.2} ms", micros / 1e3) }
     });
     format!("p50 {p50}, p99 {p99}, p99.9 {p999}, worst {max}")
+}
+
+/// Returns why a run is not valid, without the words "not valid", which the pages write themselves; `None` for a valid run.
+pub(crate) fn invalid(validity: &Validity) -> Option<String> {
+    (!validity.is_valid()).then(|| validity.to_string().trim_start_matches("not valid: ").to_owned())
 }
 
 /// Lists the real-time privileges that the system granted, and each privilege that the system refused, with advice how to get it. One indented line each.
@@ -167,6 +172,14 @@ mod tests {
     use cohaptic_wan::{Link, LinkName, PacketInfo};
 
     use super::*;
+
+    #[test]
+    fn the_reason_does_not_repeat_what_a_page_writes_before_it() {
+        let limit = Duration::from_millis(1);
+        let reason = invalid(&Validity::NotValid { late: 23, of: 1965, limit }).unwrap();
+        assert!(reason.starts_with("23 of 1965"), "{reason}");
+        assert_eq!(invalid(&Validity::Valid), None);
+    }
 
     #[test]
     fn both_delays_are_said_and_that_it_was_changed() {

@@ -20,7 +20,7 @@ use crate::arguments::RelayArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::progress::Progress;
-use crate::realtime::{self, ControlFiles, Edit, KeyedLinks, LiveControl, Publisher, counters, quantiles, quantiles_of, say, some_length};
+use crate::realtime::{self, ControlFiles, Edit, KeyedLinks, LiveControl, Publisher, counters, invalid, quantiles, quantiles_of, say, some_length};
 use crate::{interrupt, output};
 use setup::Setup;
 
@@ -132,7 +132,7 @@ fn snapshot(view: &View<'_>, pairs: &[(NodeId, NodeId)], tolerance: Tolerance) -
     let validity = tolerance.judge(view.release());
     Snapshot {
         elapsed: view.now().saturating_duration_since(Instant::ZERO),
-        invalid: (!validity.is_valid()).then(|| validity.to_string()),
+        invalid: invalid(&validity),
         lateness: vec![quantiles(&view.release().summary())],
         links: links.iter().zip(pairs).map(|(report, (from, to))| link(report, view.recent_delays(*from, *to))).collect(),
         peers: Vec::new(),

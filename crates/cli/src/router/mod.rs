@@ -19,7 +19,9 @@ use crate::arguments::RouterArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::progress::Progress;
-use crate::realtime::{self, ConfiguredDelay, ControlFiles, Edit, KeyedLinks, LiveControl, Publisher, counters, quantiles, say, some_length};
+use crate::realtime::{
+    self, ConfiguredDelay, ControlFiles, Edit, KeyedLinks, LiveControl, Publisher, counters, invalid, quantiles, say, some_length,
+};
 use crate::{input, interrupt, output};
 
 /// Runs a router between two devices and prints its report.
@@ -173,7 +175,7 @@ fn description(file: &RouterFile) -> Description {
 fn snapshot(report: &Report, validity: Validity) -> Snapshot {
     Snapshot {
         elapsed: elapsed(report),
-        invalid: (!validity.is_valid()).then(|| validity.to_string()),
+        invalid: invalid(&validity),
         lateness: vec![quantiles(&report.release)],
         links: report.counters.lanes.iter().map(link).collect(),
         peers: Vec::new(),

@@ -39,7 +39,7 @@ function showRuns() {
     const swatch = make('span', 'swatch');
     swatch.style.background = colour(i);
     name.append(swatch, make('span', '', run.name + (run.diverged_s === null ? '' : ', falls apart after ' + span(run.diverged_s, 2))));
-    tr.append(name, make('td', 'n', place([run.largest_discrepancy_m])), make('td', 'n', run.largest_force_n.toFixed(1) + ' N'));
+    tr.append(name, make('td', 'n', place([run.largest_discrepancy_m])), make('td', 'n', newtons(run.largest_force_n, 1)));
     return tr;
   });
   $('runs').replaceChildren(...rows);

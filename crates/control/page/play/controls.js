@@ -135,7 +135,7 @@ function showNumbers() {
     put(tr.cells[0].lastChild, facts.peers[i] ? facts.peers[i].name : '');
     put(tr.cells[1], { present: 'holds', stale: 'let go', absent: 'nobody', here: 'simulated' }[peer.hand]);
     put(tr.cells[2], place(peer.at));
-    put(tr.cells[3], lengthOf(wide(peer.force)).toFixed(2) + ' N');
+    put(tr.cells[3], newtons(peer.force.every(Number.isFinite) ? lengthOf(peer.force) : null, 2));
   });
   put($('apart'), place([farthest()]));
 }

@@ -55,7 +55,7 @@ function drawRoom(context, room, i) {
   const name = facts.peers[i] ? facts.peers[i].name : '';
   context.fillText(name + (own && ownHand !== null ? ' (your hand)' : ''), room.left + 9, room.top + 8);
   context.fillStyle = ink.soft;
-  if (room.height > 60) context.fillText(lengthOf(body.force).toFixed(1) + ' N', room.left + 9, room.top + 25);
+  if (room.height > 60) context.fillText(newtons(lengthOf(body.force), 1), room.left + 9, room.top + 25);
   context.restore();
 }
 

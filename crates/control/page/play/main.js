@@ -19,12 +19,18 @@ function onTrouble(text, looksOn) {
   });
 }
 
+/** What was too late and by how much, what that means, and what one can do. */
+const whyNotValid = (reason) => 'Not valid as a measurement, because ticks of the simulation came too late: ' + reason + '. The computer is too busy. The motion '
+  + 'is computed right all the same, but the hand felt it later than the links say. Close other programs and pages, or take fewer peers; then “Put everything back” counts anew.';
+
 async function showValid() {
   if (lost || document.hidden) return;
   const state = await ask('/api/state');
   put($('valid'), state.valid ? 'valid' : 'not valid');
-  put($('late'), state.valid ? 'The session is on time.' : 'The machine is busy; not valid as a measurement: ' + state.invalid + '.');
   $('valid').className = 'pill ' + (state.valid ? 'good' : 'bad');
+  $('valid').title = state.valid ? 'so far at most one tick in a thousand was too late' : '';
+  put($('late'), state.valid ? '' : whyNotValid(state.invalid));
+  $('late').hidden = state.valid;
 }
 
 readInk();

@@ -40,9 +40,12 @@ const lengthOf = (v) => Math.hypot(...v);
 /** How far out the farthest copy is [m]. */
 const farthestOut = () => Math.max(0, ...shown.map((body) => lengthOf(body.at)));
 
-/** The largest distance between two copies [m]. */
+/** The largest distance between two copies [m]; null if a copy has no finite place. Of measured places: the drawn ones follow, and of a fast swing they
+ * show less. */
 function farthest() {
+  const places = frame.peers.map((peer) => peer.at);
+  if (!places.flat().every(Number.isFinite)) return null;
   let most = 0;
-  shown.forEach((one, i) => shown.slice(i + 1).forEach((other) => { most = Math.max(most, lengthOf(add3(one.at, other.at, -1))); }));
+  places.forEach((one, i) => places.slice(i + 1).forEach((other) => { most = Math.max(most, lengthOf(one.map((value, axis) => value - other[axis]))); }));
   return most;
 }

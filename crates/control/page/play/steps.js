@@ -41,6 +41,8 @@ let step = 0;
 function makeSteps() {
   for (const { text, button, act } of STEPS) {
     const item = make('li');
+    // A narrow screen shows one step alone, which would be counted as the first.
+    item.value = $('steps').children.length + 1;
     item.append(make('p', '', text));
     if (button) {
       const node = make('button', '', button);

@@ -88,6 +88,31 @@ fn somebody_drags_takes_three_steps_and_compares() {
     end(session);
 }
 
+/// On a phone one step is shown at a time, with its own number, and a session that is late says so in a sentence on the page.
+#[test]
+#[ignore = ".ci/nightly runs it: it needs a browser"]
+fn a_phone_shows_the_number_of_the_step_and_why_a_session_is_not_valid() {
+    let Some(mut browser) = Browser::start() else { return };
+    browser.call("Emulation.setDeviceMetricsOverride", json!({ "width": 390, "height": 844, "deviceScaleFactor": 1, "mobile": true }));
+    let desk = Desk::new();
+    // A tick within a nanosecond of its instant is a rare chance, on any machine.
+    let mut session = Session::play(&desk, "--tolerance 1ns");
+    open(&mut browser, &mut session);
+    browser.wait("document.getElementById('valid').textContent === 'not valid' && !document.getElementById('late').hidden");
+    let why = browser.value("document.getElementById('late').textContent").to_string();
+    for part in ["ticks of the simulation", " were more than 1ns late", "Close other programs"] {
+        assert!(why.contains(part), "no {part:?} in {why}");
+    }
+    let visible = "[...document.querySelectorAll('#steps li')].filter((item) => item.offsetHeight > 0).map((item) => item.value)";
+    assert_eq!(browser.value(visible), json!([1]));
+    browser.click("#sway");
+    browser.wait(&format!("JSON.stringify({visible}) === '[2]'"));
+    assert_eq!(browser.value("document.documentElement.scrollWidth"), json!(390), "nothing is scrolled sideways");
+    browser.picture("play-phone");
+    assert_eq!(browser.complaints, [""; 0]);
+    end(session);
+}
+
 /// The other copies begin to move when the first sample with a motion in it has arrived: one delay after the own copy, and at most a period of sending and a
 /// tick later.
 #[test]
