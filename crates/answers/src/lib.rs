@@ -64,5 +64,7 @@ pub(crate) use pictures::{AdmittanceWords, admittance_words, axis_of_key, crossi
 pub use quick_verdict::{OPERATIONS_A_SECOND, Quick, quick_verdict};
 pub use run::run;
 pub use run_words::{angle_text, diverged, measured_lines, packets, run_words};
+pub use text_plot::TEXT_PLOT_SPANS;
 pub(crate) use text_plot::text_plot;
-pub use words::{are, figure, length, nominal};
+pub(crate) use words::LAW;
+pub use words::{are, figure, legend_name, length, nominal};

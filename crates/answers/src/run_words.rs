@@ -10,14 +10,15 @@ use cohaptic_wan::{DropCause, LinkStats};
 use crate::parts::MOST_LINKS;
 use crate::{length, text_plot};
 
-/// Returns the text about a run. `wall_s`: wall time of the run \[s\]. `positions`: positions to draw as a text plot, if wanted.
+/// Returns the text about a run. `wall_s`: wall time of the run \[s\]. `positions`: positions to draw as a text plot, if wanted, best in [`TEXT_PLOT_SPANS`](crate::TEXT_PLOT_SPANS) spans.
 #[must_use]
 pub fn run_words(scene: &Scene, summary: &Summary, measured: &[MeasuredValue], wall_s: f64, positions: Option<&Bands>) -> String {
     let mut text = String::new();
     let mut line = |line: String| text.push_str(&format!("{line}\n"));
     if let Some(positions) = positions {
         line(format!("position of each copy of the object{}", if scene.axes.count() > 1 { ", along x" } else { "" }));
-        line(text_plot(positions, 100.0, "cm").trim_end().to_owned());
+        let names: Vec<&str> = scene.peers.iter().map(|peer| peer.name.as_str()).collect();
+        line(text_plot(positions, &names).trim_end().to_owned());
     }
     let simulated = Span(summary.duration);
     match summary.ending {

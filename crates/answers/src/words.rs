@@ -5,7 +5,15 @@ use cohaptic_units::print::Counted;
 /// Returns a length in words: `12.300 mm`, and in metres with an exponent from 10 km on.
 #[must_use]
 pub fn length(metres: f64) -> String {
-    if metres.abs() < 1e4 { format!("{:.3} mm", metres * 1e3) } else { format!("{metres:.3e} m") }
+    match length_unit(metres) {
+        (factor, "mm") => format!("{:.3} mm", metres * factor),
+        (_, unit) => format!("{metres:.3e} {unit}"),
+    }
+}
+
+/// Returns the unit in which texts write a length, and the factor from metres to this unit.
+pub(crate) const fn length_unit(metres: f64) -> (f64, &'static str) {
+    if metres.abs() < 1e4 { (1e3, "mm") } else { (1.0, "m") }
 }
 
 /// Returns the note about `count` nominal verdicts, which leave random parts out because their second moment cannot be followed; `None` if `count` is 0. `one`
@@ -20,6 +28,17 @@ pub fn nominal(count: usize, [one, several]: [&str; 2]) -> Option<String> {
         )
     })
 }
+
+/// Returns the name of a variant of a scene in a legend: the name of its coordination law, and then the `KEY=VALUE` texts that make the variant out of the
+/// scene, without the text that chooses the law.
+#[must_use]
+pub fn legend_name(law: &str, overrides: &[String]) -> String {
+    let is_law = |text: &&String| text.split_once('=').is_some_and(|(key, _)| key.trim() == LAW);
+    std::iter::once(law).chain(overrides.iter().filter(|text| !is_law(text)).map(String::as_str)).collect::<Vec<&str>>().join(", ")
+}
+
+/// Key that chooses the coordination law of a scene.
+pub(crate) const LAW: &str = "coordination.strategy";
 
 /// Returns a count with its noun and verb: `1 cell is`, `2 cells are`.
 #[must_use]
@@ -37,6 +56,17 @@ pub fn figure(value: f64, digits: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_legend_names_the_law_once_and_then_what_else_differs() {
+        let name = |overrides: &[&str]| legend_name("average-position", &overrides.iter().map(|text| (*text).to_owned()).collect::<Vec<_>>());
+        assert_eq!(name(&[]), "average-position");
+        assert_eq!(name(&["coordination.strategy = average-position"]), "average-position");
+        assert_eq!(
+            name(&["scene.count=3", "coordination.strategy=average-position", "link.delay=8ms"]),
+            "average-position, scene.count=3, link.delay=8ms"
+        );
+    }
 
     #[test]
     fn one_is_and_others_are() {
