@@ -1,5 +1,6 @@
 //! `cohaptic run`: simulates a scene, or a scene and a variant of the scene, or replays the inputs of a live session.
 
+mod against;
 pub(crate) mod answer;
 mod motion;
 pub(crate) mod page;
@@ -11,11 +12,12 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
+use cohaptic_answers::TEXT_PLOT_SPANS;
 use cohaptic_files::write_whole;
-use cohaptic_harness::check::ExpectationWatch;
+use cohaptic_harness::check::{ExpectationWatch, Outcome};
 use cohaptic_harness::live::{Inputs, replay};
 use cohaptic_harness::measures::{MeasuredValue, Measures};
-use cohaptic_harness::record::{Bands, RecordError, Recorder, links_csv};
+use cohaptic_harness::record::{Bands, RecordError, RecordedPicture, Recorder, links_csv};
 use cohaptic_harness::{Model, Observer, Simulation, Summary, TickRow, Ticks};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
@@ -27,6 +29,7 @@ use crate::file::{own_folder, unwritten, write_file};
 use crate::progress::Progress;
 use crate::shell::CommandLine;
 use crate::{input, interrupt, output};
+use against::Shown;
 use answer::describe;
 use motion::Places;
 
@@ -60,17 +63,28 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     let what = inputs.as_ref().map_or(What::Simulated, What::Replayed);
     let out = arguments.out.as_deref();
     let _own = out.map(own_folder).transpose()?;
-    let first = run_one(arguments, &scene, what, out, overrides)?;
+    let mut first = run_one(arguments, &scene, what, out)?;
+    let out_against = out.map(|out| out.join("against"));
     let second = match &variant {
         // An interrupted first run is printed alone: the variant would only delay the end.
         Some(variant) if !interrupt::requested() => {
-            let both: Vec<String> = overrides.iter().chain(&arguments.against).cloned().collect();
-            let out = out.map(|out| out.join("against"));
-            let _own = out.as_deref().map(own_folder).transpose()?;
-            Some(run_one(arguments, variant, What::Simulated, out.as_deref(), &both)?)
+            let own = out_against.as_deref().map(own_folder).transpose()?;
+            Some((run_one(arguments, variant, What::Simulated, out_against.as_deref())?, own))
         }
         _ => None,
     };
+    let (mut second, _own_against) = second.unzip();
+    let both: Vec<String> = overrides.iter().chain(&arguments.against).cloned().collect();
+    let of_variant = variant.as_ref().zip(second.as_ref()).and_then(|(variant, run)| run.shown(variant, &both));
+    let page = first.shown(&scene, overrides).map(|shown| match of_variant {
+        None => shown.page(arguments),
+        Some(variant) => against::html(arguments, [shown, variant]),
+    });
+    let (page, page_of_variant) = (page.transpose()?, of_variant.map(|shown| shown.page(arguments)).transpose()?);
+    first.write_page(out, page)?;
+    if let Some(second) = &mut second {
+        second.write_page(out_against.as_deref(), page_of_variant)?;
+    }
     let drawn = arguments.motion.as_deref().map(|file| motion::draw(file, arguments, &scene, [Some(&first), second.as_ref()]));
     drawn.transpose()?;
     if arguments.scene.json {
@@ -116,6 +130,33 @@ struct Run {
     positions: Option<Bands>,
     places: Option<Places>,
     files: Vec<PathBuf>,
+    /// Parts of the page; `None` for a run without a page.
+    page: Option<PageParts>,
+}
+
+/// Parts of a page that a run has for its page alone.
+struct PageParts {
+    /// Results of the scene's expectations.
+    outcomes: Vec<Outcome>,
+    pictures: Vec<RecordedPicture>,
+}
+
+impl Run {
+    /// Returns what a page shows of the run; `None` for a run without a page.
+    fn shown<'a>(&'a self, scene: &'a Scene, overrides: &'a [String]) -> Option<Shown<'a>> {
+        let (summary, measured) = (&self.summary, &self.measured);
+        self.page.as_ref().map(|PageParts { outcomes, pictures }| Shown { scene, overrides, summary, measured, outcomes, pictures })
+    }
+
+    /// Writes the page of the run into its folder, if the run has both.
+    fn write_page(&mut self, folder: Option<&Path>, page: Option<String>) -> Result<(), Failure> {
+        if let Some((folder, page)) = folder.zip(page) {
+            let file = folder.join("run.html");
+            write_file(&file, page)?;
+            self.files.push(file);
+        }
+        Ok(())
+    }
 }
 
 /// Source of the motion of a run.
@@ -126,23 +167,23 @@ enum What<'a> {
     Replayed(&'a Inputs),
 }
 
-fn run_one(arguments: &RunArguments, scene: &Scene, what: What<'_>, out: Option<&Path>, overrides: &[String]) -> Result<Run, Failure> {
+fn run_one(arguments: &RunArguments, scene: &Scene, what: What<'_>, out: Option<&Path>) -> Result<Run, Failure> {
     let shown = is_shown(arguments);
     let paged = out.is_some() && !arguments.no_plot;
     let mut watch = Watch {
         progress: Progress::through_scene(&scene.title, scene.duration),
-        positions: shown.then(|| Bands::new(scene.duration, PLOT_SPANS, scene.peers.len())),
+        positions: shown.then(|| Bands::new(scene.duration, TEXT_PLOT_SPANS, scene.peers.len())),
         places: arguments.motion.as_ref().map(|_| Places::new(scene.peers.len())),
     };
     let start = Clock::now();
     let measures = Measures::of(scene);
     let values = |measures: Option<Measures>, summary: &Summary| measures.map(|measures| measures.values(summary.duration)).unwrap_or_default();
-    let (summary, measured, mut files) = match out {
+    let (summary, measured, mut files, page) = match out {
         None => {
             let mut observer = (&mut watch, measures);
             let summary = execute(arguments, scene, what, &mut observer)?;
             let measured = values(observer.1, &summary);
-            (summary, measured, Vec::new())
+            (summary, measured, Vec::new(), None)
         }
         Some(folder) => {
             let recorder = Recorder::create(folder, scene)?.sized(arguments.pictures.size());
@@ -151,15 +192,9 @@ fn run_one(arguments: &RunArguments, scene: &Scene, what: What<'_>, out: Option<
             let summary = execute(arguments, scene, what, &mut observer)?;
             let ((recorder, _), (measures, expectations)) = observer;
             let measured = values(measures, &summary);
-            let (mut files, pictures) = recorder.finish_with_pictures(&summary)?;
-            if let Some(expectations) = expectations {
-                let outcomes = expectations.outcomes(&summary);
-                let page = page::html(arguments, scene, overrides, (&summary, &measured), &outcomes, &pictures)?;
-                let file = folder.join("run.html");
-                write_file(&file, page)?;
-                files.push(file);
-            }
-            (summary, measured, files)
+            let (files, pictures) = recorder.finish_with_pictures(&summary)?;
+            let page = expectations.map(|expectations| PageParts { outcomes: expectations.outcomes(&summary), pictures });
+            (summary, measured, files, page)
         }
     };
     let wall_s = start.elapsed().as_secs_f64();
@@ -168,7 +203,7 @@ fn run_one(arguments: &RunArguments, scene: &Scene, what: What<'_>, out: Option<
         write_whole(path, |file| links_csv(&summary, |rows| file.write_all(rows))).map_err(unwritten(path))?;
         files.push(path.clone());
     }
-    Ok(Run { summary, measured, wall_s, positions: watch.positions, places: watch.places, files })
+    Ok(Run { summary, measured, wall_s, positions: watch.positions, places: watch.places, files, page })
 }
 
 fn execute<O: Observer>(arguments: &RunArguments, scene: &Scene, what: What<'_>, observer: &mut O) -> Result<Summary, O::Error> {
@@ -183,9 +218,6 @@ fn execute<O: Observer>(arguments: &RunArguments, scene: &Scene, what: What<'_>,
     interrupt::has_results();
     summary
 }
-
-/// Number of spans of time in the plot of the terminal: two per column, because a column has two dots.
-const PLOT_SPANS: usize = 144;
 
 /// Observer of a run. Shows the progress, collects positions for the plot and the motion picture, and ends the run when the user asks for the end.
 struct Watch {

@@ -33,7 +33,7 @@ pub(super) fn html(
     let content = input::with(path, |text, file| scene_content_of_text(text, file, overrides))?;
     let mut page = Page::new(scene.title.as_str()).with(ending(scene, summary)).with(Html::facts(facts(arguments, scene, overrides, summary)));
     page = page.with(made_by(&command_line(arguments)));
-    page = page.with(expectations(scene, outcomes)).with(measures(scene, measured)).with(Html::heading(2, "Pictures"));
+    page = page.with(section("Expectations", expectations(scene, outcomes))).with(measures(scene, measured)).with(Html::heading(2, "Pictures"));
     for (file, svg) in pictures {
         page = page.with(Html::figure(file, Html::picture(svg)));
     }
@@ -45,15 +45,21 @@ pub(super) fn html(
     Ok(page.with(scene_text(&text)).html())
 }
 
+/// Returns a section of the page, or nothing if the section would be empty.
+pub(super) fn section(heading: &str, content: Html) -> Html {
+    if content == Html::default() { content } else { Html::heading(2, heading).and(content) }
+}
+
 /// Returns a warning if the run diverged or was interrupted, otherwise nothing.
-fn ending(scene: &Scene, summary: &Summary) -> Html {
+pub(super) fn ending(scene: &Scene, summary: &Summary) -> Html {
     match summary.ending {
         Ending::Complete | Ending::Diverged(_) => diverged(summary).map_or_else(Html::default, |why| Html::warning(format!("DIVERGED: {why}."))),
         Ending::Interrupted(_) => Html::warning(format!("INTERRUPTED after {} of {}.", Span(summary.duration), Span(scene.duration))),
     }
 }
 
-fn facts<'a>(arguments: &RunArguments, scene: &Scene, overrides: &[String], summary: &Summary) -> Vec<(&'a str, Html)> {
+/// Returns the facts about the run, each with its name.
+pub(super) fn facts<'a>(arguments: &RunArguments, scene: &Scene, overrides: &[String], summary: &Summary) -> Vec<(&'a str, Html)> {
     let mut facts = vec![
         ("Simulated", format!("{}, {}", Span(summary.duration), Counted(summary.ticks, "tick")).into()),
         ("Largest discrepancy between two copies", length(summary.max_discrepancy).into()),
@@ -69,9 +75,10 @@ fn facts<'a>(arguments: &RunArguments, scene: &Scene, overrides: &[String], summ
     facts
 }
 
-fn expectations(scene: &Scene, outcomes: &[Outcome]) -> Html {
+/// Returns the expectations of the scene with their outcomes; empty if the scene expects nothing.
+pub(super) fn expectations(scene: &Scene, outcomes: &[Outcome]) -> Html {
     let Some(expect) = &scene.expect else { return Html::default() };
-    let mut content = Html::heading(2, "Expectations");
+    let mut content = Html::default();
     if !outcomes.is_empty() {
         let table = outcomes.iter().fold(columns(), |table, outcome| table.row(cells(&OutcomeDocument::new(outcome))));
         content = content.and(Html::paragraph(BARS)).and(Html::table(&table));

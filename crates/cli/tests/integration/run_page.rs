@@ -74,15 +74,42 @@ fn tables_have_the_figures_of_links_and_peers_the_timeline_and_the_expectations(
 }
 
 #[test]
-fn no_plot_leaves_the_page_away_and_a_second_run_has_its_own() {
+fn the_page_of_a_run_against_another_holds_both() {
     let desk = Desk::with("two.toml", TWO);
-    desk.text("run two.toml --no-plot --out plain");
-    assert!(!desk.path("plain/run.html").exists() && desk.path("plain/positions.svg").exists());
-    let document = desk.json("run two.toml --against link.delay=8ms --out both --json");
-    assert_eq!(document["files"][6], "both/run.html");
+    let document = desk.json("run two.toml --measure all --against link.delay=8ms --out both --json");
+    assert_eq!((&document["files"][6], &document["against"]["files"][6]), (&"both/run.html".into(), &"both/against/run.html".into()));
     let (first, second) = (desk.read("both/run.html"), desk.read("both/against/run.html"));
-    assert!(first.contains("--against link.delay=8ms --out DIR") && second.contains("--against link.delay=8ms --out DIR"));
-    assert!(second.contains("<h1>Two users, with link.delay=8ms</h1>") && second.contains("8.000</td>") && !first.contains("8.000</td>"));
+    assert_eq!((page_faults(&first), page_faults(&second)), (Vec::new(), Vec::new()));
+    let command = "--against link.delay=8ms --measure all --out DIR";
+    assert!(first.contains(command) && second.contains(command), "{first}");
+    // Each picture of both folders, pair by pair, and the links of both runs.
+    let pictures: Vec<String> =
+        ["positions", "forces", "network"].iter().flat_map(|name| [format!("both/{name}.svg"), format!("both/against/{name}.svg")]).collect();
+    let places: Vec<usize> = pictures.iter().map(|file| first.find(&desk.read(file)).unwrap_or_else(|| panic!("{file} is missing"))).collect();
+    assert!(places.is_sorted() && first.matches("<svg ").count() == 6, "{places:?}");
+    for part in [
+        "<figure id=\"against/positions.svg\">",
+        "<th scope=\"col\">Two users</th><th scope=\"col\">Two users, with link.delay=8ms</th>",
+        "<th scope=\"row\">Overrides</th><td><code>measure.names=&quot;all&quot;</code></td><td><code>measure.names=&quot;all&quot;</code>, <code>link.delay=8ms</code></td>",
+        "<th scope=\"col\" class=\"number\">Two users</th><th scope=\"col\" class=\"number\">Two users, with link.delay=8ms</th><th scope=\"col\">unit</th>",
+        "<h3>Two users, with link.delay=8ms</h3>",
+        "24.000</td>",
+        "8.000</td>",
+    ] {
+        assert!(first.contains(part), "no {part} in {first}");
+    }
+    // The second run has a page of its own too, which has only that run.
+    assert!(second.contains("<h1>Two users, with link.delay=8ms</h1>") && second.contains("8.000</td>") && !second.contains("24.000</td>"));
+    assert_eq!(second.matches("<svg ").count(), 3);
+}
+
+#[test]
+fn no_plot_leaves_the_page_away() {
+    let desk = Desk::with("two.toml", TWO);
+    desk.text("run two.toml --no-plot --out plain --against link.delay=8ms");
+    for folder in ["plain", "plain/against"] {
+        assert!(!desk.path(&format!("{folder}/run.html")).exists() && desk.path(&format!("{folder}/positions.svg")).exists());
+    }
 }
 
 #[test]
