@@ -79,6 +79,28 @@ impl Network {
         }
     }
 
+    /// Returns the line through the least and the greatest delay of each span of a shown link: time \[s\] and delay \[ms\]. The line is interrupted between two
+    /// spans if packets of a span between them were lost and none arrived: a delay that nobody measured is not drawn.
+    fn delay_runs(&self, place: usize) -> Vec<Vec<(f64, f64)>> {
+        let losses: Vec<f64> = self.shown[place].losses.iter().map(|span| self.delays.middle_of(*span)).collect();
+        let mut runs: Vec<Vec<(f64, f64)>> = Vec::new();
+        let mut before = f64::NEG_INFINITY;
+        for (t, low, high) in self.delays.curve(place) {
+            // The first loss after the span before. Losses of a span with delivered packets are at the instant of the span itself, and leave no gap.
+            let lost = losses.get(losses.partition_point(|loss| *loss <= before)).is_some_and(|loss| *loss < t);
+            if lost || runs.is_empty() {
+                runs.push(Vec::new());
+            }
+            // A part with a single delay has a single point, which is drawn as a dot. Two equal points would be a line without a length.
+            let points = [Some(low), Some(high).filter(|high| high.to_bits() != low.to_bits())].into_iter().flatten().map(|delay| (t, 1e3 * delay));
+            if let Some(run) = runs.last_mut() {
+                run.extend(points);
+            }
+            before = t;
+        }
+        runs
+    }
+
     /// Draws the picture.
     pub(super) fn picture(&self, title: &str, names: &[String]) -> Picture {
         let name = |from: usize, to: usize| format!("{} → {}", names[from], names[to]);
@@ -86,13 +108,10 @@ impl Network {
         let delay = || Axis::new("Delay").unit("ms").range(0.0, if longest > 0.0 { 1.05 * longest } else { 1.0 });
         let mut picture = Picture::new(format!("{title}: delays and losses of links")).columns(2).aspect(0.42);
         for (place, link) in self.shown.iter().enumerate() {
-            let band: Vec<(f64, f64, f64)> = self.delays.curve(place).collect();
-            // One line through the least and the greatest delay of each span in turn.
-            let extremes = band.iter().flat_map(|(t, low, high)| [(*t, 1e3 * low), (*t, 1e3 * high)]);
             let lost = Rug::new(link.losses.iter().map(|span| self.delays.middle_of(*span)), Look::of(1)).named("packets lost");
             let over_time = Panel::new(Axis::new("Time").symbol("t").unit("s").range(0.0, self.delays.seconds()), delay())
                 .titled(format!("{}: {}", name(link.from, link.to), link.losses_in_words()))
-                .with(Line::new(extremes, Look::of(0).thin()).named("delay of packets"))
+                .with(Line::runs(self.delay_runs(place), Look::of(0).thin()).named("delay of packets"))
                 .with(lost);
             let shares = Panel::new(delay(), Axis::new("Share of packets").range(0.0, 1.0))
                 .titled(link.median_in_words())
@@ -228,6 +247,19 @@ mod tests {
             assert!(svg.contains(&format!(">{text}</text>")), "{text}");
         }
         assert!(!svg.contains("Not shown"));
+    }
+
+    /// Ten spans of 100 ms. Packets of the spans 3 and 4 are lost, of span 6 one is lost and one arrives, and in span 7 nothing is sent: one gap.
+    #[test]
+    fn no_line_crosses_a_burst_of_losses() {
+        let sent = [(0, true), (100, true), (200, true), (300, false), (400, false), (500, true), (600, false), (650, true), (800, true)];
+        let packets: Vec<_> = sent.iter().map(|(at, arrives)| (1, *at, arrives.then_some(10))).collect();
+        let (network, svg) = network(2, &packets);
+        let runs = network.delay_runs(0);
+        let times = |run: &[(f64, f64)]| run.iter().map(|(t, _)| (t * 1e3).round()).collect::<Vec<f64>>();
+        assert_eq!(runs.iter().map(|run| times(run)).collect::<Vec<_>>(), [vec![50.0, 150.0, 250.0], vec![550.0, 650.0, 850.0]]);
+        let line = svg.lines().find(|line| line.starts_with("<path class=\"line s0\" stroke-width=\"0.9\"")).unwrap();
+        assert_eq!(line.matches('M').count(), 2, "{line}");
     }
 
     /// A uniform delay from 20 to 30 ms is a straight line; a constant delay is a step.
