@@ -9,7 +9,7 @@ h1, h2, h3 { line-height: 1.25; overflow-wrap: anywhere; }
 a { color: inherit; }
 section, figure { margin: 0 0 2rem; padding: 0; border-top: 1px solid var(--line); }
 dt { font-weight: 600; }
-dd { margin: 0 0 .5rem 1rem; overflow-wrap: anywhere; }
+dd { margin: 0 0 .5rem 1rem; }
 b.good { color: var(--good); }
 b.partly { color: var(--partly); }
 b.bad { color: var(--bad); }
@@ -17,8 +17,8 @@ p.warning { color: var(--bad); font-weight: 600; }
 .wide { overflow-x: auto; }
 .wide svg { max-width: max(100%, 40rem); height: auto; }
 .wide svg.gauge { max-width: none; vertical-align: middle; }
-b { white-space: nowrap; }
-table { border-collapse: collapse; margin: 1rem 0; font-size: .9rem; }
+table { border-collapse: collapse; margin: 1rem 0; font-size: .9rem; overflow-wrap: normal; }
+td b, th b { white-space: nowrap; }
 th, td { text-align: left; vertical-align: top; padding: .25rem .75rem .25rem 0; border-bottom: 1px solid var(--line); }
 th.number, td.number { text-align: right; font-variant-numeric: tabular-nums; }
 tbody th { font-weight: 400; }
@@ -38,6 +38,6 @@ tbody th, td { overflow-wrap: anywhere; }
 tbody th.number, td.number { overflow-wrap: normal; }
 h2, h3 { break-after: avoid; }
 figure, tr { break-inside: avoid; }
-details::details-content { display: block; content-visibility: visible; }
+details::details-content { display: block; content-visibility: visible; block-size: auto; }
 }
 ";

@@ -25,8 +25,10 @@ const PLACES: &str = "let lines=[];for(const [n,svg] of [...document.querySelect
 const COLOURS: &str = "let lines=[...new Set([...document.querySelectorAll('[class],body')].map(e=>{const s=getComputedStyle(e);\
     return [e.tagName.toLowerCase()+'.'+(e.getAttribute('class')||''),s.fill,s.stroke,s.color,s.backgroundColor].join('|')}))];";
 
-/// Script that writes by how much the page is wider than the window \[px\].
-const WIDTH: &str = "lines.push('WIDER '+(document.documentElement.scrollWidth-document.documentElement.clientWidth));";
+/// Script that writes by how much the page is wider than the window \[px\], first of a laptop, then of a phone of 390 px. No window of the browser is as narrow
+/// as a phone, but a body of this width is laid out alike.
+const WIDTH: &str = "lines.push('WIDER '+(document.documentElement.scrollWidth-document.documentElement.clientWidth));\
+    document.body.style.width='390px';lines.push('WIDER '+(document.body.scrollWidth-390));";
 
 /// Returns the misplaced texts of named pictures, as [`misplaced`] does, with the boxes measured by a browser. Returns `None` without a `chromium` on the path.
 ///
@@ -43,8 +45,8 @@ pub fn in_browser(folder: &Path, pictures: &[(String, String)]) -> Option<Vec<St
     Some(placed(&lines, &expected))
 }
 
-/// Returns the faults of a page in a browser: misplaced texts of its pictures, and a page wider than the window of a laptop. Returns `None` without a
-/// `chromium` on the path; see [`in_browser`].
+/// Returns the faults of a page in a browser: misplaced texts of its pictures, and a page that is wider than the window of a laptop or of a phone. Returns
+/// `None` without a `chromium` on the path; see [`in_browser`].
 ///
 /// # Panics
 ///
@@ -52,12 +54,17 @@ pub fn in_browser(folder: &Path, pictures: &[(String, String)]) -> Option<Vec<St
 #[must_use]
 pub fn page_in_browser(folder: &Path, page: &str) -> Option<Vec<String>> {
     let mut lines = answer(folder, page, Scheme::Light, &format!("{PLACES}{WIDTH}"))?;
-    let wider = lines.pop().and_then(|line| line.strip_prefix("WIDER ")?.parse::<i32>().ok());
+    let mut wider = |window: &str| {
+        let by = lines.pop().and_then(|line| line.strip_prefix("WIDER ")?.parse::<i32>().ok());
+        (by != Some(0)).then(|| format!("the page is wider than the window of a {window} by {by:?} px"))
+    };
+    // The last line is popped first.
+    let wider: Vec<String> = ["phone", "laptop"].into_iter().filter_map(&mut wider).collect();
     let pictures: Vec<&str> = page.split("<svg ").skip(1).collect();
     let names: Vec<String> = (1..=pictures.len()).map(|number| format!("picture {number}")).collect();
     let expected: Vec<(&str, usize)> = names.iter().map(String::as_str).zip(pictures.iter().map(|svg| svg.matches("<text ").count())).collect();
     let mut faults = placed(&lines, &expected);
-    faults.extend((wider != Some(0)).then(|| format!("the page is wider than its window by {wider:?} px")));
+    faults.extend(wider);
     Some(faults)
 }
 
