@@ -53,9 +53,9 @@ pub(crate) fn admittance_of<'py>(
     said.set_item("inertia", pair(fit.inertia))?;
     said.set_item("object_mass", admittance.object_mass())?;
     said.set_item("notes", admittance.notes().to_vec())?;
-    let (title, peer) = (scene.scene.title.clone(), peer.to_owned());
+    let (title, peer, law) = (scene.scene.title.clone(), peer.to_owned(), scene.scene.coordination.strategy.name());
     let drawing = Drawing::of(move || {
-        let curve = AdmittanceCurve { name: "as it stands", admittance: &admittance, response: &response };
+        let curve = AdmittanceCurve { name: law, admittance: &admittance, response: &response };
         // The same frequencies had a response before.
         admittance_picture(&title, &peer, &[curve]).unwrap_or_else(|_| Picture::new(title.as_str()))
     });

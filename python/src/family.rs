@@ -34,10 +34,10 @@ impl Scene {
     }
 }
 
-/// What a picture of a family is called: its scene with every open key at the lower end.
-fn title(py: Python<'_>, family: &Family) -> PyResult<String> {
+/// The scene of a family with every open key at the lower end. Pictures have its title and the name of its law.
+fn at_low(py: Python<'_>, family: &Family) -> PyResult<cohaptic_scene::Scene> {
     let low: Vec<f64> = family.keys().iter().map(|key| key.low).collect();
-    family.scene(&low).map(|scene| scene.title).map_err(|error| refused(py, &error))
+    family.scene(&low).map_err(|error| refused(py, &error))
 }
 
 fn criterion(family: &Family) -> &'static str {
@@ -71,12 +71,12 @@ pub(crate) fn map_of<'py>(
     })?;
     let said = PyDict::new(py);
     let drawing = {
-        let (map, keys, title, criterion) = (map.clone(), keys.clone(), title(py, &family)?, family.criterion());
+        let (map, keys, low, criterion) = (map.clone(), keys.clone(), at_low(py, &family)?, family.criterion());
         let left_out = family.left_out().to_vec();
         Drawing::of(move || {
-            let named = NamedMap { name: "as it stands", map: &map, criterion, left_out: &left_out };
-            let drawn = map_picture(&title, [&keys[0], &keys[1]], &[named]);
-            drawn.unwrap_or_else(|| Picture::new(title.as_str()))
+            let named = NamedMap { name: low.coordination.strategy.name(), map: &map, criterion, left_out: &left_out };
+            let drawn = map_picture(&low.title, [&keys[0], &keys[1]], &[named]);
+            drawn.unwrap_or_else(|| Picture::new(low.title.as_str()))
         })
     };
     said.set_item("drawing", drawing)?;
@@ -119,7 +119,7 @@ pub(crate) fn boundary_of<'py>(
     })?;
     let said = PyDict::new(py);
     let drawing = {
-        let (found, key, title, criterion) = (found.clone(), key.clone(), title(py, &family)?, family.criterion());
+        let (found, key, title, criterion) = (found.clone(), key.clone(), at_low(py, &family)?.title, family.criterion());
         let left_out = family.left_out().to_vec();
         Drawing::of(move || boundary_picture(&title, &key, criterion, &left_out, &found))
     };

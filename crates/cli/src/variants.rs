@@ -7,7 +7,7 @@ use crate::failure::Failure;
 /// Variant of a scene that a picture shows.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Variant {
-    /// Name in the legend. The unchanged scene is called "as it stands".
+    /// Name in documents and messages. The unchanged scene is called "as it stands". Legends name the law: see [`cohaptic_answers::legend_name`].
     pub(crate) name: String,
     /// Overrides of the variant, applied after all `--set`.
     pub(crate) overrides: Vec<String>,

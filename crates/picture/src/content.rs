@@ -131,12 +131,22 @@ impl Band {
     }
 }
 
-/// An area inside closed outlines. A place inside an even number of outlines is outside, so an inner outline is a hole.
+/// An area inside closed outlines, with or without a border. A place inside an even number of outlines is outside, so an inner outline is a hole.
+///
+/// ```
+/// use cohaptic_picture::{Fill, Look, Region};
+///
+/// let triangle = vec![(0.0, 0.0), (2.0, 0.0), (0.0, 2.0)];
+/// // Only the slope is drawn as a line: the other sides lie on the axes.
+/// let stable = Region::new([triangle], Fill::Tint(0)).bordered([[(2.0, 0.0), (0.0, 2.0)]], Look::of(0)).named("stable");
+/// ```
 #[derive(Clone, PartialEq, Debug)]
 pub struct Region {
     pub(crate) name: Text,
     pub(crate) fill: Fill,
     pub(crate) outlines: Vec<Vec<(f64, f64)>>,
+    /// Line on the border of the area. `None` for an area without such a line.
+    pub(crate) border: Option<Line>,
 }
 
 impl Region {
@@ -144,7 +154,7 @@ impl Region {
     #[must_use]
     pub fn new(outlines: impl IntoIterator<Item = Vec<(f64, f64)>>, fill: Fill) -> Self {
         let finite = |outline: &Vec<(f64, f64)>| outline.len() > 2 && outline.iter().all(|(x, y)| x.is_finite() && y.is_finite());
-        Self { name: Text::default(), fill, outlines: outlines.into_iter().filter(finite).collect() }
+        Self { name: Text::default(), fill, outlines: outlines.into_iter().filter(finite).collect(), border: None }
     }
 
     /// Creates a region of the grid cells (column, row) with `shown` true. `xs` and `ys` are values at the centres of columns and rows, ascending. A cell
@@ -175,7 +185,14 @@ impl Region {
                 }
             }
         }
-        Self { name: Text::default(), fill, outlines }
+        Self { name: Text::default(), fill, outlines, border: None }
+    }
+
+    /// Draws lines over the area, such as the part of the outlines that is not an end of an axis. The sample in the legend has the same border, so that areas
+    /// in front of each other are told apart without colours.
+    #[must_use]
+    pub fn bordered<P: IntoIterator<Item = (f64, f64)>>(self, lines: impl IntoIterator<Item = P>, look: Look) -> Self {
+        Self { border: Some(Line::runs(lines, look)), ..self }
     }
 
     /// Sets the name for the legend.

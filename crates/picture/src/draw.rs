@@ -6,7 +6,7 @@ use crate::content::{Band, Content, HeatMap, Line, Region, Rug};
 use crate::extent::{Extent, Scale, count, whole};
 use crate::layout::{AFTER_TICK, AxisLayout, BAR, Layout, PanelLayout, TICK, TITLE};
 use crate::legend::{draw_marker, stroke};
-use crate::look::{PATTERNS, style};
+use crate::look::{Fill, PATTERNS, style};
 use crate::panel::{Extents, Panel};
 use crate::path::{Frame, data, reduced};
 use crate::picture::Picture;
@@ -106,7 +106,8 @@ impl Sheet<'_> {
             match content {
                 Content::Line(line) => self.line(line),
                 Content::Rug(rug) => self.rug(rug),
-                Content::HeatMap(_) | Content::Band(_) | Content::Region(_) => {}
+                Content::Region(region) => region.border.iter().for_each(|border| self.line(border)),
+                Content::HeatMap(_) | Content::Band(_) => {}
             }
         }
         self.ends();
@@ -208,7 +209,7 @@ impl Sheet<'_> {
         }
     }
 
-    fn area(&mut self, outlines: &[Vec<(f64, f64)>], class: &str) {
+    fn area(&mut self, outlines: &[Vec<(f64, f64)>], fill: Fill) {
         let frame = self.frame();
         let cut: Vec<Vec<(f64, f64)>> = outlines
             .iter()
@@ -216,8 +217,12 @@ impl Sheet<'_> {
             .map(|outline| frame.cut_outline(outline))
             .filter(|outline| outline.len() > 2)
             .collect();
-        if !cut.is_empty() {
-            self.xml.element("path", &[("class", class), ("fill-rule", "evenodd"), ("d", &data(&cut, true))]);
+        if cut.is_empty() {
+            return;
+        }
+        let data = data(&cut, true);
+        for class in fill.classes() {
+            self.xml.element("path", &[("class", &class), ("fill-rule", "evenodd"), ("d", &data)]);
         }
     }
 
@@ -225,14 +230,14 @@ impl Sheet<'_> {
         for run in &band.runs {
             let high = reduced(&run.iter().map(|(x, _, high)| self.corner(*x, *high)).collect::<Vec<_>>());
             let low = reduced(&run.iter().map(|(x, low, _)| self.corner(*x, *low)).collect::<Vec<_>>());
-            self.area(&[high.into_iter().chain(low.into_iter().rev()).collect()], &band.fill.class());
+            self.area(&[high.into_iter().chain(low.into_iter().rev()).collect()], band.fill);
         }
     }
 
     fn region(&mut self, region: &Region) {
         let outline = |outline: &Vec<(f64, f64)>| outline.iter().map(|(x, y)| self.corner(*x, *y)).collect();
         let outlines: Vec<Vec<(f64, f64)>> = region.outlines.iter().map(outline).collect();
-        self.area(&outlines, &region.fill.class());
+        self.area(&outlines, region.fill);
     }
 
     fn rug(&mut self, rug: &Rug) {

@@ -22,7 +22,7 @@ pub enum LegendPlace {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Sample {
     Line { look: Look, joined: bool, marker: Option<Marker> },
-    Area(Fill),
+    Area { fill: Fill, border: Option<Look> },
     Tick(Look),
 }
 
@@ -30,8 +30,8 @@ pub(crate) enum Sample {
 pub(crate) fn entry(content: &Content) -> Option<(Sample, &Text)> {
     let (sample, name) = match content {
         Content::Line(line) => (Sample::Line { look: line.look, joined: line.joined, marker: line.marker }, &line.name),
-        Content::Band(band) => (Sample::Area(band.fill), &band.name),
-        Content::Region(region) => (Sample::Area(region.fill), &region.name),
+        Content::Band(band) => (Sample::Area { fill: band.fill, border: None }, &band.name),
+        Content::Region(region) => (Sample::Area { fill: region.fill, border: region.border.as_ref().map(|line| line.look) }, &region.name),
         Content::Rug(rug) => (Sample::Tick(rug.look), &rug.name),
         Content::HeatMap(_) => return None,
     };
@@ -109,13 +109,14 @@ fn draw_sample(xml: &mut Xml, sample: Sample, x: f64, y: f64, font: f64) {
                 draw_marker(xml, marker, look, 0.5 * (x + end), y);
             }
         }
-        Sample::Area(fill) => {
-            let (height, width) = (coordinate(0.75 * font), coordinate(end - x));
-            let class = fill.class();
-            xml.element(
-                "rect",
-                &[("class", &class), ("x", &coordinate(x)), ("y", &coordinate(y - 0.375 * font)), ("width", &width), ("height", &height)],
-            );
+        Sample::Area { fill, border } => {
+            let (left, top, height, width) = (coordinate(x), coordinate(y - 0.375 * font), coordinate(0.75 * font), coordinate(end - x));
+            for class in fill.classes() {
+                xml.element("rect", &[("class", &class), ("x", &left), ("y", &top), ("width", &width), ("height", &height)]);
+            }
+            if let Some(look) = border {
+                stroke(xml, look, &format!("M{left},{top}h{width}v{height}h-{width}Z"));
+            }
         }
         Sample::Tick(look) => {
             let at = |share: f64| coordinate(x + share * (end - x));

@@ -75,16 +75,21 @@ pub enum Fill {
     Hatch,
     /// Grey lines from top left to bottom right.
     BackHatch,
+    /// Grey lines from top left to bottom right over a light tint of the colour of the line with this number. The area is told from a heat map by its colour,
+    /// and by the lines where a print has no colours.
+    HatchedTint(usize),
 }
 
 impl Fill {
-    pub(crate) fn class(self) -> String {
+    /// Returns the classes of the shapes that draw an area, the lowest first.
+    pub(crate) fn classes(self) -> Vec<String> {
         match self {
-            Self::Tint(number) => format!("tint f{}", number % COLOURS),
-            Self::Deep(number) => format!("deep f{}", number % COLOURS),
-            Self::Grey => "tint fr".to_owned(),
-            Self::Hatch => "hatch".to_owned(),
-            Self::BackHatch => "back-hatch".to_owned(),
+            Self::Tint(number) => vec![format!("tint f{}", number % COLOURS)],
+            Self::Deep(number) => vec![format!("deep f{}", number % COLOURS)],
+            Self::Grey => vec!["tint fr".to_owned()],
+            Self::Hatch => vec!["hatch".to_owned()],
+            Self::BackHatch => vec!["back-hatch".to_owned()],
+            Self::HatchedTint(number) => [Self::Tint(number), Self::BackHatch].into_iter().flat_map(Self::classes).collect(),
         }
     }
 }

@@ -7,7 +7,7 @@ mod words;
 use cohaptic_stability::{Admittance, AnalysisError, FrequencyResponse, LowFrequencyFit, MeanSquare, Verdict, ideal};
 use cohaptic_units::print::csv_field;
 
-use crate::{AdmittanceWords, admittance_words};
+use crate::{AdmittanceWords, admittance_words, legend_name};
 pub use document::document;
 pub use page::html;
 pub use words::words;
@@ -15,8 +15,10 @@ pub use words::words;
 /// The admittance of a scene or of a variant.
 #[derive(Clone, Debug)]
 pub struct Curve {
-    /// Name in the legend; "as it stands" for the scene as it stands.
+    /// Name in documents: the overrides, or "as it stands" for the scene as it stands.
     pub name: String,
+    /// Name of the coordination law, such as `average-position`.
+    pub law: String,
     /// Overrides which make the variant out of the scene.
     pub overrides: Vec<String>,
     /// Title of the scene.
@@ -34,6 +36,12 @@ pub struct Curve {
 }
 
 impl Curve {
+    /// Returns the name of the curve in a legend: its law and its overrides.
+    #[must_use]
+    pub fn legend(&self) -> String {
+        legend_name(&self.law, &self.overrides)
+    }
+
     /// Returns the names and units of the admittance.
     fn words(&self) -> AdmittanceWords {
         admittance_words(&self.admittance)

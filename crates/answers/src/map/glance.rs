@@ -5,6 +5,9 @@ use crate::text_plot::BRAILLE;
 const WIDTH: usize = 60;
 const HEIGHT: usize = 15;
 
+/// A character in which every dot is set, for the legend.
+pub(super) const FULL: char = '\u{28ff}';
+
 /// An axis: its label, and its values from left to right or from bottom to top.
 pub(super) struct Axis<'a> {
     pub(super) label: &'a str,

@@ -8,7 +8,7 @@ mod words;
 use cohaptic_stability::{Criterion, KeyRange, Kinds, Map, Verdict, VerdictKind};
 use cohaptic_units::print::csv_field;
 
-use crate::nominal;
+use crate::{legend_name, nominal};
 pub use document::document;
 pub use page::html;
 pub use words::words;
@@ -27,8 +27,10 @@ pub struct Filled<'a> {
 /// The map of a variant of a scene.
 #[derive(Clone, Debug)]
 pub struct VariantMap {
-    /// Name of the variant in the legend.
+    /// Name of the variant in documents: its overrides, or "as it stands" for the scene as it stands.
     pub name: String,
+    /// Name of the coordination law, such as `average-position`.
+    pub law: String,
     /// Overrides which make the variant out of the scene.
     pub overrides: Vec<String>,
     /// The radii, indexed by row and column, with the values of both keys.
@@ -67,6 +69,12 @@ impl Filled<'_> {
 }
 
 impl VariantMap {
+    /// Returns the name of the variant in a legend: its law and its overrides.
+    #[must_use]
+    pub fn legend(&self) -> String {
+        legend_name(&self.law, &self.overrides)
+    }
+
     /// Returns the number of nominal cells, which leave random parts of the links out.
     fn nominal_cells(&self) -> usize {
         self.map.nominal.iter().flatten().filter(|nominal| **nominal).count()

@@ -20,12 +20,13 @@ pub fn words(filled: &Filled<'_>, speed: Speed, pictures: bool) -> String {
         // Writing to a string cannot fail.
         let _ = match maps.len() {
             1 => writeln!(text),
-            _ => writeln!(text, "\n{}", map.name),
+            _ => writeln!(text, "\n{}", map.legend()),
         };
         if pictures && number < MOST_PICTURES {
             let (x, y) = (label(axes[0]), label(axes[1]));
             let shown = (glance::Axis { label: &x, values: &map.map.x }, glance::Axis { label: &y, values: &map.map.y });
             text.push_str(&glance::draw(&shown.0, &shown.1, |column, row| map.verdicts[row][column] == Verdict::Stable));
+            let _ = writeln!(text, "  {} {}: {}", glance::FULL, map.kinds().says("stable"), map.legend());
         }
         headlines(axes, map, |value| value).iter().for_each(|line| text.push_str(&format!("  {line}\n")));
     }

@@ -6,7 +6,7 @@ use cohaptic_stability::{Admittance, AdmittanceError, FrequencyResponse, PushedA
 /// An admittance, its name in the legend, and its values.
 #[derive(Clone, Copy, Debug)]
 pub struct AdmittanceCurve<'a> {
-    /// Name in the legend.
+    /// Name in the legend, without the verdict: see [`legend_name`](crate::legend_name).
     pub name: &'a str,
     /// Admittance of a peer, along or about its axes.
     pub admittance: &'a Admittance,

@@ -74,6 +74,7 @@ impl Subject {
         let response = admittance.response_watched(frequencies, watch).map_err(|error| Failure::Input(error.to_string()))?;
         let fit = admittance.fit_low_frequency();
         let (name, overrides, mass) = (variant.name, variant.overrides, admittance.object_mass());
-        Ok(Curve { name, overrides, title: scene.title, admittance, response, fit, chance, mass })
+        let law = scene.coordination.strategy.name().to_owned();
+        Ok(Curve { name, law, overrides, title: scene.title, admittance, response, fit, chance, mass })
     }
 }

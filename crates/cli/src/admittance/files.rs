@@ -20,8 +20,9 @@ pub(super) fn write(folder: &Path, arguments: &AdmittanceArguments, text: &str, 
     let mut written = vec![write_into(folder, "admittance.csv", csv(curves))?];
     if is_whole {
         let title = curves.first().map_or("", |curve| curve.title.as_str());
-        let named: Vec<AdmittanceCurve<'_>> =
-            curves.iter().map(|Curve { name, admittance, response, .. }| AdmittanceCurve { name, admittance, response }).collect();
+        let names: Vec<String> = curves.iter().map(Curve::legend).collect();
+        let named = curves.iter().zip(&names).map(|(Curve { admittance, response, .. }, name)| AdmittanceCurve { name, admittance, response });
+        let named: Vec<AdmittanceCurve<'_>> = named.collect();
         let picture = admittance_picture(title, &arguments.peer, &named);
         let picture = picture.map_err(|error| Failure::Input(error.to_string()))?;
         let svg = picture.size(arguments.pictures.size()).svg();

@@ -36,7 +36,7 @@ fn kinds() -> Vec<(String, Vec<&'static str>, Vec<&'static str>)> {
         (
             random("--vary link.loss=0%..40%/5 --vary coordination.stiffness=500..2000/4:log"),
             vec!["Median of the largest discrepancy [mm]", "Coordination stiffness", "Loss on links [%]"],
-            vec!["nominal: nothing is left to chance", "nominally stable"],
+            vec!["nominal: nothing is left to chance", "nominally stable: average-position"],
         ),
         (
             random(&format!("--vary link.loss=0%,40% --vary coordination.stiffness=500,900 {STRATEGIES}")),
@@ -52,7 +52,7 @@ fn kinds() -> Vec<(String, Vec<&'static str>, Vec<&'static str>)> {
         (
             format!("campaign two.toml --verdicts {DIVERGING} --vary coordination.damping=5,20"),
             vec!["all runs diverged", "Share of runs that diverged"],
-            vec!["stable", "unstable"],
+            vec!["stable: average-position", "unstable"],
         ),
         (
             format!("campaign paper.toml --set {UNFOLLOWED} --verdicts --vary coordination.stiffness=500..1000/3"),
@@ -144,6 +144,20 @@ fn pictures_are_the_same_for_any_number_of_threads_and_when_the_command_is_repea
     let document = desk.json(&format!("{command} --out one --json"));
     let files: Vec<&str> = document["files"].as_array().unwrap().iter().map(|file| file.as_str().unwrap()).collect();
     assert_eq!(files, ["one/runs.parquet", "one/verdicts.csv", "one/discrepancy.svg", "one/verdicts.svg", "one/campaign.html"]);
+}
+
+/// With the last stiffness all runs diverge, by far more than 1 m. The scale ends at the other runs, which stay within millimetres.
+#[test]
+fn cells_whose_runs_diverged_have_a_colour_of_their_own_and_do_not_set_the_scale() {
+    let desk = desk();
+    desk.text(&format!("campaign two.toml {DIVERGING} --vary coordination.damping=5,20 --out out"));
+    let svg = desk.read("out/discrepancy.svg");
+    let words = words(&svg);
+    assert!(["Median of the largest discrepancy [mm]", "all runs diverged"].iter().all(|part| words.iter().any(|word| word == part)), "{words:?}");
+    // A tint and a hatching over it, in the panel of medians and in the legend.
+    for class in ["tint f1", "back-hatch"] {
+        assert_eq!(["path", "rect"].map(|shape| svg.matches(&format!("<{shape} class=\"{class}\"")).count()), [1, 1], "{class}");
+    }
 }
 
 #[test]

@@ -76,7 +76,7 @@ fn cells_that_cannot_be_followed_are_marked_and_counted() {
     );
     let picture = desk.read("out/map.svg");
     assert!(
-        picture.contains(": nominal radius squared 1")
+        picture.contains(": nominal radius squared below 1")
             && picture.contains("nominally stable: ")
             && picture.contains("nominal (random outages left out)")
     );

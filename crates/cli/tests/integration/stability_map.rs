@@ -91,15 +91,14 @@ fn every_curve_has_a_table_and_an_entry_in_the_legend() {
     assert_eq!(cohaptic_picture::testing::faults(&svg), [""; 0]);
     let words = words(&svg);
     for part in [
-        "<A> & B: spectral radius 1",
+        "<A> & B: spectral radius below 1",
         "Coordination stiffness",
         "[N/m]",
         "Coordination damping",
         "[N·s/m]",
-        "as it stands",
-        "scene.count=2",
-        "scene.count=5, link.delay=24ms",
-        "stable: as it stands",
+        "stable: average-position",
+        "stable: average-position, scene.count=2",
+        "stable: average-position, scene.count=5, link.delay=24ms",
     ] {
         assert!(words.iter().any(|word| word == part), "no {part:?} in {words:?}");
         assert!(!text.contains('\u{28ff}'), "no small picture where there is a large one");
@@ -108,6 +107,25 @@ fn every_curve_has_a_table_and_an_entry_in_the_legend() {
     let alone = desk.cohaptic(&format!("{MAP} --grid 20x16 --out c --set scene.count=2"));
     assert_eq!(alone.stderr, "wrote c/map.csv\nwrote c/map.svg\nwrote c/map.html\n");
     assert_eq!(desk.read("c/map.csv"), desk.read("a/b/map-2.csv"), "a curve is the map with these overrides");
+}
+
+/// A colour belongs to a law: the picture has a filled area and an entry for each, and so has the text with its small pictures.
+#[test]
+fn legends_name_the_law_of_each_region() {
+    let desk = Desk::with("paper.toml", PAPER);
+    let command = format!("{MAP} --grid 20x16 --set scene.count=3 --curve coordination.strategy=PD");
+    let text = desk.text(&command);
+    let entries: Vec<&str> = text.lines().filter(|line| line.starts_with("  \u{28ff} ")).collect();
+    assert_eq!(entries, ["  \u{28ff} stable: average-position", "  \u{28ff} stable: proportional-derivative"], "{text}");
+    desk.text(&format!("{command} --out out"));
+    let svg = desk.read("out/map.svg");
+    let words = words(&svg);
+    for (number, law) in ["average-position", "proportional-derivative"].into_iter().enumerate() {
+        assert!(words.contains(&format!("stable: {law}")), "{words:?}");
+        assert_eq!(svg.matches(&format!("<path class=\"tint f{number}\"")).count(), 1, "the region of {law} is filled");
+    }
+    desk.text(&format!("{MAP} --prove 3 --out proven"));
+    assert!(desk.read("proven/proof.svg").contains(">proven stable: average-position</text>"));
 }
 
 #[test]

@@ -41,6 +41,21 @@ fn cells_and_bands_that_begin_at_zero_reach_the_foot_of_a_logarithmic_axis() {
     assert!((ys("tint").1 - foot).abs() < 0.02, "{svg}");
 }
 
+/// The edge of the area is a line within the panel; the other sides lie on the axes and have no line. The sample in the legend has the fill and the edge.
+#[test]
+fn an_area_with_a_border_is_one_entry_of_the_legend() {
+    let corners = vec![(0.0, 0.0), (2.0, 0.0), (0.0, 2.0)];
+    let axis = || Axis::new("x").range(0.0, 4.0);
+    let area = Region::new([corners], Fill::Tint(1)).bordered([[(2.0, 0.0), (0.0, 2.0)]], Look::of(1)).named("stable");
+    let svg = Picture::new("").panel(Panel::new(axis(), axis()).with(area)).svg();
+    assert_eq!(cohaptic_picture::testing::faults(&svg), [""; 0]);
+    let edges: Vec<&str> = svg.lines().filter(|line| line.starts_with("<path class=\"line s1\"")).collect();
+    assert!(edges.len() == 2 && edges.iter().all(|edge| edge.contains("stroke-dasharray")), "{edges:?}");
+    // In the panel a segment between two points, in the legend a closed frame.
+    assert!(edges[0].matches(['M', 'L']).count() == 2 && edges[1].contains("Z\""), "{edges:?}");
+    assert_eq!(["<path class=\"tint f1\"", "<rect class=\"tint f1\"", ">stable</text>"].map(|part| svg.matches(part).count()), [1, 1, 1]);
+}
+
 fn samples(count: u32, end: f64) -> impl Iterator<Item = f64> {
     (0..count).map(move |n| f64::from(n) / f64::from(count - 1) * end)
 }
@@ -96,7 +111,7 @@ fn heat() -> Picture {
     let map = HeatMap::new(&xs, &ys, values, Axis::new("Largest difference of the copies").unit("m").logarithmic());
     let panel = Panel::new(Axis::new("Delay").symbol("T_d").unit("ms").tight(), Axis::new("Loss").unit("%").tight())
         .with(map)
-        .with(Region::cells(&xs, &ys, Fill::BackHatch, move |column, row| missing[row][column]).named("diverges"));
+        .with(Region::cells(&xs, &ys, Fill::HatchedTint(1), move |column, row| missing[row][column]).named("diverges"));
     Picture::new("Difference over delay and loss").panel(panel)
 }
 

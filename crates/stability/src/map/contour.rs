@@ -16,6 +16,15 @@ pub struct Polyline {
     pub closed: bool,
 }
 
+impl Polyline {
+    /// Returns the points to draw the line through. A closed line ends with its first point again.
+    #[must_use]
+    pub fn path(&self) -> Vec<(f64, f64)> {
+        let again = self.points.first().filter(|_| self.closed);
+        self.points.iter().chain(again).copied().collect()
+    }
+}
+
 impl Map {
     /// Returns the lines where the radius is 1, with the stable side on their left, x to the right and y up. A line that does not end at the edge of the map is
     /// closed. Between two nodes the logarithm of the radius is taken to be linear; rows that were not computed count as unstable.

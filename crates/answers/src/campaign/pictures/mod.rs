@@ -9,6 +9,7 @@ use cohaptic_campaign::{CampaignPlan, MOST_COMBINATIONS_OF_QUANTILES, MOST_RUNS_
 use cohaptic_picture::{Panel, Picture, Size};
 
 use super::Finished;
+use crate::LAW;
 pub(crate) use arranged::Along;
 use arranged::{Arranged, Keys};
 use scale::Scale;
@@ -113,6 +114,16 @@ impl Sheet<'_> {
             Keys::Line(along) => panels::shares_along(self, along, facet),
             Keys::Grid(both) => panels::shares_of_cells(self, (&both.0, &both.1), facet),
         }
+    }
+
+    /// Returns the name of the coordination law of all combinations. `None` if the law is a varied key, because the titles of the panels name it then.
+    fn law(&self) -> Option<&'static str> {
+        if self.plan.variations().iter().any(|vary| vary.key() == LAW) {
+            return None;
+        }
+        // The scene of a combination that was left out cannot be read.
+        let first = (0..self.plan.combinations()).find(|combination| !self.report.refused.contains_key(combination))?;
+        self.plan.scene(first).ok().map(|scene| scene.coordination.strategy.name())
     }
 
     /// Returns the combination at these indices along the axes, in panel `facet`.

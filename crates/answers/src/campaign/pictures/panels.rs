@@ -47,7 +47,7 @@ pub(super) fn medians_of_cells(sheet: &Sheet<'_>, (x, y): (&Along, &Along), face
     let value = |column: usize, row: usize| known(column, row).map_or(f64::NAN, |quantiles| scale.value(quantiles.median));
     let panel = heat_map((x, y), scale.axis_of_medians(), value);
     let is_diverged = |column: usize, row: usize| known(column, row).is_none();
-    with_cells(panel, (x, y), Fill::BackHatch, "all runs diverged", is_diverged)
+    with_cells(panel, (x, y), Fill::HatchedTint(1), "all runs diverged", is_diverged)
 }
 
 /// Draws the share of diverged runs of each combination of two keys of numbers.

@@ -116,7 +116,9 @@ fn regions(sheet: &Sheet<'_>, along: (&Along, &Along), facet: usize, criterion: 
     let verdicts = sheet.report.judgements.iter().filter(|judgement| judgement.verdict().is_some());
     let kinds = Kinds::of(criterion, verdicts.map(is_nominal));
     let panel = Panel::new(along.0.axis(), along.1.axis());
-    let panel = with_cells(panel, along, Fill::Tint(0), &kinds.says(Verdict::Stable.word()), is(Verdict::Stable));
+    let stable = kinds.says(Verdict::Stable.word());
+    let stable = sheet.law().map_or_else(|| stable.clone(), |law| format!("{stable}: {law}"));
+    let panel = with_cells(panel, along, Fill::Tint(0), &stable, is(Verdict::Stable));
     let panel = with_cells(panel, along, Fill::Tint(1), &kinds.says(Verdict::Unstable.word()), is(Verdict::Unstable));
     let unknown = |column: usize, row: usize| is(Verdict::Marginal)(column, row) || is(Verdict::Overflow)(column, row);
     let panel = with_cells(panel, along, Fill::Grey, "cannot be told", unknown);

@@ -1,5 +1,4 @@
-//! The files of `cohaptic stability map --out`: one table per variant, one picture with the outline of each variant's region, and the page. The region of the
-//! first variant is shaded.
+//! The files of `cohaptic stability map --out`: one table per variant, one picture with the stable region of each variant, and the page.
 
 use std::path::Path;
 
@@ -22,8 +21,9 @@ pub(super) fn write(folder: &Path, order: &Order, arguments: &MapArguments, maps
         map.file = Some(path.clone());
         files.push(path);
     }
-    let named: Vec<NamedMap<'_>> =
-        maps.iter().map(|map| NamedMap { name: &map.name, map: &map.map, criterion: map.criterion, left_out: &map.left_out }).collect();
+    let names: Vec<String> = maps.iter().map(VariantMap::legend).collect();
+    let named = maps.iter().zip(&names).map(|(map, name)| NamedMap { name, map: &map.map, criterion: map.criterion, left_out: &map.left_out });
+    let named: Vec<NamedMap<'_>> = named.collect();
     let picture = map_picture(&order.title, order.axes(), &named);
     let svg = picture.map(|picture| picture.size(arguments.pictures.size()).svg()).unwrap_or_default();
     files.push(write_into(folder, "map.svg", &svg)?);

@@ -11,6 +11,7 @@ use std::process::ExitCode;
 use std::time::Instant as Clock;
 
 use cohaptic_answers::map::{Speed, VariantMap};
+use cohaptic_scene::Scene;
 use cohaptic_stability::{Family, Grid, KeyRange, MapError};
 
 use super::source::{self, Said};
@@ -33,6 +34,8 @@ struct Order {
     variants: Vec<Variant>,
     /// Families of scenes, indexed by variant.
     families: Vec<Family>,
+    /// Names of the coordination laws, indexed by variant; empty for a variant whose scene is refused at the lower ends of the ranges.
+    laws: Vec<String>,
 }
 
 /// Computes the maps and writes the answer, or does the part of a shard.
@@ -53,7 +56,8 @@ pub(crate) fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
         let Variant { name, overrides, .. } = &order.variants[number];
         let verdicts = map.verdicts(&order.families[number]).map_err(|error| order.failure(number, arguments, error.into()))?;
         let (criterion, left_out) = (order.families[number].criterion(), order.families[number].left_out().to_vec());
-        Ok(VariantMap { name: name.clone(), overrides: overrides.clone(), criterion, left_out, map, verdicts, file: None })
+        let law = order.laws[number].clone();
+        Ok(VariantMap { name: name.clone(), law, overrides: overrides.clone(), criterion, left_out, map, verdicts, file: None })
     });
     let mut maps = named.collect::<Result<Vec<VariantMap>, Failure>>()?;
     let speed = Speed { wall_s: start.elapsed().as_secs_f64(), cells };
@@ -92,11 +96,12 @@ impl Order {
             let said = Said { file, ranges: &ranges, overrides: (variant.option, &variant.overrides) };
             families.push(Family::new(&text, file, &variant.on_top_of(set), keys()).map_err(|error| said.failure(error))?);
         }
-        let title = match families.first().map(source::at_low) {
-            Some(Ok(scene)) => scene.title,
-            Some(Err(_)) | None => output::path(input::named(file)),
-        };
-        Ok(Self { text, file: output::path(input::named(file)), title, ranges, grid, variants, families })
+        // A scene that is refused here is refused with a message by the computation of its first cell.
+        let scenes: Vec<Option<Scene>> = families.iter().map(|family| source::at_low(family).ok()).collect();
+        let title = scenes.first().and_then(Option::as_ref).map_or_else(|| output::path(input::named(file)), |scene| scene.title.clone());
+        let laws =
+            scenes.iter().map(|scene| scene.as_ref().map_or_else(String::new, |scene| scene.coordination.strategy.name().to_owned())).collect();
+        Ok(Self { text, file: output::path(input::named(file)), title, ranges, grid, variants, families, laws })
     }
 
     /// Converts an error of the map with index `variant` to a failure that names the user's option.
@@ -107,6 +112,11 @@ impl Order {
             MapError::Family(error) => said.failure(error),
             error @ (MapError::Grid { .. } | MapError::Keys { .. } | MapError::Known { .. }) => Failure::Input(error.to_string()),
         }
+    }
+
+    /// Returns the name of a variant in a legend.
+    fn legend(&self, variant: usize) -> String {
+        cohaptic_answers::legend_name(&self.laws[variant], &self.variants[variant].overrides)
     }
 
     /// Returns the ranges of the keys along x and y.

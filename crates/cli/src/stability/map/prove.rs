@@ -248,12 +248,11 @@ fn pictures(order: &Order, proofs: &[Proof], arguments: &MapArguments) -> Vec<(S
         let axes = [order.x(), order.y()].map(|range| axis_of(range).range(range.low, range.high));
         let [x, y] = axes;
         let panel = Panel::new(x, y)
-            .with(Region::new(boxes(Guarantee::Stable), Fill::Tint(0)).named("proven stable"))
+            .with(Region::new(boxes(Guarantee::Stable), Fill::Tint(0)).named(format!("proven stable: {}", order.legend(number))))
             .with(Region::new(boxes(Guarantee::Unstable), Fill::Tint(1)).named("proven unstable"))
             .with(Region::new(boxes(Guarantee::Undecided), Fill::Grey).named("undecided"));
-        let title = if proofs.len() > 1 { format!("{}: {}", order.title, proof.name) } else { order.title.clone() };
         let name = if number == 0 { "proof.svg".to_owned() } else { format!("proof-{}.svg", number + 1) };
-        let svg = Picture::new(title.as_str()).panel(panel).size(arguments.pictures.size()).svg();
+        let svg = Picture::new(order.title.as_str()).panel(panel).size(arguments.pictures.size()).svg();
         pictures.push((name, svg));
     }
     pictures
