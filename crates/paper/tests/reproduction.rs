@@ -1,6 +1,7 @@
 //! The reproduction at coarse resolution: every verdict, and well-formed page and drawings.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test may fail")]
 
+use std::collections::BTreeSet;
 use std::sync::OnceLock;
 
 use cohaptic_paper::{Claim, FAILS, Options, Reproduction, Unwatched, Verdict, Watch, page, reproduce};
@@ -146,6 +147,21 @@ fn the_page_needs_nothing_from_elsewhere() {
         assert_eq!(cohaptic_picture::testing::faults(&figure.svg), [""; 0], "{}", figure.id);
         let columns = figure.csv.lines().next().unwrap().split(',').count();
         assert!(figure.csv.lines().all(|line| line.split(',').count() == columns), "{}", figure.id);
+    }
+}
+
+/// A region has one filled area for each law, reading and number of users that is stable anywhere, as the data tell.
+#[test]
+fn stability_regions_are_filled() {
+    for figure in quick().figures.iter().filter(|figure| ["fig-3", "fig-4"].contains(&figure.id.as_str())) {
+        let mut rows = figure.csv.lines().map(|line| line.split(',').collect::<Vec<_>>());
+        assert_eq!(rows.next().unwrap(), ["strategy", "peers", "mass", "delay_ms", "damping", "stiffness", "coupling_stiffness", "radius"]);
+        let stable = rows.filter(|row| row[7].parse::<f64>().unwrap() < 1.0).map(|row| row[..5].join(",")).collect::<BTreeSet<_>>();
+        assert!(stable.len() > 30, "{}: {stable:?}", figure.id);
+        assert_eq!(figure.svg.matches("<path class=\"tint fr\"").count(), stable.len(), "{}", figure.id);
+        // The legend has a filled sample with its own edge for each number of users.
+        assert_eq!(figure.svg.matches("<rect class=\"tint fr\"").count(), 5, "{}", figure.id);
+        assert!((0..5).all(|number| figure.svg.contains(&format!("<path class=\"line s{number}\""))), "{}", figure.id);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use cohaptic_picture::{Axis, Line, Look, Panel, Picture, Size};
+use cohaptic_picture::{Axis, Fill, Look, Panel, Picture, Region, Size};
 
 use super::Figure;
 use crate::case::Strategy;
@@ -15,7 +15,7 @@ pub(super) fn figures(atlas: &Atlas, size: Size) -> Vec<Figure> {
         let panels: Vec<Panel> = settings.iter().flat_map(|setting| Strategy::BOTH.map(|strategy| panel(atlas, *setting, strategy))).collect();
         Figure {
             id: id.to_owned(),
-            svg: Picture::new(title.as_str()).columns(2).aspect(1.0).panels(panels).size(size).svg(),
+            svg: Picture::new(title.as_str()).note(SHADES).columns(2).aspect(1.0).panels(panels).size(size).svg(),
             title,
             caption: caption(),
             csv: csv(atlas, &settings),
@@ -24,22 +24,23 @@ pub(super) fn figures(atlas: &Atlas, size: Size) -> Vec<Figure> {
     vec![of("fig-3", "3", 0.0), of("fig-4", "4", 5.0)]
 }
 
+/// What the shades of a panel mean.
+const SHADES: &str = "Each region is filled on the stable side of its line. The darker a place, the more of these numbers of users are stable there.";
+
 fn panel(atlas: &Atlas, setting: Setting, strategy: Strategy) -> Panel {
-    let kilo = |(x, y): (f64, f64)| (x / 1000.0, y / 1000.0);
-    let lines = PEERS.iter().enumerate().filter_map(|(number, peers)| {
-        let region = atlas.region(setting, strategy, *peers)?;
-        let closed = |line: cohaptic_stability::Polyline| {
-            // A closed contour repeats its first point, so that the drawn line closes.
-            let first = line.points.first().copied().filter(|_| line.closed);
-            line.points.into_iter().chain(first).map(kilo).collect::<Vec<_>>()
-        };
-        Some(Line::runs(region.map.contour().into_iter().map(closed), Look::of(number)).named(format!("N = {peers}")))
+    let kilo = |points: Vec<(f64, f64)>| points.into_iter().map(|(x, y)| (x / 1000.0, y / 1000.0)).collect::<Vec<_>>();
+    let areas = PEERS.iter().enumerate().filter_map(|(number, peers)| {
+        let map = &atlas.region(setting, strategy, *peers)?.map;
+        let outlines = map.regions().into_iter().map(|region| kilo(region.points));
+        let edges = map.contour().into_iter().map(|edge| kilo(edge.path()));
+        // One tint for all regions: where several lie on each other, a patchwork of colours would hide which side of an edge is stable.
+        Some(Region::new(outlines, Fill::Grey).bordered(edges, Look::of(number)).named(format!("N = {peers}")))
     });
     let mass = setting.mass.words();
     let axis = |name: &str, symbol: &str| Axis::new(name).symbol(symbol).unit("kN/m").range(0.0, HIGHEST / 1000.0);
     Panel::new(axis("Coordination stiffness", "K_T"), axis("Coupling stiffness", "K_C"))
         .titled(format!("{}, {mass}, {} ms one way", strategy.word(), setting.delay_us / 1000))
-        .with_all(lines)
+        .with_all(areas)
 }
 
 fn caption() -> String {
