@@ -2,10 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use cohaptic_answers::page::{MOST_ROWS, made_by, scene_text};
 use cohaptic_harness::Summary;
 use cohaptic_harness::check::Outcome;
 use cohaptic_harness::measures::MeasuredValue;
-use cohaptic_answers::page::MOST_ROWS;
 use cohaptic_picture::page::{Html, Page, Table};
 use cohaptic_scene::{Scene, scene_content_of_text};
 use cohaptic_units::print::SixDigits;
@@ -48,16 +48,14 @@ pub(super) fn html(arguments: &RunArguments, runs: [Shown<'_>; 2]) -> Result<Str
     let timelines = [edits(&content(&runs[0])?.keys), edits(&content(&runs[1])?.keys)];
     let timeline = |number: usize| if timelines[number].is_empty() { Html::default() } else { Html::table(&timelines[number]) };
     let mut page = Page::new(runs[0].scene.title.as_str()).with(each(&runs, |_, shown| ending(shown.scene, shown.summary)));
-    page = page.with(compared_facts(arguments, &runs)).with(Html::heading(2, "Made by")).with(Html::preformatted(&command_line(arguments)));
+    page = page.with(compared_facts(arguments, &runs)).with(made_by(&command_line(arguments)));
     page = page.with(section("Measures", compared_measures(&runs))).with(section("Pictures", pictures(&runs)));
     page = page.with(section("Expectations", each(&runs, |_, shown| expectations(shown.scene, shown.outcomes))));
     page = page.with(section("Peers", each(&runs, |_, shown| peers(shown.scene, shown.summary))));
     page = page
         .with(section("Links", each(&runs, |_, shown| links(shown.summary))))
         .with(section("Timeline", each(&runs, |number, _| timeline(number))));
-    let said = "The file as it was read; overrides are not in it.";
-    page = page.with(Html::heading(2, "Scene")).with(Html::details("The text of the scene", Html::paragraph(said).and(Html::preformatted(&text))));
-    Ok(page.html())
+    Ok(page.with(scene_text(&text)).html())
 }
 
 /// Places the contents of both runs below each other, each with the title of its scene above it. A run without content is left out.
