@@ -67,4 +67,4 @@ pub use run_words::{angle_text, diverged, measured_lines, packets, run_words};
 pub use text_plot::TEXT_PLOT_SPANS;
 pub(crate) use text_plot::text_plot;
 pub(crate) use words::LAW;
-pub use words::{are, figure, legend_name, length, nominal};
+pub use words::{are, figure, legend_name, length};

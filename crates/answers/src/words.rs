@@ -19,7 +19,7 @@ pub(crate) const fn length_unit(metres: f64) -> (f64, &'static str) {
 /// Returns the note about `count` nominal verdicts, which leave random parts out because their second moment cannot be followed; `None` if `count` is 0. `one`
 /// and `several` follow the number: "cell is", "cells are".
 #[must_use]
-pub fn nominal(count: usize, [one, several]: [&str; 2]) -> Option<String> {
+pub(crate) fn nominal(count: usize, [one, several]: [&str; 2]) -> Option<String> {
     (count > 0).then(|| {
         format!(
             "{count} {} nominal: the second moment cannot be followed there, and the radius is the square of the spectral radius with every delay its mean and \

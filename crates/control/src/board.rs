@@ -32,7 +32,7 @@ impl Board {
 
     /// Returns the description of the present run.
     #[must_use]
-    pub fn description(&self) -> Arc<Description> {
+    pub(crate) fn description(&self) -> Arc<Description> {
         self.latest().description
     }
 

@@ -37,6 +37,7 @@ impl ServerConfig {
 
 /// Error of starting a server.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum ServeError {
     /// The address is reachable from other machines, and remote access is not allowed.
     #[error(

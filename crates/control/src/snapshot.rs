@@ -118,7 +118,7 @@ pub enum Presence {
 
 impl Presence {
     /// All values, in the order of the declaration.
-    pub const ALL: [Self; 4] = [Self::Here, Self::Present, Self::Stale, Self::Absent];
+    pub(crate) const ALL: [Self; 4] = [Self::Here, Self::Present, Self::Stale, Self::Absent];
 
     /// Returns the name shown to users.
     #[must_use]
@@ -175,7 +175,7 @@ pub enum Kind {
 impl Kind {
     /// Returns the name of the command on the command line.
     #[must_use]
-    pub const fn name(self) -> &'static str {
+    pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Live => "live",
             Self::Relay => "relay",

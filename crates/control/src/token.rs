@@ -19,6 +19,7 @@ pub struct Token(String);
 
 /// Error of making a token.
 #[derive(Clone, PartialEq, Eq, Debug, Error)]
+#[non_exhaustive]
 pub enum TokenError {
     /// The token is too short to be secret, or too long for an address.
     #[error("a token of {found} characters: expected {SHORTEST} to {LONGEST}, random ones; leave it out to get one")]
@@ -43,7 +44,7 @@ impl Token {
     /// # Errors
     ///
     /// [`TokenError::NoRandomNumbers`] if the system returns no random numbers.
-    pub fn random() -> Result<Self, TokenError> {
+    pub(crate) fn random() -> Result<Self, TokenError> {
         let mut bytes = [0; RANDOM_BYTES];
         getrandom::fill(&mut bytes).map_err(|error| TokenError::NoRandomNumbers(error.to_string()))?;
         Ok(Self(bytes.iter().map(|byte| format!("{byte:02x}")).collect()))

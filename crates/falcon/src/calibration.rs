@@ -43,7 +43,7 @@ impl Calibration {
 
     /// Returns the motor counts per N·m of torque at an arm, without a sign: a positive count turns the arm backwards.
     #[must_use]
-    pub const fn counts_per_newton_metre(&self) -> f64 {
+    pub(crate) const fn counts_per_newton_metre(&self) -> f64 {
         self.counts_per_newton_metre
     }
 

@@ -19,7 +19,7 @@ pub const PACKET: usize = 64;
 /// Number of status bytes at the beginning of every packet from the device.
 pub const STATUS: usize = 2;
 /// Payload of a full packet \[bytes\].
-pub const PAYLOAD: usize = PACKET - STATUS;
+pub(crate) const PAYLOAD: usize = PACKET - STATUS;
 
 /// Value of a reset that discards bytes from the device.
 pub const PURGE_RX: u16 = 1;

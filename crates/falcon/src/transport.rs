@@ -57,7 +57,7 @@ pub enum Request {
 impl Request {
     /// Returns the number on the wire.
     #[must_use]
-    pub const fn number(self) -> u8 {
+    pub(crate) const fn number(self) -> u8 {
         self as u8
     }
 }

@@ -51,5 +51,5 @@ pub mod session;
 pub use admission::{Admission, AdmissionConfig, AdmissionConfigError, AdmissionControl, AdmissionStats, Admitted, Limits, Place, Refusal, Seat};
 pub use entropy::{Entropy, EntropyError, SystemEntropy};
 pub use key::{KeyFileError, SessionKey};
-pub use seal::{MAX_DATAGRAM, NONCE_LEN, Nonce, SEAL_LEN, TAG_LEN};
+pub use seal::{MAX_DATAGRAM, Nonce};
 pub use session::{Conductor, LinkChange, Report, Session, SessionConfig, SessionError, Status};

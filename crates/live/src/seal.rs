@@ -18,11 +18,11 @@ use zeroize::Zeroizing;
 use crate::{Place, SessionKey};
 
 /// Length of a nonce \[byte\].
-pub const NONCE_LEN: usize = 16;
+pub(crate) const NONCE_LEN: usize = 16;
 /// Length of a tag \[byte\].
-pub const TAG_LEN: usize = 16;
+pub(crate) const TAG_LEN: usize = 16;
 /// Length that a seal adds to a sample: nonce and tag \[byte\].
-pub const SEAL_LEN: usize = NONCE_LEN + TAG_LEN;
+pub(crate) const SEAL_LEN: usize = NONCE_LEN + TAG_LEN;
 /// Length of the longest datagram of a session \[byte\]. A buffer for receiving must be longer: the system would cut a longer datagram to this length, and the
 /// datagram would pass for a valid one.
 pub const MAX_DATAGRAM: usize = wire::MAX_LEN + SEAL_LEN;

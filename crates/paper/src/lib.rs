@@ -96,6 +96,7 @@ impl Watch for Unwatched {
 
 /// Error of [`reproduce`].
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum PaperError {
     /// The watcher ended the work.
     #[error("given up before the end")]

@@ -30,7 +30,7 @@ const BEYOND: f64 = 0.5;
 impl Gauge {
     /// Returns the position of a value on the common axis; `None` for NaN.
     #[must_use]
-    pub fn place(&self, value: f64) -> Option<f64> {
+    pub(crate) fn place(&self, value: f64) -> Option<f64> {
         let size = |limit: f64| if limit == 0.0 { (value - limit).abs() } else { limit.abs() };
         let share = |distance: f64, unit: f64| if distance == 0.0 { 0.0 } else { distance / unit };
         let place = match (self.low, self.high) {

@@ -36,6 +36,7 @@ const ON_SCREEN: f64 = 13.0;
 
 /// Error of making a size.
 #[derive(Clone, PartialEq, Eq, Debug, Error)]
+#[non_exhaustive]
 pub enum SizeError {
     /// The word is not a size.
     #[error("`{0}` is not a size of a picture: one-column, two-columns, page, WIDTHxHEIGHT in pixels (960x400), or WIDTHxHEIGHTmm (85x60mm)")]
@@ -67,7 +68,7 @@ impl Size {
     /// # Errors
     ///
     /// [`SizeError::OutOfRange`].
-    pub fn millimetres(width: f64, height: f64) -> Result<Self, SizeError> {
+    pub(crate) fn millimetres(width: f64, height: f64) -> Result<Self, SizeError> {
         Self { width: width * MILLIMETRE, height: Some(height * MILLIMETRE), font: PRINTED, print: true }.checked()
     }
 

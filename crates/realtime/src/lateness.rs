@@ -65,7 +65,7 @@ impl Lateness {
 
     /// Returns the lateness that the share `share` of all values, from 0 to 1, does not exceed; zero if nothing was recorded.
     #[must_use]
-    pub fn quantile(&self, share: f64) -> Duration {
+    pub(crate) fn quantile(&self, share: f64) -> Duration {
         Duration::from_nanos(self.nanos.value_at_quantile(share))
     }
 

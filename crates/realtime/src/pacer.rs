@@ -91,12 +91,6 @@ impl Pacer {
         Self { pacing, wake_ups: WakeUps { counts: [0; WakeUps::STEPS], count: later }, margin }
     }
 
-    /// Returns the way of waiting.
-    #[must_use]
-    pub const fn pacing(&self) -> Pacing {
-        self.pacing
-    }
-
     /// Returns the present margin: see [`Pacing`]. The margin changes with each wake-up, and depends only on the lateness of wake-ups so far.
     #[must_use]
     pub const fn margin(&self) -> Duration {

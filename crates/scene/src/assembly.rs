@@ -119,7 +119,7 @@ impl Scaling {
 
     /// Returns the factor of the coupling gains for this number of peers: 2/N for [`Scaling::InverseN`].
     #[must_use]
-    pub fn coupling_factor(self, peers: usize) -> f64 {
+    pub(crate) fn coupling_factor(self, peers: usize) -> f64 {
         match self {
             Self::None => 1.0,
             Self::InverseN => 2.0 / count(peers),

@@ -115,7 +115,7 @@ impl Scene {
 
     /// Returns the number of peers by which masses and gains are scaled: the number given to [`Scene::scaled_for`], otherwise the number of listed peers.
     #[must_use]
-    pub fn number(&self) -> usize {
+    pub(crate) fn number(&self) -> usize {
         self.scaled_for.unwrap_or(self.peers.len())
     }
 
@@ -341,7 +341,7 @@ impl PeerKind {
 
     /// Returns true if a live session reads a person's hand at each tick.
     #[must_use]
-    pub const fn is_in_hand(&self) -> bool {
+    pub(crate) const fn is_in_hand(&self) -> bool {
         matches!(self, Self::Falcon(..) | Self::Pointer(..))
     }
 }

@@ -18,7 +18,7 @@ impl Scene {
     /// `None` where the links do not bound the age, or where the bound may change: for links with anything but constant delays and patterns of lost packets,
     /// access lines that lose packets, changes of links in the timeline, peers whose clocks differ, and dead bands.
     #[must_use]
-    pub fn oldest_sample(&self) -> Option<u64> {
+    pub(crate) fn oldest_sample(&self) -> Option<u64> {
         let clock = self.lasting_clock()?;
         // An access line may delay but not lose packets: the formula below counts the longest run of a single line.
         let line = |model: Option<&LinkModel>| {
@@ -46,7 +46,7 @@ impl Scene {
     /// `None` where the age is not the same for all samples: for links that do more than delay or whose delays differ, access lines, dead bands, changes of
     /// links in the timeline, and peers whose clocks differ.
     #[must_use]
-    pub fn middle_age(&self) -> Option<u64> {
+    pub(crate) fn middle_age(&self) -> Option<u64> {
         let clock = self.lasting_clock()?;
         if self.peers.iter().any(|peer| peer.uplink.is_some() || peer.downlink.is_some()) {
             return None;

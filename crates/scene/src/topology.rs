@@ -251,7 +251,7 @@ impl Topology {
 
     /// Returns true if all peers have the same sum of weights ([`Topology::degree`]), to the bit.
     #[must_use]
-    pub fn is_regular(&self) -> bool {
+    pub(crate) fn is_regular(&self) -> bool {
         (1..self.peers()).all(|peer| self.degree(peer).to_bits() == self.degree(0).to_bits())
     }
 }

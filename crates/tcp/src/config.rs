@@ -73,6 +73,7 @@ pub struct TcpConfig {
 
 /// Algorithm by which the congestion window grows and shrinks.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
+#[non_exhaustive]
 pub enum CongestionControl {
     /// CUBIC (RFC 9438).
     #[default]

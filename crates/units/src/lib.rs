@@ -39,4 +39,4 @@ pub use parse::ParseError;
 pub use probability::{Probability, ProbabilityError};
 pub use rate::Rate;
 pub use size::Bytes;
-pub use visible::{Visible, is_hidden, visible_lines};
+pub use visible::{Visible, visible_lines};

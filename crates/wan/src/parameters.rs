@@ -236,7 +236,7 @@ impl Form {
 impl Form {
     /// Returns the expected text of messages: `an integer from 2 to 1000000`.
     #[must_use]
-    pub fn expected(&self) -> String {
+    pub(crate) fn expected(&self) -> String {
         match self {
             Self::Duration => "a duration such as \"8ms\"".to_owned(),
             Self::PositiveDuration => "a duration above zero such as \"8ms\"".to_owned(),
@@ -402,11 +402,11 @@ impl Quantity {
 /// Weight of one of several alternatives, at least 0.
 pub const WEIGHT: Quantity = Quantity::not_negative("");
 /// Number of packets, at least 0, not necessarily whole \[packet\].
-pub const PACKETS: Quantity = Quantity::not_negative("packets");
+pub(crate) const PACKETS: Quantity = Quantity::not_negative("packets");
 /// Fraction from 0 to 1.
-pub const FRACTION: Quantity = Quantity { range: Range::Fraction, unit: "" };
+pub(crate) const FRACTION: Quantity = Quantity { range: Range::Fraction, unit: "" };
 /// Correlation from −1 to below 1.
-pub const CORRELATION: Quantity = Quantity { range: Range::Correlation, unit: "" };
+pub(crate) const CORRELATION: Quantity = Quantity { range: Range::Correlation, unit: "" };
 
 /// Word that removes the table that the key is laid over.
 pub(crate) const NONE: Form = Form::Words(&[("none", "takes away what it is laid over")]);

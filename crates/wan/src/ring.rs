@@ -60,17 +60,10 @@ impl<T> Ring<T> {
         self.places.get(self.first)?.as_ref()
     }
 
-    /// Returns the first value for changes.
-    #[must_use]
-    #[inline(always)]
-    pub fn front_mut(&mut self) -> Option<&mut T> {
-        self.places.get_mut(self.first)?.as_mut()
-    }
-
     /// Returns the last value.
     #[must_use]
     #[inline(always)]
-    pub fn back(&self) -> Option<&T> {
+    pub(crate) fn back(&self) -> Option<&T> {
         let last = self.len.checked_sub(1)?;
         // `len` is above zero, so there are slots, and the mask does not underflow.
         self.places[(self.first + last) & (self.places.len() - 1)].as_ref()
@@ -108,7 +101,7 @@ impl<T> Ring<T> {
 
     /// Drops the first value in its place. Does nothing on an empty ring.
     #[inline(always)]
-    pub fn drop_front(&mut self) {
+    pub(crate) fn drop_front(&mut self) {
         if self.len > 0 {
             drop(self.places[self.first].take());
             self.pass();
@@ -181,12 +174,7 @@ mod tests {
                         ring.clear();
                         deque.clear();
                     }
-                    _ => {
-                        if let Some(front) = ring.front_mut() {
-                            *front ^= 128;
-                            deque[0] ^= 128;
-                        }
-                    }
+                    _ => {}
                 }
                 prop_assert_eq!((ring.len(), ring.is_empty()), (deque.len(), deque.is_empty()));
                 prop_assert_eq!((ring.front(), ring.back()), (deque.front(), deque.back()));

@@ -7,7 +7,7 @@ mod words;
 
 use cohaptic_stability::{Boundary, BoundaryOptions, Cell, Family, KeyRange, Kinds, Verdict, VerdictKind};
 
-use crate::nominal;
+use crate::words::nominal;
 pub use document::document;
 pub use page::html;
 pub use tables::{crossings_csv, samples_csv};

@@ -8,7 +8,7 @@ use cohaptic_campaign::{Judge, Judgement, Report, Verdict};
 use cohaptic_scene::Scene;
 use cohaptic_stability::{AnalysisError, Limits, Method, VerdictKind, Watch, judge_watched};
 
-use crate::nominal;
+use crate::words::nominal;
 
 /// Judge of combinations by analysis. The watch may stop the analysis.
 #[derive(Clone, Copy)]

@@ -8,7 +8,8 @@ mod words;
 use cohaptic_stability::{Criterion, KeyRange, Kinds, Map, Verdict, VerdictKind};
 use cohaptic_units::print::csv_field;
 
-use crate::{legend_name, nominal};
+use crate::legend_name;
+use crate::words::nominal;
 pub use document::document;
 pub use page::html;
 pub use words::words;

@@ -43,7 +43,7 @@ impl Kind {
 
     /// Returns the word in JSON documents.
     #[must_use]
-    pub const fn word(self) -> &'static str {
+    pub(crate) const fn word(self) -> &'static str {
         match self {
             Self::Engine => "engine",
             Self::Axes => "axes",

@@ -14,6 +14,7 @@ pub struct Strategies {
 
 /// Why a text is no list of comparable strategies.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum StrategiesError {
     /// The list has fewer than two strategies.
     #[error(

@@ -7,6 +7,7 @@ pub const MOST_VALUES: usize = 1_000_000;
 
 /// Why a text is no variation of a key.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum VaryError {
     /// The text has no `=`, or no key before the `=`.
     #[error(

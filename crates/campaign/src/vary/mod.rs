@@ -99,7 +99,7 @@ impl Variation {
     }
 
     /// Returns the values as written, in order.
-    pub fn texts(&self) -> impl ExactSizeIterator<Item = &str> {
+    pub(crate) fn texts(&self) -> impl ExactSizeIterator<Item = &str> {
         self.values.iter().map(|varied| varied.text.as_str())
     }
 

@@ -14,9 +14,9 @@ pub struct Firmware {
 
 impl Firmware {
     /// Least length of an image \[bytes\]. Known images have 7,324 to 8,492 bytes.
-    pub const SHORTEST: usize = 1024;
+    pub(crate) const SHORTEST: usize = 1024;
     /// Greatest length of an image \[bytes\].
-    pub const LONGEST: usize = 65_536;
+    pub(crate) const LONGEST: usize = 65_536;
 
     /// Returns an image of these bytes.
     ///

@@ -18,7 +18,7 @@ pub enum Axis {
 impl Axis {
     /// Returns the index in a triple.
     #[must_use]
-    pub const fn index(self) -> usize {
+    pub(crate) const fn index(self) -> usize {
         self as usize
     }
 }
@@ -45,13 +45,13 @@ impl<const A: usize> Axes<A> {
 
     /// Returns the components of a vector of the device along the peer's axes.
     #[must_use]
-    pub fn of_device(&self, vector: Triple) -> [f64; A] {
+    pub(crate) fn of_device(&self, vector: Triple) -> [f64; A] {
         self.0.map(|axis| vector[axis.index()])
     }
 
     /// Returns a vector of the peer as a vector of the device, zero along the axes that the peer does not use.
     #[must_use]
-    pub fn to_device(&self, vector: [f64; A]) -> Triple {
+    pub(crate) fn to_device(&self, vector: [f64; A]) -> Triple {
         let mut spread = [0.0; 3];
         for (axis, part) in self.0.iter().zip(vector) {
             spread[axis.index()] = part;
@@ -61,7 +61,7 @@ impl<const A: usize> Axes<A> {
 
     /// Returns, indexed by the device's axes, whether the peer does not use the axis.
     #[must_use]
-    pub fn unused(&self) -> [bool; 3] {
+    pub(crate) fn unused(&self) -> [bool; 3] {
         [Axis::X, Axis::Y, Axis::Z].map(|axis| !self.0.contains(&axis))
     }
 }

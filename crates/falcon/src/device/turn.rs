@@ -57,7 +57,7 @@ impl<const A: usize> DeviceConfig<A> {
     /// # Errors
     ///
     /// [`DeviceConfigError`] with the number out of range.
-    pub fn checked(self) -> Result<Self, DeviceConfigError> {
+    pub(crate) fn checked(self) -> Result<Self, DeviceConfigError> {
         if !(Duration::from_micros(250)..=Duration::from_millis(20)).contains(&self.period) {
             return Err(DeviceConfigError::Period(self.period));
         }

@@ -47,7 +47,7 @@ impl DriverConfig {
     /// # Errors
     ///
     /// [`DriverConfigError`] with the first number out of range.
-    pub fn checked(self) -> Result<Self, DriverConfigError> {
+    pub(crate) fn checked(self) -> Result<Self, DriverConfigError> {
         self.limits.checked()?;
         for (name, span, most) in [
             ("patience of an exchange", self.patience, Duration::from_millis(100)),

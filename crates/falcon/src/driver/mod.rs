@@ -13,7 +13,6 @@ pub use config::{DriverConfig, DriverConfigError};
 pub use error::DriverError;
 pub use statistics::Statistics;
 pub use status::{Phase, Reading, Setpoint, Status};
-pub use velocity::VelocityFilter;
 
 use core::time::Duration;
 
@@ -24,6 +23,7 @@ use crate::kinematics::{Triple, angles_of_counts, forward_from};
 use crate::protocol::{Command, Framer, Report};
 use crate::safety::{ForceGate, Moment, MotorCounts, Verdict};
 use crate::transport::{Transport, TransportError};
+use velocity::VelocityFilter;
 
 /// Packets of zero force at a stop.
 const FAREWELLS: u32 = 5;

@@ -62,7 +62,7 @@ pub struct Reading {
     pub at: Instant,
     /// Position \[m\] relative to the calibration's origin.
     pub position: Triple,
-    /// Velocity \[m/s\], estimated by a [`VelocityFilter`](super::VelocityFilter).
+    /// Velocity \[m/s\], estimated by a low-pass filter of the bandwidth [`DriverConfig::velocity_bandwidth`](super::DriverConfig::velocity_bandwidth).
     pub velocity: Triple,
 }
 

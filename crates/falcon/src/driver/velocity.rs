@@ -15,7 +15,7 @@ const PAUSE: Duration = Duration::from_millis(50);
 /// Each update closes the part 1 − exp(−2π·f·Δt) of the gap to the newest difference, so the bandwidth f is independent of the rate of updates. The estimate
 /// lags by 1/(2π·f), 5 ms at 30 Hz. One count of an encoder, 0.03 mm, within one millisecond shows as 5 mm/s at 30 Hz instead of 30 mm/s.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct VelocityFilter {
+pub(crate) struct VelocityFilter {
     bandwidth: f64,
     last: Option<(Instant, Triple)>,
     velocity: Triple,
@@ -24,12 +24,12 @@ pub struct VelocityFilter {
 impl VelocityFilter {
     /// Returns a filter at rest with the bandwidth `bandwidth` \[Hz\].
     #[must_use]
-    pub const fn new(bandwidth: f64) -> Self {
+    pub(crate) const fn new(bandwidth: f64) -> Self {
         Self { bandwidth, last: None, velocity: [0.0; 3] }
     }
 
     /// Takes a position \[m\] and returns the velocity \[m/s\]. A position of the same instant or of an earlier instant changes nothing.
-    pub fn update(&mut self, at: Instant, position: Triple) -> Triple {
+    pub(crate) fn update(&mut self, at: Instant, position: Triple) -> Triple {
         let Some((before, old)) = self.last else {
             // The first position has no difference.
             self.last = Some((at, position));
@@ -55,7 +55,7 @@ impl VelocityFilter {
     }
 
     /// Resets the filter to rest, after a jump of positions.
-    pub const fn reset(&mut self) {
+    pub(crate) const fn reset(&mut self) {
         (self.last, self.velocity) = (None, [0.0; 3]);
     }
 }

@@ -17,14 +17,12 @@ pub(super) const R: f64 = 0.0400;
 /// Offset s of an arm's axis from the middle, across the leg \[m\].
 pub(super) const S: f64 = -0.02309;
 
-/// Azimuths of the legs top, right and left around the middle \[degrees\], clockwise from the front.
-pub const AZIMUTHS: [f64; 3] = [105.0, -15.0, -135.0];
 /// Angle of an arm at the index of its encoder \[degrees\].
-pub const HOME_ANGLE: f64 = 35.0;
+pub(crate) const HOME_ANGLE: f64 = 35.0;
 /// Encoder counts per turn of an arm: 320 slots with four counts each, and drums of 110 mm and 14.25 mm.
-pub const COUNTS_PER_TURN: f64 = 320.0 * 4.0 * 110.0 / 14.25;
+pub(crate) const COUNTS_PER_TURN: f64 = 320.0 * 4.0 * 110.0 / 14.25;
 /// Angle of an arm per count \[degrees\]: 0.036434659…
-pub const DEGREES_PER_COUNT: f64 = 360.0 / COUNTS_PER_TURN;
+pub(crate) const DEGREES_PER_COUNT: f64 = 360.0 / COUNTS_PER_TURN;
 
 /// Returns the angle of an arm \[rad\] at a count, which may have a fraction.
 #[must_use]
@@ -38,7 +36,7 @@ pub fn count_of_angle(angle: f64) -> f64 {
     (angle * (180.0 / PI) - HOME_ANGLE) / DEGREES_PER_COUNT
 }
 
-/// Cosine and sine of each leg's azimuth.
+/// Cosine and sine of the azimuths of the legs top, right and left around the middle: 105°, −15° and −135° clockwise from the front.
 pub(super) const DIRECTIONS: [(f64, f64); 3] =
     [(-0.258_819_045_102_520_74, 0.965_925_826_289_068_3), (0.965_925_826_289_068_3, -0.258_819_045_102_520_74), (-FRAC_1_SQRT_2, -FRAC_1_SQRT_2)];
 
@@ -55,7 +53,7 @@ mod tests {
 
     #[test]
     fn directions_are_those_of_the_azimuths() {
-        for (azimuth, (cosine, sine)) in AZIMUTHS.into_iter().zip(DIRECTIONS) {
+        for (azimuth, (cosine, sine)) in [105.0_f64, -15.0, -135.0].into_iter().zip(DIRECTIONS) {
             assert!((azimuth.to_radians().cos() - cosine).abs() < 3e-16 && (azimuth.to_radians().sin() - sine).abs() < 3e-16);
         }
     }

@@ -13,7 +13,7 @@ mod linear;
 mod workspace;
 
 pub use forward::{ForwardError, TOLERANCE, forward, forward_from};
-pub use geometry::{AZIMUTHS, COUNTS_PER_TURN, DEGREES_PER_COUNT, HOME_ANGLE, angle_of_count, count_of_angle};
+pub use geometry::{angle_of_count, count_of_angle};
 pub use jacobian::Jacobian;
 pub use workspace::{ANGLE_LIMITS, is_usable};
 
@@ -36,6 +36,6 @@ pub fn inverse(position: Triple) -> Option<Triple> {
 
 /// Returns the angles \[rad\] of encoder counts. The angles have a meaning only for a homed device.
 #[must_use]
-pub fn angles_of_counts(counts: [i16; 3]) -> Triple {
+pub(crate) fn angles_of_counts(counts: [i16; 3]) -> Triple {
     counts.map(|count| angle_of_count(f64::from(count)))
 }

@@ -69,20 +69,8 @@ impl Framer {
 
     /// Returns the number of discarded bytes, which belonged to no complete packet.
     #[must_use]
-    pub const fn garbage(&self) -> u64 {
+    pub(crate) const fn garbage(&self) -> u64 {
         self.garbage
-    }
-
-    /// Returns the number of held bytes of an incomplete packet.
-    #[must_use]
-    pub const fn held(&self) -> usize {
-        self.count
-    }
-
-    /// Discards the held bytes as garbage: after a purge no later byte completes them.
-    pub fn reset(&mut self) {
-        self.garbage += self.count as u64;
-        self.count = 0;
     }
 
     /// Discards bytes from the front until the rest can be the beginning of a packet.
@@ -173,7 +161,7 @@ mod tests {
             let found = all(&mut framer, &report.encode());
             prop_assert_eq!(found, [report]);
             // Every byte is part of a packet, held or counted as garbage.
-            prop_assert_eq!(framer.held(), 0);
+            prop_assert_eq!(framer.count, 0);
             prop_assert_eq!(framer.garbage() + (before * PACKET) as u64, garbage.len() as u64);
         }
 
@@ -181,7 +169,7 @@ mod tests {
         fn any_bytes_are_taken(bytes in vec(any::<u8>(), 0..400)) {
             let mut framer = Framer::new();
             let found = all(&mut framer, &bytes).len();
-            prop_assert_eq!(framer.garbage() + (found * PACKET + framer.held()) as u64, bytes.len() as u64);
+            prop_assert_eq!(framer.garbage() + (found * PACKET + framer.count) as u64, bytes.len() as u64);
             let mut device = Framer::new();
             for byte in &bytes {
                 let _: Option<CommandParts> = device.push(*byte);

@@ -16,6 +16,6 @@ pub use report::{Buttons, DecodeReportError, Report};
 /// Length of a packet in either direction \[bytes\].
 pub const PACKET: usize = 16;
 /// First byte of a packet.
-pub const START: u8 = b'<';
+pub(crate) const START: u8 = b'<';
 /// Last byte of a packet.
-pub const END: u8 = b'>';
+pub(crate) const END: u8 = b'>';

@@ -51,7 +51,7 @@ impl ZeroCause {
 
     /// Returns the index in [`ZeroCause::ALL`].
     #[must_use]
-    pub const fn index(self) -> usize {
+    pub(crate) const fn index(self) -> usize {
         self as usize
     }
 
@@ -136,12 +136,6 @@ impl ForceGate {
     #[must_use]
     pub const fn is_stopped(&self) -> bool {
         self.stopped
-    }
-
-    /// Returns the limits.
-    #[must_use]
-    pub const fn limits(&self) -> &Limits {
-        &self.limits
     }
 
     /// Returns the force and the motor counts for the wanted force `wanted` \[N\]. Must be called once per packet, because the calls measure the time between

@@ -35,7 +35,7 @@ impl Limits {
     /// # Errors
     ///
     /// [`LimitsError`] with the first limit out of range.
-    pub fn checked(self) -> Result<Self, LimitsError> {
+    pub(crate) fn checked(self) -> Result<Self, LimitsError> {
         if !(0.0..=20.0).contains(&self.force) {
             return Err(LimitsError::Force(self.force));
         }

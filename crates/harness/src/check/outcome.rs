@@ -29,7 +29,7 @@ pub struct Outcome {
 impl Outcome {
     /// Returns the line of a failed expectation; `None` if the expectation holds.
     #[must_use]
-    pub fn failure(&self) -> Option<String> {
+    pub(crate) fn failure(&self) -> Option<String> {
         let Self { key, name, expected, found, .. } = self;
         let line = || match *key {
             "stable" => format!("expected {expected}, but {found}"),

@@ -39,7 +39,7 @@ pub enum Stability {
 impl Stability {
     /// Returns the finding for the expectation `stable`: `true` for a stable scene, `false` for an unstable one.
     #[must_use]
-    pub fn finding(self, stable: bool) -> Finding {
+    pub(crate) fn finding(self, stable: bool) -> Finding {
         let passed = matches!((self, stable), (Self::Stable, true) | (Self::Unstable, false));
         let found = match self {
             Self::Stable => "a small disturbance dies out".to_owned(),

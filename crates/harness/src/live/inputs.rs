@@ -8,7 +8,7 @@ use cohaptic_units::Instant;
 use cohaptic_wan::LinkModel;
 
 /// First line of a record of inputs.
-pub const HEADER: &str = "at_ns,input,peer,to,value";
+pub(crate) const HEADER: &str = "at_ns,input,peer,to,value";
 
 /// Recorded inputs of a session, in the order of time.
 #[derive(Clone, PartialEq, Debug, Default)]
@@ -27,6 +27,7 @@ pub(crate) enum Recorded {
 
 /// Reason why a text is no valid record of the inputs of a scene. Lines are counted from 1; line 1 is the header.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum InputsError {
     /// The first line is not the header.
     #[error("line 1: found \"{found}\", expected the header \"{HEADER}\"")]

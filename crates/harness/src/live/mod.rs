@@ -24,7 +24,7 @@ pub(crate) use seat::Seat;
 
 pub use crate::rows::{Input, InputRow};
 pub use device::LiveDevice;
-pub use inputs::{HEADER, Inputs, InputsError};
+pub use inputs::{Inputs, InputsError};
 pub use presence::{Datagram, Transmit};
 pub use recorded::{RecordedScene, SceneDifference};
 pub use replay::replay;

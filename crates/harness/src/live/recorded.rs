@@ -30,6 +30,7 @@ pub struct RecordedScene {
 
 /// Difference between a recorded scene and a present one. Values are TOML; `None`: absent.
 #[derive(Clone, PartialEq, Eq, Debug)]
+#[non_exhaustive]
 pub enum SceneDifference {
     /// A key differs.
     Key {

@@ -25,6 +25,7 @@ pub enum Presence {
 
 /// Reason why a sample from outside was refused. Only counters have changed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SampleError {
     /// The peer is not in another process.
     #[error("peer {peer} is no peer of kind \"udp\" of this scene")]

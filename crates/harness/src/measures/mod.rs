@@ -42,8 +42,6 @@ use cohaptic_scene::{Measure, MeasureName, MeasureSettings, Scene};
 
 use crate::{HoldRow, InstantRow, Model, NoObserver, Observer, SendRow, Simulation, StepRow, Summary, TickRow};
 
-pub use quantiles::QuantileSketch;
-
 /// Accumulated quantity of a run, and the measures computed from this quantity.
 trait Accumulator: Sized {
     /// Type that selects one of the measures.
@@ -132,7 +130,7 @@ macro_rules! accumulators {
         impl Measures {
             /// Returns measures of a run of the scene, before the run.
             #[must_use]
-            pub fn new(scene: &Scene, names: &[MeasureName], settings: &MeasureSettings) -> Self {
+            pub(crate) fn new(scene: &Scene, names: &[MeasureName], settings: &MeasureSettings) -> Self {
                 let asked = Asked { scene, names, settings };
                 let mut rows = Rows::NONE;
                 $(

@@ -105,7 +105,7 @@ impl Bands {
 
     /// Returns the span of an instant; `None` at the end of the scene and beyond.
     #[must_use]
-    pub fn span(&self, at: Instant) -> Option<usize> {
+    pub(crate) fn span(&self, at: Instant) -> Option<usize> {
         if at >= Instant::ZERO.saturating_add(self.duration) {
             return None;
         }
@@ -115,7 +115,7 @@ impl Bands {
     /// Returns the middle of a span \[s\].
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "the number of spans is small")]
-    pub fn middle_of(&self, span: usize) -> f64 {
+    pub(crate) fn middle_of(&self, span: usize) -> f64 {
         (span as f64 + 0.5) * (self.width as f64 / 1e9)
     }
 
@@ -146,7 +146,7 @@ impl Bands {
 
     /// Returns the number of spans.
     #[must_use]
-    pub const fn spans(&self) -> usize {
+    pub(crate) const fn spans(&self) -> usize {
         self.spans
     }
 

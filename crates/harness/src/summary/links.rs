@@ -54,7 +54,7 @@ impl LinkSummaries {
     ///
     /// If the number of entries is not N·(N−1).
     #[must_use]
-    pub fn each(peers: usize, stats: Vec<LinkStats>) -> Self {
+    pub(crate) fn each(peers: usize, stats: Vec<LinkStats>) -> Self {
         assert_eq!(stats.len(), peers * peers.saturating_sub(1), "every pair of {peers} peers has a link in either direction");
         Self { peers, stats, together: 1, topology: None }
     }
@@ -65,14 +65,14 @@ impl LinkSummaries {
     ///
     /// If the number of entries is not the number of links of the topology.
     #[must_use]
-    pub fn on(topology: Arc<Topology>, stats: Vec<LinkStats>) -> Self {
+    pub(crate) fn on(topology: Arc<Topology>, stats: Vec<LinkStats>) -> Self {
         assert_eq!(stats.len(), topology.links(), "each link of a topology has counters");
         Self { peers: topology.peers(), stats, together: 1, topology: Some(topology) }
     }
 
     /// Stores the common counters of the links of each sender, by sender.
     #[must_use]
-    pub fn by_sender(stats: Vec<LinkStats>) -> Self {
+    pub(crate) fn by_sender(stats: Vec<LinkStats>) -> Self {
         let peers = stats.len();
         Self { peers, stats, together: peers.saturating_sub(1).max(1), topology: None }
     }

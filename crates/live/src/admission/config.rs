@@ -108,6 +108,7 @@ impl AdmissionConfig {
 
 /// Reason why an admission control cannot be made.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum AdmissionConfigError {
     /// The number of axes is not 1 to 3.
     #[error("{}; a sample has 1 to 3", Counted(*found, "axis"))]

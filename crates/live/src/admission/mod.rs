@@ -31,18 +31,19 @@ use cohaptic_peer::wire::{self, Sample, SampleKind};
 use cohaptic_units::Instant;
 use zeroize::Zeroizing;
 
-use crate::handshake::{HANDSHAKE_LEN, HELLO_MAGIC, Hello, Welcome};
+use crate::handshake::hello::HELLO_MAGIC;
+use crate::handshake::{HANDSHAKE_LEN, Hello, Welcome};
 use crate::seal::{JoiningKeys, MAX_DATAGRAM, SEAL_LEN, Sealed, nonce_of};
 use crate::{Entropy, Nonce, SessionKey};
 
 pub use config::{AdmissionConfig, AdmissionConfigError, Limits, Place, Seat};
 pub use refusal::{AdmissionStats, Refusal};
-pub use seats::{SeatStatus, WINDOW};
+pub use seats::SeatStatus;
 
 use seats::{Occupant, SeatState};
 
 /// Upper bound (exclusive) of the sequence numbers that a peer may give its samples: 2⁴⁰.
-pub const SEQUENCE_END: u64 = 1 << SEQUENCE_BITS;
+pub(crate) const SEQUENCE_END: u64 = 1 << SEQUENCE_BITS;
 
 /// Bits of an admitted sequence number that hold the peer's own number.
 const SEQUENCE_BITS: u32 = 40;

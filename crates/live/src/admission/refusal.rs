@@ -8,6 +8,7 @@ use crate::handshake::HandshakeError;
 
 /// Cause for which the session refused a datagram. A refused datagram changes nothing but a counter.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+#[non_exhaustive]
 pub enum Refusal {
     /// The datagram is no hello, and shorter than the header of a sample.
     TooShort,
@@ -55,7 +56,7 @@ pub enum Refusal {
 
 impl Refusal {
     /// All causes, in the order of their counters.
-    pub const ALL: [Self; 21] = [
+    pub(crate) const ALL: [Self; 21] = [
         Self::TooShort,
         Self::Oversized,
         Self::Magic,

@@ -144,7 +144,7 @@ const fn since(then: Instant, now: Instant) -> Duration {
 }
 
 /// Length of the window of sequence numbers: a late number is admitted once if the number is less than this below the highest number seen.
-pub const WINDOW: u32 = 128;
+pub(crate) const WINDOW: u32 = 128;
 
 /// Sequence numbers seen in one joining: a window of 128 numbers up to the highest number seen, as in RFC 4303, section 3.4.3.
 #[derive(Clone, Copy, Debug)]

@@ -11,9 +11,9 @@ use crate::handshake::HANDSHAKE_LEN;
 use crate::{Entropy, EntropyError, MAX_DATAGRAM, Place, SessionKey};
 
 /// Time between two hellos while no welcome comes.
-pub const HELLO_EVERY: Duration = Duration::from_millis(250);
+pub(crate) const HELLO_EVERY: Duration = Duration::from_millis(250);
 /// Time without a new sample from any peer after which a client begins anew: the session may have been restarted.
-pub const SILENCE: Duration = Duration::from_secs(1);
+pub(crate) const SILENCE: Duration = Duration::from_secs(1);
 
 /// Identity of a client, and its way of joining.
 #[derive(Clone, Debug)]

@@ -6,7 +6,7 @@
 use cohaptic_peer::wire::SampleKind;
 
 use crate::handshake::{HANDSHAKE_LEN, HandshakeError, Hello, Welcome};
-use crate::seal::{JoiningKeys, MAX_DATAGRAM, SEAL_LEN, Sealed};
+use crate::seal::{JoiningKeys, MAX_DATAGRAM, NONCE_LEN, SEAL_LEN, Sealed};
 use crate::{Entropy, EntropyError, Nonce, Place, SessionKey};
 
 /// Peer that asks for a seat: a hello that is not answered yet.
@@ -37,7 +37,7 @@ impl Joining {
     ///
     /// [`EntropyError`] if the source has no random bytes.
     pub fn draw(session: u64, place: Place, key: &SessionKey, entropy: &mut impl Entropy) -> Result<Self, EntropyError> {
-        let mut client_nonce = [0; crate::NONCE_LEN];
+        let mut client_nonce = [0; NONCE_LEN];
         entropy.fill(&mut client_nonce)?;
         Ok(Self::new(session, place, key, client_nonce))
     }
@@ -68,6 +68,7 @@ impl Joining {
 
 /// Reason why a datagram is not the welcome for a joining.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum WelcomeError {
     /// The datagram is no welcome, or was not made with the session key.
     #[error(transparent)]
@@ -125,6 +126,7 @@ impl Joined {
 
 /// Reason why a datagram from the session cannot be opened.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum OpenError {
     /// The datagram is not as long as a sealed sample of this session.
     #[error("{found} bytes; expected {expected}")]

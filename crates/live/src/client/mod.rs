@@ -7,5 +7,5 @@
 mod conversation;
 mod joining;
 
-pub use conversation::{Client, ClientConfig, HELLO_EVERY, Heard, SILENCE, SessionInfo};
+pub use conversation::{Client, ClientConfig, Heard, SessionInfo};
 pub use joining::{Joined, Joining, OpenError, WelcomeError};

@@ -39,6 +39,7 @@ pub struct FalconFault {
 
 /// Fault for which a Falcon cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FaultKind {
     /// The Falcon is not connected, or must not be opened.
     #[error(transparent)]

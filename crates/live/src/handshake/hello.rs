@@ -17,7 +17,7 @@ use super::{BODY_LEN, HANDSHAKE_LEN, HandshakeError, VERSION, finish, open, part
 use crate::{Nonce, Place, SessionKey};
 
 /// First four bytes of a hello.
-pub const HELLO_MAGIC: [u8; 4] = *b"CHPH";
+pub(crate) const HELLO_MAGIC: [u8; 4] = *b"CHPH";
 
 /// Request of a peer for its seat.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

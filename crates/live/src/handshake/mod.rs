@@ -3,17 +3,17 @@
 //! Both datagrams are 88 bytes long. An answer no longer than its request amplifies nothing for a sender with a false address. Both datagrams end with a tag
 //! under the session key. Their first four bytes differ, so that neither datagram passes for the other. A hello alone changes nothing in the session.
 
-mod hello;
+pub(crate) mod hello;
 mod welcome;
 
-pub use hello::{HELLO_MAGIC, Hello};
-pub use welcome::{WELCOME_MAGIC, Welcome};
+pub use hello::Hello;
+pub use welcome::Welcome;
 
 use crate::SessionKey;
 use crate::seal::{TAG_LEN, Tag, session_tag, verify_session_tag};
 
 /// Version of the protocol, in hellos and welcomes.
-pub const VERSION: u16 = 1;
+pub(crate) const VERSION: u16 = 1;
 /// Length of a hello and of a welcome \[byte\].
 pub const HANDSHAKE_LEN: usize = BODY_LEN + TAG_LEN;
 
@@ -22,6 +22,7 @@ const BODY_LEN: usize = 72;
 
 /// Fault of a hello or a welcome.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum HandshakeError {
     /// The datagram begins with other bytes than a hello or a welcome does.
     #[error("it is no such datagram")]

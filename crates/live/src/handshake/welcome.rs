@@ -22,7 +22,7 @@ use super::{BODY_LEN, HANDSHAKE_LEN, HandshakeError, VERSION, finish, open, part
 use crate::{Nonce, Place, SessionKey};
 
 /// First four bytes of a welcome.
-pub const WELCOME_MAGIC: [u8; 4] = *b"CHPW";
+pub(crate) const WELCOME_MAGIC: [u8; 4] = *b"CHPW";
 
 /// Answer of the session to a [`Hello`](super::Hello): parameters of the session, and the nonces of both sides.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

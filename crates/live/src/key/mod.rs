@@ -53,6 +53,7 @@ const MAX_FILE_LEN: u16 = 1024;
 
 /// Reason why a key file cannot be read or written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum KeyFileError {
     /// The file cannot be opened or read.
     #[error("cannot read the key file {}: {source}", path.display())]

@@ -67,6 +67,7 @@ pub enum Recorded {
 
 /// Reason why a session cannot begin or had to end.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SessionError {
     /// The session would listen without a key at an address that other machines reach, and [`SessionConfig::allow_remote`] is not set.
     #[error(

@@ -23,7 +23,7 @@ pub enum DelayLaw {
 
 impl DelayLaw {
     /// All families.
-    pub const ALL: [Self; 6] = [Self::Normal, Self::Uniform, Self::Laplace, Self::Lognormal, Self::Gamma, Self::Weibull];
+    pub(crate) const ALL: [Self; 6] = [Self::Normal, Self::Uniform, Self::Laplace, Self::Lognormal, Self::Gamma, Self::Weibull];
 
     /// Returns the name in scenes and JSON.
     #[must_use]

@@ -23,6 +23,7 @@ pub struct Measurements {
 
 /// Error of making measurements. Packets are counted from 1.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum MeasurementsError {
     /// An instant or a delay is NaN or infinite.
     #[error("packet {packet}: found {value}, expected a finite time and a finite delay (a lost packet has none)")]

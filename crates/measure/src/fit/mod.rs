@@ -129,6 +129,7 @@ pub struct Goodness {
 
 /// Error of an estimate.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FitError {
     /// No packet arrived, or no packet was sent.
     #[error("none of {} arrived: expected at least {LEAST_RECEIVED} delays", Counted(*packets, "packet"))]

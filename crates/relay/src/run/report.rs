@@ -117,12 +117,6 @@ impl View<'_> {
     pub fn clients(&self) -> usize {
         self.engine.clients()
     }
-
-    /// Returns the address of a program, or `None` if the address is not known or the relay is a proxy.
-    #[must_use]
-    pub fn program_address(&self, program: NodeId) -> Option<SocketAddr> {
-        self.engine.program_address(program)
-    }
 }
 
 /// Returns the counters of every link of the network, ordered by sender and then by receiver.

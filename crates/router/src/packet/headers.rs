@@ -32,6 +32,7 @@ pub struct Headers {
 
 /// Reason why bytes are no packet of IP.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+#[non_exhaustive]
 pub enum Malformed {
     /// The bytes end within the fixed header.
     Short,
@@ -55,7 +56,7 @@ impl Ecn {
 
     /// Returns whether both ends understand congestion marks: any codepoint but 00.
     #[must_use]
-    pub const fn is_capable(self) -> bool {
+    pub(crate) const fn is_capable(self) -> bool {
         self.0 != 0
     }
 

@@ -33,7 +33,7 @@ impl FileSchema {
 
     /// Returns the title of the JSON Schema.
     #[must_use]
-    pub const fn title(self) -> &'static str {
+    pub(crate) const fn title(self) -> &'static str {
         match self {
             Self::Scene => "cohaptic scene",
             Self::Relay => "cohaptic relay file",

@@ -11,7 +11,7 @@ impl Attoseconds {
     /// Parses a decimal number, with or without sign, fraction and exponent, in the unit 10^`unit` s. Digits below 10⁻¹⁸ s are cut. Returns `None` if the text
     /// is no number (NaN and infinities are not numbers) or if the number is out of range.
     #[must_use]
-    pub fn parse(text: &str, unit: i32) -> Option<Self> {
+    pub(crate) fn parse(text: &str, unit: i32) -> Option<Self> {
         let (number, exponent) = match text.split_once(['e', 'E']) {
             Some((number, exponent)) => (number, exponent.parse::<i32>().ok()?),
             None => (text, 0),
@@ -64,7 +64,7 @@ impl Attoseconds {
 
     /// Returns the exact difference, or `None` if the difference is out of range.
     #[must_use]
-    pub const fn since(self, earlier: Self) -> Option<Self> {
+    pub(crate) const fn since(self, earlier: Self) -> Option<Self> {
         match self.0.checked_sub(earlier.0) {
             Some(attos) => Some(Self(attos)),
             None => None,
@@ -73,7 +73,7 @@ impl Attoseconds {
 
     /// Returns the time in nanoseconds, rounded to the nearest whole number, halves to the even number. Returns `None` below zero and from 2⁶⁴ on.
     #[must_use]
-    pub fn nanos(self) -> Option<u64> {
+    pub(crate) fn nanos(self) -> Option<u64> {
         let (whole, rest) = (self.0.div_euclid(NANO), self.0.rem_euclid(NANO));
         let up = rest > NANO / 2 || (rest == NANO / 2 && whole % 2 != 0);
         // The sign is tested before rounding: −0.1 ns would round to 0.

@@ -37,6 +37,7 @@ pub struct DelayRow {
 
 /// Reason for refusing a table of delays. Lines are counted from 1.
 #[derive(Clone, PartialEq, Debug)]
+#[non_exhaustive]
 pub enum DelayTableError {
     /// A column is missing, occurs twice, or is excluded by another column.
     Columns {

@@ -29,6 +29,7 @@ impl core::error::Error for NetemError {}
 
 /// A fault in the words of a netem.
 #[derive(Clone, PartialEq, Eq, Debug)]
+#[non_exhaustive]
 pub enum NetemErrorKind {
     /// A word where an option was expected.
     UnknownWord {

@@ -23,6 +23,7 @@ use crate::stages::slots::Slots;
 
 /// Why words that `tc` accepts describe an impossible link.
 #[derive(Clone, PartialEq, Debug)]
+#[non_exhaustive]
 pub enum ExactError {
     /// Options that contradict each other.
     Contradiction(Contradiction),

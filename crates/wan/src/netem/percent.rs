@@ -16,8 +16,6 @@ const ALL: f64 = 4_294_967_295.0;
 impl Percent {
     /// 0 %.
     pub const ZERO: Self = Self(0.0);
-    /// 100 %.
-    pub const HUNDRED: Self = Self(100.0);
 
     /// Makes a percentage. Returns `None` unless `percent` lies in 0..=100.
     #[must_use]
@@ -40,19 +38,19 @@ impl Percent {
 
     /// Returns the fraction as a probability.
     #[must_use]
-    pub fn probability(self) -> Probability {
+    pub(crate) fn probability(self) -> Probability {
         Probability::new(self.fraction()).unwrap_or(Probability::ONE)
     }
 
     /// Returns the number that `tc` hands to the kernel for p: rint(p·(2³² − 1)), ties to even.
     #[must_use]
-    pub fn as_u32(self) -> u32 {
+    pub(crate) fn as_u32(self) -> u32 {
         scaled(self.fraction())
     }
 
     /// Returns the number that `tc` hands to the kernel for 1 − p, where the complement is the default of another probability: rint((1 − p)·(2³² − 1)).
     #[must_use]
-    pub fn complement_as_u32(self) -> u32 {
+    pub(crate) fn complement_as_u32(self) -> u32 {
         scaled(1.0 - self.fraction())
     }
 }

@@ -7,6 +7,7 @@ use super::{DelaySpec, GemodelSpec, LossSpec, Netem, Percent, SlotGap, SlotSpec,
 
 /// A contradiction between two options, an option without a required second option, or a value out of range.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[non_exhaustive]
 pub enum Contradiction {
     /// `reorder` without a delay: no waiting packet can be overtaken.
     ReorderWithoutDelay,
@@ -57,7 +58,7 @@ impl core::error::Error for Contradiction {}
 impl Contradiction {
     /// Returns the name of the option to change.
     #[must_use]
-    pub const fn option(self) -> &'static str {
+    pub(crate) const fn option(self) -> &'static str {
         match self {
             Self::ReorderWithoutDelay => "reorder",
             Self::GapWithoutReorder => "gap",

@@ -154,7 +154,7 @@ pub struct StateSpec {
 impl StateSpec {
     /// Returns \[p13, p31, p32, p23, p14\] as fractions, with defaults where a probability is not given.
     #[must_use]
-    pub fn probabilities(&self) -> [f64; 5] {
+    pub(crate) fn probabilities(&self) -> [f64; 5] {
         let or = |said: Option<Percent>, default: f64| said.map_or(default, Percent::fraction);
         let p13 = self.p13.fraction();
         [p13, or(self.p31, 1.0 - p13), or(self.p32, 0.0), or(self.p23, 1.0), or(self.p14, 0.0)]
@@ -177,7 +177,7 @@ pub struct GemodelSpec {
 impl GemodelSpec {
     /// Returns \[p, r, 1 − h, 1 − k\] as fractions, with defaults where a probability is not given.
     #[must_use]
-    pub fn probabilities(&self) -> [f64; 4] {
+    pub(crate) fn probabilities(&self) -> [f64; 4] {
         let or = |said: Option<Percent>, default: f64| said.map_or(default, Percent::fraction);
         let p = self.p.fraction();
         [p, or(self.r, 1.0 - p), or(self.loss_in_bad, 1.0), or(self.loss_in_good, 0.0)]

@@ -68,6 +68,7 @@ pub struct NetworkConfig {
 
 /// Why a call failed. The network is unchanged after each of these errors.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[non_exhaustive]
 pub enum NetworkError {
     /// An earlier call had a later instant.
     TimeWentBack(TimeWentBack),

@@ -94,7 +94,7 @@ impl fmt::Debug for LinkConfig {
 impl LinkConfig {
     /// Returns whether this link draws random numbers for loss or for jitter, as most random links do. [`has_chance`](Self::has_chance) covers all stages.
     #[must_use]
-    pub fn is_random(&self) -> bool {
+    pub(crate) fn is_random(&self) -> bool {
         self.loss.is_random() || self.delay.jitter().is_some()
     }
 

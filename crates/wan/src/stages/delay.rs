@@ -76,6 +76,7 @@ enum Memory {
 
 /// Reason for which a delay is refused.
 #[derive(Clone, Copy, PartialEq, Debug)]
+#[non_exhaustive]
 pub enum DelayError {
     /// A law with a least value would begin below the floor and cannot be cut there, or the deviation is too large for the mean.
     ReachesBelowFloor {

@@ -34,6 +34,7 @@ pub struct ModulatorState {
 
 /// Reason for which a modulator is refused. States count from 0.
 #[derive(Clone, PartialEq, Debug)]
+#[non_exhaustive]
 pub enum ModulatorError {
     /// The modulator has no state.
     NoStates,

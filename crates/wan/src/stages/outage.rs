@@ -53,6 +53,7 @@ pub struct IdleOutages {
 
 /// Reason for which outages are refused. The index counts from zero in the order given.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[non_exhaustive]
 pub enum OutagesError {
     /// The outage ends before it begins, or at the instant at which it begins.
     Empty {
@@ -150,7 +151,7 @@ impl Outages {
     /// Returns whether a scheduled outage covers `now`. The link is down at the first instant of an outage, and up at its end.
     #[must_use]
     #[inline]
-    pub fn scheduled_at(&self, now: Instant) -> bool {
+    pub(crate) fn scheduled_at(&self, now: Instant) -> bool {
         // Outages are ordered and do not overlap, so only the first outage that ends after `now` can cover `now`.
         let next = self.scheduled.partition_point(|outage| outage.to <= now);
         self.scheduled.get(next).is_some_and(|outage| outage.from <= now)

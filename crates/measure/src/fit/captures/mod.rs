@@ -77,6 +77,7 @@ pub enum End {
 
 /// Error of reading and matching two captures.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum CaptureError {
     /// A file is no capture, or is damaged.
     #[error("the capture of the {}: {problem} after {}", end.name(), Counted(*frames, "frame"))]
@@ -116,6 +117,7 @@ pub enum CaptureError {
 
 /// Fault of a capture.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum CaptureProblem {
     /// The beginning of the file is not that of a capture.
     #[error("found no pcap or pcapng header, expected one of the two formats")]

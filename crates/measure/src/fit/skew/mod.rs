@@ -60,6 +60,7 @@ pub enum Location {
 
 /// Error of estimating a drift.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SkewError {
     /// Too few packets arrived.
     #[error("only {} arrived: expected at least {LEAST_RECEIVED} delays to tell drift from chance", Counted(*received, "packet"))]
@@ -90,7 +91,7 @@ pub enum SkewError {
 
 impl Location {
     /// All locations. Their number divides the level of the test.
-    pub const ALL: [Self; 4] = [Self::Mean, Self::Median, Self::LowerEighth, Self::Least];
+    pub(crate) const ALL: [Self; 4] = [Self::Mean, Self::Median, Self::LowerEighth, Self::Least];
 
     /// Returns the name in JSON.
     #[must_use]

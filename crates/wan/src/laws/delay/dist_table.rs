@@ -72,7 +72,7 @@ impl DistTable {
     /// Largest number of entries that `tc` accepts.
     pub const MOST: usize = 16_384;
     /// Entry of one standard deviation.
-    pub const ONE_DEVIATION: f64 = 8192.0;
+    pub(crate) const ONE_DEVIATION: f64 = 8192.0;
 
     /// Reads a `.dist` file: integers as C's `strtol` reads them in base 0, separated by white space. `#` begins a comment up to the end of the line.
     ///

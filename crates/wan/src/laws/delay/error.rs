@@ -6,6 +6,7 @@ use cohaptic_units::print::SixDigits;
 
 /// Reason for which a law, or a correlation of a law, is refused. Numbers are in the caller's unit.
 #[derive(Clone, Copy, PartialEq, Debug)]
+#[non_exhaustive]
 pub enum LawError {
     /// A number is NaN or infinite.
     NotFinite {

@@ -7,6 +7,7 @@ use crate::netem::{Contradiction, TableName};
 
 /// Why no qdisc can be made of a netem.
 #[derive(Clone, PartialEq, Eq, Debug)]
+#[non_exhaustive]
 pub enum QdiscError {
     /// The options contradict each other.
     Contradiction(Contradiction),

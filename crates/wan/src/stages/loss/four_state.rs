@@ -28,6 +28,7 @@ pub struct FourState {
 
 /// Reason for which a four-state model is refused.
 #[derive(Clone, Copy, PartialEq, Debug)]
+#[non_exhaustive]
 pub enum FourStateError {
     /// The probabilities of leaving the gap exceed 1 together.
     Gap {

@@ -90,7 +90,7 @@ impl Loss {
 
     /// Returns whether the model draws random numbers.
     #[must_use]
-    pub const fn is_random(&self) -> bool {
+    pub(crate) const fn is_random(&self) -> bool {
         !matches!(self, Self::None | Self::Pattern(_))
     }
 }

@@ -139,7 +139,7 @@ impl Pattern {
 
     /// Returns whether the pattern covers the packet `number` offered at `now`. A pattern looks at one of both only, depending on its unit.
     #[must_use]
-    pub fn covers(&self, number: u64, now: Instant) -> bool {
+    pub(crate) fn covers(&self, number: u64, now: Instant) -> bool {
         let counted = match self.counts {
             Counts::Packets => number,
             Counts::Nanoseconds => now.as_nanos(),

@@ -20,7 +20,7 @@ pub struct Load {
 impl Load {
     /// Returns a load of packets of `size`, several of which may be offered at once.
     #[must_use]
-    pub const fn of(size: Bytes) -> Self {
+    pub(crate) const fn of(size: Bytes) -> Self {
         Self { size, gap: Duration::ZERO }
     }
 }

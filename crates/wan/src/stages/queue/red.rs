@@ -77,7 +77,7 @@ impl Red {
 
     /// Returns the size of the mean packet, whose transmission time is the unit of the decay while the transmitter is idle.
     #[must_use]
-    pub const fn mean_packet(&self) -> Bytes {
+    pub(crate) const fn mean_packet(&self) -> Bytes {
         self.mean_packet
     }
 }
