@@ -1,5 +1,7 @@
 //! Sockets and tasks of a test bed, as traits, and the test bed of the present thread.
 //!
+//! Use this crate if you write a package that stands in for a runtime or for sockets, and want it to have the sockets of the test kit wherever a test bed runs.
+//!
 //! A package `tokio` made by `cohaptic tokio` stands in for tokio in existing programs. Each of its sockets holds a real socket, or a socket of the test bed that
 //! runs on the thread. That package asks [`bed`] which of the two a program gets. The test kit implements the traits of this crate with its own sockets, and
 //! registers each running test bed with [`enter`].

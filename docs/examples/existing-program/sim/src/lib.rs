@@ -1,0 +1,1 @@
+//! The tests of `orders` over bad networks are in `tests`.
