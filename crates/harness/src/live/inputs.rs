@@ -16,7 +16,7 @@ pub struct Inputs {
     pub(crate) rows: Vec<(Instant, Recorded)>,
 }
 
-/// Input read from a record. Variants correspond to those of [`Input`].
+/// Input read from a record. Variants correspond to those of [`Input`](crate::rows::Input).
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) enum Recorded {
     Sample { peer: usize, datagram: Vec<u8> },
