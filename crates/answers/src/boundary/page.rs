@@ -1,7 +1,7 @@
 //! The page `boundary.html`.
 
 use cohaptic_picture::page::{Html, Table};
-use cohaptic_units::print::{Counted, six_digits};
+use cohaptic_units::print::{Counted, SixDigits, six_digits};
 
 use super::{Searched, words};
 use crate::page::{AnswerPage, MOST_ROWS, Origin, clauses, headed, more_rows, range};
@@ -15,7 +15,7 @@ pub fn html(searched: &Searched<'_>, origin: &Origin<'_>) -> String {
     let asked = vec![
         ("Along", range(searched.range)),
         ("First values", Counted(searched.options.samples, "value").to_string().into()),
-        ("Tolerance of a crossing", format!("{:.1e}{}", searched.options.tolerance, searched.range.unit).into()),
+        ("Tolerance of a crossing", format!("{}{}", SixDigits(searched.options.tolerance), searched.range.unit).into()),
     ];
     let crossings = found.crossings.len() as u64;
     AnswerPage {

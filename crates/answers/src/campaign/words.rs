@@ -6,7 +6,7 @@ use cohaptic_campaign::{CombinationReport, Judgement};
 use cohaptic_units::print::Counted;
 
 use super::Finished;
-use crate::length;
+use crate::{figure, length};
 
 /// Most combinations listed in the text. The table of runs has all.
 const MOST_COMBINATIONS: usize = 20;
@@ -86,7 +86,7 @@ pub(super) fn cells(finished: &Finished, most: usize) -> Vec<Vec<String>> {
 /// Returns the cells of a judgement: verdict, kind and radius, or dashes.
 fn judged(judgement: &Judgement) -> [String; 3] {
     match judgement.verdict() {
-        Some(verdict) => [verdict.word.to_string(), verdict.judged.to_string(), format!("{:.6}", verdict.radius)],
+        Some(verdict) => [verdict.word.to_string(), verdict.judged.to_string(), figure(verdict.radius, 6)],
         None => [const { "-" }; 3].map(str::to_owned),
     }
 }

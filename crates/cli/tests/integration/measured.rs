@@ -45,7 +45,7 @@ fn the_commands_of_the_page_of_measured_figures_run() {
                 set(&mut words, "--runs", "9");
                 let document = parse(&text(&words));
                 assert_eq!((document["runs"].as_u64(), document["runs_computed"].as_u64()), (Some(9), Some(9)), "{words:?}");
-                assert_eq!(desk.files(&folder), ["campaign.json", "runs.parquet"]);
+                assert_eq!(desk.files(&folder), ["campaign.html", "campaign.json", "runs.parquet"]);
             }
             _ => panic!("docs/measured.md: this test does not know how to run cohaptic {}", words.join(" ")),
         }

@@ -25,7 +25,8 @@ pub(super) fn figures(atlas: &Atlas, size: Size) -> Vec<Figure> {
 }
 
 /// What the shades of a panel mean.
-const SHADES: &str = "Each region is filled on the stable side of its line. The darker a place, the more of these numbers of users are stable there.";
+const SHADES: &str =
+    "Each region is filled on the stable side of its line. The stronger the tint of a place, the more of these numbers of users are stable there.";
 
 fn panel(atlas: &Atlas, setting: Setting, strategy: Strategy) -> Panel {
     let kilo = |points: Vec<(f64, f64)>| points.into_iter().map(|(x, y)| (x / 1000.0, y / 1000.0)).collect::<Vec<_>>();

@@ -30,6 +30,12 @@ const COLOURS: &str = "let lines=[...new Set([...document.querySelectorAll('[cla
 const WIDTH: &str = "lines.push('WIDER '+(document.documentElement.scrollWidth-document.documentElement.clientWidth));\
     document.body.style.width='390px';lines.push('WIDER '+(document.body.scrollWidth-390));";
 
+/// Script that writes by how much the widest table or picture is cut off on a sheet of A4 with the margins of a browser \[px\]. The style for paper is made
+/// the style for all media, because a browser that prints does not answer.
+const PAPER: &str = "for(const r of document.styleSheets[0].cssRules)if(r.media&&r.media.mediaText==='print')r.media.mediaText='all';\
+    document.documentElement.style.width='718px';\
+    lines.push('CUT '+Math.max(0,...[...document.querySelectorAll('.wide')].map(e=>e.scrollWidth-e.clientWidth)));";
+
 /// Returns the misplaced texts of named pictures, as [`misplaced`] does, with the boxes measured by a browser. Returns `None` without a `chromium` on the path.
 ///
 /// The page and the browser's data are written into `folder`, which the caller must remove.
@@ -45,14 +51,20 @@ pub fn in_browser(folder: &Path, pictures: &[(String, String)]) -> Option<Vec<St
     Some(placed(&lines, &expected))
 }
 
+<<<<<<< ours
 /// Returns the faults of a page in a browser: misplaced texts of its pictures, and a page that is wider than the window of a laptop or of a phone. Returns
 /// `None` without a `chromium` on the path; see [`in_browser`].
+=======
+/// Returns the faults of a page in a browser: misplaced texts of its pictures, a page wider than the window of a laptop, and tables or pictures cut off on
+/// paper. Returns `None` without a `chromium` on the path; see [`in_browser`].
+>>>>>>> theirs
 ///
 /// # Panics
 ///
 /// As [`in_browser`].
 #[must_use]
 pub fn page_in_browser(folder: &Path, page: &str) -> Option<Vec<String>> {
+<<<<<<< ours
     let mut lines = answer(folder, page, Scheme::Light, &format!("{PLACES}{WIDTH}"))?;
     let mut wider = |window: &str| {
         let by = lines.pop().and_then(|line| line.strip_prefix("WIDER ")?.parse::<i32>().ok());
@@ -60,11 +72,21 @@ pub fn page_in_browser(folder: &Path, page: &str) -> Option<Vec<String>> {
     };
     // The last line is popped first.
     let wider: Vec<String> = ["phone", "laptop"].into_iter().filter_map(&mut wider).collect();
+=======
+    let mut lines = answer(folder, page, Scheme::Light, &format!("{PLACES}{WIDTH}{PAPER}"))?;
+    let mut last = |prefix: &str| lines.pop().and_then(|line| line.strip_prefix(prefix)?.parse::<i32>().ok());
+    let (cut, wider) = (last("CUT "), last("WIDER "));
+>>>>>>> theirs
     let pictures: Vec<&str> = page.split("<svg ").skip(1).collect();
     let names: Vec<String> = (1..=pictures.len()).map(|number| format!("picture {number}")).collect();
     let expected: Vec<(&str, usize)> = names.iter().map(String::as_str).zip(pictures.iter().map(|svg| svg.matches("<text ").count())).collect();
     let mut faults = placed(&lines, &expected);
+<<<<<<< ours
     faults.extend(wider);
+=======
+    faults.extend((wider != Some(0)).then(|| format!("the page is wider than its window by {wider:?} px")));
+    faults.extend((cut != Some(0)).then(|| format!("a table or picture is cut off on paper by {cut:?} px")));
+>>>>>>> theirs
     Some(faults)
 }
 

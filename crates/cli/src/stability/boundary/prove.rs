@@ -8,7 +8,7 @@ use cohaptic_answers::page::{AnswerPage, MOST_ROWS, more_rows, range};
 use cohaptic_picture::page::{Html, Table};
 use cohaptic_proofs::{Guarantee, ProofError, ProvenLine, ProvenStretch, SharedProof, TopologyCertificate};
 use cohaptic_stability::BoundaryError;
-use cohaptic_units::print::{Counted, csv_field};
+use cohaptic_units::print::{Counted, SixDigits, csv_field};
 use serde::Serialize;
 
 use super::Order;
@@ -164,7 +164,7 @@ fn page(order: &Order, arguments: &BoundaryArguments, line: &ProvenLine, uncerti
         ],
         asked: vec![
             ("Along", range(&order.range)),
-            ("Tolerance of a crossing", format!("{:.1e}{}", order.options.tolerance, order.range.unit).into()),
+            ("Tolerance of a crossing", format!("{}{}", SixDigits(order.options.tolerance), order.range.unit).into()),
         ],
         tables: Html::heading(2, "Stretches").and(Html::table(&stretches)).and(more_rows(line.stretches.len() as u64, "stretches", "proof.csv")),
         notes: uncertified.and_then(guarantee::left_open).into_iter().collect(),
