@@ -105,7 +105,7 @@ fn tasks_end_when_their_host_crashes() {
 #[test]
 fn other_hosts_keep_their_tasks() {
     two().run(async |bed: Bed| {
-        let handle = bed.host("client").spawn(async { tokio::spawn(async { 7 }) }).await.unwrap();
+        let (handle,) = bed.host("client").spawn(async { (tokio::spawn(async { 7 }),) }).await.unwrap();
         bed.host("server").crash();
         assert_eq!(handle.await.unwrap(), 7);
     });

@@ -160,7 +160,7 @@ fn write_real(folder: &Path, version: &str, sources: &Path, manifest: &Table) ->
     }
     if appended < APPENDED.len() {
         let text = format!(
-            "tokio {version} is built in another way than the versions that this program knows: expected a newer cohaptic, or a tokio from 1.38 on"
+            "tokio {version} is built in another way than the versions that this program knows: expected a newer cohaptic, or an older tokio"
         );
         return Err(Failure::System(text));
     }

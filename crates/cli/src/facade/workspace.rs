@@ -14,6 +14,9 @@ const FOLDER: &str = "target/cohaptic";
 /// Folder in which the workspace with the tests is looked for.
 const SIM: &str = "sim";
 
+/// Second number of the oldest version of tokio whose functions the package has.
+const OLDEST: u32 = 47;
+
 /// Workspace whose programs are tested.
 #[derive(Debug)]
 pub(super) struct Workspace {
@@ -94,7 +97,14 @@ impl Workspace {
         if let Some(source) = text(found, "source").filter(|source| !source.starts_with("registry+") && !source.starts_with("sparse+")) {
             return Err(Failure::Input(format!("tokio comes from {source}: expected a version of a registry")));
         }
-        Ok(text(found, "version"))
+        let version = text(found, "version").unwrap_or_default();
+        let minor = version.split('.').nth(1).and_then(|minor| minor.parse::<u32>().ok());
+        if minor.is_none_or(|minor| minor < OLDEST) {
+            return Err(Failure::Input(format!(
+                "tokio {version} cannot be replaced: expected 1.{OLDEST} or later, which cargo update -p tokio brings"
+            )));
+        }
+        Ok(Some(version))
     }
 }
 

@@ -121,9 +121,11 @@ fn what_is_missing_is_named() {
     desk.cohaptic("tokio").assert_refused(2, &["names no tokio 1"]);
     desk.write("Cargo.lock", lock().replace("registry+", "git+"));
     desk.cohaptic("tokio").assert_refused(2, &["tokio comes from git+"]);
-    desk.write("Cargo.lock", lock().replace(&version(), "1.0.999"));
+    desk.write("Cargo.lock", lock().replace(&version(), "1.46.1"));
+    desk.cohaptic("tokio").assert_refused(2, &["tokio 1.46.1 cannot be replaced: expected 1.47 or later"]);
+    desk.write("Cargo.lock", lock().replace(&version(), "1.999.0"));
     Outcome::of(desk.command("tokio").env("CARGO_NET_OFFLINE", "true").output().unwrap())
-        .assert_refused(2, &["cargo has no sources of tokio 1.0.999"]);
+        .assert_refused(2, &["cargo has no sources of tokio 1.999.0"]);
     Outcome::of(desk.command("tokio").env("CARGO", desk.path("nothing")).output().unwrap()).assert_refused(3, &["cargo cannot be called"]);
     Desk::new().cohaptic("tokio").assert_refused(2, &["the workspace cannot be read", "Cargo.toml"]);
 }

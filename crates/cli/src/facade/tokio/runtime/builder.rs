@@ -16,6 +16,7 @@ macro_rules! setters {
         $(
             $(#[$condition])*
             #[doc = concat!("See `tokio::runtime::Builder::", stringify!($name), "`.")]
+            #[track_caller]
             pub fn $name(&mut self $(, $value: $kind)?) -> &mut Self {
                 self.0.$name($($value)?);
                 self
@@ -62,8 +63,18 @@ impl Builder {
 
     /// See `tokio::runtime::Builder::name`.
     //@ has runtime/builder.rs|pub fn name(
+    #[track_caller]
     pub fn name(&mut self, name: impl Into<String>) -> &mut Self {
         self.0.name(name);
+        self
+    }
+
+    /// See `tokio::runtime::Builder::max_io_events_per_busy_tick`.
+    //@ has runtime/builder.rs|pub fn max_io_events_per_busy_tick(
+    #[cfg(any(feature = "net", all(unix, feature = "process"), all(unix, feature = "signal")))]
+    #[track_caller]
+    pub fn max_io_events_per_busy_tick(&mut self, capacity: usize) -> &mut Self {
+        self.0.max_io_events_per_busy_tick(capacity);
         self
     }
 
