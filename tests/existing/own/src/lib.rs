@@ -1,1 +1,0 @@
-//! The tests are copied from the sources of tokio: see `run`.
