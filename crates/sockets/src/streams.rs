@@ -8,8 +8,8 @@ use std::pin::Pin;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
-/// Future of a connection that is being opened.
-pub type Connecting = Pin<Box<dyn Future<Output = io::Result<Box<dyn Stream>>> + Send>>;
+/// Future of a connection that is being opened. `Sync`, as that of tokio's `TcpStream::connect` is.
+pub type Connecting = Pin<Box<dyn Future<Output = io::Result<Box<dyn Stream>>> + Send + Sync>>;
 
 /// Readiness of a socket.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
