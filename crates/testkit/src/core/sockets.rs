@@ -47,6 +47,8 @@ pub(crate) struct SocketState {
     pub(super) inbox: Ring<Box<Parcel>>,
     /// Bytes of all datagrams in `inbox`, without overhead.
     pub(super) held: usize,
+    /// Memory that Linux would count for all datagrams in `inbox` \[bytes\].
+    pub(super) memory: usize,
     readers: Waiters,
     /// `true` if IP has refused a datagram that was sent, and the program has not been told.
     pub(super) refused: bool,
@@ -56,16 +58,17 @@ pub(crate) struct SocketState {
 }
 
 impl SocketState {
-    /// Puts a datagram into the buffer. `room` is the size of the buffer \[bytes\]; `all` counts the bytes of the whole run. A datagram that does not fit is
-    /// lost.
+    /// Puts a datagram into the buffer. `room` is the size of the buffer \[bytes\]; `all` counts the bytes of the whole run. A datagram whose memory does not fit is
+    /// lost, unless the buffer is empty.
     #[inline(always)]
     pub(super) fn keep(&mut self, parcel: Box<Parcel>, (room, all): (usize, &mut Held), woken: &mut Woken) -> Result<(), Lost> {
         let len = parcel.bytes.len();
-        let held = self.held + len;
-        if held > room {
+        let memory = self.memory + memory_of(len, self.port.is_six());
+        if memory > room && self.memory > 0 {
             return Err(Lost::BufferFull);
         }
-        self.held = held;
+        self.memory = memory;
+        self.held += len;
         all.add(Where::Buffers, Held::cost(len));
         self.inbox.push(|| parcel);
         self.readers.wake(woken);
@@ -76,7 +79,7 @@ impl SocketState {
     fn clear(&mut self, all: &mut Held) {
         all.remove(Where::Buffers, self.held as u64 + self.inbox.len() as u64 * Held::cost(0));
         self.inbox.clear();
-        self.held = 0;
+        (self.held, self.memory) = (0, 0);
     }
 
     pub(super) fn name(&self) -> SocketName {
@@ -115,6 +118,14 @@ impl SocketState {
         self.clear(all);
         self.readers.wake(woken);
     }
+}
+
+/// Returns the memory that Linux counts for a received datagram of `len` bytes (`SKB_TRUESIZE`): a descriptor of 256 bytes, and a piece of memory for headers
+/// and data whose size is a power of two, apart from the smallest.
+#[inline]
+const fn memory_of(len: usize, is_six: bool) -> usize {
+    let used = len + if is_six { 72 } else { 59 };
+    if used <= 256 { 832 } else { 256 + (used + 320).next_power_of_two() }
 }
 
 /// All sockets that have not been closed.
@@ -169,7 +180,7 @@ impl Core {
         };
         let (at, port) = ((!ip.is_unspecified()).then(|| Addresses::short(ip)), Port::new(ip.is_ipv6(), port));
         let (readers, inbox) = (Waiters::default(), Ring::new());
-        let state = SocketState { host, at, port, peer: None, inbox, held: 0, readers, refused: false, may_broadcast: false, died: None };
+        let state = SocketState { host, at, port, peer: None, inbox, held: 0, memory: 0, readers, refused: false, may_broadcast: false, died: None };
         let id = self.sockets.insert(state);
         self.hosts[host.index()].bound.add(port, id);
         Ok(id)
@@ -298,6 +309,7 @@ impl Core {
         };
         let len = datagram.bytes.len();
         socket.held -= len;
+        socket.memory -= memory_of(len, socket.port.is_six());
         self.wire.held.remove(Where::Buffers, Held::cost(len));
         let seen = look(&datagram);
         self.spare.put(datagram);

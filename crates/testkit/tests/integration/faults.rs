@@ -224,7 +224,8 @@ fn nobody_at_a_port_is_told_over_the_link() {
 
 #[test]
 fn a_full_buffer_loses_what_comes_and_everything_has_a_name_in_the_trace() {
-    let bed = Testbed::new(["a", "b"]).links("delay 1ms").receive_buffer(25).seed(1);
+    // Two datagrams of 10 bytes take 1664 bytes of memory.
+    let bed = Testbed::new(["a", "b"]).links("delay 1ms").receive_buffer(1664).seed(1);
     let (got, happened) = bed.run_twice(|bed| async move {
         let (a, b) = (bed.host("a").bind("0.0.0.0:0").unwrap(), bed.host("b").bind("0.0.0.0:5").unwrap());
         for _ in 0..3 {
@@ -262,4 +263,31 @@ fn links_change_while_it_runs() {
             assert_eq!(delays, [10_000_000, 1_000, 0, 3_000_000_000]);
         });
     }
+}
+
+/// Returns how many of `sizes`, sent again and again, a buffer of the default size keeps.
+fn kept(address: &'static str, sizes: &'static [usize]) -> Vec<usize> {
+    Testbed::new(["a", "b"]).links("delay 1ms").seed(1).run(move |bed| async move {
+        let any = if address.starts_with('[') { "[::]" } else { "0.0.0.0" };
+        let (a, b) = (bed.host("a").bind(format!("{any}:0")).unwrap(), bed.host("b").bind(format!("{any}:5")).unwrap());
+        for size in sizes.iter().cycle().take(300) {
+            a.send_to(&vec![0; *size], address).await.unwrap();
+        }
+        time::sleep(DELAY).await;
+        let mut counts = vec![0; sizes.len()];
+        while let Ok(read) = b.try_recv(&mut [0; 4000]) {
+            counts[sizes.iter().position(|size| *size == read).unwrap()] += 1;
+        }
+        counts
+    })
+}
+
+/// Measured on Linux 6.18 (`SKB_TRUESIZE`).
+#[test]
+fn a_buffer_counts_the_memory_of_datagrams() {
+    for (size, count) in [(&[1], 256), (&[197], 256), (&[198], 166), (&[645], 166), (&[646], 92), (&[1669], 92), (&[1670], 48)] {
+        assert_eq!(kept("b:5", size), [count], "{size:?}");
+    }
+    assert_eq!([kept("[b]:5", &[184]), kept("[b]:5", &[185])], [[256], [166]]);
+    assert_eq!(kept("b:5", &[1472, 100]), [68, 67]);
 }
