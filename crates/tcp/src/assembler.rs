@@ -3,6 +3,7 @@
 use alloc::collections::{BTreeMap, VecDeque};
 use alloc::vec::Vec;
 
+use crate::memory;
 use crate::ranges::Ranges;
 use crate::send_buffer::KEPT;
 use crate::sequence::Position;
@@ -16,10 +17,27 @@ pub(crate) struct Assembler {
     pieces: BTreeMap<Position, Vec<u8>>,
     /// Number of octets in `pieces`.
     waiting: usize,
+    /// Memory that the pieces take in Linux \[byte\].
+    waiting_memory: usize,
+    /// Segments of the octets in order, with their memory.
+    segments: VecDeque<Held>,
+    /// Memory of `segments` \[byte\].
+    ready_memory: usize,
     /// Positions of the octets in `pieces`, with neighbouring pieces joined to one range.
     ranges: Ranges,
     /// One position in each of the at most four ranges that changed last, the latest first (RFC 2018, section 4).
     recent: Vec<Position>,
+}
+
+/// Memory of unread octets in order.
+#[derive(Clone, Copy, Debug)]
+struct Held {
+    /// Octets that were not read.
+    octets: usize,
+    /// Memory that is free once all octets were read \[byte\].
+    memory: usize,
+    /// Octets of later data that the same memory takes.
+    room: usize,
 }
 
 impl Assembler {
@@ -32,22 +50,41 @@ impl Assembler {
         // Index in `data`. Each position that is asked for lies between `start` and `end`.
         let offset = |position: Position| usize::try_from(position - start).unwrap_or(data.len());
         if start > *next {
-            let (pieces, waiting) = (&mut self.pieces, &mut self.waiting);
+            let (pieces, waiting, memory) = (&mut self.pieces, &mut self.waiting, &mut self.waiting_memory);
             // Only missing parts are copied, so that an octet that arrives twice takes memory once.
             self.ranges.insert(start, end, |from, to| {
                 let piece = data[offset(from)..offset(to)].to_vec();
                 *waiting += piece.len();
+                *memory += memory::of_received(piece.len()).0;
                 let before = pieces.insert(from, piece);
-                *waiting -= before.map_or(0, |piece| piece.len());
+                debug_assert!(before.is_none(), "only missing parts are inserted");
             });
             self.remember(start);
             return;
         }
-        self.ready.extend(&data[offset(*next)..]);
+        self.hold(&data[offset(*next)..]);
         *next = end;
         if !self.ranges.is_empty() {
             self.join(next);
         }
+    }
+
+    /// Notes that the FIN at `position` has arrived out of order. It takes a position, and is acknowledged selectively with the octets before it.
+    pub(crate) fn insert_fin(&mut self, position: Position) {
+        self.ranges.insert(position, position + 1, |_, _| {});
+        self.remember(position);
+    }
+
+    /// Appends octets in order. Short data may fit into the memory of the segment before.
+    fn hold(&mut self, data: &[u8]) {
+        self.ready.extend(data);
+        if let Some(last) = self.segments.back_mut().filter(|last| last.room >= data.len()) {
+            (last.octets, last.room) = (last.octets + data.len(), last.room - data.len());
+            return;
+        }
+        let (memory, room) = memory::of_received(data.len());
+        self.segments.push_back(Held { octets: data.len(), memory, room });
+        self.ready_memory += memory;
     }
 
     /// Moves the pieces from `next` up to the first gap to the octets in order.
@@ -55,9 +92,10 @@ impl Assembler {
         while let Some(first) = self.pieces.first_entry().filter(|first| first.key() <= next) {
             let (start, piece) = first.remove_entry();
             self.waiting -= piece.len();
+            self.waiting_memory -= memory::of_received(piece.len()).0;
             // The data in order may have ended inside this piece: its first `known` octets are already there.
             let known = usize::try_from(*next - start).map_or(piece.len(), |known| known.min(piece.len()));
-            self.ready.extend(&piece[known..]);
+            self.hold(&piece[known..]);
             *next += (piece.len() - known) as u64;
         }
         self.ranges.remove_below(*next);
@@ -80,9 +118,9 @@ impl Assembler {
         self.recent.iter().filter_map(|position| self.ranges.around(*position))
     }
 
-    /// Returns the range out of order that contains all positions from `start` to `end` (exclusive), if there is such a range.
-    pub(crate) fn holding(&self, start: Position, end: Position) -> Option<(Position, Position)> {
-        self.ranges.around(start).filter(|range| range.1 >= end)
+    /// Returns the first range out of order that has positions from `start` to `end` (exclusive).
+    pub(crate) fn first_within(&self, start: Position, end: Position) -> Option<(Position, Position)> {
+        self.ranges.first_within(start, end)
     }
 
     /// Returns whether data out of order waits for missing octets.
@@ -97,6 +135,16 @@ impl Assembler {
     /// Returns the number of octets held, in order or not.
     pub(crate) fn held(&self) -> usize {
         self.ready.len() + self.waiting
+    }
+
+    /// Returns the memory that Linux counts for all octets held \[byte\].
+    pub(crate) const fn memory(&self) -> usize {
+        self.ready_memory + self.waiting_memory
+    }
+
+    /// Returns the end (exclusive) of the data out of order.
+    pub(crate) fn end(&self) -> Option<Position> {
+        self.ranges.end()
     }
 
     /// Copies octets in order into `to` and keeps the octets. Returns the number of octets.
@@ -114,9 +162,22 @@ impl Assembler {
     pub(crate) fn read(&mut self, to: &mut [u8]) -> usize {
         let count = self.peek(to);
         self.ready.drain(..count);
+        let mut left = count;
+        while let Some(first) = self.segments.front_mut().filter(|first| left > 0 || first.octets == 0) {
+            let taken = left.min(first.octets);
+            (first.octets, left) = (first.octets - taken, left - taken);
+            // The memory of a segment is free once all of its octets were read.
+            if first.octets == 0 {
+                self.ready_memory -= first.memory;
+                self.segments.pop_front();
+            }
+        }
         // An empty ring keeps its capacity, and an idle connection is to be small.
         if self.ready.is_empty() && self.ready.capacity() > KEPT {
             self.ready = VecDeque::new();
+        }
+        if self.segments.is_empty() {
+            self.segments = VecDeque::new();
         }
         count
     }
@@ -124,7 +185,7 @@ impl Assembler {
     /// Drops the data out of order, because the missing octets will not arrive any more.
     pub(crate) fn forget_gaps(&mut self) {
         self.pieces.clear();
-        self.waiting = 0;
+        (self.waiting, self.waiting_memory) = (0, 0);
         self.ranges.clear();
         self.recent = Vec::new();
     }
@@ -156,9 +217,14 @@ mod tests {
                 prop_assert_eq!(assembler.has_gaps(), covered[expected..].contains(&true));
                 prop_assert_eq!(assembler.held(), assembler.unread() + assembler.pieces.values().map(Vec::len).sum::<usize>());
             }
+            let memory = |octets: usize| memory::of_received(octets).0;
+            prop_assert_eq!(assembler.waiting_memory, assembler.pieces.values().map(|piece| memory(piece.len())).sum::<usize>());
+            prop_assert_eq!(assembler.ready_memory, assembler.segments.iter().map(|held| held.memory).sum::<usize>());
+            prop_assert_eq!(assembler.unread(), assembler.segments.iter().map(|held| held.octets).sum::<usize>());
             let mut read = vec![0; 300];
             let count = assembler.read(&mut read);
             prop_assert_eq!(&read[..count], &text[..count]);
+            prop_assert_eq!(assembler.ready_memory, 0);
         }
     }
 

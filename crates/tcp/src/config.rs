@@ -37,9 +37,11 @@ pub struct TcpConfig {
     pub least_timeout: Duration,
     /// Upper bound of the retransmission timeout and of the time between two probes of a closed window. Default 120 s.
     pub greatest_timeout: Duration,
-    /// Number of repetitions of a SYN before the connection ends with [`Error::TimedOut`](crate::Error::TimedOut). Default 6, that is, 127 s.
+    /// Number of repetitions of a SYN, beside those at equal distance, before the connection ends with [`Error::TimedOut`](crate::Error::TimedOut). The
+    /// connection also ends once 2^(`syn_retries` + 1) − 1 times `initial_timeout` have passed. Default 6: SYNs after 0, 1, 2, 3, 4, 5, 7, 11, 19, 35 and
+    /// 67 s, and the end after 131 s.
     pub syn_retries: u32,
-    /// Number of repetitions of a SYN at equal distance before the distance doubles. Linux 6.5 and later have 4. Default 0.
+    /// Number of further repetitions of a SYN, at equal distance, before the distance doubles. Linux before 6.5 has 0. Default 4.
     pub linear_syn_retries: u32,
     /// Number of repetitions of a SYN with ACK before the connection ends. Default 5, that is, 63 s.
     pub syn_ack_retries: u32,
@@ -57,16 +59,25 @@ pub struct TcpConfig {
     pub quick_acks: u32,
     /// Length of TIME-WAIT, and of FIN-WAIT-2 once the program has closed the connection. Default 60 s.
     pub time_wait: Duration,
-    /// Size of the receive buffer, which bounds the offered window \[byte\], from 1 to 1 GiB. Default 6 MiB.
-    pub receive_buffer: usize,
+    /// Size of a receive buffer that stays \[byte\], from 1 to 1 GiB. All of the buffer is offered as window from the beginning. With `None`, window and buffer
+    /// are those of Linux: the buffer counts the memory of whole segments, and grows from `least_receive_buffer` to `greatest_receive_buffer` as the program
+    /// reads; the window grows with the full segments that arrive. Default `None`.
+    pub receive_buffer: Option<usize>,
+    /// Size of the receive buffer at the beginning \[byte\], not zero (`tcp_rmem[1]`). Default 128 KiB.
+    pub least_receive_buffer: usize,
+    /// Upper bound of the receive buffer \[byte\], up to 1 GiB (`tcp_rmem[2]`). Default 6 MiB, as in Linux before 6.19.
+    pub greatest_receive_buffer: usize,
     /// Upper bound of the send buffer \[byte\]. Default 4 MiB.
     pub send_buffer: usize,
-    /// Lower bound of the send buffer \[byte\], not zero. The buffer is twice the congestion window, within both bounds. Default 64 KiB.
+    /// Lower bound of the send buffer \[byte\], not zero. The buffer has the memory that Linux plans for twice the congestion window, 4608 octets for each
+    /// segment of 1448, but at least for ten segments, and never shrinks. Default 16 KiB.
     pub least_send_buffer: usize,
     /// `true` if Nagle's algorithm is off, so that a small segment leaves while another small segment is unacknowledged. Default off.
     pub nodelay: bool,
     /// Times of the probes of an idle connection. `None` sends no probes. Default `None`.
     pub keepalive: Option<Keepalive>,
+    /// `true` if CUBIC leaves slow start before a loss, when acknowledgements or round trips tell that the path is full (`HyStart`). Default on.
+    pub hystart: bool,
     /// `true` if the congestion window shrinks while the program sends nothing (RFC 2861). Default on.
     pub slow_start_after_idle: bool,
 }
@@ -130,7 +141,7 @@ impl Default for TcpConfig {
             least_timeout: Duration::ZERO,
             greatest_timeout: Duration::from_secs(120),
             syn_retries: 6,
-            linear_syn_retries: 0,
+            linear_syn_retries: 4,
             syn_ack_retries: 5,
             retries: 15,
             orphan_retries: 8,
@@ -138,11 +149,14 @@ impl Default for TcpConfig {
             delayed_ack: Duration::from_millis(40),
             quick_acks: 16,
             time_wait: Duration::from_secs(60),
-            receive_buffer: 6 << 20,
+            receive_buffer: None,
+            least_receive_buffer: 128 << 10,
+            greatest_receive_buffer: 6 << 20,
             send_buffer: 4 << 20,
-            least_send_buffer: 64 << 10,
+            least_send_buffer: 16 << 10,
             nodelay: false,
             keepalive: None,
+            hystart: true,
             slow_start_after_idle: true,
         }
     }
@@ -176,8 +190,8 @@ impl fmt::Display for ConfigError {
 impl core::error::Error for ConfigError {}
 
 impl TcpConfig {
-    /// Returns TCP as in textbooks: Reno with NewReno, an initial window of 3 segments, timeouts of at least 1 s, no selective acknowledgements, no timestamps
-    /// and no tail loss probes. If ECN is on, a SYN without ECN follows a reset, as RFC 3168 says and Linux does not.
+    /// Returns TCP as in textbooks: Reno with NewReno, an initial window of 3 segments, timeouts of at least 1 s, a fixed window, no selective acknowledgements, no
+    /// timestamps and no tail loss probes. If ECN is on, a SYN without ECN follows a reset, as RFC 3168 says and Linux does not.
     #[must_use]
     pub fn textbook() -> Self {
         Self {
@@ -191,6 +205,8 @@ impl TcpConfig {
             least_variance: Duration::ZERO,
             least_timeout: Duration::from_secs(1),
             quick_acks: 0,
+            linear_syn_retries: 0,
+            receive_buffer: Some(6 << 20),
             ..Self::default()
         }
     }
@@ -210,7 +226,8 @@ impl TcpConfig {
             ("ttl", self.ttl == 0),
             ("initial_window", self.initial_window == 0),
             ("initial_timeout", self.initial_timeout.is_zero()),
-            ("receive_buffer", self.receive_buffer == 0),
+            ("receive_buffer", self.receive_buffer == Some(0)),
+            ("least_receive_buffer", self.least_receive_buffer == 0),
             ("least_send_buffer", self.least_send_buffer == 0),
             ("the interval of keep-alive probes", keepalive.interval.is_zero()),
             ("the idle time before keep-alive probes", keepalive.idle.is_zero()),
@@ -220,12 +237,13 @@ impl TcpConfig {
         if let Some((name, _)) = zeros.iter().find(|(_, is_zero)| *is_zero) {
             return Err(ConfigError::Zero(name));
         }
-        if self.receive_buffer > 1 << 30 {
-            return Err(ConfigError::ReceiveBuffer(self.receive_buffer));
+        if self.largest_window() > 1 << 30 {
+            return Err(ConfigError::ReceiveBuffer(self.largest_window()));
         }
         let pairs = [
             ("least_timeout", "greatest_timeout", self.least_timeout > self.greatest_timeout),
             ("initial_timeout", "greatest_timeout", self.initial_timeout > self.greatest_timeout),
+            ("least_receive_buffer", "greatest_receive_buffer", self.least_receive_buffer > self.greatest_receive_buffer),
             ("least_send_buffer", "send_buffer", self.least_send_buffer > self.send_buffer),
         ];
         match pairs.iter().find(|(.., is_wrong)| *is_wrong) {
@@ -242,6 +260,11 @@ impl TcpConfig {
 
     /// Returns the number of bits by which offered windows are shifted, 0 to 14: the least shift with which 16 bits can express the whole receive buffer.
     pub(crate) fn window_scale(&self) -> u8 {
-        (0..14).find(|shift| self.receive_buffer >> shift <= 65_535).unwrap_or(14)
+        (0..14).find(|shift| self.largest_window() >> shift <= 65_535).unwrap_or(14)
+    }
+
+    /// Returns the largest window that this end may offer \[byte\].
+    fn largest_window(&self) -> usize {
+        self.receive_buffer.unwrap_or(self.greatest_receive_buffer)
     }
 }

@@ -40,6 +40,22 @@ impl State {
     }
 }
 
+/// Reaction of the sender to losses and marks of congestion (RFC 5681, 6582, 6675), by the names of Linux. The variants are ordered by severity.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
+pub enum CaState {
+    /// No sign of a loss.
+    #[default]
+    Open,
+    /// Segments have arrived out of order, or a duplicate acknowledgement has arrived.
+    Disorder,
+    /// The window shrinks because of a mark, or of a loss repaired by a tail probe (congestion window reduced).
+    Cwr,
+    /// Lost segments are sent again while the window shrinks.
+    Recovery,
+    /// The retransmission timer has run out.
+    Loss,
+}
+
 /// Figures of a connection, after the example of Linux's `TCP_INFO`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
@@ -58,7 +74,19 @@ pub struct Info {
     pub congestion_window: u32,
     /// Threshold of slow start \[segments\]. `u32::MAX` before the first reduction and the first long pause.
     pub slow_start_threshold: u32,
-    /// Sender's estimate of the number of segments on the way.
+    /// State of the reaction to losses (`tcpi_ca_state`).
+    pub ca_state: CaState,
+    /// Sent and unacknowledged segments (`tcpi_unacked`).
+    pub unacked: u32,
+    /// Unacknowledged segments that have arrived out of order (`tcpi_sacked`). Without selective acknowledgements, the number of duplicates.
+    pub sacked: u32,
+    /// Unacknowledged segments that count as lost (`tcpi_lost`).
+    pub lost: u32,
+    /// Lost segments whose repetition is on the way (`tcpi_retrans`).
+    pub retrans: u32,
+    /// Largest extent of a reordering so far \[segments\], from 3 to 300 (`tcpi_reordering`).
+    pub reordering: u32,
+    /// Sender's estimate of the number of segments on the way: `unacked` + `retrans` − `sacked` − `lost`.
     pub in_flight: u32,
     /// Segments sent again since the connection began, SYNs included.
     pub retransmissions: u64,

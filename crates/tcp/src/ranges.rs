@@ -55,6 +55,11 @@ impl Ranges {
         (position < end).then_some((start, end))
     }
 
+    /// Returns the first range that has positions from `start` to `end` (exclusive).
+    pub(crate) fn first_within(&self, start: Position, end: Position) -> Option<(Position, Position)> {
+        self.around(start).or_else(|| self.0.range(start..end.max(start)).next().map(|(&low, &high)| (low, high))).filter(|_| start < end)
+    }
+
     /// Returns the end (exclusive) of the highest range.
     pub(crate) fn end(&self) -> Option<Position> {
         self.0.last_key_value().map(|(_, &end)| end)
@@ -94,6 +99,10 @@ mod tests {
             ranges.remove_below(cut);
             for (at, is_in) in (0u64..).zip(model) {
                 prop_assert_eq!(ranges.around(at).is_some(), is_in && at >= cut);
+            }
+            for (start, end) in (0u64..70).flat_map(|start| (start..start + 8).map(move |end| (start, end))) {
+                let first = (start..end).find_map(|at| ranges.around(at));
+                prop_assert_eq!(ranges.first_within(start, end), first);
             }
             let edges: Vec<_> = ranges.0.iter().collect();
             prop_assert!(edges.windows(2).all(|pair| pair[0].1 < pair[1].0), "ranges touch: {:?}", edges);

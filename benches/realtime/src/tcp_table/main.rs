@@ -212,5 +212,6 @@ fn explain() {
         "  what leaves together, so that a receiver acknowledges less often than the test kit's, which sees every packet. The packets of one segment come in a"
     );
     println!("  burst, which a short queue may drop.");
-    println!("- **HyStart.** Linux's CUBIC may leave slow start when round trips grow, before anything is lost. The test kit has no HyStart.");
+    println!("- **Pacing.** The test kit paces nothing. Linux paces only under the queue `fq`.\n");
+    println!("What single segments do, and not only their sums, is compared by [scripts](../crates/tcp/README.md#scripts-of-segments).");
 }

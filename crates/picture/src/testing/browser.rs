@@ -51,42 +51,26 @@ pub fn in_browser(folder: &Path, pictures: &[(String, String)]) -> Option<Vec<St
     Some(placed(&lines, &expected))
 }
 
-<<<<<<< ours
-/// Returns the faults of a page in a browser: misplaced texts of its pictures, and a page that is wider than the window of a laptop or of a phone. Returns
-/// `None` without a `chromium` on the path; see [`in_browser`].
-=======
-/// Returns the faults of a page in a browser: misplaced texts of its pictures, a page wider than the window of a laptop, and tables or pictures cut off on
-/// paper. Returns `None` without a `chromium` on the path; see [`in_browser`].
->>>>>>> theirs
+/// Returns the faults of a page in a browser: misplaced texts of its pictures, a page that is wider than the window of a laptop or of a phone, and tables or
+/// pictures cut off on paper. Returns `None` without a `chromium` on the path; see [`in_browser`].
 ///
 /// # Panics
 ///
 /// As [`in_browser`].
 #[must_use]
 pub fn page_in_browser(folder: &Path, page: &str) -> Option<Vec<String>> {
-<<<<<<< ours
-    let mut lines = answer(folder, page, Scheme::Light, &format!("{PLACES}{WIDTH}"))?;
-    let mut wider = |window: &str| {
-        let by = lines.pop().and_then(|line| line.strip_prefix("WIDER ")?.parse::<i32>().ok());
-        (by != Some(0)).then(|| format!("the page is wider than the window of a {window} by {by:?} px"))
-    };
-    // The last line is popped first.
-    let wider: Vec<String> = ["phone", "laptop"].into_iter().filter_map(&mut wider).collect();
-=======
     let mut lines = answer(folder, page, Scheme::Light, &format!("{PLACES}{WIDTH}{PAPER}"))?;
     let mut last = |prefix: &str| lines.pop().and_then(|line| line.strip_prefix(prefix)?.parse::<i32>().ok());
-    let (cut, wider) = (last("CUT "), last("WIDER "));
->>>>>>> theirs
+    // The last line is popped first.
+    let (cut, phone, laptop) = (last("CUT "), last("WIDER "), last("WIDER "));
     let pictures: Vec<&str> = page.split("<svg ").skip(1).collect();
     let names: Vec<String> = (1..=pictures.len()).map(|number| format!("picture {number}")).collect();
     let expected: Vec<(&str, usize)> = names.iter().map(String::as_str).zip(pictures.iter().map(|svg| svg.matches("<text ").count())).collect();
     let mut faults = placed(&lines, &expected);
-<<<<<<< ours
-    faults.extend(wider);
-=======
-    faults.extend((wider != Some(0)).then(|| format!("the page is wider than its window by {wider:?} px")));
+    for (window, by) in [("phone", phone), ("laptop", laptop)] {
+        faults.extend((by != Some(0)).then(|| format!("the page is wider than the window of a {window} by {by:?} px")));
+    }
     faults.extend((cut != Some(0)).then(|| format!("a table or picture is cut off on paper by {cut:?} px")));
->>>>>>> theirs
     Some(faults)
 }
 

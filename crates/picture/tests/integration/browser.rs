@@ -89,20 +89,15 @@ fn a_browser_shows_pages_without_scrolling_sideways_and_texts_apart() {
         return;
     };
     assert_eq!(found, [""; 0]);
-<<<<<<< ours
     for (width, windows) in [("3000px", &["phone", "laptop"][..]), ("500px", &["phone"])] {
         let wide = page().replace("<main>", &format!("<main style=\"width:{width};max-width:none\">"));
         let found = page_in_browser(folder.path(), &wide).unwrap();
         assert!(found.iter().zip(windows).all(|(fault, window)| fault.contains(window)) && found.len() == windows.len(), "{width}: {found:?}");
     }
-=======
-    let wide = page().replace("<main>", "<main style=\"width:3000px;max-width:none\">");
-    assert!(page_in_browser(folder.path(), &wide).unwrap().iter().any(|fault| fault.starts_with("the page is wider")));
     // On a screen a wide table scrolls in its box. A sheet of paper does not scroll.
     let long = Table::new().column("a").row([Html::text(&"key.".repeat(60))]);
     let table = Page::new("A wide table").with(Html::table(&long)).html();
     assert_eq!(page_in_browser(folder.path(), &table).unwrap(), [""; 0]);
     let screen = table.replace("@media print", "@media speech");
     assert!(page_in_browser(folder.path(), &screen).unwrap().iter().any(|fault| fault.starts_with("a table or picture is cut off on paper")));
->>>>>>> theirs
 }

@@ -4,6 +4,8 @@ use core::time::Duration;
 
 use cohaptic_units::Instant;
 
+use super::hystart::{HyStart, RoundTrip};
+
 /// Numerator and denominator of the factor β of a reduction: 717/1024, as in Linux.
 const BETA: (u64, u64) = (717, 1024);
 
@@ -23,6 +25,10 @@ pub(crate) struct Cubic {
     acked: u32,
     /// Window, instant and result of the last full computation of [`step`](Self::step).
     last: Option<(u32, Instant, u32)>,
+    /// Least round trip since the last timeout, apart from the first second of an epoch. Zero before the first sample.
+    least_rtt: Duration,
+    /// Search for the end of slow start. `None` if slow start lasts until a loss.
+    hystart: Option<HyStart>,
 }
 
 /// Cubic curve W(t) = C·(t − K)³ + origin with C = 0.4 segments/s³, where t is the time since the beginning of the epoch.
@@ -42,14 +48,18 @@ impl Curve {
         Self { origin: origin.max(window), k: cube_root(u128::from(rise) * 10 * NANOS_CUBED / 4) }
     }
 
-    /// Returns the window `t` nanoseconds after the beginning of the epoch \[1/1000 segment\].
-    fn at(&self, t: u64) -> u64 {
+    /// Returns the distance of the curve from the plateau `t` nanoseconds after the beginning of the epoch \[1/1000 segment\].
+    fn distance(&self, t: u64) -> u64 {
         // The cube of at most 1000 s times four is 4·10³⁶ ns³, which 128 bits hold. At 1000 s the curve is 4·10⁸ segments away from the plateau, above
         // any real window.
         let distance = u128::from(t.abs_diff(self.k)).min(1_000_000_000_000);
-        let change = u64::try_from(distance.pow(3) * 4 / (NANOS_CUBED / 100)).unwrap_or(u64::MAX);
-        let origin = u64::from(self.origin) * 1000;
-        if t < self.k { origin.saturating_sub(change) } else { origin.saturating_add(change) }
+        u64::try_from(distance.pow(3) * 4 / (NANOS_CUBED / 100)).unwrap_or(u64::MAX)
+    }
+
+    /// Returns the window `t` nanoseconds after the beginning of the epoch \[segments\]. As in Linux, the distance from the plateau is rounded down.
+    fn at(&self, t: u64) -> u32 {
+        let distance = u32::try_from(self.distance(t) / 1000).unwrap_or(u32::MAX);
+        if t < self.k { self.origin.saturating_sub(distance) } else { self.origin.saturating_add(distance) }
     }
 }
 
@@ -57,6 +67,31 @@ impl Curve {
 const NANOS_CUBED: u128 = 1_000_000_000_000_000_000_000_000_000;
 
 impl Cubic {
+    pub(crate) fn new(has_hystart: bool) -> Self {
+        Self { hystart: has_hystart.then(HyStart::default), ..Self::default() }
+    }
+
+    /// Drops the state after a timeout.
+    pub(crate) fn restart(&mut self) {
+        *self = Self::new(self.hystart.is_some());
+    }
+
+    /// Takes a round trip. Returns whether slow start ends here; `slow_start` is the window if slow start lasts.
+    pub(crate) fn ends_slow_start(&mut self, now: Instant, slow_start: Option<u32>, sample: RoundTrip) -> bool {
+        // Round trips soon after a recovery tell of the queue that the recovery has left.
+        if self.epoch.is_some_and(|epoch| now.saturating_duration_since(epoch) < Duration::from_secs(1)) {
+            return false;
+        }
+        let latest = sample.latest.max(Duration::from_nanos(1));
+        if self.least_rtt.is_zero() || latest < self.least_rtt {
+            self.least_rtt = latest;
+        }
+        match (&mut self.hystart, slow_start) {
+            (Some(hystart), Some(window)) => hystart.ends(now, window, self.least_rtt, sample),
+            _ => false,
+        }
+    }
+
     /// Ends the epoch and returns the threshold after a loss at `window` \[segments\], at least 2. A window below the last `W_max` lowers `W_max` further, so
     /// that the flow makes room for new flows (fast convergence, RFC 9438, section 4.7).
     pub(crate) fn reduced(&mut self, window: u32) -> u32 {
@@ -68,8 +103,8 @@ impl Cubic {
     }
 
     /// Returns the number of acknowledged segments after which the window grows by one segment, at least 2. `acked` counts the segments acknowledged since the
-    /// last call, `least_rtt` is the least round trip.
-    pub(crate) fn step(&mut self, now: Instant, window: u32, acked: u32, least_rtt: Duration) -> u32 {
+    /// last call.
+    pub(crate) fn step(&mut self, now: Instant, window: u32, acked: u32) -> u32 {
         self.acked = self.acked.saturating_add(acked);
         // As in Linux, a result counts for 31 ms (1/32 s) while the window is the same.
         if let Some((last_window, at, step)) = self.last
@@ -86,8 +121,8 @@ impl Cubic {
             now
         });
         // The target is the window one round trip ahead, where the growth decided now takes effect.
-        let t = now.saturating_duration_since(epoch) + least_rtt;
-        let target = u32::try_from(self.curve.at(u64::try_from(t.as_nanos()).unwrap_or(u64::MAX)) / 1000).unwrap_or(u32::MAX);
+        let t = now.saturating_duration_since(epoch) + self.least_rtt;
+        let target = self.curve.at(u64::try_from(t.as_nanos()).unwrap_or(u64::MAX));
         // Reaching the target within a window of acknowledgements takes one increase per window/(target − window). At or above the target, the window almost
         // stands still.
         let mut step = if target > window { window / (target - window) } else { window.saturating_mul(100) };
@@ -142,8 +177,10 @@ mod tests {
         assert_eq!(cubic.reduced(100), 70);
         let curve = Curve::new(70, cubic.last_most);
         assert_eq!(curve.k / 1000, 4_217_163);
-        assert_eq!([0, 1, 6].map(|second| (curve.at(second * 1_000_000_000) + 50) / 100), [700, 867, 1023]);
-        assert_eq!(curve.at(curve.k), 100_000);
+        // W(0) = 70, W(1 s) = 86.7 and W(6 s) = 102.3.
+        assert_eq!([0, 1, 6].map(|second| (curve.distance(second * 1_000_000_000) + 50) / 100), [300, 133, 23]);
+        assert_eq!([0, 1, 6].map(|second| curve.at(second * 1_000_000_000)), [71, 87, 102]);
+        assert_eq!(curve.at(curve.k), 100);
     }
 
     #[test]
@@ -158,13 +195,14 @@ mod tests {
         // 70 segments, R = 100 ms, so that Reno is slower; the window is ahead by a round trip.
         let mut congestion = super::super::Congestion::new(&crate::TcpConfig::default());
         (congestion.window, congestion.is_limiting) = (100, true);
+        congestion.sample(Instant::ZERO, RoundTrip { latest: Duration::from_millis(100), una: 0, next: 0, burst: Duration::ZERO });
         congestion.threshold = congestion.reduced();
         congestion.window = congestion.threshold;
         let rtt = Duration::from_millis(100);
         let mut now = Instant::ZERO;
         let window_at = |congestion: &mut super::super::Congestion, now: &mut Instant, end: u64| {
             while now.as_nanos() < end {
-                congestion.grow(*now, congestion.window, rtt);
+                congestion.grow(*now, congestion.window);
                 *now += rtt;
             }
             congestion.window

@@ -2,6 +2,7 @@
 //! the next flight.
 
 mod cubic;
+mod hystart;
 mod reduction;
 
 use core::time::Duration;
@@ -11,6 +12,7 @@ use cohaptic_units::Instant;
 use crate::config::{CongestionControl, TcpConfig};
 use crate::sequence::Position;
 use cubic::Cubic;
+pub(crate) use hystart::RoundTrip;
 pub(crate) use reduction::Reduction;
 
 /// Threshold of slow start before any reduction.
@@ -39,7 +41,7 @@ pub(crate) struct Congestion {
 
 impl Congestion {
     pub(crate) fn new(config: &TcpConfig) -> Self {
-        let cubic = (config.congestion == CongestionControl::Cubic).then(Cubic::default);
+        let cubic = (config.congestion == CongestionControl::Cubic).then(|| Cubic::new(config.hystart));
         let window = config.initial_window;
         Self { window, threshold: UNBOUNDED, count: 0, cubic, initial: window, is_limiting: false, most_out: 0, usage_end: 0 }
     }
@@ -61,12 +63,22 @@ impl Congestion {
     pub(crate) fn restart(&mut self, window: u32) {
         self.window = window.max(1);
         if let Some(cubic) = &mut self.cubic {
-            *cubic = Cubic::default();
+            cubic.restart();
         }
     }
 
-    /// Lets the window grow after `acked` acknowledged segments. Does nothing unless the window has limited the sender. `least_rtt` is the least round trip.
-    pub(crate) fn grow(&mut self, now: Instant, acked: u32, least_rtt: Duration) {
+    /// Takes the round trip that an acknowledgement tells. With CUBIC, the sample may end slow start.
+    pub(crate) fn sample(&mut self, now: Instant, sample: RoundTrip) {
+        let is_slow_start = self.is_slow_start();
+        if let Some(cubic) = &mut self.cubic
+            && cubic.ends_slow_start(now, is_slow_start.then_some(self.window), sample)
+        {
+            self.threshold = self.window;
+        }
+    }
+
+    /// Lets the window grow after `acked` acknowledged segments. Does nothing unless the window has limited the sender.
+    pub(crate) fn grow(&mut self, now: Instant, acked: u32) {
         if !self.is_limited() {
             return;
         }
@@ -81,7 +93,7 @@ impl Congestion {
             return;
         }
         let step = match &mut self.cubic {
-            Some(cubic) => cubic.step(now, self.window, acked, least_rtt),
+            Some(cubic) => cubic.step(now, self.window, acked),
             None => self.window,
         };
         // The count may have been collected at a larger step. The window then grows by one segment only, as in Linux.
@@ -110,18 +122,22 @@ impl Congestion {
         }
     }
 
-    /// Shrinks the window after a pause of `idle` in sending (RFC 2861): by half for each timeout, down to the initial window.
-    pub(crate) fn rest(&mut self, idle: Duration, timeout: Duration) {
+    /// Moves the beginning of CUBIC's curve by a pause of `idle` in sending.
+    pub(crate) fn shift(&mut self, idle: Duration) {
         if let Some(cubic) = &mut self.cubic {
-            // The curve of CUBIC must not rise during the pause, also if the pause is too short to shrink the window.
             cubic.shift(idle);
         }
+    }
+
+    /// Shrinks the window after a pause of `idle` in sending (RFC 2861): by half for each timeout, down to the initial window. `threshold` is the threshold to
+    /// keep.
+    pub(crate) fn rest(&mut self, idle: Duration, timeout: Duration, threshold: u32) {
         if idle <= timeout {
             return;
         }
         let least = self.initial.min(self.window);
         // The threshold keeps three quarters of the window, so that slow start returns there if the path has not changed.
-        self.threshold = self.threshold.max(self.window / 4 * 3);
+        self.threshold = threshold;
         let mut rest = idle.saturating_sub(timeout);
         while !rest.is_zero() && self.window > least {
             self.window /= 2;

@@ -1,9 +1,13 @@
 //! Arrival of an acknowledgement: the peer's window, the segments that have arrived, the round trip, and then losses and the congestion window.
 
+use core::time::Duration;
+
 use cohaptic_units::Instant;
 
+use super::burst::LONGEST_BURST;
 use super::{Connection, Timer};
-use crate::connection::parts::Phase;
+use crate::congestion::RoundTrip;
+use crate::info::CaState;
 use crate::scoreboard::News;
 use crate::segment::{Flags, Segment};
 use crate::sequence::{Position, extend};
@@ -24,6 +28,8 @@ pub(super) struct Ack {
     pub(super) tells_mark: bool,
     /// The peer reports a duplicate.
     pub(super) tells_duplicate: bool,
+    /// The duplicate may be a tail probe.
+    pub(super) answers_probe: bool,
     /// Timestamp of this end that the peer echoes \[ticks\].
     pub(super) echo: Option<u32>,
     /// Segments that have arrived at the peer.
@@ -39,9 +45,13 @@ impl Connection {
             self.challenge(now);
             return false;
         }
+        self.learn_timestamp(now, segment, start, position);
         let has_advanced = position > self.send.una;
         let has_widened = position >= self.send.una && self.learn_window(segment, start, has_advanced);
         let was_empty = self.send.board.is_empty();
+        if has_widened && was_empty && self.send.has_new() {
+            self.end_pause(now);
+        }
         let mut ack = Ack {
             position: position.max(self.send.una),
             has_advanced,
@@ -49,8 +59,9 @@ impl Connection {
             echo: segment.options.timestamps.map(|(_, echo)| echo).filter(|echo| self.receive.has_timestamps && *echo != 0),
             ..Ack::default()
         };
-        // Nothing was on the way, so the acknowledgement can only tell of the window.
+        // Nothing was on the way, so the acknowledgement can only tell of the window, or of a duplicate that undoes an earlier reduction.
         if was_empty {
+            self.take_late_duplicate(now, segment, &mut ack);
             self.hear_of_window(now);
             return true;
         }
@@ -64,13 +75,40 @@ impl Connection {
         if let Some(round_trip) = round_trip {
             self.round_trips.sample(now, round_trip);
         }
+        if let Some(latest) = ack.news.latest_round_trip(now) {
+            let burst = Duration::from_nanos((4 * LONGEST_BURST).saturating_mul(1_000_000_000) / self.pacing_rate().unwrap_or(u64::MAX).max(1));
+            let (una, next) = (self.send.una, self.send.next);
+            self.congestion.sample(now, RoundTrip { latest, una, next, burst: burst.min(Duration::from_millis(1)) });
+        }
         if has_advanced {
             (self.counters.retries, self.counters.stalled_since) = (0, None);
         }
         self.recover(now, &ack, has_widened, segment.sequence_length() > 0);
         let delivered = u32::try_from(self.send.delivered - delivered).unwrap_or(u32::MAX);
         self.adapt_window(now, &ack, delivered, self.send.board.losses > losses);
+        self.expand_send_buffer();
         true
+    }
+
+    /// Takes over the timestamp to echo. Only a segment that contains the last acknowledged position sets it, so that a delayed acknowledgement counts into
+    /// the round trip (RFC 7323, section 4.3), and only if its acknowledgement is valid and not overtaken: a forged value would make all later segments old.
+    fn learn_timestamp(&mut self, now: Instant, segment: &Segment<'_>, start: Position, position: Position) {
+        if let (Some((value, _)), true) = (segment.options.timestamps, self.receive.has_timestamps)
+            && start <= self.receive.acked
+            && position >= self.send.una
+        {
+            self.receive.recent = Some((value, now));
+        }
+    }
+
+    /// Handles a report of a duplicate that comes after everything was acknowledged. The report may show that the last reduction was needless.
+    fn take_late_duplicate(&mut self, now: Instant, segment: &Segment<'_>, ack: &mut Ack) {
+        if self.receive.has_sack {
+            self.take_blocks(segment, self.send.una, self.send.una, ack);
+        }
+        if ack.tells_duplicate {
+            self.change_phase(now, ack);
+        }
     }
 
     /// Takes over the window that the segment offers (RFC 9293, section 3.10.7.4). Returns whether the window has changed.
@@ -118,10 +156,11 @@ impl Connection {
             let is_within_next = blocks.get(1).map(block).is_some_and(|next| next.0 <= start && end <= next.1);
             // The first block reports a duplicate if it lies below the acknowledgement number of its segment, or within the second block (RFC 2883, section 4).
             // The segment's own number counts here, because a later acknowledgement may have overtaken the segment.
-            if start < extend(segment.acknowledgement, una) || is_within_next {
+            if (start < extend(segment.acknowledgement, una) || is_within_next)
+                && let Some(is_probe) = self.note_duplicate(start, end)
+            {
                 rest = &blocks[1..];
-                ack.tells_duplicate = true;
-                self.note_duplicate(start, end);
+                (ack.tells_duplicate, ack.answers_probe) = (true, is_probe);
             }
         }
         for (start, end) in rest.iter().map(block) {
@@ -152,12 +191,11 @@ impl Connection {
 
     /// Changes the congestion window after an acknowledgement with which `delivered` segments arrived. `has_lost` says that a segment was found lost.
     fn adapt_window(&mut self, now: Instant, ack: &Ack, delivered: u32, has_lost: bool) {
-        if matches!(self.recovery.phase, Phase::Reduced | Phase::Recovery) {
+        if matches!(self.recovery.phase, CaState::Cwr | CaState::Recovery) {
             self.reduce_window(delivered, ack.has_advanced, has_lost);
         } else if ack.has_advanced || (ack.news.has_sacked && self.rack.degree > DUPLICATES) {
             // On a path with strong reordering, segments that arrive out of order are no sign of loss, so the window grows with them as well.
-            let least = self.round_trips.least().unwrap_or_default();
-            self.congestion.grow(now, delivered, least);
+            self.congestion.grow(now, delivered);
         }
     }
 

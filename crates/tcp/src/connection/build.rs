@@ -15,8 +15,6 @@ impl Connection {
     /// Returns this end's SYN. In SYN-RECEIVED, the SYN has an ACK.
     pub(super) fn build_syn(&self, now: Instant) -> Segment<'static> {
         let has_come = self.state == State::SynReceived;
-        // The window of a SYN is never scaled (RFC 7323, section 2.2).
-        let window = self.config.receive_buffer.min(65_535);
         let room = self.config.segment_room(self.local.is_ipv4());
         let options = Options {
             mss: Some(u16::try_from(room).unwrap_or(u16::MAX)),
@@ -32,13 +30,7 @@ impl Connection {
             Flags::SYN.with_if(Flags::ECE | Flags::CWR, self.asks_for_ecn())
         };
         let acknowledgement = if has_come { on_wire(self.receive.next) } else { 0 };
-        Segment {
-            sequence: on_wire(self.send.first),
-            acknowledgement,
-            window: u16::try_from(window).unwrap_or(u16::MAX),
-            options,
-            ..self.empty(flags)
-        }
+        Segment { sequence: on_wire(self.send.first), acknowledgement, window: self.receive.first_window, options, ..self.empty(flags) }
     }
 
     /// Returns whether the next SYN asks for ECN. If the next SYN does not ask but the answer grants ECN, the answer belongs to an earlier SYN. The connection
@@ -63,9 +55,10 @@ impl Connection {
         }
     }
 
-    /// Returns a reset at the next position.
-    pub(super) fn build_reset(&self) -> Segment<'static> {
-        self.empty(Flags::RST | Flags::ACK)
+    /// Returns a reset at the next position, with the window and the timestamps of other segments, as Linux sends.
+    pub(super) fn build_reset(&mut self, now: Instant) -> Segment<'static> {
+        let segment = self.build(now, self.send.next, self.send.next);
+        Segment { flags: Flags::RST | Flags::ACK, ..segment }
     }
 
     /// Returns a segment with the positions from `start` to `end` (exclusive), which may include the FIN. The segment acknowledges all octets that have arrived
@@ -75,10 +68,8 @@ impl Connection {
         let data_end = end.min(self.send.buffer.end()).max(start);
         let payload = if data_end > start { self.send.buffer.copy(start, data_end) } else { Vec::new() };
         let has_fin = end > data_end;
-        let is_last = data_end == self.send.buffer.end() && !payload.is_empty();
         let flags = Flags::ACK
             .with_if(Flags::FIN, has_fin)
-            .with_if(Flags::PSH, is_last)
             .with_if(Flags::ECE, self.send.tells_mark)
             .with_if(Flags::CWR, self.send.tells_reduction && !payload.is_empty());
         // CWR travels once, with data (RFC 3168, section 6.1.2).
@@ -116,29 +107,6 @@ impl Connection {
         let blocks = usize::from(self.receive.duplicate.is_some())
             + if self.receive.assembler.has_gaps() { self.receive.assembler.blocks().count() } else { 0 };
         if blocks == 0 { 0 } else { 4 + 8 * blocks.min(if self.receive.has_timestamps { 3 } else { 4 }) }
-    }
-
-    /// Returns the window to offer as the header has it, in units of the window scale, and moves the edge of the window. The window is the free part of the
-    /// buffer, but never a small window (RFC 9293, section 3.8.6.2.2), and never moves the edge back.
-    fn offer_window(&mut self) -> u16 {
-        let unit = 1u64 << self.receive.scale;
-        let most = 65_535u64 << self.receive.scale;
-        let current = self.receive.window();
-        let free = self.free_window();
-        let window = if free > current { (free & !(unit - 1)).max(current) } else { current };
-        // An unchanged window is rounded up to whole units, because rounding down would move its edge back.
-        let window = window.next_multiple_of(unit).min(most);
-        self.receive.edge = self.receive.edge.max(self.receive.next + window);
-        u16::try_from(window >> self.receive.scale).unwrap_or(u16::MAX)
-    }
-
-    /// Returns the free octets of the receive buffer. Returns zero if less than half of the buffer is free, and the free part is below a sixteenth of the
-    /// buffer or below a segment.
-    pub(super) fn free_window(&self) -> u64 {
-        let capacity = self.config.receive_buffer;
-        let free = capacity.saturating_sub(self.receive.assembler.unread());
-        let is_little = free < capacity / 2 && (free < capacity / 16 || free < self.receive.segment);
-        if is_little { 0 } else { free as u64 }
     }
 
     /// Notes that an acknowledgement of all octets in order has left.

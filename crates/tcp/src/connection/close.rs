@@ -55,8 +55,7 @@ impl Connection {
             self.state,
             State::SynReceived | State::Established | State::FinWait1 | State::FinWait2 | State::CloseWait | State::Closing | State::LastAck
         ) {
-            let reset = self.build_reset();
-            self.replies.push_back(reset);
+            self.is_reset_due = true;
         }
         // TIME-WAIT stays, because its purpose is to keep late segments away from the next connection with these addresses.
         if self.state != State::TimeWait {

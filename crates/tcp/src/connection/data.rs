@@ -6,6 +6,7 @@ use super::Connection;
 use crate::info::State;
 use crate::segment::{Ecn, Flags, Segment};
 use crate::sequence::Position;
+use crate::tuning::Tuning;
 
 impl Connection {
     /// Takes in the data and the FIN of a valid segment that begins at `start`.
@@ -17,14 +18,19 @@ impl Connection {
             return;
         }
         if self.is_orphan && data_end > self.receive.next {
-            // Nobody will read the new data (RFC 9293, section 3.6.1).
-            self.abort();
+            // Nobody will read the new data (RFC 9293, section 3.6.1). As in Linux, the reset has the number that the peer expects, as if there were no
+            // connection: this end may have sent more than the peer has received.
+            self.die(None);
+            self.replies.extend(segment.refusal(self.config.ttl));
             return;
         }
         self.note_marks(segment);
+        self.hear_echo(now, segment);
         // The whole segment has arrived before: the acknowledgement was lost, or the segment was sent again too early.
-        if data_end + u64::from(has_fin) <= self.receive.next {
-            self.tell_duplicate(start, data_end);
+        let segment_end = data_end + u64::from(has_fin);
+        if segment_end <= self.receive.next {
+            self.hurry_acknowledgements();
+            self.tell_duplicate(start, segment_end);
             self.receive.ack_now = true;
             return;
         }
@@ -34,6 +40,9 @@ impl Connection {
         // A FIN counts only if no data before it was cut off.
         if has_fin && end == data_end {
             self.receive.fin = Some(data_end);
+            if data_end > self.receive.next {
+                self.receive.assembler.insert_fin(data_end);
+            }
         }
         self.accept_octets(now, start, end, payload);
         if self.receive.fin == Some(self.receive.next) && !self.receive.is_ended {
@@ -44,12 +53,10 @@ impl Connection {
 
     /// Takes in the octets of `payload` from `start` to `end`, and notes which of them are duplicates. `payload` may be longer: the rest was cut off.
     fn accept_octets(&mut self, now: Instant, start: Position, end: Position, payload: &[u8]) {
-        if start < self.receive.next && end > start {
+        if start < self.receive.next {
             self.tell_duplicate(start, self.receive.next.min(end));
-        }
-        if let Some((low, high)) = self.receive.assembler.holding(start, end)
-            && end > start
-        {
+        } else if let Some((low, high)) = self.receive.assembler.first_within(start, end) {
+            // As in Linux, what the segment has in common with the first range is reported. There is one report for each acknowledgement.
             self.tell_duplicate(start.max(low), end.min(high));
         }
         // Whether there were gaps is read before the data goes in, because this data may fill the last gap.
@@ -66,8 +73,13 @@ impl Connection {
 
     /// Learns the peer's segment size from `count` octets of data, and whether the peer sends after a pause.
     fn learn_rhythm(&mut self, now: Instant, count: usize) {
+        let mss = self.advertised_mss();
         if count >= self.receive.segment {
-            self.receive.segment = count.min(self.send.mss);
+            let (offered, is_new) = (self.receive.offered(), count != self.receive.segment);
+            if let Some(tuning) = self.receive.tuning.as_mut().filter(|_| is_new) {
+                tuning.learn_segment(count, offered);
+            }
+            self.receive.segment = count.min(mss);
         } else {
             self.receive.pushed = (self.receive.pushed + 1).min(2);
         }
@@ -78,6 +90,24 @@ impl Connection {
             self.receive.quick = self.config.quick_acks;
         }
         self.receive.last_data_at = Some(now);
+        let (held, full, next, edge) = (self.receive.assembler.memory(), self.receive.segment, self.receive.next, self.receive.edge);
+        if let Some(tuning) = &mut self.receive.tuning {
+            if !self.receive.has_timestamps {
+                tuning.hear_data(now, next, edge);
+            }
+            // As in Linux, the acknowledgement that offers a larger window leaves without delay.
+            self.receive.quick |= u32::from(tuning.grow(count, held, full, mss));
+        }
+    }
+
+    /// Takes the round trip that the timestamps of arriving data tell, for the receive buffer.
+    fn hear_echo(&mut self, now: Instant, segment: &Segment<'_>) {
+        if let (Some((_, echo)), Some(tuning)) = (segment.options.timestamps, &mut self.receive.tuning)
+            && self.receive.has_timestamps
+        {
+            let is_full = segment.payload.len() >= self.receive.segment;
+            tuning.hear_echo(echo, is_full.then(|| Self::ticks(now).wrapping_sub(echo)));
+        }
     }
 
     /// Notes marks of congestion on arriving data, and the peer's answer to reported marks (RFC 3168, section 6.1.3).
@@ -118,9 +148,10 @@ impl Connection {
             | State::LastAck
             | State::TimeWait
             | State::Closed => {
-                // As in Linux, the acknowledgement waits, because it can travel with this end's own FIN.
+                // As in Linux, the acknowledgement waits, because it can travel with this end's own FIN. Before any data, the delay has no length yet.
                 self.state = State::CloseWait;
                 self.receive.is_interactive = true;
+                self.receive.ack_now |= self.receive.last_data_at.is_none();
             }
         }
     }
@@ -128,9 +159,11 @@ impl Connection {
     /// Decides when arrived data is acknowledged: at once if more than a full segment is unacknowledged or if quick acknowledgements are left, otherwise after
     /// a delay (RFC 9293, section 3.8.6.3).
     fn decide_acknowledgement(&mut self, now: Instant) {
+        let unacked = usize::try_from(self.receive.next - self.receive.acked).unwrap_or(usize::MAX);
+        // As in Linux, an acknowledgement that would offer less than before waits for the program to read.
+        let keeps_window = self.receive.tuning.is_none() || self.receive.assembler.unread() == 0 || self.free_window().0 >= self.receive.offered();
         let receive = &mut self.receive;
-        let unacked = usize::try_from(receive.next - receive.acked).unwrap_or(usize::MAX);
-        if unacked > receive.segment || (receive.quick > 0 && !receive.is_interactive) {
+        if (unacked > receive.segment && keeps_window) || (receive.quick > 0 && !receive.is_interactive) {
             receive.ack_now = true;
         }
         if !receive.ack_now && unacked > 0 {
@@ -140,7 +173,12 @@ impl Connection {
     }
 
     /// Decides, after the program has read, whether an acknowledgement leaves now: for arrived data, or for a larger window.
-    pub(super) fn after_reading(&mut self) {
+    pub(super) fn after_reading(&mut self, now: Instant) {
+        let (unread, next) = (self.receive.assembler.unread() as u64, self.receive.next - u64::from(self.receive.is_ended));
+        let waiting = self.receive.assembler.end().map_or(0, |end| end.saturating_sub(next));
+        if let Some(tuning) = &mut self.receive.tuning {
+            tuning.adapt(now, next - unread, next, waiting);
+        }
         let receive = &self.receive;
         let unacked = usize::try_from(receive.next - receive.acked).unwrap_or(usize::MAX);
         // The program has read everything and may have no answer, so that waiting for data to travel with is in vain.
@@ -151,8 +189,9 @@ impl Connection {
         }
         // A window that has at least doubled is offered at once (RFC 9293, section 3.8.6.2.2). Smaller changes travel with other segments.
         let offered = receive.window();
-        if receive.has_offered && !receive.is_ended && self.state.is_synchronised() && 2 * offered <= self.config.receive_buffer as u64 {
-            let free = self.free_window().min(65_535 << self.receive.scale);
+        let most = receive.tuning.as_ref().map_or_else(|| self.config.receive_buffer.unwrap_or(0) as u64, Tuning::most);
+        if receive.has_offered && !receive.is_ended && self.state.is_synchronised() && 2 * offered <= most {
+            let free = self.free_window().0.min(65_535 << self.receive.scale);
             self.receive.ack_now |= free > 0 && free >= 2 * offered;
         }
     }

@@ -1,8 +1,12 @@
 //! Calls that report the state of a connection to its owner, and change nothing.
 
 use super::Connection;
+use super::acknowledge::DUPLICATES;
 use crate::info::Info;
 use crate::sequence::on_wire;
+
+/// Most segments by which a reordering is reported, as in Linux (`tcp_max_reordering`).
+const MOST_REORDERING: u32 = 300;
 
 impl Connection {
     /// Returns whether only the peer's program can let this connection continue: data waits, the peer's window is closed, no segment is on the way, and the
@@ -43,6 +47,7 @@ impl Connection {
     /// Returns the figures of the connection, after the example of Linux's `TCP_INFO`.
     #[must_use]
     pub fn info(&self) -> Info {
+        let board = &self.send.board;
         Info {
             state: self.state,
             srtt: self.round_trips.srtt(),
@@ -51,7 +56,13 @@ impl Connection {
             timeout: self.round_trips.timeout(&self.config),
             congestion_window: self.congestion.window,
             slow_start_threshold: self.congestion.threshold,
-            in_flight: self.send.board.in_flight(),
+            ca_state: self.recovery.phase,
+            unacked: board.packets_out(),
+            sacked: board.sacked_out,
+            lost: board.lost_out,
+            retrans: board.again_out,
+            reordering: self.rack.degree.clamp(DUPLICATES, MOST_REORDERING),
+            in_flight: board.in_flight(),
             retransmissions: self.counters.retransmissions,
             timeouts: self.counters.timeouts,
             recoveries: self.counters.recoveries,

@@ -4,10 +4,9 @@ use core::time::Duration;
 
 use cohaptic_units::Instant;
 
-use super::acknowledge::Ack;
-use super::acknowledge::DUPLICATES;
-use super::parts::Phase;
+use super::acknowledge::{Ack, DUPLICATES};
 use super::{Connection, Timer};
+use crate::info::CaState;
 use crate::sequence::Position;
 
 /// Number of recoveries during which a larger reordering window is kept (RFC 8985, section 6.2).
@@ -36,7 +35,7 @@ impl Connection {
     /// Returns the time by which a segment may be late before it counts as lost (RFC 8985, section 6.2, step 4).
     fn reordering_window(&self) -> Duration {
         // On a path without reordering so far, waiting during recovery, or after three segments out of order, would only delay the repair.
-        if !self.rack.has_reordering && (self.recovery.phase >= Phase::Recovery || self.send.board.sacked_out >= DUPLICATES) {
+        if !self.rack.has_reordering && (self.recovery.phase >= CaState::Recovery || self.send.board.sacked_out >= DUPLICATES) {
             return Duration::ZERO;
         }
         let least = self.round_trips.least().unwrap_or_default();
@@ -62,8 +61,8 @@ impl Connection {
         }
         if !self.receive.has_sack {
             // NewReno: three duplicates tell of the loss of the first segment. In recovery, a partial acknowledgement tells that the next segment is lost too.
-            let is_told = self.recovery.phase < Phase::Recovery && self.send.board.sacked_out >= DUPLICATES;
-            if is_told || (self.recovery.phase == Phase::Recovery && ack.has_advanced) {
+            let is_told = self.recovery.phase < CaState::Recovery && self.send.board.sacked_out >= DUPLICATES;
+            if is_told || (self.recovery.phase == CaState::Recovery && ack.has_advanced) {
                 self.send.board.mark_first_lost();
             }
             return false;
@@ -90,10 +89,8 @@ impl Connection {
         let before = self.send.board.lost_out;
         self.timer = None;
         let waits = self.detect_by_time(now);
-        if self.send.board.lost_out > before {
-            if self.recovery.phase < Phase::Recovery {
-                self.enter_recovery(false);
-            }
+        if self.send.board.lost_out > before && self.recovery.phase < CaState::Recovery {
+            self.enter_recovery(false);
             // No acknowledgement has arrived. One segment counts as delivered, because otherwise the window would not be computed and nothing could leave.
             self.reduce_window(1, false, true);
         }
@@ -105,9 +102,9 @@ impl Connection {
     /// Handles the end of the retransmission timer (RFC 5681, section 3.1, and RFC 6298, section 5).
     pub(super) fn enter_loss(&mut self, now: Instant) {
         // The threshold is reduced once per loss event. Another timeout of the same event must not reduce the threshold again.
-        let is_first = self.recovery.phase <= Phase::Disorder
+        let is_first = self.recovery.phase <= CaState::Disorder
             || self.send.una >= self.recovery.high
-            || (self.recovery.phase == Phase::Loss && self.counters.retries == 0);
+            || (self.recovery.phase == CaState::Loss && self.counters.retries == 0);
         let patience = self.rack.rtt.saturating_add(self.reordering_window());
         let has_sack = self.receive.has_sack;
         self.send.board.mark_all_lost(now, (has_sack && self.config.rack && self.rack.delivered.is_some()).then_some(patience), has_sack);
@@ -118,7 +115,7 @@ impl Connection {
             self.begin_undo();
         }
         self.congestion.restart(self.send.board.in_flight() + 1);
-        self.recovery.phase = Phase::Loss;
+        self.recovery.phase = CaState::Loss;
         self.recovery.high = self.send.next;
         self.tail.end = None;
         self.send.tells_reduction = self.send.has_ecn;
@@ -129,13 +126,13 @@ impl Connection {
     pub(super) fn end_tail_probe(&mut self, ack: &Ack) {
         let Some(end) = self.tail.end.filter(|end| ack.position >= *end) else { return };
         // A probe with new data repairs nothing. After a reported duplicate, the last segment and the probe have both arrived.
-        if !self.tail.is_again || ack.tells_duplicate {
+        if !self.tail.is_again || ack.answers_probe {
             self.tail.end = None;
         } else if ack.position > end {
             // Later data is acknowledged and no duplicate was reported: the last segment was lost, and the probe has replaced it.
             self.tail.end = None;
             self.enter_reduced();
-            if self.recovery.phase == Phase::Reduced {
+            if self.recovery.phase == CaState::Cwr {
                 self.end_reduction_at_once(ack);
             }
         } else if ack.is_duplicate {

@@ -2,6 +2,7 @@
 
 mod acknowledge;
 mod build;
+mod burst;
 mod close;
 mod data;
 mod inspect;
@@ -14,6 +15,7 @@ mod recovery;
 mod timers;
 mod transmit;
 mod undo;
+mod window;
 
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
@@ -58,9 +60,22 @@ pub struct Connection {
     linger_until: Option<Instant>,
     /// Purpose of the next segment sent regardless of the congestion window.
     probe: Option<Probe>,
-    /// SYNs and resets, which leave before all other segments.
+    /// SYNs and answers to segments that are refused, which leave before all other segments.
     replies: VecDeque<Segment<'static>>,
+    /// The peer is told by a reset that this end has given the connection up.
+    is_reset_due: bool,
     counters: Counters,
+    /// Calls of the program since `poll_transmit` was last called.
+    calls: Calls,
+}
+
+/// Calls of the program that have effects which need the time. The calls have no time of their own, but the owner calls `poll_transmit` after each of them.
+#[derive(Clone, Copy, Default, Debug)]
+struct Calls {
+    /// Data was read.
+    has_read: bool,
+    /// Data was written while no segment was on the way.
+    has_written: bool,
 }
 
 /// Purpose of a segment sent regardless of the congestion window.
@@ -94,7 +109,7 @@ impl Connection {
     /// Returns whether the connection has ended and has nothing to send. The owner may then drop the connection, once the program has closed its end.
     #[must_use]
     pub fn is_finished(&self) -> bool {
-        self.state == State::Closed && self.replies.is_empty()
+        self.state == State::Closed && self.replies.is_empty() && !self.is_reset_due
     }
 
     /// Ends the connection. The next call of the program returns `error`, once. Data that has arrived in order stays readable, unless the connection is an

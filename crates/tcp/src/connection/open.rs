@@ -9,6 +9,8 @@ use super::parts::{Receive, Send};
 use super::{Connection, Timer};
 use crate::config::{ConfigError, EcnFallback, TcpConfig};
 use crate::congestion::Congestion;
+use crate::connection::timers::TWO_TICKS;
+use crate::connection::window::{first_window, tuning};
 use crate::error::Error;
 use crate::info::State;
 use crate::scoreboard::{News, Scoreboard};
@@ -42,6 +44,9 @@ impl Connection {
         let mut connection = Self::new(now, config, syn.destination, syn.source, initial_sequence)?;
         if syn.flags.has(Flags::SYN) && !syn.flags.has(Flags::ACK) && !syn.flags.has(Flags::RST) {
             connection.learn_syn(now, syn);
+            // Now it is known whether segments have timestamps.
+            connection.receive.first_window = first_window(&connection.config, connection.advertised_mss());
+            connection.receive.edge = connection.receive.next + u64::from(connection.receive.first_window);
             connection.send.window = u64::from(syn.window);
             connection.send.max_window = connection.send.window;
             connection.state = State::SynReceived;
@@ -66,9 +71,11 @@ impl Connection {
             window_from: 0,
             scale: 0,
             buffer: SendBuffer::new(first + 1),
+            capacity: 0,
             board: Scoreboard::default(),
             mss: DEFAULT_MSS,
             small_end: first,
+            burst: Default::default(),
             is_shut: false,
             last_data_at: now,
             delivered: 0,
@@ -86,6 +93,8 @@ impl Connection {
             has_timestamps: config.timestamps,
             recent: None,
             assembler: Default::default(),
+            tuning: tuning(&config),
+            first_window: first_window(&config, config.segment_room(local.is_ipv4())),
             fin: None,
             is_ended: false,
             duplicate: None,
@@ -120,14 +129,16 @@ impl Connection {
             linger_until: None,
             probe: None,
             replies: Default::default(),
+            is_reset_due: false,
             counters: Default::default(),
+            calls: Default::default(),
         })
     }
 
     /// Sends the SYN, or the SYN with ACK, for the first time.
     fn send_syn(&mut self, now: Instant) {
         self.send.next = self.send.first + 1;
-        self.send.board.push(self.send.first, self.send.next, now);
+        self.send.board.push(self.send.first, self.send.next, now, false);
         self.timer = Some((now.saturating_add(self.config.initial_timeout), Timer::Retransmission));
         let syn = self.build_syn(now);
         self.replies.push_back(syn);
@@ -155,7 +166,7 @@ impl Connection {
         self.receive.next = first(syn.sequence) + 1;
         self.receive.acked = self.receive.next;
         // The window on this end's SYN has 16 bits and is not scaled.
-        self.receive.edge = self.receive.next + self.config.receive_buffer.min(65_535) as u64;
+        self.receive.edge = self.receive.next + u64::from(self.receive.first_window);
         self.receive.segment = self.receive.segment.min(self.send.mss);
         self.receive.last_heard = now;
         self.send.window_from = self.receive.next - 1;
@@ -167,6 +178,10 @@ impl Connection {
         // An acknowledgement of anything but the SYN belongs to an older connection. This check comes first, so a reset of this kind has no effect.
         if has_ack && extend(segment.acknowledgement, self.send.una) != self.send.next {
             self.replies.extend(segment.refusal(self.config.ttl));
+            // The reset ends the older connection of the peer's, so that the SYN finds the listener. As in Linux, the SYN is repeated soon, once.
+            if self.counters.retries == 0 {
+                self.timer = Some((now.saturating_add(TWO_TICKS), Timer::Retransmission));
+            }
             return;
         }
         if segment.flags.has(Flags::RST) {
@@ -217,6 +232,11 @@ impl Connection {
         self.state = if self.send.is_shut { State::FinWait1 } else { State::Established };
         self.timer = None;
         self.send.last_data_at = now;
+        self.expand_send_buffer();
+        let (window, mss, next) = (self.receive.offered(), self.advertised_mss(), self.receive.next);
+        if let Some(tuning) = &mut self.receive.tuning {
+            tuning.begin(now, window, mss, next);
+        }
         self.restart_keepalive(now);
     }
 

@@ -4,11 +4,14 @@ use core::time::Duration;
 
 use cohaptic_units::Instant;
 
+use super::burst::Burst;
 use crate::assembler::Assembler;
 use crate::congestion::Reduction;
+use crate::info::CaState;
 use crate::scoreboard::{Scoreboard, SentAt};
 use crate::send_buffer::SendBuffer;
 use crate::sequence::Position;
+use crate::tuning::Tuning;
 
 /// State of the sending half.
 #[derive(Clone, Debug)]
@@ -28,14 +31,18 @@ pub(super) struct Send {
     /// Number of bits by which the peer's windows are shifted.
     pub(super) scale: u8,
     pub(super) buffer: SendBuffer,
+    /// Size of the buffer \[byte\]. Never shrinks.
+    pub(super) capacity: usize,
     pub(super) board: Scoreboard,
     /// Most octets of data that a segment may carry beside timestamps.
     pub(super) mss: usize,
     /// End of the last segment below the full size (for Minshall's form of Nagle's algorithm).
     pub(super) small_end: Position,
+    /// Burst that is leaving.
+    pub(super) burst: Burst,
     /// The program has shut this half, so that a FIN follows the data.
     pub(super) is_shut: bool,
-    /// Instant at which new data, or the SYN, was sent last.
+    /// Instant at which data, or the SYN, was sent last.
     pub(super) last_data_at: Instant,
     /// Number of segments known to have arrived at the peer.
     pub(super) delivered: u64,
@@ -76,6 +83,8 @@ pub(super) struct Receive {
     pub(super) first: Option<u32>,
     /// Position of the first missing octet.
     pub(super) next: Position,
+    /// Window that this end's SYN offers \[byte\].
+    pub(super) first_window: u16,
     /// End (exclusive) of the offered window.
     pub(super) edge: Position,
     /// Value of `next` when the last acknowledgement left.
@@ -89,6 +98,8 @@ pub(super) struct Receive {
     /// Timestamp to echo, and the instant of its arrival.
     pub(super) recent: Option<(u32, Instant)>,
     pub(super) assembler: Assembler,
+    /// Buffer and window that grow. `None` with a fixed receive buffer.
+    pub(super) tuning: Option<Tuning>,
     /// Position of the peer's FIN, once the FIN has arrived, also out of order.
     pub(super) fin: Option<Position>,
     /// The peer's FIN and all octets before the FIN have arrived.
@@ -122,29 +133,17 @@ impl Receive {
     pub(super) const fn window(&self) -> u64 {
         self.edge.saturating_sub(self.next)
     }
-}
 
-/// Reaction of the sender to losses (RFC 5681, 6582, 6675). Brackets contain the names of Linux. The variants are ordered by severity, and comparisons use this
-/// order.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Default)]
-pub(super) enum Phase {
-    /// No sign of a loss (Open).
-    #[default]
-    Open,
-    /// Segments have arrived out of order, or a duplicate acknowledgement has arrived (Disorder).
-    Disorder,
-    /// The window shrinks because of a mark, or of a loss repaired by a tail probe (CWR).
-    Reduced,
-    /// Lost segments are sent again while the window shrinks (Recovery).
-    Recovery,
-    /// The retransmission timer has run out (Loss).
-    Loss,
+    /// Returns the window that was offered last \[byte\].
+    pub(super) const fn offered(&self) -> u64 {
+        self.edge.saturating_sub(self.acked)
+    }
 }
 
 /// State of loss recovery.
 #[derive(Clone, Default, Debug)]
 pub(super) struct Recovery {
-    pub(super) phase: Phase,
+    pub(super) phase: CaState,
     /// End of the data sent when the phase began. The phase ends when this position is acknowledged.
     pub(super) high: Position,
     /// Progress of the window from its value before the phase to the threshold.
@@ -205,6 +204,8 @@ pub(super) struct Counters {
     /// Number of probes since an acknowledgement last opened the window.
     pub(super) window_probes: u32,
     pub(super) retransmissions: u64,
+    /// Number of segments that the peer has reported as duplicates.
+    pub(super) duplicates: u64,
     pub(super) timeouts: u64,
     pub(super) recoveries: u64,
     pub(super) undone: u64,

@@ -2,10 +2,14 @@
 
 use cohaptic_units::Instant;
 
-use super::Connection;
+use super::{Calls, Connection};
 use crate::config::Keepalive;
 use crate::error::Error;
 use crate::info::State;
+use crate::memory;
+
+/// Segments for which the send buffer has room at least (`TCP_INIT_CWND`).
+const LEAST_SEGMENTS: usize = 10;
 
 impl Connection {
     /// Reads data that has arrived in order into `to`. Returns the number of octets, which is zero if `to` is empty, or at the end of the peer's data.
@@ -17,7 +21,7 @@ impl Connection {
     pub fn read(&mut self, to: &mut [u8]) -> Result<usize, Error> {
         if self.may_read(to)? {
             let count = self.receive.assembler.read(to);
-            self.after_reading();
+            self.calls.has_read = true;
             return Ok(count);
         }
         Ok(0)
@@ -77,21 +81,43 @@ impl Connection {
             return Err(Error::WouldBlock);
         }
         self.send.buffer.write(&data[..count]);
+        self.calls.has_written |= self.send.board.is_empty();
         Ok(count)
+    }
+
+    /// Handles the effects of the program's calls that need the time.
+    pub(super) fn follow_up_calls(&mut self, now: Instant) {
+        let Calls { has_read, has_written } = core::mem::take(&mut self.calls);
+        if has_read {
+            self.after_reading(now);
+        }
+        if has_written {
+            self.end_pause(now);
+        }
+    }
+
+    /// Shrinks the congestion window after a long pause, because the window says nothing about the path any more. As in Linux, a pause ends when the program
+    /// writes or when the peer's window changes, and not when data leaves.
+    pub(super) fn end_pause(&mut self, now: Instant) {
+        if self.config.slow_start_after_idle {
+            let (idle, threshold) = (now.saturating_duration_since(self.send.last_data_at), self.current_threshold());
+            self.congestion.rest(idle, self.round_trips.timeout(&self.config), threshold);
+        }
     }
 
     /// Returns the octets that can be written. As in Linux, the room is rounded up so that the unsent data ends with a full segment. Otherwise a small segment
     /// could leave in the middle of a stream, and Nagle's algorithm would hold back the last segment until the small segment is acknowledged.
     fn room(&self) -> usize {
-        let room = self.send_capacity().saturating_sub(self.send.buffer.len());
+        let room = self.send.capacity.saturating_sub(self.send.buffer.len());
         let unsent = usize::try_from(self.send.buffer.end().saturating_sub(self.send.next)).unwrap_or(usize::MAX);
         unsent.saturating_add(room).next_multiple_of(self.segment_size().max(1)) - unsent
     }
 
-    /// Returns the size of the send buffer \[byte\]: twice the congestion window within the bounds of the configuration, as Linux tunes the buffer.
-    fn send_capacity(&self) -> usize {
-        let window = usize::try_from(self.congestion.window).unwrap_or(usize::MAX);
-        window.saturating_mul(2 * self.send.mss).max(self.config.least_send_buffer).min(self.config.send_buffer)
+    /// Enlarges the send buffer to the memory of twice the congestion window, within the bounds of the configuration.
+    pub(super) fn expand_send_buffer(&mut self) {
+        let segments = usize::try_from(self.congestion.window).unwrap_or(usize::MAX).max(LEAST_SEGMENTS);
+        let wanted = segments.saturating_mul(2 * memory::of_sent(self.send.mss));
+        self.send.capacity = self.send.capacity.max(wanted.clamp(self.config.least_send_buffer, self.config.send_buffer));
     }
 
     /// Returns whether [`read`](Self::read) would not block.
@@ -108,7 +134,7 @@ impl Connection {
         match self.state {
             State::SynSent | State::SynReceived => self.error.is_some() || self.send.is_shut,
             // Free room of at least half of the used room is a third of the whole buffer.
-            State::Established | State::CloseWait => self.error.is_some() || self.send_capacity().saturating_sub(used) >= (used / 2).max(1),
+            State::Established | State::CloseWait => self.error.is_some() || self.send.capacity.saturating_sub(used) >= (used / 2).max(1),
             State::FinWait1 | State::FinWait2 | State::Closing | State::LastAck | State::TimeWait | State::Closed => true,
         }
     }

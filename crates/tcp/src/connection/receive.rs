@@ -32,7 +32,9 @@ impl Connection {
     /// Handles a segment after the peer's SYN has arrived.
     fn handle_synchronised(&mut self, now: Instant, segment: &Segment<'_>) {
         let start = extend(segment.sequence, self.receive.next);
-        if !self.answers_own_syn(segment, start) && !self.is_valid(now, segment, start) {
+        if self.answers_own_syn(segment, start) {
+            self.receive.ack_now = true;
+        } else if !self.is_valid(now, segment, start) {
             return;
         }
         // After the SYN, every valid segment has an ACK (RFC 9293, section 3.10.7.4).
@@ -42,13 +44,6 @@ impl Connection {
         self.counters.probes = 0;
         self.receive.last_heard = now;
         self.restart_keepalive(now);
-        // Only a segment that contains the last acknowledged position sets the timestamp to echo, so that a delayed acknowledgement counts into the round
-        // trip (RFC 7323, section 4.3).
-        if let (Some((value, _)), true) = (segment.options.timestamps, self.receive.has_timestamps)
-            && start <= self.receive.acked
-        {
-            self.receive.recent = Some((value, now));
-        }
         if self.state == State::SynReceived {
             if extend(segment.acknowledgement, self.send.una) != self.send.first + 1 {
                 self.replies.extend(segment.refusal(self.config.ttl));
@@ -64,6 +59,8 @@ impl Connection {
             self.accept_data(now, segment, start);
         } else if segment.sequence_length() > 0 && start < self.receive.next && self.state != State::Closed {
             // The peer has sent its FIN again, because the acknowledgement was lost.
+            self.hurry_acknowledgements();
+            self.tell_duplicate(start, self.receive.next.min(start + segment.sequence_length() as u64));
             self.receive.ack_now = true;
         }
     }
@@ -138,6 +135,7 @@ impl Connection {
             self.answer_at_times(now);
         } else {
             if start < self.receive.next {
+                self.hurry_acknowledgements();
                 self.tell_duplicate(start, end.min(self.receive.next));
             }
             self.receive.ack_now = true;
@@ -157,11 +155,14 @@ impl Connection {
         }
     }
 
-    /// Notes that the octets from `start` to `end` (exclusive) have arrived twice. The next acknowledgement reports them, and the next acknowledgements are not
-    /// delayed, because the peer is recovering from a loss.
-    pub(super) fn tell_duplicate(&mut self, start: Position, end: Position) {
+    /// Lets the next acknowledgements leave without delay, because the peer is recovering from a loss.
+    pub(super) const fn hurry_acknowledgements(&mut self) {
         self.receive.quick = self.config.quick_acks;
         self.receive.is_interactive = false;
+    }
+
+    /// Notes that the positions from `start` to `end` (exclusive) have arrived twice. The next acknowledgement reports them.
+    pub(super) fn tell_duplicate(&mut self, start: Position, end: Position) {
         if self.receive.has_sack && start < end {
             self.receive.duplicate = Some((start, end));
         }

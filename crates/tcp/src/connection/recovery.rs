@@ -4,8 +4,8 @@ use cohaptic_units::Instant;
 
 use super::Connection;
 use super::acknowledge::Ack;
-use super::parts::Phase;
 use crate::congestion::{Reduction, UNBOUNDED};
+use crate::info::CaState;
 
 impl Connection {
     /// Finds losses, changes the phase and sets the timer after the acknowledgement `ack`. `has_widened` says that the acknowledgement changed the peer's
@@ -17,7 +17,7 @@ impl Connection {
         let mut waits_for_reordering = false;
         // An acknowledgement with ordinary news in the phase Open needs no search for losses.
         let is_dubious = !(has_data || has_widened || ack.has_advanced) || ack.news.has_sacked || ack.tells_mark || ack.tells_duplicate;
-        if is_dubious || self.recovery.phase != Phase::Open {
+        if is_dubious || self.recovery.phase != CaState::Open {
             waits_for_reordering = self.change_phase(now, ack);
         }
         // The sending half has one timer, and the reordering timer has priority.
@@ -27,12 +27,12 @@ impl Connection {
     }
 
     /// Takes back false reactions, finds losses and changes the phase. Returns whether the timer was set for segments that may only be late.
-    fn change_phase(&mut self, now: Instant, ack: &Ack) -> bool {
+    pub(super) fn change_phase(&mut self, now: Instant, ack: &Ack) -> bool {
         // A mark tells of congestion even if nothing was lost, so this reduction must stay.
         if ack.tells_mark {
             self.recovery.prior_threshold = None;
         }
-        if self.recovery.phase == Phase::Open {
+        if self.recovery.phase == CaState::Open {
             if self.send.board.again_out == 0 {
                 self.recovery.again_at = None;
             }
@@ -40,7 +40,7 @@ impl Connection {
             return false;
         }
         match self.recovery.phase {
-            Phase::Recovery => {
+            CaState::Recovery => {
                 if !ack.has_advanced {
                     self.count_duplicate(ack);
                 } else if self.undo_in_recovery(ack) {
@@ -51,23 +51,23 @@ impl Connection {
                     self.stay_open(ack);
                 }
                 let waits = self.find_losses(now, ack);
-                if self.recovery.phase != Phase::Recovery {
+                if self.recovery.phase != CaState::Recovery {
                     self.stay_open(ack);
                 }
                 waits
             }
-            Phase::Loss => {
+            CaState::Loss => {
                 self.go_on_after_timeout(ack);
                 let waits = self.find_losses(now, ack);
-                if self.recovery.phase == Phase::Open {
+                if self.recovery.phase == CaState::Open {
                     return self.enter_if_lost(ack, waits);
                 }
                 waits
             }
-            Phase::Open | Phase::Disorder | Phase::Reduced => {
+            CaState::Open | CaState::Disorder | CaState::Cwr => {
                 self.count_duplicate(ack);
                 // A reduction because of a mark is not taken back by duplicates.
-                if self.recovery.phase != Phase::Reduced {
+                if self.recovery.phase != CaState::Cwr {
                     self.undo_by_duplicates();
                 }
                 let waits = self.find_losses(now, ack);
@@ -89,14 +89,14 @@ impl Connection {
     /// Ends the phase, because all data sent before the phase is acknowledged. Returns whether this acknowledgement needs no further reaction.
     fn end_phase(&mut self, ack: &Ack) -> bool {
         match self.recovery.phase {
-            Phase::Reduced => {
+            CaState::Cwr => {
                 // The phase ends when a later position is acknowledged as well, so each window of data has at most one reduction.
                 if self.send.una != self.recovery.high {
                     self.end_reduction();
-                    self.recovery.phase = Phase::Open;
+                    self.recovery.phase = CaState::Open;
                 }
             }
-            Phase::Recovery => {
+            CaState::Recovery => {
                 // The duplicates of this phase do not count for the next phase.
                 if !self.receive.has_sack {
                     self.send.board.sacked_out = 0;
@@ -105,9 +105,9 @@ impl Connection {
                     return true;
                 }
                 self.end_reduction();
-                self.recovery.phase = Phase::Open;
+                self.recovery.phase = CaState::Open;
             }
-            Phase::Open | Phase::Disorder | Phase::Loss => {}
+            CaState::Open | CaState::Disorder | CaState::Loss => {}
         }
         false
     }
@@ -136,13 +136,12 @@ impl Connection {
         }
         board.sacked_out = board.sacked_out.min(board.packets_out().saturating_sub(board.lost_out.max(1)));
         // Progress outside of recovery shows that the duplicates were only reordering.
-        if self.recovery.phase < Phase::Recovery {
+        if self.recovery.phase < CaState::Recovery {
             board.sacked_out = 0;
         }
     }
 
-    /// Reduces the window after a mark. Otherwise chooses Disorder if segments are sacked, lost or sent again, or a reduction can still be taken back, and Open
-    /// if not.
+    /// Reduces the window after a mark. Otherwise chooses Disorder if segments are sacked, lost or sent again, and Open if not.
     pub(super) fn stay_open(&mut self, ack: &Ack) {
         if !self.send.board.has_sent_again() {
             self.recovery.again_at = None;
@@ -150,12 +149,12 @@ impl Connection {
         if ack.tells_mark {
             self.enter_reduced();
         }
-        if self.recovery.phase == Phase::Reduced {
+        if self.recovery.phase == CaState::Cwr {
             return;
         }
         let board = &self.send.board;
-        let is_amiss = board.sacked_out + board.lost_out > 0 || board.has_sent_again() || self.recovery.undo_from.is_some();
-        let phase = if is_amiss { Phase::Disorder } else { Phase::Open };
+        let is_amiss = board.sacked_out + board.lost_out > 0 || board.has_sent_again();
+        let phase = if is_amiss { CaState::Disorder } else { CaState::Open };
         if self.recovery.phase != phase {
             (self.recovery.phase, self.recovery.high) = (phase, self.send.next);
         }
@@ -174,7 +173,7 @@ impl Connection {
     /// Ends a reduction: sets the window to the threshold.
     fn end_reduction(&mut self) {
         // After an undo, the window has its old value again and must stay.
-        let is_reduced = self.recovery.phase == Phase::Reduced || self.recovery.undo_from.is_some();
+        let is_reduced = self.recovery.phase == CaState::Cwr || self.recovery.undo_from.is_some();
         if is_reduced && self.congestion.threshold < UNBOUNDED {
             self.congestion.window = self.congestion.threshold;
         }
@@ -183,17 +182,17 @@ impl Connection {
     /// Reduces the window although no segment is missing, because of a mark or of a loss repaired by a tail probe. Does nothing during another reduction.
     pub(super) fn enter_reduced(&mut self) {
         self.recovery.prior_threshold = None;
-        if self.recovery.phase < Phase::Reduced {
+        if self.recovery.phase < CaState::Cwr {
             self.recovery.undo_from = None;
             self.begin_reduction();
-            self.recovery.phase = Phase::Reduced;
+            self.recovery.phase = CaState::Cwr;
         }
     }
 
     /// Ends a reduction that needs no flight of its own: the threshold becomes the window at once.
     pub(super) fn end_reduction_at_once(&mut self, ack: &Ack) {
         self.end_reduction();
-        self.recovery.phase = Phase::Open;
+        self.recovery.phase = CaState::Open;
         self.stay_open(ack);
     }
 
@@ -201,11 +200,11 @@ impl Connection {
     pub(super) fn enter_recovery(&mut self, tells_mark: bool) {
         self.begin_undo();
         // A reduction because of a mark continues: the same window of data is not reduced twice.
-        if self.recovery.phase < Phase::Reduced {
+        if self.recovery.phase < CaState::Cwr {
             self.recovery.prior_threshold = (!tells_mark).then_some(self.current_threshold());
             self.begin_reduction();
         }
-        self.recovery.phase = Phase::Recovery;
+        self.recovery.phase = CaState::Recovery;
         self.recovery.high = self.send.next;
         self.counters.recoveries += 1;
     }
@@ -213,8 +212,8 @@ impl Connection {
     /// Returns the threshold to return to if nothing was lost: at least three quarters of the window, unless a reduction is in progress.
     pub(super) fn current_threshold(&self) -> u32 {
         match self.recovery.phase {
-            Phase::Reduced | Phase::Recovery => self.congestion.threshold,
-            Phase::Open | Phase::Disorder | Phase::Loss => self.congestion.threshold.max(self.congestion.window / 4 * 3),
+            CaState::Cwr | CaState::Recovery => self.congestion.threshold,
+            CaState::Open | CaState::Disorder | CaState::Loss => self.congestion.threshold.max(self.congestion.window / 4 * 3),
         }
     }
 }

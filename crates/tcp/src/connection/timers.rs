@@ -5,9 +5,9 @@ use core::time::Duration;
 use cohaptic_units::Instant;
 
 use super::{Connection, Probe};
-use crate::config::Keepalive;
-use crate::connection::parts::Phase;
+use crate::config::{Keepalive, TcpConfig};
 use crate::error::Error;
+use crate::info::CaState;
 use crate::info::State;
 use crate::rtt::doubled;
 
@@ -24,8 +24,8 @@ pub(super) enum Timer {
     WindowProbe,
 }
 
-/// Least margin above two round trips before a tail probe: two of Linux's ticks.
-const LEAST_TAIL: Duration = Duration::from_millis(2);
+/// Shortest time of a timer: two of Linux's ticks (`TCP_TIMEOUT_MIN`). Also the margin above two round trips before a tail probe.
+pub(super) const TWO_TICKS: Duration = Duration::from_millis(2);
 
 /// First timeout in the limit for unanswered data: Linux counts `retries` with its least timeout, whatever the round trip.
 const RETRY_BASE: Duration = Duration::from_millis(200);
@@ -91,11 +91,11 @@ impl Connection {
     /// retransmission timer would begin anew at `now`.
     pub(super) fn set_tail_timer(&mut self, now: Instant, has_advanced: bool) -> bool {
         let board = &self.send.board;
-        let is_wanted = self.config.tail_loss_probe && self.receive.has_sack && matches!(self.recovery.phase, Phase::Open | Phase::Reduced);
+        let is_wanted = self.config.tail_loss_probe && self.receive.has_sack && matches!(self.recovery.phase, CaState::Open | CaState::Cwr);
         let Some(first) = board.first().filter(|_| is_wanted && self.state.may_send() && self.tail.end.is_none()) else { return false };
         let mut wait = match self.round_trips.srtt() {
             // The peer may delay the acknowledgement of a single segment.
-            Some(srtt) => 2 * srtt + if board.packets_out() == 1 { self.config.least_variance.max(LEAST_TAIL) } else { LEAST_TAIL },
+            Some(srtt) => 2 * srtt + if board.packets_out() == 1 { self.config.least_variance.max(TWO_TICKS) } else { TWO_TICKS },
             None => self.config.initial_timeout,
         };
         let timeout = self.round_trips.timeout(&self.config);
@@ -152,21 +152,30 @@ impl Connection {
     /// Repeats the SYN, or ends the connection after the last repetition.
     fn repeat_handshake(&mut self, now: Instant) {
         let is_client = self.state == State::SynSent;
-        let retries = if is_client { self.config.syn_retries } else { self.config.syn_ack_retries };
-        if self.counters.retries >= retries {
+        let is_over = if is_client { self.is_syn_given_up(now) } else { self.counters.retries >= self.config.syn_ack_retries };
+        if is_over {
             self.die(Some(Error::TimedOut));
             return;
         }
         self.counters.retries += 1;
+        self.counters.stalled_since.get_or_insert(self.send.last_data_at);
         self.counters.retransmissions += 1;
         // The first repetitions of a client's SYN may come at equal distance.
         if !is_client || self.counters.retries > self.config.linear_syn_retries {
             self.round_trips.backoff += 1;
         }
         self.send.board.sent_again(self.send.first, now, false);
-        self.timer = Some((now.saturating_add(self.round_trips.timeout(&self.config)), Timer::Retransmission));
+        self.timer = Some((now.saturating_add(self.borne_timeout(now)), Timer::Retransmission));
         let syn = self.build_syn(now);
         self.replies.push_back(syn);
+    }
+
+    /// Returns whether the SYN is not repeated any more: all repetitions are spent, or the time is over that the repetitions at growing distance take
+    /// (`tcp_write_timeout`).
+    fn is_syn_given_up(&self, now: Instant) -> bool {
+        let TcpConfig { syn_retries, linear_syn_retries, initial_timeout, user_timeout, .. } = self.config;
+        let limit = user_timeout.unwrap_or_else(|| (0..=syn_retries).map(|times| doubled(initial_timeout, times, &self.config)).sum());
+        self.counters.retries >= syn_retries.saturating_add(linear_syn_retries) || now.saturating_duration_since(self.send.last_data_at) >= limit
     }
 
     /// Returns whether the time since `since` has reached the limit for unanswered data. Returns `false` if `since` is `None`.
@@ -230,9 +239,8 @@ impl Connection {
         };
         if is_over {
             // If the peer is alive after all, the reset tells the peer that this end has given the connection up.
-            let reset = self.build_reset();
+            self.is_reset_due = true;
             self.die(Some(Error::TimedOut));
-            self.replies.push_back(reset);
             return;
         }
         self.counters.probes += 1;

@@ -3,18 +3,22 @@
 use cohaptic_units::Instant;
 
 use super::{Connection, Probe, Timer};
-use crate::connection::parts::Phase;
-use crate::segment::{Ecn, Segment};
+use crate::info::CaState;
+use crate::segment::{Ecn, Flags, Segment};
 use crate::sequence::{Position, on_wire};
 
 impl Connection {
     /// Returns the next segment to send at `now`, or `None` if no segment may leave at present.
     #[must_use]
     pub fn poll_transmit(&mut self, now: Instant) -> Option<Segment<'static>> {
+        self.follow_up_calls(now);
         // The order of the choices matters. Every segment after the replies acknowledges all data in order, so that a pure acknowledgement comes last. Lost
         // segments come before new data, because the peer's program waits for lost data.
         if let Some(reply) = self.replies.pop_front() {
             return Some(reply);
+        }
+        if core::mem::take(&mut self.is_reset_due) {
+            return Some(self.build_reset(now));
         }
         if self.state.is_synchronised() {
             if let Some(probe) = self.probe.take()
@@ -38,28 +42,30 @@ impl Connection {
     fn lost_again(&mut self, now: Instant) -> Option<Segment<'static>> {
         let board = &self.send.board;
         let lost = board.next_lost()?;
-        let (start, end) = (lost.start, lost.end);
+        let (start, end, pushes) = (lost.start, lost.end, lost.pushes);
         let is_first = start == self.send.una;
         // The first segment may leave also beyond a shrunken window of the peer: the answer tells the present window.
         if board.in_flight() >= self.congestion.window || (!is_first && end > self.send.window_end()) {
             return None;
         }
         self.send.board.sent_again(start, now, true);
-        if matches!(self.recovery.phase, Phase::Reduced | Phase::Recovery) {
+        if matches!(self.recovery.phase, CaState::Cwr | CaState::Recovery) {
             self.recovery.reduction.sent += 1;
         }
         if is_first && !matches!(self.timer, Some((_, Timer::Reordering))) {
             self.set_retransmission_timer(now, true);
         }
-        Some(self.again(now, start, end))
+        Some(self.again(now, start, end, pushes))
     }
 
     /// Returns an earlier segment once more, and counts the repetition for the undo.
-    fn again(&mut self, now: Instant, start: Position, end: Position) -> Segment<'static> {
+    fn again(&mut self, now: Instant, start: Position, end: Position, pushes: bool) -> Segment<'static> {
+        self.send.last_data_at = now;
         self.counters.retransmissions += 1;
         self.recovery.again_at.get_or_insert(now);
         self.recovery.undo_left = Some(self.recovery.undo_left.unwrap_or(0) + 1);
-        self.build(now, start, end)
+        let segment = self.build(now, start, end);
+        Segment { flags: segment.flags.with_if(Flags::PSH, pushes), ..segment }
     }
 
     /// Returns the end of the next new segment, if the peer's window has room for a full segment or for all remaining data. A smaller part is not sent, so that
@@ -86,13 +92,6 @@ impl Connection {
     fn new_data(&mut self, now: Instant, is_probe: bool) -> Option<Segment<'static>> {
         if !self.send.has_new() {
             return None;
-        }
-        // The pause ends here. Its length shrinks the congestion window, because the window says nothing about the path after a long pause.
-        if self.send.board.is_empty() && self.send.next > self.send.first + 1 {
-            let idle = now.saturating_duration_since(self.send.last_data_at);
-            if self.config.slow_start_after_idle && !idle.is_zero() && self.recovery.phase == Phase::Open {
-                self.congestion.rest(idle, self.round_trips.timeout(&self.config));
-            }
         }
         let (una, next) = (self.send.una, self.send.next);
         let in_flight = self.send.board.in_flight();
@@ -124,12 +123,19 @@ impl Connection {
         // New data soon after the arrival of data is an answer.
         let has_answered = self.receive.last_data_at.is_some_and(|at| now.saturating_duration_since(at) < self.config.delayed_ack);
         let segment = self.build(now, start, end);
+        let has_data = !segment.payload.is_empty();
+        let pushes = has_data && start + segment.payload.len() as u64 == self.send.buffer.end();
+        let ends_burst = self.ends_burst(now, start, end);
+        if self.send.board.in_flight() == 0 {
+            // The curve of CUBIC must not rise during the pause that ends here.
+            self.congestion.shift(now.saturating_duration_since(self.send.last_data_at));
+        }
         self.send.next = end;
-        self.send.board.push(start, end, now);
+        self.send.board.push(start, end, now, pushes);
         self.send.last_data_at = now;
         // After an answer, later acknowledgements wait for data to travel with.
         self.receive.is_interactive |= has_answered;
-        if matches!(self.recovery.phase, Phase::Reduced | Phase::Recovery) {
+        if matches!(self.recovery.phase, CaState::Cwr | CaState::Recovery) {
             self.recovery.reduction.sent += 1;
         }
         let is_limiting = self.send.board.in_flight() >= self.congestion.window;
@@ -138,8 +144,9 @@ impl Connection {
             self.set_retransmission_timer(now, was_empty);
         }
         self.set_tail_timer(now, false);
-        let ecn = if self.send.has_ecn && !segment.payload.is_empty() { Ecn::Capable0 } else { Ecn::NotCapable };
-        Segment { ecn, ..segment }
+        let ecn = if self.send.has_ecn && has_data { Ecn::Capable0 } else { Ecn::NotCapable };
+        let flags = segment.flags.with_if(Flags::PSH, pushes || (has_data && ends_burst));
+        Segment { ecn, flags, ..segment }
     }
 
     /// Sets the timer for a probe of the peer's window, unless a segment is on the way whose answer will tell the window.
@@ -165,7 +172,8 @@ impl Connection {
                 let end = self.send.window_end().min(self.send.end()).min(self.send.next + self.segment_size() as u64);
                 if self.send.has_new() && self.send.next < end && self.state.may_send() {
                     (self.counters.probes, self.counters.probe_backoff) = (0, 0);
-                    return Some(self.send_new(now, end));
+                    let segment = self.send_new(now, end);
+                    return Some(Segment { flags: segment.flags | Flags::PSH, ..segment });
                 }
                 // A segment without data from below the peer's window carries nothing, but forces an answer.
                 let segment = self.build(now, self.send.next, self.send.next);
@@ -177,8 +185,8 @@ impl Connection {
     /// Sends the last segment again as a probe. The estimate of the segments on the way does not change.
     fn last_again(&mut self, now: Instant) -> Option<Segment<'static>> {
         let last = self.send.board.last()?;
-        let (start, end) = (last.start, last.end);
+        let (start, end, pushes) = (last.start, last.end, last.pushes);
         self.send.board.sent_again(start, now, false);
-        Some(self.again(now, start, end))
+        Some(self.again(now, start, end, pushes))
     }
 }

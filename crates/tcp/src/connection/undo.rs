@@ -3,7 +3,7 @@
 
 use super::Connection;
 use super::acknowledge::Ack;
-use super::parts::Phase;
+use crate::info::CaState;
 use crate::sequence::Position;
 
 impl Connection {
@@ -18,16 +18,26 @@ impl Connection {
         self.recovery.undo_left = (again > 0).then_some(again);
     }
 
-    /// Notes that the peer has received the positions from `start` to `end` (exclusive) twice.
-    pub(super) fn note_duplicate(&mut self, start: Position, end: Position) {
-        self.rack.saw_duplicate = true;
-        let Some(from) = self.recovery.undo_from else { return };
-        // A duplicate from before the phase says nothing about the phase. One report may cover several segments.
-        if end > from && start < end {
-            let segments = (end - start).div_ceil(self.send.mss as u64);
+    /// Notes that the peer has received the positions from `start` to `end` (exclusive) twice. Returns whether the duplicate may be a tail probe, or `None` if
+    /// the report does not count: the range is impossible, or more duplicates were reported than segments were sent again, so that the network has copied.
+    pub(super) fn note_duplicate(&mut self, start: Position, end: Position) -> Option<bool> {
+        let length = end.checked_sub(start).filter(|length| (1..=self.send.max_window).contains(length))?;
+        // One report may cover several segments.
+        let segments = length.div_ceil(self.send.mss as u64);
+        let is_probe = segments == 1 && self.tail.end == Some(end);
+        self.counters.duplicates += segments;
+        if self.counters.duplicates > self.counters.retransmissions {
+            return None;
+        }
+        // A needless probe was sent by its timer, and tells nothing about the patience with late segments. Nor does any duplicate on a path that has never
+        // reordered.
+        self.rack.saw_duplicate |= self.rack.has_reordering && !is_probe;
+        // A duplicate from before the phase says nothing about the phase.
+        if self.recovery.undo_from.is_some_and(|from| end > from) {
             let left = &mut self.recovery.undo_left;
             *left = left.map(|left| left.saturating_sub(u32::try_from(segments).unwrap_or(u32::MAX)));
         }
+        Some(is_probe)
     }
 
     /// Returns whether the timestamp echoed by `ack` is older than the first repetition of a segment, so that the original transmission was answered.
@@ -73,7 +83,7 @@ impl Connection {
             self.recovery.again_at = None;
         }
         self.undo(true);
-        self.recovery.phase = Phase::Disorder;
+        self.recovery.phase = CaState::Disorder;
         self.stay_open(ack);
         false
     }
@@ -83,8 +93,8 @@ impl Connection {
         let may = self.recovery.undo_from.is_some() && self.recovery.undo_left == Some(0);
         if may {
             self.undo(false);
-            if self.recovery.phase == Phase::Recovery {
-                self.recovery.phase = Phase::Disorder;
+            if self.recovery.phase == CaState::Recovery {
+                self.recovery.phase = CaState::Disorder;
             }
         }
         may
@@ -105,8 +115,8 @@ impl Connection {
             }
             return true;
         }
-        if self.recovery.phase == Phase::Loss {
-            self.recovery.phase = Phase::Open;
+        if self.recovery.phase == CaState::Loss {
+            self.recovery.phase = CaState::Open;
         }
         false
     }
@@ -117,7 +127,7 @@ impl Connection {
             self.undo(true);
             self.counters.retries = 0;
             if self.receive.has_sack {
-                self.recovery.phase = Phase::Open;
+                self.recovery.phase = CaState::Open;
             }
             return;
         }

@@ -29,6 +29,8 @@ pub(crate) struct Sent {
     again: bool,
     /// The segment was repeated at least once.
     ever_again: bool,
+    /// The segment has the flag PSH, because the program's data ended with it when it was sent first.
+    pub(crate) pushes: bool,
 }
 
 /// Instant and number of a transmission. The number orders transmissions of the same instant.
@@ -71,8 +73,12 @@ pub(crate) struct News {
     pub(crate) has_acked_again: bool,
     /// Instant at which the first acknowledged segment that was neither sacked before nor ever sent again was sent.
     pub(crate) first_acked: Option<Instant>,
+    /// Instant at which the last such segment was sent.
+    pub(crate) last_acked: Option<Instant>,
     /// Instant at which the first newly sacked segment that was never sent again was sent.
     pub(crate) first_sacked: Option<Instant>,
+    /// Instant at which the last such segment was sent.
+    pub(crate) last_sacked: Option<Instant>,
     /// Latest transmission among the segments that arrived, and whether its segment was ever sent again.
     pub(crate) latest: Option<(SentAt, bool)>,
     /// Start of the first segment that arrived after a later segment, although the first was never sent again.
@@ -108,11 +114,11 @@ impl Scoreboard {
     }
 
     /// Appends a new segment, sent at `at`. The segment must begin where the last segment ends.
-    pub(crate) fn push(&mut self, start: Position, end: Position, at: Instant) {
+    pub(crate) fn push(&mut self, start: Position, end: Position, at: Instant, pushes: bool) {
         self.transmissions += 1;
         let order = self.transmissions;
         self.by_time.push_back(((at, order), start));
-        self.queue.push_back(Sent { start, end, at, order, sacked: false, lost: false, again: false, ever_again: false });
+        self.queue.push_back(Sent { start, end, at, order, sacked: false, lost: false, again: false, ever_again: false, pushes });
     }
 
     /// Returns the index in `queue` of the segment that contains `start`.
@@ -143,6 +149,7 @@ impl Scoreboard {
                     news.has_acked_again = true;
                 } else {
                     news.first_acked = news.first_acked.or(Some(sent.at));
+                    news.last_acked = Some(sent.at);
                     news.note_order(sent.start, highest_sacked);
                 }
             }
@@ -192,6 +199,7 @@ impl Scoreboard {
                 news.hear(sent);
                 if !sent.ever_again {
                     news.first_sacked = news.first_sacked.or(Some(sent.at));
+                    news.last_sacked = Some(sent.at);
                     news.note_order(sent.start, highest_sacked);
                 }
             }
@@ -245,5 +253,11 @@ impl News {
     pub(crate) fn round_trip(&self, now: Instant) -> Option<Duration> {
         let acked = self.first_acked.filter(|_| !self.has_acked_again);
         Some(now.saturating_duration_since(acked.or(self.first_sacked)?))
+    }
+
+    /// Returns the round trip of the segment sent last among those of [`round_trip`](Self::round_trip).
+    pub(crate) fn latest_round_trip(&self, now: Instant) -> Option<Duration> {
+        let acked = self.last_acked.filter(|_| !self.has_acked_again);
+        Some(now.saturating_duration_since(acked.or(self.last_sacked)?))
     }
 }

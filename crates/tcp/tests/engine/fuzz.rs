@@ -214,8 +214,8 @@ proptest! {
         let configs = [
             TcpConfig::default(),
             TcpConfig::textbook(),
-            TcpConfig { ecn: true, rack: false, receive_buffer: 5000, ..TcpConfig::default() },
-            TcpConfig { receive_buffer: 100_000, timestamps: false, keepalive: Some(Default::default()), ..TcpConfig::default() },
+            TcpConfig { ecn: true, rack: false, receive_buffer: Some(5000), ..TcpConfig::default() },
+            TcpConfig { receive_buffer: Some(100_000), timestamps: false, keepalive: Some(Default::default()), ..TcpConfig::default() },
         ];
         fire(configs[kind].clone(), shots);
     }
@@ -232,7 +232,7 @@ proptest! {
         let configs = [
             TcpConfig::default(),
             TcpConfig::textbook(),
-            TcpConfig { rack: false, receive_buffer: 8000, nodelay: true, ..TcpConfig::default() },
+            TcpConfig { rack: false, receive_buffer: Some(8000), nodelay: true, ..TcpConfig::default() },
             TcpConfig { sack: false, ecn: true, ..TcpConfig::default() },
         ];
         let mut world = World::new(&words, seed)

@@ -7,6 +7,7 @@
     reason = "tests fail where they stop, and count samples"
 )]
 
+mod buffers;
 mod fuzz;
 mod recovery;
 mod rows;

@@ -105,20 +105,23 @@ fn reno_has_the_throughput_of_the_square_root_law() {
     }
 }
 
-/// RFC 9438, section 5.2: the average window is (3.7/1.2)^¼·(R/p)^¾ segments where CUBIC is ahead of Reno.
+/// RFC 9438, section 5.2: the average window is (3.7/1.2)^¼·(R/p)^¾ segments where CUBIC is ahead of Reno. Linux rounds the distance from the plateau down to
+/// whole segments, so that the window is up to a segment ahead of the curve: a fifth more at a window of 56 segments.
 #[test]
 fn cubic_has_the_throughput_of_its_response_function() {
     let (every, round_trip) = (1000, 0.2);
     let seen = throughput(&TcpConfig::default(), every, "delay 100ms", 60);
     let window = (0.4f64 * 3.7 / 1.2).powf(0.25) * (round_trip * every as f64).powf(0.75);
     let expected = window * 1448.0 * 8.0 / round_trip;
-    assert!((0.85..1.15).contains(&(seen / expected)), "{seen:.0} bit/s, expected {expected:.0}");
+    assert!((1.0..1.3).contains(&(seen / expected)), "{seen:.0} bit/s, expected {expected:.0}");
 }
 
 #[test]
 fn jitter_without_loss_costs_no_window() {
+    // Jitter may look like a queue that grows, and end slow start early, on Linux as here.
+    let config = TcpConfig { hystart: false, ..TcpConfig::default() };
     for seed in 0..20 {
-        let mut world = World::new("delay 20ms 5ms", seed).programs(Program::default(), Program::writes(1_000_000)).connect();
+        let mut world = World::new("delay 20ms 5ms", seed).config(&config).programs(Program::default(), Program::writes(1_000_000)).connect();
         world.run_to_the_last_octet(Duration::from_secs(60));
         let info = world.ends[1].as_ref().unwrap().info();
         assert_eq!(info.timeouts, 0);
@@ -154,7 +157,7 @@ fn every_octet_arrives_over_bad_links() {
         TcpConfig::textbook(),
         TcpConfig { rack: false, ..TcpConfig::default() },
         TcpConfig { sack: false, ..TcpConfig::default() },
-        TcpConfig { timestamps: false, receive_buffer: 20_000, ..TcpConfig::default() },
+        TcpConfig { timestamps: false, receive_buffer: Some(20_000), ..TcpConfig::default() },
     ];
     for words in words {
         for (seed, config) in (0..4).flat_map(|seed| configs.iter().map(move |config| (seed, config))) {

@@ -23,7 +23,7 @@ use std::net::SocketAddr;
 /// Name of these sockets in messages.
 const KIND: &str = "a TCP socket";
 
-pub use cohaptic_tcp::{ConfigError, CongestionControl, EcnFallback, Flags, Info, Keepalive, State, TcpConfig};
+pub use cohaptic_tcp::{CaState, ConfigError, CongestionControl, EcnFallback, Flags, Info, Keepalive, State, TcpConfig};
 #[cfg(feature = "tokio")]
 pub use owned::{OwnedReadHalf, OwnedWriteHalf, ReuniteError};
 #[cfg(feature = "tokio")]

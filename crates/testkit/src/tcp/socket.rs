@@ -258,9 +258,10 @@ impl TcpSocket {
         recv_buffer_size,
         set_recv_buffer_size,
         u32,
-        "The size of the receive buffer \\[byte\\]: as with Linux, twice the size that was set.",
-        |settings| told(settings.config.receive_buffer),
-        |to, size| to.config.receive_buffer = doubled(size)
+        "The size of the receive buffer \\[byte\\]: as with Linux, twice the size that was set. A size that was set stays, and is the window. The default grows \
+         as the program reads.",
+        |settings| told(settings.config.receive_buffer.unwrap_or(settings.config.least_receive_buffer)),
+        |to, size| to.config.receive_buffer = Some(doubled(size))
     );
     option!(
         linger,

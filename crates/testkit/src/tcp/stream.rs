@@ -79,7 +79,7 @@ impl TcpStream {
     ///
     /// # Errors
     ///
-    /// [`io::ErrorKind::ConnectionRefused`] after a round trip if nobody listens there; [`io::ErrorKind::TimedOut`] after 127 s without an answer;
+    /// [`io::ErrorKind::ConnectionRefused`] after a round trip if nobody listens there; [`io::ErrorKind::TimedOut`] after 131 s without an answer;
     /// [`io::ErrorKind::HostUnreachable`] if no host ever had the address.
     ///
     /// # Panics

@@ -23,10 +23,10 @@ fn the_trace_shows_flags_relative_numbers_and_windows() {
     assert_eq!(
         lines[..4],
         [
-            "0 s  a -> b  packet 0 is SYN 49152 > 80, sequence 0, 0 octets, window 65535",
-            "0.05 s  b -> a  packet 0 is SYN|ACK 80 > 49152, sequence 0, 0 octets, acknowledges 1, window 65535",
-            "0.1 s  a -> b  packet 1 is ACK 49152 > 80, sequence 1, 0 octets, acknowledges 1, window 6291456",
-            "0.5 s  a -> b  packet 2 is PSH|ACK 49152 > 80, sequence 1, 5 octets, acknowledges 1, window 6291456",
+            "0 s  a -> b  packet 0 is SYN 49152 > 80, sequence 0, 0 octets, window 64240",
+            "0.05 s  b -> a  packet 0 is SYN|ACK 80 > 49152, sequence 0, 0 octets, acknowledges 1, window 65160",
+            "0.1 s  a -> b  packet 1 is ACK 49152 > 80, sequence 1, 0 octets, acknowledges 1, window 64256",
+            "0.5 s  a -> b  packet 2 is PSH|ACK 49152 > 80, sequence 1, 5 octets, acknowledges 1, window 64256",
         ]
     );
     // With headers: 20 of IP, 20 of TCP and 12 of timestamps.
@@ -155,7 +155,7 @@ fn what_each_socket_waits_for_is_told() {
 
 #[test]
 fn two_ends_that_write_and_do_not_read_are_stuck_and_named() {
-    let config = TcpConfig { receive_buffer: 20_000, least_send_buffer: 20_000, send_buffer: 20_000, ..TcpConfig::default() };
+    let config = TcpConfig { receive_buffer: Some(20_000), least_send_buffer: 20_000, send_buffer: 20_000, ..TcpConfig::default() };
     for bed in beds() {
         let text = complaint(bed.tcp(config.clone()), async |bed| {
             let (mut client, mut server, _listener) = pair(&bed).await;
@@ -190,7 +190,7 @@ fn idle_connections_that_are_kept_alive_are_stuck_too() {
 
 #[test]
 fn a_closed_window_is_no_reason_to_give_up_while_a_program_waits_for_time() {
-    let config = TcpConfig { receive_buffer: 20_000, ..TcpConfig::default() };
+    let config = TcpConfig { receive_buffer: Some(20_000), ..TcpConfig::default() };
     for bed in beds() {
         bed.tcp(config.clone()).time_limit(DAY).run(|bed| async move {
             let (mut client, mut server, _listener) = pair(&bed).await;

@@ -71,6 +71,8 @@ fn marks_slow_a_sender_down_that_asks_for_them() {
             let (mut client, mut server, _listener) = pair(&bed).await;
             let writing = bed.host("a").spawn(async move {
                 send_all(&mut client, 500_000).await;
+                // The buffer takes much of the data before a mark is reported.
+                time::sleep(Duration::from_secs(5)).await;
                 client.info()
             });
             read_all(&mut server, 500_000).await;
@@ -113,7 +115,7 @@ fn small_writes_wait_for_an_answer_unless_the_stream_has_no_delay() {
 
 #[test]
 fn a_slow_reader_holds_the_writer_back() {
-    let config = TcpConfig { receive_buffer: 30_000, send_buffer: 40_000, least_send_buffer: 40_000, ..TcpConfig::default() };
+    let config = TcpConfig { receive_buffer: Some(30_000), send_buffer: 40_000, least_send_buffer: 40_000, ..TcpConfig::default() };
     for bed in beds() {
         bed.tcp(config.clone()).run_twice(|bed| async move {
             let (client, mut server, _listener) = pair(&bed).await;
