@@ -18,10 +18,11 @@ use core::time::Duration;
 
 use cohaptic_units::{Bytes, Instant, Rate};
 
-use super::codel::{self, CODEL, CoDelState};
+use super::codel::CODEL;
+use super::fifo::{Fifo, Rules};
 use super::framing::{CELLS, SIGNED_SIZE};
-use super::limit::{LIMIT, Waiting};
-use super::red::{self, RED, RedState};
+use super::limit::LIMIT;
+use super::red::RED;
 use super::{CoDel, DeliveryTrace, Framing, QueueLimit, Red};
 use crate::fates::fate::DropCause;
 use crate::packet::{Carried, Exit, Output, Outputs};
@@ -78,6 +79,30 @@ impl Bottleneck {
             Service::Recorded(trace) => red.mean_packet().get() as f64 * 8.0 / trace.mean_rate(),
         }
     }
+
+    /// Returns the bits that a transmitter of constant rate has sent after a span, in 10⁻⁹ bit; 0 for a transmitter that follows a recording, which sends at its opportunities.
+    pub(super) fn bits_sent(&self, span: Duration) -> u128 {
+        match &self.service {
+            Service::Rate(rate) => rate.bits_sent(span),
+            Service::Recorded(_) => 0,
+        }
+    }
+
+    /// Returns the time from `now` after which the transmitter will have sent a packet of which `left` bits remained at `since`, and `waiting` bits after it (all in
+    /// 10⁻⁹ bit): the wait of the newest packet.
+    pub(super) fn time_to_send(&self, (since, left): (Instant, u128), waiting: u128, now: Instant) -> Duration {
+        match &self.service {
+            Service::Rate(rate) => {
+                let sent = rate.bits_sent(now.saturating_duration_since(since));
+                rate.transmission_time(left.saturating_sub(sent) + waiting)
+            }
+            Service::Recorded(trace) => {
+                let needed = (left + waiting).div_ceil(giga_bits(trace.bytes())).max(1);
+                let done = u64::try_from(needed).ok().and_then(|needed| trace.nth_after(now, needed));
+                done.unwrap_or(Instant::MAX).saturating_duration_since(now)
+            }
+        }
+    }
 }
 
 /// Returns an idle span of the transmitter as a number of mean packets, each of which takes `mean_packet` \[s\]. Returns zero if a mean packet takes no time.
@@ -94,63 +119,86 @@ pub(crate) fn giga_bits(bytes: Bytes) -> u128 {
 #[derive(Clone, Debug)]
 pub(crate) struct BottleneckStage<T> {
     config: Bottleneck,
-    /// Waiting packets, the oldest first, each with the instant at which it was offered.
-    waiting: VecDeque<(Instant, Carried<T>)>,
-    /// Bytes of the waiting packets, framing not counted. Wider than [`Bytes`], whose sum would saturate and then be wrong after a departure.
-    waiting_bytes: u128,
-    /// Bits to transmit for the waiting packets, in 10⁻⁹ bit.
-    waiting_bits: u128,
-    in_service: Option<InService<T>>,
-    /// Instant since which the transmitter is idle, or, with RED, up to which idle time has been counted. Meaningless during a transmission.
-    idle_since: Instant,
+    queue: Queue<T>,
     /// Size of the latest packet that found the transmitter idle, with its transmission time. Cached, because the time is a division of 128 bits.
     latest_service: Option<(Bytes, Duration)>,
-    red: RedState,
-    codel: CoDelState,
 }
 
-/// Packet in transmission.
-#[derive(Clone, Debug)]
-pub(crate) struct InService<T> {
-    pub(crate) packet: Carried<T>,
-    /// Instant since which the remaining bits are sent at the present rate.
-    pub(crate) since: Instant,
-    /// Bits that remained at `since`, in 10⁻⁹ bit.
-    pub(crate) left: u128,
-    /// Instant of the next event: the departure of the packet, or, on a recorded line, the next opportunity to send.
-    pub(crate) next: Instant,
-    /// Number of opportunities at `next`. Used only on a recorded line.
-    pub(crate) opportunities: u64,
+/// Packets of a stage, each with the instant at which it was offered.
+pub(crate) type Queue<T> = Fifo<(Instant, Carried<T>), Sums>;
+
+/// Sums over the waiting packets of a stage.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Sums {
+    /// Bytes, framing not counted. Wider than [`Bytes`], whose sum would saturate and then be wrong after a departure.
+    bytes: u128,
+    /// Bits to transmit, in 10⁻⁹ bit.
+    bits: u128,
+}
+
+impl<T> Rules<(Instant, Carried<T>)> for Bottleneck {
+    type Sums = Sums;
+
+    fn bottleneck(&self) -> &Bottleneck {
+        self
+    }
+
+    fn offered(&self, (offered, _): &(Instant, Carried<T>)) -> Instant {
+        *offered
+    }
+
+    fn size(&self, (_, packet): &(Instant, Carried<T>)) -> Bytes {
+        packet.info.size
+    }
+
+    fn bits(&self, (_, packet): &(Instant, Carried<T>)) -> u128 {
+        giga_bits(self.framing.on_the_line(packet.info.size))
+    }
+
+    fn ecn_capable(&self, (_, packet): &(Instant, Carried<T>)) -> bool {
+        packet.info.ecn_capable
+    }
+
+    fn mark(&self, (_, packet): &mut (Instant, Carried<T>)) {
+        packet.marks.congestion = true;
+    }
+
+    fn add(&self, sums: &mut Sums, packet: &(Instant, Carried<T>)) {
+        sums.bytes += u128::from(self.size(packet).get());
+        sums.bits += self.bits(packet);
+    }
+
+    fn remove(&self, sums: &mut Sums, packet: &(Instant, Carried<T>)) {
+        sums.bytes -= u128::from(self.size(packet).get());
+        sums.bits -= self.bits(packet);
+    }
+
+    fn waiting(&self, sums: &Sums, _count: usize) -> (u128, u128) {
+        (sums.bytes, sums.bits)
+    }
+
+    fn mean_packet(&self, red: &Red) -> f64 {
+        self.time_of_mean_packet(red)
+    }
+
+    fn next(&self, now: Instant, left: u128) -> (Instant, u64) {
+        match &self.service {
+            Service::Rate(rate) => (now.saturating_add(rate.transmission_time(left)), 0),
+            Service::Recorded(trace) => trace.next_after(now).unwrap_or((Instant::MAX, 1)),
+        }
+    }
 }
 
 impl<T> BottleneckStage<T> {
     /// Returns an idle bottleneck.
     pub(crate) fn new(config: Bottleneck) -> Self {
-        Self {
-            config,
-            waiting: VecDeque::new(),
-            waiting_bytes: 0,
-            waiting_bits: 0,
-            in_service: None,
-            idle_since: Instant::ZERO,
-            latest_service: None,
-            red: RedState::default(),
-            codel: CoDelState::default(),
-        }
+        let queue = Fifo::new(&config.discipline);
+        Self::resumed(config, queue)
     }
 
-    /// Returns a bottleneck with a packet in transmission, waiting packets with the instants at which they were offered, the instant since which the
-    /// transmitter is idle, and the state of the disciplines.
-    pub(crate) fn resumed(
-        config: Bottleneck,
-        in_service: Option<InService<T>>,
-        waiting: VecDeque<(Instant, Carried<T>)>,
-        (idle_since, red, codel): (Instant, RedState, CoDelState),
-    ) -> Self {
-        let mut stage = Self { in_service, waiting, idle_since, red, codel, ..Self::new(config) };
-        stage.waiting_bytes = stage.waiting.iter().map(|(_, packet)| u128::from(packet.info.size.get())).sum();
-        stage.waiting_bits = stage.bits_of_waiting();
-        stage
+    /// Returns a bottleneck with packets.
+    pub(crate) const fn resumed(config: Bottleneck, queue: Queue<T>) -> Self {
+        Self { config, queue, latest_service: None }
     }
 
     /// Returns the departure of a packet of `size` that is offered `now` to an idle transmitter. Returns `None` if the transmitter is busy or follows a
@@ -160,7 +208,7 @@ impl<T> BottleneckStage<T> {
     pub(crate) fn departure_if_idle(&mut self, now: Instant, size: Bytes) -> Option<Instant> {
         let Service::Rate(rate) = &self.config.service else { return None };
         // A waiting packet implies a packet in transmission, so that the queue is empty here.
-        if self.in_service.is_some() || matches!(self.config.discipline, Discipline::Red(_)) {
+        if self.queue.on_line().is_some() || matches!(self.config.discipline, Discipline::Red(_)) {
             return None;
         }
         let service = match self.latest_service {
@@ -178,195 +226,63 @@ impl<T> BottleneckStage<T> {
     /// memory of an empty queue stays unchanged.
     #[inline]
     pub(crate) fn is_idle_from(&mut self, departure: Instant) {
-        self.idle_since = departure;
+        self.queue.is_idle_from(departure);
     }
 
     /// Takes a packet, which is then sent, waits, or is dropped into `outputs`; other packets may be dropped in its place. `word` gives the packet's random
     /// word for queues.
-    pub(crate) fn offer(&mut self, now: Instant, mut packet: Carried<T>, word: impl FnOnce() -> u64, outputs: &mut Outputs<T>) {
-        if let Discipline::Red(red) = self.config.discipline {
-            match self.red_verdict(&red, now, packet.info.ecn_capable, word()) {
-                red::Verdict::Pass => {}
-                red::Verdict::Mark => packet.marks.congestion = true,
-                red::Verdict::Drop => return drop(outputs, now, DropCause::Red, packet),
-            }
-        }
-        // An idle transmitter implies an empty queue, so no limit applies.
-        if self.in_service.is_none() {
-            self.serve(now, now, packet, outputs);
-            return;
-        }
-        let size = packet.info.size;
-        // The newest packet is dropped if dropping every waiting packet does not make room for it.
-        while !self.admits(now, size) {
-            let head = if self.config.discipline == Discipline::HeadDrop { self.take_head() } else { None };
-            match head {
-                Some((_, head)) => drop(outputs, now, DropCause::QueueFull, head),
-                None => return drop(outputs, now, DropCause::QueueFull, packet),
-            }
-        }
-        self.waiting_bytes += u128::from(size.get());
-        self.waiting_bits += self.on_the_line(&packet);
-        self.waiting.push_back((now, packet));
+    pub(crate) fn offer(&mut self, now: Instant, packet: Carried<T>, word: impl FnOnce() -> u64, outputs: &mut Outputs<T>) {
+        self.queue.offer(now, &self.config, (now, packet), word, |cause, packet| drop(outputs, now, cause, packet));
     }
 
     /// Returns the instant at which [`BottleneckStage::release`] must be called next, or `None` if the transmitter is idle.
     pub(crate) fn next_at(&self) -> Option<Instant> {
-        self.in_service.as_ref().map(|service| service.next)
+        self.queue.on_line().map(|on_line| on_line.next)
     }
 
     /// Appends the packets that leave the bottleneck `now` to `released`, and dropped packets to `outputs`. `now` is the instant returned by
     /// [`next_at`](Self::next_at).
     pub(crate) fn release(&mut self, now: Instant, released: &mut VecDeque<Carried<T>>, outputs: &mut Outputs<T>) {
-        let Some(service) = self.in_service.take() else { return };
-        match &self.config.service {
+        let Self { config, queue, .. } = self;
+        let trace = match &config.service {
             Service::Rate(_) => {
-                released.push_back(service.packet);
-                self.serve_next(now, outputs);
+                let left = queue.leave(now, config, |at, cause, packet| drop(outputs, at, cause, packet));
+                return released.extend(left.map(|(_, (_, packet))| packet));
             }
-            Service::Recorded(trace) => {
-                // The opportunities of this instant are shared by as many packets as fit. A budget that is left when the queue is empty is lost.
-                let mut budget = giga_bits(trace.bytes()).saturating_mul(service.opportunities.into());
-                self.in_service = Some(service);
-                while let Some(service) = &mut self.in_service {
-                    if service.left > budget {
-                        service.left -= budget;
-                        break;
-                    }
-                    budget -= service.left;
-                    released.extend(self.in_service.take().map(|service| service.packet));
-                    self.serve_next(now, outputs);
-                    if budget == 0 {
-                        break;
-                    }
-                }
-                self.announce(now);
+            Service::Recorded(trace) => trace,
+        };
+        // The opportunities of this instant are shared by as many packets as fit. A budget that is left when the queue is empty is lost.
+        let opportunities = queue.on_line().map_or(0, |on_line| on_line.opportunities);
+        let mut budget = giga_bits(trace.bytes()).saturating_mul(opportunities.into());
+        while let Some(on_line) = queue.on_line_mut() {
+            if on_line.left > budget {
+                on_line.left -= budget;
+                break;
+            }
+            budget -= on_line.left;
+            released.extend(queue.on_line_mut().take().map(|on_line| on_line.packet.1));
+            queue.serve_next(now, config, |cause, packet| drop(outputs, now, cause, packet));
+            if budget == 0 {
+                break;
             }
         }
+        queue.announce(now, config);
     }
 
-    /// Changes rate, framing, limit and discipline. A waiting packet keeps its place even if a smaller limit is exceeded. The packet in transmission keeps the
-    /// bits already sent.
+    /// Changes rate, framing, limit and discipline; see [`Fifo::reconfigure`].
     pub(crate) fn reconfigure(&mut self, now: Instant, config: Bottleneck) {
-        if let (Some(service), Service::Rate(rate)) = (&mut self.in_service, &self.config.service) {
-            service.left = service.left.saturating_sub(rate.bits_sent(now.saturating_duration_since(service.since)));
-        }
-        // A new kind of discipline begins without memory. New parameters of the same kind keep the memory.
-        if core::mem::discriminant(&self.config.discipline) != core::mem::discriminant(&config.discipline) {
-            (self.red, self.codel) = (RedState::default(), CoDelState::default());
-        }
+        self.queue.reconfigure(now, &self.config, &config);
         (self.config, self.latest_service) = (config, None);
-        self.waiting_bits = self.bits_of_waiting();
-        self.announce(now);
     }
 
     /// Returns the packet in transmission and all waiting packets, in order, when a link loses its bottleneck.
     pub(crate) fn dismantle(self) -> impl Iterator<Item = Carried<T>> {
-        self.in_service.into_iter().map(|service| service.packet).chain(self.waiting.into_iter().map(|(_, packet)| packet))
-    }
-
-    /// Returns the bits to transmit for all waiting packets, in 10⁻⁹ bit.
-    fn bits_of_waiting(&self) -> u128 {
-        self.waiting.iter().map(|(_, packet)| self.on_the_line(packet)).sum()
-    }
-
-    /// Returns the bits to transmit for a packet, in 10⁻⁹ bit.
-    fn on_the_line(&self, packet: &Carried<T>) -> u128 {
-        giga_bits(self.config.framing.on_the_line(packet.info.size))
-    }
-
-    /// Returns whether the limit admits another packet of `size`.
-    fn admits(&self, now: Instant, size: Bytes) -> bool {
-        let Some(limit) = self.config.limit else { return true };
-        let time = if matches!(limit, QueueLimit::Time(_)) { self.time_to_send_all(now) } else { Duration::ZERO };
-        limit.admits(Waiting { packets: self.waiting.len() as u64, bytes: self.waiting_bytes, time }, size)
-    }
-
-    /// Returns the time after which the transmitter will have sent all its packets, which is the wait of the newest packet.
-    fn time_to_send_all(&self, now: Instant) -> Duration {
-        let Some(service) = &self.in_service else { return Duration::ZERO };
-        match &self.config.service {
-            Service::Rate(rate) => {
-                let sent = rate.bits_sent(now.saturating_duration_since(service.since));
-                rate.transmission_time(service.left.saturating_sub(sent) + self.waiting_bits)
-            }
-            Service::Recorded(trace) => {
-                let needed = (service.left + self.waiting_bits).div_ceil(giga_bits(trace.bytes())).max(1);
-                let done = u64::try_from(needed).ok().and_then(|needed| trace.nth_after(now, needed));
-                done.unwrap_or(Instant::MAX).saturating_duration_since(now)
-            }
-        }
-    }
-
-    /// Returns RED's verdict about an offered packet.
-    fn red_verdict(&mut self, red: &Red, now: Instant, ecn_capable: bool, word: u64) -> red::Verdict {
-        let idle = if self.in_service.is_none() { now.saturating_duration_since(self.idle_since) } else { Duration::ZERO };
-        // A packet that RED drops leaves the transmitter idle. Moving `idle_since` keeps the next packet from counting the same idle time again.
-        self.idle_since = now;
-        let idle_packets = idle_packets(idle, self.config.time_of_mean_packet(red));
-        self.red.verdict(red, self.waiting_bytes, idle_packets, ecn_capable, word)
-    }
-
-    /// Removes the oldest waiting packet, and returns it with the instant at which it was offered.
-    fn take_head(&mut self) -> Option<(Instant, Carried<T>)> {
-        let (since, packet) = self.waiting.pop_front()?;
-        self.waiting_bytes -= u128::from(packet.info.size.get());
-        self.waiting_bits -= self.on_the_line(&packet);
-        Some((since, packet))
-    }
-
-    /// Begins to send the oldest waiting packet, or marks the transmitter idle if no packet waits.
-    fn serve_next(&mut self, now: Instant, outputs: &mut Outputs<T>) {
-        match self.take_head() {
-            Some((since, packet)) => self.serve(now, since, packet, outputs),
-            None => {
-                self.codel.empty();
-                self.idle_since = now;
-            }
-        }
-    }
-
-    /// Begins to send a packet that has waited since `since`. If CoDel drops the packet, the next waiting packet takes its place.
-    fn serve(&mut self, now: Instant, mut since: Instant, mut packet: Carried<T>, outputs: &mut Outputs<T>) {
-        if let Discipline::CoDel(codel) = self.config.discipline {
-            loop {
-                let sojourn = now.saturating_duration_since(since);
-                match self.codel.verdict(&codel, now, sojourn, self.waiting_bytes, packet.info.ecn_capable) {
-                    codel::Verdict::Send => break,
-                    codel::Verdict::Mark => {
-                        packet.marks.congestion = true;
-                        break;
-                    }
-                    codel::Verdict::Drop => {
-                        drop(outputs, now, DropCause::CoDel, packet);
-                        let Some(next) = self.take_head() else {
-                            self.codel.empty();
-                            self.idle_since = now;
-                            return;
-                        };
-                        (since, packet) = next;
-                    }
-                }
-            }
-        }
-        let left = self.on_the_line(&packet);
-        self.in_service = Some(InService { packet, since: now, left, next: now, opportunities: 0 });
-        self.announce(now);
-    }
-
-    /// Sets the next event of the packet in transmission, whose remaining bits are those at `now`.
-    fn announce(&mut self, now: Instant) {
-        let Some(service) = &mut self.in_service else { return };
-        service.since = now;
-        match &self.config.service {
-            Service::Rate(rate) => service.next = now.saturating_add(rate.transmission_time(service.left)),
-            Service::Recorded(trace) => (service.next, service.opportunities) = trace.next_after(now).unwrap_or((Instant::MAX, 1)),
-        }
+        self.queue.dismantle().map(|(_, packet)| packet)
     }
 }
 
 /// Appends a dropped packet to `outputs`.
-fn drop<T>(outputs: &mut Outputs<T>, now: Instant, cause: DropCause, packet: Carried<T>) {
+fn drop<T>(outputs: &mut Outputs<T>, now: Instant, cause: DropCause, (_, packet): (Instant, Carried<T>)) {
     outputs.push(Output { packet, exit: Exit::Dropped(now, cause) });
 }
 
