@@ -176,8 +176,7 @@ impl<P, S: Default> Fifo<P, S> {
     #[inline(always)]
     fn serve<R: Rules<P, Sums = S>>(&mut self, now: Instant, rules: &R, mut packet: P, mut dropped: impl FnMut(DropCause, P)) {
         if let Discipline::CoDel(codel) = &rules.bottleneck().discipline {
-            loop {
-                let DisciplineState::CoDel(state) = &mut self.discipline else { break };
+            while let DisciplineState::CoDel(state) = &mut self.discipline {
                 let (sojourn, left) = (now.saturating_duration_since(rules.offered(&packet)), rules.waiting(&self.sums, self.waiting.len()).0);
                 match state.verdict(codel, now, sojourn, left, rules.ecn_capable(&packet)) {
                     codel::Verdict::Send => break,
