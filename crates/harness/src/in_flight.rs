@@ -45,7 +45,6 @@ impl<const A: usize> SamplesInFlight<A> {
     }
 
     /// Returns the kind of the samples.
-    #[inline(always)]
     pub(crate) const fn kind(&self) -> SampleKind {
         self.kind
     }

@@ -33,7 +33,6 @@ impl<C: Copy> Gains<C> {
 impl<N: Number> Gains<N> {
     /// Returns the force of the spring and the damper \[N\], where `apart` is the motion of one end relative to the other end.
     #[must_use]
-    #[inline(always)]
     pub fn force(&self, apart: Motion<N>) -> N {
         self.stiffness * apart.position + self.damping * apart.velocity
     }

@@ -43,7 +43,6 @@ impl<const A: usize> Device<A> for RestingDevice<A> {
         State { position: self.position, velocity: [0.0; A] }
     }
 
-    #[inline]
     fn advance(&mut self, _now: Instant, _span: Duration, _coupling_force: [f64; A]) {}
 }
 
@@ -142,7 +141,6 @@ impl<const A: usize> HandForce<A> {
 }
 
 impl<const A: usize> Device<A> for SimulatedDevice<A> {
-    #[inline]
     fn state(&self) -> State<A> {
         self.state
     }

@@ -70,7 +70,6 @@ impl<const A: usize> Lead<A> {
 
     /// Returns whether the lead is linear from the instant of its sum to `now`.
     #[must_use]
-    #[inline]
     pub fn holds_at(&self, now: Instant) -> bool {
         self.since <= now && now < self.until
     }

@@ -14,7 +14,6 @@ pub struct Motion<N = f64> {
 impl<N: Number> Motion<N> {
     /// Returns the motion relative to `other`: the differences of position and velocity.
     #[must_use]
-    #[inline(always)]
     pub fn relative_to(self, other: Self) -> Self {
         Self { position: self.position - other.position, velocity: self.velocity - other.velocity }
     }

@@ -1,4 +1,7 @@
 //! Numbers in which the tick of a peer is computed.
+//!
+//! Most functions that are generic over [`Number`] are `#[inline(always)]`: a caller may compile a tick of eight peers for wider instructions than those of
+//! its build, and a function that is not inlined there is compiled without these instructions.
 
 use core::ops::{Add, Mul, Neg, Sub};
 
@@ -20,7 +23,6 @@ impl Number for qd::Quad {
 }
 
 impl Number for f64 {
-    #[inline(always)]
     fn of(value: f64) -> Self {
         value
     }

@@ -30,7 +30,6 @@ impl<const A: usize> ObjectCopy<A> {
 
     /// Returns position and velocity of the copy.
     #[must_use]
-    #[inline]
     pub const fn state(&self) -> &State<A> {
         &self.state
     }

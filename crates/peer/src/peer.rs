@@ -395,7 +395,6 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
 
     /// Returns the copy of the object.
     #[must_use]
-    #[inline]
     pub const fn object(&self) -> &ObjectCopy<A> {
         &self.object
     }

@@ -129,7 +129,6 @@ impl<C> StepMap<C> {
 impl<C: Copy> StepMap<C> {
     /// Returns the coefficients: increments by (x, v) row by row, then by the force.
     #[must_use]
-    #[inline(always)]
     pub const fn coefficients(&self) -> ([[C; 2]; 2], [C; 2]) {
         (self.state, self.force)
     }

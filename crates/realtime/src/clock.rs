@@ -50,7 +50,6 @@ impl MonotonicClock {
 }
 
 impl Clock for MonotonicClock {
-    #[inline]
     fn now(&self) -> Instant {
         Instant::from_nanos(nanos(clock_gettime(ClockId::Monotonic)) - self.origin)
     }

@@ -36,7 +36,6 @@ impl Lateness {
     }
 
     /// Records the lateness of one event; zero if the event was on time.
-    #[inline]
     pub fn record(&mut self, lateness: Duration) {
         self.sum = self.sum.saturating_add(lateness);
         // Clamped first: the histogram refuses values above its bound.

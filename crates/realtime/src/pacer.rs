@@ -103,7 +103,6 @@ impl Pacer {
     /// # Errors
     ///
     /// The error of the system.
-    #[inline]
     pub fn wait(&mut self, clock: &impl Clock, deadline: Option<Instant>, readable: &[BorrowedFd<'_>]) -> io::Result<Woken> {
         let woken = self.approach(clock, deadline, readable)?;
         if let (Woken::Deadline, Some(deadline)) = (woken, deadline) {
@@ -120,7 +119,6 @@ impl Pacer {
     /// # Errors
     ///
     /// The error of the system.
-    #[inline]
     pub(crate) fn approach(&mut self, clock: &impl Clock, deadline: Option<Instant>, readable: &[BorrowedFd<'_>]) -> io::Result<Woken> {
         let Some(deadline) = deadline else {
             return Ok(if clock.block(None, readable)? { Woken::Readable } else { Woken::Early });
@@ -148,7 +146,6 @@ impl Pacer {
     }
 
     /// Counts a wake-up that was late by `late`, and computes the margin anew.
-    #[inline]
     fn learn(&mut self, late: Duration) {
         self.wake_ups.note(late);
         // Without a bound within the histogram, even the longest margin covers too few wake-ups; the margin is then the longest.
@@ -174,7 +171,6 @@ impl WakeUps {
     /// Count at which all counts are halved.
     const MOST: u32 = 1 << 11;
 
-    #[inline]
     fn note(&mut self, late: Duration) {
         let step = late.as_nanos() / Self::STEP.as_nanos();
         if let Some(count) = usize::try_from(step).ok().and_then(|step| self.counts.get_mut(step)) {
@@ -190,7 +186,6 @@ impl WakeUps {
     }
 
     /// Returns the lateness, rounded down to a step, that `percent` of the wake-ups do not exceed, or `None` if it is beyond the last step.
-    #[inline]
     fn bound(&self, percent: u32) -> Option<Duration> {
         let wanted = (self.count * percent).div_ceil(100);
         let mut found = 0;

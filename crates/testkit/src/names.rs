@@ -87,7 +87,6 @@ impl fmt::Debug for Names {
 impl Deref for Names {
     type Target = [String];
 
-    #[inline]
     fn deref(&self) -> &[String] {
         &self.list
     }

@@ -18,14 +18,12 @@ impl Instant {
 
     /// Returns the instant `nanos` nanoseconds after the beginning.
     #[must_use]
-    #[inline]
     pub const fn from_nanos(nanos: u64) -> Self {
         Self(nanos)
     }
 
     /// Returns the time since the beginning \[ns\], exactly.
     #[must_use]
-    #[inline]
     pub const fn as_nanos(self) -> u64 {
         self.0
     }

@@ -13,14 +13,12 @@ impl Bytes {
 
     /// Returns the size of `bytes` bytes.
     #[must_use]
-    #[inline]
     pub const fn new(bytes: u64) -> Self {
         Self(bytes)
     }
 
     /// Returns the size \[byte\].
     #[must_use]
-    #[inline]
     pub const fn get(self) -> u64 {
         self.0
     }

@@ -242,12 +242,10 @@ struct Pending<P> {
 impl<P> Event for Pending<P> {
     type Key = (Instant, u64, u8);
 
-    #[inline]
     fn at(&self) -> Instant {
         self.at
     }
 
-    #[inline]
     fn key(&self) -> Self::Key {
         (self.at, self.packet.sequence, self.copy)
     }

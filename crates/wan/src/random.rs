@@ -101,7 +101,6 @@ impl Stream {
 
     /// Returns the draws of a copy of a packet. Copy 0 is the packet itself.
     #[must_use]
-    #[inline]
     pub const fn copy(self, number: u64, copy: u8) -> PacketDraws {
         PacketDraws { key: self.key, number, copy }
     }
@@ -136,14 +135,12 @@ impl PacketDraws {
 
     /// Returns the words for a purpose, beginning with the first word.
     #[must_use]
-    #[inline]
     pub const fn draws(self, purpose: Purpose) -> Draws {
         Draws { packet: self, purpose, block: 0, spare: None }
     }
 
     /// Returns the words for a purpose, beginning with the second word.
     #[must_use]
-    #[inline]
     pub const fn more(self, purpose: Purpose) -> Draws {
         Draws { packet: self, purpose, block: 1, spare: None }
     }

@@ -41,14 +41,12 @@ impl<T> Ring<T> {
 
     /// Returns the number of values.
     #[must_use]
-    #[inline]
     pub const fn len(&self) -> usize {
         self.len
     }
 
     /// Returns whether the ring has no values.
     #[must_use]
-    #[inline]
     pub const fn is_empty(&self) -> bool {
         self.len == 0
     }

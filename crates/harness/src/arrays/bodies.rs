@@ -34,13 +34,11 @@ impl<const A: usize> Bodies<A> {
     }
 
     /// Returns the bodies without the hands.
-    #[inline(always)]
     pub(super) fn blocks(&self) -> &Blocks {
         &self.blocks
     }
 
     /// Returns the bodies without the hands, to change contacts, hands and means.
-    #[inline(always)]
     pub(super) fn blocks_mut(&mut self) -> &mut Blocks {
         &mut self.blocks
     }

@@ -1,4 +1,8 @@
 //! Choice of the processor's instructions.
+//!
+//! Only code that is inlined into the call of [`on_widest`] is compiled for the wide instructions: a function that stays a call has the instructions of any
+//! processor. Most functions that the loops over ticks and packets reach are therefore `#[inline(always)]`, in the arrays and in `cohaptic_peer`. Rare branches
+//! are `#[inline(never)]` or `#[cold]`, so that the loops stay short. `benches/benches/mesh.rs` measures the loops.
 
 use pulp::{Arch, NullaryFnOnce};
 

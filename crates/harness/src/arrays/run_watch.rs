@@ -23,7 +23,6 @@ pub(super) trait RunWatch<const A: usize> {
     fn change_damping(&mut self, _scene: &Scene) {}
 
     /// Called after each tick with the distance between copies before they moved \[m\]. Returns whether the run goes on.
-    #[inline(always)]
     fn after_motion(&mut self, _now: Instant, _discrepancy: f64) -> bool {
         true
     }

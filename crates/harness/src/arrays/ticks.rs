@@ -24,14 +24,12 @@ pub(super) trait Source {
 }
 
 impl<'a> Ticks<'a> {
-    #[inline(always)]
     pub(super) fn new(at: Instant, peers: usize, blocks: &'a [Block], source: &'a dyn Source) -> Self {
         Self { at, peers, blocks, source }
     }
 
     /// Returns the instant.
     #[must_use]
-    #[inline]
     pub const fn at(&self) -> Instant {
         self.at
     }

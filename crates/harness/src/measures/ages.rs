@@ -135,7 +135,6 @@ impl Accumulator for Ages {
 }
 
 /// Converts nanoseconds to seconds by a product with 10⁻⁹, which is faster than a division.
-#[inline]
 #[expect(clippy::cast_precision_loss, reason = "an age above 104 days is rounded to its nearest double")]
 fn seconds(nanos: u64) -> f64 {
     nanos as f64 * 1e-9

@@ -54,12 +54,10 @@ impl<const A: usize> Remote<A> for NoRemote {
 
     const IS_EMPTY: bool = true;
 
-    #[inline(always)]
     fn lead(&self) -> usize {
         0
     }
 
-    #[inline(always)]
     fn is_there(&self, _place: usize) -> bool {
         true
     }

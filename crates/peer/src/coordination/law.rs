@@ -51,7 +51,6 @@ pub trait Law<N: Number> {
     fn force(&self, seen: &Observation<N>, memory: &mut [N]) -> N;
 
     /// Returns the desired motion of the copy (xd, vd), for the record.
-    #[inline(always)]
     fn target(&self, seen: &Observation<N>) -> Motion<N> {
         seen.mean
     }

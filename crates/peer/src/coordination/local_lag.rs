@@ -49,7 +49,6 @@ impl<C: Copy> Coefficients for LocalLag<C> {
 }
 
 impl<N: Number> Law<N> for LocalLag<N> {
-    #[inline(always)]
     fn lag(&self) -> usize {
         self.lag
     }

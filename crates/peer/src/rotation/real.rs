@@ -17,7 +17,6 @@ pub trait Real: Number {
 }
 
 impl Real for f64 {
-    #[inline(always)]
     fn recip(self) -> Self {
         1.0 / self
     }

@@ -113,14 +113,12 @@ impl Spin {
 impl<C> RotationStep<C> {
     /// Returns the method that computes the rotation.
     #[must_use]
-    #[inline(always)]
     pub const fn method(&self) -> RotationMethod {
         self.method
     }
 
     /// Returns the number of equal steps in the span.
     #[must_use]
-    #[inline(always)]
     pub const fn steps(&self) -> u32 {
         self.steps
     }

@@ -192,7 +192,6 @@ impl UdpEndpoint {
     pub const BATCH: usize = BATCH_SIZE;
 
     /// Decides on an error of reading: passing errors are counted, and the result says whether to read again.
-    #[cold]
     fn cannot_receive(&mut self, error: io::Error) -> io::Result<usize> {
         match Errno::from_io_error(&error).unwrap_or(Errno::IO) {
             Errno::AGAIN => Ok(0),
@@ -212,7 +211,6 @@ impl UdpEndpoint {
 
     /// Queues a datagram for the next [`UdpEndpoint::flush`] and returns `true`. Beyond [`EndpointConfig::waiting`] the datagram is dropped and counted, and
     /// the result is `false`.
-    #[inline]
     pub fn queue(&mut self, to: SocketAddr, bytes: &[u8], ecn: Option<Ecn>) -> bool {
         let has_room = self.outbox.len() < self.config.waiting;
         if has_room {
@@ -282,7 +280,6 @@ impl UdpEndpoint {
     }
 
     /// Settles the first waiting datagram after a call that failed with `error`: sends the datagram alone, or counts its loss.
-    #[cold]
     fn cannot_send(&mut self, error: &io::Error) {
         let Some(run) = self.outbox.next_run(1) else { return };
         // Another datagram of the same call can have caused the failure.

@@ -54,7 +54,6 @@ impl Clients {
 
     /// Returns the client with the address `from`, and whether the client is new. Restarts the client's silence timer. Returns `None` if there is no room for a
     /// new client.
-    #[inline]
     pub(super) fn client(&mut self, from: SocketAddr, now: Instant) -> Option<(ClientId, bool)> {
         let known = match self.last {
             Some((address, slot)) if address == from => Some(slot),
@@ -72,7 +71,6 @@ impl Clients {
     }
 
     /// Returns the client whose port received an answer, and restarts the client's silence timer. Returns `None` if the client has left.
-    #[inline]
     pub(super) fn at_port(&mut self, slot: u32, now: Instant) -> Option<ClientId> {
         let place = self.slots.get_mut(slot as usize).filter(|place| place.address.is_some())?;
         place.heard = now;
@@ -80,7 +78,6 @@ impl Clients {
     }
 
     /// Returns the address of a client, or `None` if the client has left.
-    #[inline]
     pub(super) fn address(&self, client: ClientId) -> Option<SocketAddr> {
         self.slots.get(client.slot as usize).filter(|slot| slot.generation == client.generation)?.address
     }
@@ -138,7 +135,6 @@ impl Clients {
     }
 
     /// Gives a new client a slot, or returns `None` if every slot is taken.
-    #[cold]
     fn open(&mut self, from: SocketAddr, now: Instant) -> Option<u32> {
         // Clients whose silence has ended make room first, even if the driver has not let time pass that far.
         self.handle_timeout(now);

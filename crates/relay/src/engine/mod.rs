@@ -119,7 +119,6 @@ impl Engine {
     }
 
     /// Offers a datagram to its link, or drops and counts the datagram.
-    #[inline]
     pub fn handle_datagram(&mut self, arrival: Arrival<'_>) -> Intake {
         let intake = self.stage(arrival);
         self.offer_staged();
@@ -128,7 +127,6 @@ impl Engine {
 
     /// Admits a datagram like [`Engine::handle_datagram`], but offers the datagram only with [`Engine::offer_staged`]. Datagrams read from several sockets are
     /// thus offered in the order of their arrival.
-    #[inline]
     pub fn stage(&mut self, arrival: Arrival<'_>) -> Intake {
         let Arrival { at, port, from, bytes, ecn } = arrival;
         let mut opened = None;
@@ -199,7 +197,6 @@ impl Engine {
     }
 
     /// Lets logical time pass until `now`. An instant in the past changes nothing.
-    #[inline]
     pub fn handle_timeout(&mut self, now: Instant) {
         self.pass(now);
         if let Routes::Clients { clients, .. } = &mut self.routes {
@@ -210,7 +207,6 @@ impl Engine {
     /// Returns the instant of the next necessary call of [`Engine::handle_timeout`], or `None` if no datagram, no change of a link and no client waits for
     /// time.
     #[must_use]
-    #[inline]
     pub fn poll_timeout(&self) -> Option<Instant> {
         let clients = match &self.routes {
             Routes::Programs(_) => None,
@@ -222,7 +218,6 @@ impl Engine {
 
     /// Returns the next datagram that leaves, up to the present logical time, or `None` when all have been polled. Drops and counts datagrams for receivers
     /// without a known address.
-    #[inline]
     pub fn poll_release(&mut self) -> Option<Release<'_>> {
         if let Some(packet) = self.released.take() {
             self.pool.put(packet);
@@ -346,7 +341,6 @@ impl Engine {
 
     /// Returns the port and the receiver for a datagram delivered by its link, or `None` if the receiver's address is not known. The port is the port standing
     /// for the sender.
-    #[inline]
     fn way_out(&self, event: &PacketEvent<Arc<Packet>, Path>) -> Option<(Port, SocketAddr)> {
         match &self.routes {
             Routes::Programs(programs) => Some((Port::Program(event.path.from), programs.address(event.path.to)?)),
@@ -360,7 +354,6 @@ impl Engine {
     }
 
     /// Lets logical time pass until `now`, and makes the changes of links that are due on the way. Never goes back.
-    #[inline]
     fn pass(&mut self, now: Instant) {
         // A change must be made at its own instant, before later datagrams leave the link.
         while self.changes.front().is_some_and(|change| change.at <= now) {
@@ -380,7 +373,6 @@ impl Engine {
     }
 
     /// Counts a datagram that was not admitted, and returns the reason.
-    #[cold]
     const fn refuse(&mut self, why: Intake) -> Intake {
         let counter = match why {
             Intake::Offered | Intake::FromNewClient(_) => &mut self.counts.offered,

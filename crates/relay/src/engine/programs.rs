@@ -46,7 +46,6 @@ impl Programs {
 
     /// Returns the program that sends from `from` to the port of program `to`, or `None` for a stranger without a place. Records `now` as the latest sign of
     /// the program.
-    #[inline]
     pub(super) fn sender(&mut self, from: SocketAddr, to: NodeId, now: Instant) -> Option<NodeId> {
         let place = match self.last {
             Some((address, place)) if address == from => place,
@@ -62,13 +61,11 @@ impl Programs {
     }
 
     /// Returns the address of a program, or `None` if the address is not known yet.
-    #[inline]
     pub(super) fn address(&self, place: NodeId) -> Option<SocketAddr> {
         self.programs.get(place.index())?.address
     }
 
     /// Gives a stranger the place of a program, or returns `None` if no program can have this address.
-    #[cold]
     fn learn(&mut self, from: SocketAddr, to: NodeId, now: Instant) -> Option<NodeId> {
         // The candidates: a configured address is never taken away, and a program does not send to its own port.
         let open = |place: &NodeId| *place != to && !self.programs[place.index()].is_given;

@@ -15,7 +15,6 @@ impl Recent {
     /// Capacity of the ring.
     const MOST: usize = 128;
 
-    #[inline]
     pub(super) fn record(&mut self, delay: Duration) {
         // While the ring grows, `next` is its length, and the lookup finds nothing.
         if let Some(oldest) = self.delays.get_mut(self.next) {

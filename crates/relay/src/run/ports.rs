@@ -166,7 +166,6 @@ impl Ports {
     }
 
     /// Closes the sockets of former clients, then opens sockets for new clients.
-    #[inline]
     pub(super) fn follow_clients(&mut self, engine: &mut Engine) {
         if let Layout::Proxy { clients } = self.layout {
             self.follow(engine, clients);
@@ -204,7 +203,6 @@ impl Ports {
     }
 
     /// Queues the datagrams that leave now in their sockets. Returns whether the bound [`RELEASES`] ended the taking, so that more may be left.
-    #[inline]
     pub(super) fn take_releases(&mut self, engine: &mut Engine) -> bool {
         for _ in 0..RELEASES {
             let Some(release) = engine.poll_release() else { return false };
@@ -230,7 +228,6 @@ impl Ports {
 
     /// Sends the queued datagrams and records how late each one is: the time of the clock before the call of the kernel, less the instant when the datagram
     /// should have left. A late offer to the link counts as lateness, too.
-    #[inline]
     pub(super) fn send(&mut self, clock: &MonotonicClock, lateness: &mut Lateness) {
         let ports = &mut self.ports;
         self.dirty.retain(|place| {

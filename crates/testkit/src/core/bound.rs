@@ -16,12 +16,10 @@ pub(super) struct Bound(Vec<(Port, SocketId)>);
 pub(super) struct Port(u32);
 
 impl Port {
-    #[inline]
     pub(super) const fn new(is_six: bool, number: u16) -> Self {
         Self((is_six as u32) << u16::BITS | number as u32)
     }
 
-    #[inline]
     pub(super) const fn is_six(self) -> bool {
         self.0 >> u16::BITS != 0
     }

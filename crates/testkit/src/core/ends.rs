@@ -39,7 +39,6 @@ impl Ends {
     }
 
     /// Like [`Ends::new`], but takes short addresses.
-    #[inline]
     pub(super) const fn of([from, to]: [u32; 2], [from_port, to_port]: [u16; 2], is_six: bool, kind: Kind) -> Self {
         Self { from, to, from_port, to_port, is_six, kind }
     }

@@ -94,7 +94,6 @@ impl Shared {
     }
 
     /// Returns the number of the run.
-    #[inline]
     pub(crate) const fn run(&self) -> u64 {
         self.run
     }

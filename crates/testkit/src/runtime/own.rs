@@ -179,7 +179,6 @@ impl Batch {
 impl Deref for Executor {
     type Target = Inner;
 
-    #[inline]
     fn deref(&self) -> &Inner {
         &self.0
     }

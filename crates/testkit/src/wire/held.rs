@@ -36,7 +36,6 @@ impl Held {
     }
 
     /// Returns the bytes counted for a packet with a content of `len` bytes.
-    #[inline(always)]
     pub(crate) const fn cost(len: usize) -> u64 {
         len as u64 + PACKET_COST
     }

@@ -84,7 +84,6 @@ impl<A: Clone + Send + Sync + 'static> Wire<A> {
 }
 
 impl<A: Clone> Wire<A> {
-    #[inline]
     pub(crate) const fn now(&self) -> Instant {
         self.now
     }

@@ -49,7 +49,6 @@ impl Recording {
     }
 
     /// Returns whether anything is recorded.
-    #[inline]
     pub(super) const fn is_on(&self) -> bool {
         self.traces || self.keeps_packets
     }

@@ -57,7 +57,6 @@ pub struct PacketEvent<P, L = ()> {
 impl<P, L> Deref for PacketEvent<P, L> {
     type Target = PacketRecord<L>;
 
-    #[inline]
     fn deref(&self) -> &PacketRecord<L> {
         &self.record
     }

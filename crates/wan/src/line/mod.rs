@@ -76,7 +76,6 @@ impl<P, T: Clone> Line<P, T> {
     }
 
     /// Returns the number of packets offered so far, which is the number of the next packet.
-    #[inline]
     pub(crate) const fn offered(&self) -> u64 {
         self.flow.offered
     }
@@ -173,7 +172,6 @@ impl<P, T: Clone> Line<P, T> {
     }
 
     /// Returns the counters that every packet touches, for an owner that counts arrivals itself.
-    #[inline(always)]
     pub(crate) const fn flow(&mut self) -> &mut Flow {
         &mut self.flow
     }

@@ -14,7 +14,6 @@ impl NodeId {
 
     /// Returns the index of the node in a list of nodes.
     #[must_use]
-    #[inline]
     pub const fn index(self) -> usize {
         self.0 as usize
     }
@@ -47,7 +46,6 @@ impl LinkId {
 
     /// Returns the index of the link in a list of links.
     #[must_use]
-    #[inline]
     pub const fn index(self) -> usize {
         self.0 as usize
     }

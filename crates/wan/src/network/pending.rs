@@ -132,7 +132,6 @@ impl Turn {
     }
 
     /// Returns the link of the event. The event must be one of a link, not of an access line.
-    #[inline(always)]
     pub(super) const fn link(self) -> LinkId {
         LinkId(self.0 & ((1 << NUMBER_BITS) - 1))
     }
@@ -152,7 +151,6 @@ impl Turn {
 impl<P> Event for Pending<P> {
     type Key = (Instant, Turn, u64, Path, u8);
 
-    #[inline(always)]
     fn at(&self) -> Instant {
         self.at
     }

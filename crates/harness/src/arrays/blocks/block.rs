@@ -168,7 +168,6 @@ impl Block {
     }
 
     /// Returns the positions of the copies \[m\].
-    #[inline(always)]
     pub(in crate::arrays) const fn positions(&self) -> &[f64; WIDTH] {
         &self.object.position.0
     }

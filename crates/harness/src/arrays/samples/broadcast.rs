@@ -134,7 +134,6 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
     }
 
     /// Returns whether no held sample has changed since the means were computed.
-    #[inline(always)]
     pub(in crate::arrays) fn is_settled(&self) -> bool {
         self.changed == Changed::Nothing
     }

@@ -10,7 +10,6 @@ const HORIZON: u64 = 1024;
 const SLOTS: usize = 2048;
 
 /// Returns the first slot of a tick: samples in order. The next slot holds samples that overtake.
-#[inline(always)]
 fn slot(tick: u64) -> usize {
     2 * (tick % HORIZON) as usize
 }

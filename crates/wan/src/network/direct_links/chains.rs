@@ -43,7 +43,6 @@ fn threshold(probability: Probability) -> u64 {
     threshold
 }
 
-#[inline(always)]
 const fn is_below(word: u64, threshold: u64) -> bool {
     word >> 11 < threshold
 }

@@ -423,7 +423,6 @@ impl Arrivals {
 
     /// Returns whether the packet at this array index arrives before a packet that was sent earlier.
     #[must_use]
-    #[inline(always)]
     pub const fn overtakes(&self, place: usize) -> bool {
         self.overtake >> place & 1 == 1
     }

@@ -224,7 +224,6 @@ impl<T> BottleneckStage<T> {
 
     /// Records that a packet left at the instant returned by [`departure_if_idle`](BottleneckStage::departure_if_idle), and that no packet followed. CoDel's
     /// memory of an empty queue stays unchanged.
-    #[inline]
     pub(crate) fn is_idle_from(&mut self, departure: Instant) {
         self.queue.is_idle_from(departure);
     }
