@@ -402,7 +402,7 @@ def read_key(path):
     with open(path, encoding="ascii") as file:
         digits = file.read(1024).rstrip()
     if len(digits) != 64:
-        raise ValueError(f"{path} is no key file: it must hold 64 hexadecimal digits")
+        raise ValueError(f"{path} is not a key file: it must hold 64 hexadecimal digits")
     return bytes.fromhex(digits)
 
 

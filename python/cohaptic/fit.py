@@ -40,7 +40,7 @@ def fit(
     """
     if isinstance(source, tuple):
         if receiver is not None or port is not None:
-            raise TypeError("receiver and port are for captures: expected a file beside them")
+            raise TypeError("receiver and port are for captures: expected a file too")
         at, delays = (np.ascontiguousarray(numbers, dtype=np.float64).reshape(-1) for numbers in source)
         measured = _native.Delays.of(at, delays)
     else:

@@ -102,7 +102,7 @@ fn seconds(at: Instant) -> Option<f64> {
 }
 
 fn no_instant(seconds: f64) -> PyErr {
-    PyValueError::new_err(format!("{seconds} s is no instant: expected seconds from 0 to 1.8e10"))
+    PyValueError::new_err(format!("{seconds} s is not an instant: expected seconds from 0 to 1.8e10"))
 }
 
 fn gone_back(at: f64) -> PyErr {
@@ -159,7 +159,7 @@ impl Link {
         if packets == 0 {
             return Err(PyValueError::new_err("0 packets: expected at least 1"));
         }
-        let no_time = |_| PyValueError::new_err(format!("{every} s is no time between packets: expected seconds, from 0 on"));
+        let no_time = |_| PyValueError::new_err(format!("{every} s is not a time between packets: expected seconds, from 0 on"));
         let every = Duration::try_from_secs_f64(every).map_err(no_time)?;
         let stream = SteadyStream { packets, every, info: PacketInfo { size: Bytes::new(size), ecn_capable: ecn } };
         if let Some(why) = too_long(&stream) {

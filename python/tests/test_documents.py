@@ -53,7 +53,7 @@ def test_why_there_is_no_verdict_is_said_as_by_the_program(answer, tmp_path) -> 
     document = answer("campaign", path, "--verdicts", "--no-plot", "--out", str(tmp_path / "out"))
     table = campaign(Scene(path), verdicts=True)
     assert table.summary == without_program(document)
-    assert table.summary["combinations"][0]["reason"].startswith("its timeline changes it")
+    assert table.summary["combinations"][0]["reason"].startswith("the timeline changes the scene")
     assert table.decode("verdict").tolist() == [""]
     assert np.isnan(table["radius"]).all()
 

@@ -79,5 +79,5 @@ def test_values_are_written_as_the_program_reads_them() -> None:
     for wrong in (("scene.seed",), ({"scene.seed": 5}, 5)):
         with pytest.raises(TypeError, match="a mapping alone"):
             scene.set(*wrong)
-    with pytest.raises(TypeError, match="no value of a scene"):
+    with pytest.raises(TypeError, match="not a value of a scene"):
         scene.set("scene.seed", object())

@@ -75,7 +75,7 @@ fn judged(scene: &Scene, stable: bool, watch: &dyn Watch, note: impl FnOnce(Stri
         Quick::Stopped => return Judged::Found(Finding { passed: false, found: "the analysis was interrupted".to_owned(), radius: None }),
         Quick::Simulate(refused) => {
             if let Some(refused) = refused {
-                note(format!("stable: told by a simulation with the seed of the scene, not in the mean square: {refused}"));
+                note(format!("stable: judged by a simulation with the seed of the scene, not in the mean square: {refused}"));
             }
             return Judged::Unknown;
         }

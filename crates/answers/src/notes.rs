@@ -11,7 +11,7 @@ pub fn notes(judgement: &Judgement) -> Vec<String> {
     let nominal = &judgement.analysis.notes;
     let of_nominal = nominal.iter().map(|note| match mean_square.notes.contains(note) {
         true => format!("both radii: {note}"),
-        false => format!("the spectral radius, with nothing left to chance: {note}"),
+        false => format!("the spectral radius, with delays at their mean and no losses: {note}"),
     });
     let of_mean_square = mean_square.notes.iter().filter(|note| !nominal.contains(note)).map(|note| format!("the mean-square radius: {note}"));
     of_nominal.chain(of_mean_square).collect()

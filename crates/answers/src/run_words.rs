@@ -109,7 +109,7 @@ pub fn packets(summary: &Summary) -> String {
     parts.push(format!("{} on the way at the end", everywhere.in_flight()));
     let stale: u64 = summary.peers.iter().map(|peer| peer.stale_samples).sum();
     if stale > 0 {
-        parts.push(format!("{stale} of those delivered too late to be used"));
+        parts.push(format!("{stale} of those delivered came too late to be used"));
     }
     let refused: u64 = summary.peers.iter().map(|peer| peer.refused_samples).sum();
     if refused > 0 {

@@ -22,8 +22,7 @@ pub(crate) const fn length_unit(metres: f64) -> (f64, &'static str) {
 pub(crate) fn nominal(count: usize, [one, several]: [&str; 2]) -> Option<String> {
     (count > 0).then(|| {
         format!(
-            "{count} {} nominal: the second moment cannot be followed there, and the radius is the square of the spectral radius with every delay its mean and \
-             nothing lost; stability point says why",
+            "{count} {} nominal: the second moment cannot be followed there, and the radius is the square of the spectral radius with every delay at its mean and no losses; stability point says why",
             if count == 1 { one } else { several }
         )
     })

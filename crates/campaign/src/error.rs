@@ -48,7 +48,7 @@ pub enum CampaignError {
         varied: Vec<String>,
     },
     /// The path names something other than a folder.
-    #[error("{} is no folder: expected one for the campaign, which need not exist yet", path.display())]
+    #[error("{} is not a folder: expected a folder for the campaign, which need not exist yet", path.display())]
     NoFolder {
         /// The path.
         path: PathBuf,
@@ -80,7 +80,7 @@ pub enum CampaignError {
         way_out: &'static str,
     },
     /// Another process works on the folder.
-    #[error("another process works on the campaign in {}: expected to be the only one; wait for it, or choose another folder", path.display())]
+    #[error("another process works on the campaign in {}: wait until it has ended, or choose another folder", path.display())]
     Busy {
         /// The folder.
         path: PathBuf,
@@ -101,13 +101,13 @@ pub enum CampaignError {
         age_s: u64,
     },
     /// The folder holds no campaign.
-    #[error("{} holds no campaign: expected the folder in which shards of it were done", path.display())]
+    #[error("{} holds no campaign: expected a folder in which shards were run", path.display())]
     NoCampaign {
         /// The folder.
         path: PathBuf,
     },
     /// Parts of the campaign are not done, so there is no table.
-    #[error("{} is not whole: {missing}", path.display())]
+    #[error("{} is not complete: {missing}", path.display())]
     Missing {
         /// The folder.
         path: PathBuf,

@@ -42,7 +42,7 @@ const LAST_MOMENT: Duration = Duration::from_millis(50);
 /// Line about results that take long to write.
 const WRITES: &str = "what was computed is written before the program ends, however long that takes; a second signal ends the program at once";
 /// Line about a computation that ended without results.
-const ENDED: &str = "the computation was ended where it stood; files that are whole are kept";
+const ENDED: &str = "the computation stopped where it stood; complete files are kept";
 
 /// Installs the handler of signals. If that is impossible, signals end the program at once, as the system's default.
 pub(crate) fn listen() {

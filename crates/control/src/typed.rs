@@ -41,7 +41,11 @@ fn parse(text: &str) -> Option<Toml> {
 
 fn converted(value: &Json) -> Result<Toml, String> {
     Ok(match value {
-        Json::Null => return Err("null is no value; what takes a key away is in the table of link keys, such as \"0s\" or \"unlimited\"".to_owned()),
+        Json::Null => {
+            return Err(
+                "null is not a value; the table of link keys names the value that switches a key off, such as \"0s\" or \"unlimited\"".to_owned()
+            );
+        }
         Json::Bool(value) => Toml::Boolean(*value),
         Json::Number(number) => match (number.as_i64(), number.as_f64()) {
             (Some(integer), _) => Toml::Integer(integer),

@@ -15,7 +15,7 @@ use std::path::Path;
 pub fn open_continued(path: &Path, whole: u64) -> io::Result<File> {
     // `symlink_metadata`, because `metadata` would look at the target of the link.
     if fs::symlink_metadata(path).is_ok_and(|about| !about.is_file()) {
-        return Err(io::Error::new(ErrorKind::InvalidInput, "it is no regular file: expected one, or none"));
+        return Err(io::Error::new(ErrorKind::InvalidInput, "it is not a regular file: expected a regular file, or none"));
     }
     let mut file = File::options().write(true).create(true).truncate(false).open(path)?;
     file.set_len(whole)?;

@@ -56,7 +56,7 @@ impl OwnFolder {
             Ok(Some(lock)) => Ok(Some(lock)),
             Ok(None) => Err(io::Error::new(
                 ErrorKind::ResourceBusy,
-                "another process writes into this folder: expected to be the only one; wait for it, or choose another folder",
+                "another process writes into this folder: wait until it has ended, or choose another folder",
             )),
             Err(error) if lock::is_impossible(&error) => {
                 // The attempt to lock has created the file, which nobody would remove later.

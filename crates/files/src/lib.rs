@@ -115,7 +115,7 @@ pub fn read_text(path: &Path) -> io::Result<String> {
 ///
 /// The errors of [`read_bytes_up_to`], and [`io::ErrorKind::InvalidData`] for bytes that are not UTF-8.
 pub fn read_text_up_to(path: &Path, most: u64) -> io::Result<String> {
-    String::from_utf8(read_bytes_up_to(path, most)?).map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is no text: expected UTF-8"))
+    String::from_utf8(read_bytes_up_to(path, most)?).map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is not a text: expected UTF-8"))
 }
 
 /// An open file whose reads fail with [`io::ErrorKind::FileTooLarge`] once more than a given number of bytes was read.
@@ -225,7 +225,7 @@ mod tests {
     fn what_is_no_text_is_refused_as_such() {
         let file = file(0);
         std::fs::write(file.path(), b"a\xff").unwrap();
-        assert_eq!(read_text(file.path()).unwrap_err().to_string(), "it is no text: expected UTF-8");
+        assert_eq!(read_text(file.path()).unwrap_err().to_string(), "it is not a text: expected UTF-8");
         std::fs::write(file.path(), "ä").unwrap();
         assert_eq!(read_text(file.path()).unwrap(), "ä");
     }

@@ -9,10 +9,10 @@ pub enum AddressError {
     #[error("has no port")]
     Port,
     /// The text is a port at a host whose name would have to be looked up.
-    #[error("names a host that would have to be looked up")]
+    #[error("names a host that would need a look-up")]
     Name,
     /// The text has another form.
-    #[error("is no address with a port")]
+    #[error("is not an address with a port")]
     Form,
 }
 

@@ -39,7 +39,7 @@ pub fn html(reproduction: &Reproduction) -> String {
 }
 
 /// Returns the claims that the paper makes, of one kind of verdict.
-fn of_kind<'a>(claims: &'a [Claim], kind: fn(&Verdict) -> bool) -> impl Iterator<Item = &'a Claim> {
+fn of_kind(claims: &[Claim], kind: fn(&Verdict) -> bool) -> impl Iterator<Item = &Claim> {
     claims.iter().filter(move |claim| !claim.is_own && kind(&claim.verdict))
 }
 

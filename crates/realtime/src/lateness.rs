@@ -125,18 +125,20 @@ pub enum Validity {
         late: u64,
         /// Number of all events.
         of: u64,
+        /// Name of the events, in the plural: what was late.
+        what: &'static str,
         /// Limit of the tolerance, see [`Tolerance::limit`].
         limit: Duration,
     },
 }
 
 impl Tolerance {
-    /// Judges a distribution.
+    /// Judges a distribution. `what` names its events in the plural, such as `"ticks"`.
     #[must_use]
-    pub fn judge(&self, lateness: &Lateness) -> Validity {
+    pub fn judge(&self, lateness: &Lateness, what: &'static str) -> Validity {
         let (late, of) = (lateness.count_later_than(self.limit), lateness.count());
         // A single late event among fewer than a thousand is no fault of a short run.
-        if late > 1 && late > of / 1000 { Validity::NotValid { late, of, limit: self.limit } } else { Validity::Valid }
+        if late > 1 && late > of / 1000 { Validity::NotValid { late, of, what, limit: self.limit } } else { Validity::Valid }
     }
 }
 
@@ -146,15 +148,20 @@ impl Validity {
     pub const fn is_valid(&self) -> bool {
         matches!(self, Self::Valid)
     }
+
+    /// Returns the reason for which the run is not valid, as a sentence without its full stop; `None` for a valid run.
+    #[must_use]
+    pub fn reason(&self) -> Option<String> {
+        let Self::NotValid { late, of, what, limit } = self else { return None };
+        Some(format!("{late} of {of} {what} were more than {} late, and at most one in a thousand may be", Span(*limit)))
+    }
 }
 
 impl fmt::Display for Validity {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Valid => f.write_str("valid"),
-            Self::NotValid { late, of, limit } => {
-                write!(f, "not valid: {late} of {of} were more than {} late, expected at most one in a thousand", Span(*limit))
-            }
+        match self.reason() {
+            None => f.write_str("valid"),
+            Some(reason) => write!(f, "not valid: {reason}"),
         }
     }
 }
@@ -204,13 +211,13 @@ mod tests {
             let mut lateness = Lateness::new();
             (0..on_time).for_each(|_| lateness.record(Duration::from_micros(60)));
             (0..late).for_each(|_| lateness.record(Duration::from_millis(3)));
-            tolerance.judge(&lateness)
+            tolerance.judge(&lateness, "ticks")
         };
         assert_eq!(run(0, 0), Validity::Valid);
         assert_eq!(run(9_990, 10), Validity::Valid);
-        assert_eq!(run(9_989, 11), Validity::NotValid { late: 11, of: 10_000, limit: Duration::from_millis(1) });
+        assert_eq!(run(9_989, 11), Validity::NotValid { late: 11, of: 10_000, what: "ticks", limit: Duration::from_millis(1) });
         assert_eq!(run(10, 1), Validity::Valid);
-        let text = run(10, 2).to_string();
-        assert_eq!(text, "not valid: 2 of 12 were more than 1ms late, expected at most one in a thousand");
+        assert_eq!(run(10, 2).to_string(), "not valid: 2 of 12 ticks were more than 1ms late, and at most one in a thousand may be");
+        assert_eq!((run(10, 1).to_string(), run(10, 1).reason()), ("valid".to_owned(), None));
     }
 }

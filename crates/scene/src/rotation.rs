@@ -356,8 +356,8 @@ peer = { device = { mass = 0.1 }, coupling = { stiffness = 100 }, grasp = [0.1, 
         refused(&["object.inertia=[1, 1, 0]"], "object.inertia");
         refused(&["object.inertia=[1, 1]"], "expected a number [kg·m²], or a list of three");
         refused(&["scene.axes=2", "peer.grasp=0"], "expected scene.axes = 3, or no object.inertia");
-        refused(&["object.orientation=[0, 0, 0, 0]"], "is no quaternion");
-        refused(&["object.orientation=[1, 0, 0]"], "is no quaternion");
+        refused(&["object.orientation=[0, 0, 0, 0]"], "is not a quaternion");
+        refused(&["object.orientation=[1, 0, 0]"], "is not a quaternion");
         refused(&["coordination.rotational-stiffness=[1, 1, 3]"], "a stiffness is above the sum of the two others");
         for (strategy, why) in
             [("wave", "axis in common"), ("set-position", "energies"), ("passivity-control", "energies"), ("client-server", "clients")]
@@ -372,8 +372,8 @@ peer = { device = { mass = 0.1 }, coupling = { stiffness = 100 }, grasp = [0.1, 
         }
         refused(&["coordination.send-when={position=0.001}"], "dead bands say nothing of attitudes");
         refused(&["peer.device.inertia=0.001"], "expected coupling.rotational-stiffness");
-        refused(&["peer.device.rotational-damping=0.001"], "expected device.inertia beside it");
-        refused(&["peer.coupling.rotational-damping=0.001"], "expected rotational-stiffness beside it");
+        refused(&["peer.device.rotational-damping=0.001"], "expected device.inertia too");
+        refused(&["peer.coupling.rotational-damping=0.001"], "expected rotational-stiffness too");
         refused(&["peer.hand={torque=[0, 0, 1]}"], "the torque of a hand needs a device that turns");
         refused(&["peer.kind=falcon", "peer.device.inertia=0.001", "peer.coupling.rotational-stiffness=1"], "a Falcon turns nothing");
         refused(&["timeline=[{at=\"0s\", coordination={rotational-stiffness=[1, 1, 3]}}]"], "a stiffness is above the sum of the two others");

@@ -131,7 +131,7 @@ fn a_missing_key_is_said_at_the_head_of_its_table() {
         ("[[timeline]]\nat = \"1s\"\nlink = \"all\"", "18:1: timeline.0.set: missing key"),
         ("[[timeline]]\nlink = \"all\"\nset = { delay = \"1ms\" }", "18:1: timeline.0.at: missing key"),
         ("[[timeline]]\nat = \"1s\"", "18:1: timeline.0.set: missing key"),
-        ("[[timeline]]\nat = \"1s\"\nset = {}", "18:1: timeline.0: nothing is given: expected link, peer or coordination"),
+        ("[[timeline]]\nat = \"1s\"\nset = {}", "18:1: timeline.0: no key is given: expected link, peer or coordination"),
     ]);
 }
 
@@ -151,7 +151,7 @@ fn a_wrong_unit_or_type_is_refused() {
         (
             "delay = \"24ms\"",
             "rate = \"1Mbit\"\nqueue.limit = \"100\"",
-            "18:15: link.queue.limit: \"100\" is no limit of a queue: expected a limit such as \"100 packets\"",
+            "18:15: link.queue.limit: \"100\" is not a limit of a queue: expected a limit such as \"100 packets\"",
         ),
         ("delay = \"24ms\"", "order = \"fifo\"", "17:9: link.order: unknown name \"fifo\": expected one of allow-reordering, in-order"),
         ("[link]\n", "[[link]]\n", "16:1: link: found a list: expected a table of link keys"),
@@ -163,7 +163,7 @@ fn a_wrong_unit_or_type_is_refused() {
         ),
         ("[peer]", "[peer]\nhand = \"soft\"", "10:8: peer.hand: unknown hand \"soft\": expected \"none\""),
         ("[peer]", "[peer]\ncontact = { pull = 1 }", "10:13: peer.contact.pull: unknown key: expected push"),
-        ("[peer]", "[peer]\nclock.drift = \"20\"", "10:15: peer.clock.drift: \"20\" is no drift: expected a drift such as \"20ppm\""),
+        ("[peer]", "[peer]\nclock.drift = \"20\"", "10:15: peer.clock.drift: \"20\" is not a drift: expected a drift such as \"20ppm\""),
         ("[peer]", "[peer]\nclock.drift = 0.2", "10:15: peer.clock.drift: a clock drift of 0.2 is out of range: expected at most 0.1"),
         ("[peer]", "[peer]\ncompute-delay = true", "10:17: peer.compute-delay: found true: expected a number of ticks, 0 or 1"),
     ]);
@@ -256,10 +256,10 @@ fn what_does_not_fit_together_is_refused() {
         (
             "[peer]",
             "[peer]\nhand = { force = 1, sine = { amplitude = 1, frequency = 1 } }",
-            "10:21: peer.hand.sine: \"force\" is given already: expected only one of",
+            "10:21: peer.hand.sine: \"force\" was given before: expected only one of",
         ),
         ("[peer]", "[peer]\nhand = { force = 1, follows = { position = 1 } }", "10:21: peer.hand.follows: only an arm follows"),
-        ("[peer]", "[peer]\nhand = {}", "10:8: peer.hand: nothing is given: expected \"none\""),
+        ("[peer]", "[peer]\nhand = {}", "10:8: peer.hand: no key is given: expected \"none\""),
         (
             "duration = \"7s\"",
             "duration = \"7s\"\naxes = 2\n[simulation]\nsubsteps = 2",
@@ -331,7 +331,7 @@ fn a_change_that_cannot_happen_is_refused() {
         ("[[timeline]]\nat = \"1s\"\ncoordination = { wave = { impedance = 1 } }", "20:18: timeline.0.coordination.wave: unknown key"),
         ("[[timeline]]\nat = \"1s\"\nlink = \"all\"\nset = {}", "21:7: timeline.0.set: nothing changes"),
         ("[[timeline]]\nat = \"1s\"\nlink = \"some\"\nset = { loss = 0 }", "20:8: timeline.0.link: unknown links \"some\": expected \"all\" or"),
-        ("[[timeline]]\nat = \"1s\"\nlink = \"all\"\npeer = \"left\"\nset = { loss = 0 }", "21:1: timeline.0.peer: \"link\" is given already"),
+        ("[[timeline]]\nat = \"1s\"\nlink = \"all\"\npeer = \"left\"\nset = { loss = 0 }", "21:1: timeline.0.peer: \"link\" was given before"),
         (
             "[[timeline]]\nat = \"1s\"\nlink = \"all\"\nset = { queue = { limit = \"1 packet\" } }",
             "21:9: timeline.0.set.queue: queue means nothing on a link without a rate",

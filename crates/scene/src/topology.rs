@@ -100,7 +100,7 @@ impl Topology {
                 let wrong = if !weight.is_finite() || *weight < 0.0 {
                     "expected a finite number that is not negative".to_owned()
                 } else if row == column && *weight != 0.0 {
-                    "a peer is no neighbour of itself: expected 0".to_owned()
+                    "a peer is not its own neighbour: expected 0".to_owned()
                 } else if row > column && mutual != Some(*weight) {
                     format!("weights are mutual: expected {} as in row {}, column {}", mutual.unwrap_or(0.0), column + 1, row + 1)
                 } else {

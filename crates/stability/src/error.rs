@@ -41,7 +41,7 @@ pub enum AnalysisError {
     },
     /// The strategy has no linear form.
     #[error(
-        "{strategy} coordination is followed as a whole alone, not in parts of equal peers: ask `cohaptic stability point`, `map` or `boundary` for its radius, \
+        "{strategy} coordination is analysed only as a whole, not in parts of equal peers: ask `cohaptic stability point`, `map` or `boundary` for its radius, \
          without --graph, --every-number, --switching, --losses-in-a-row and --delay-within; --prove of `map` and `boundary` follows it too, and of waves --every-number"
     )]
     OtherStrategy {
@@ -79,7 +79,7 @@ pub enum AnalysisError {
     },
     /// The object turns, its motion does not split into scenes of one axis, and this analysis needs such scenes.
     #[error(
-        "{what} of an object that turns is there only where its motion splits into scenes of one axis, and here it does not: {why}; \
+        "{what} of an object that turns exists only where its motion splits into scenes of one axis, and here it does not: {why}; \
          `cohaptic stability point`, `map` and `boundary` take all components together where nothing else is asked for"
     )]
     Unsplit {

@@ -60,8 +60,8 @@ impl ToLink for str {
         if self.trim().is_empty() {
             return LinkModel::default();
         }
-        let netem = Netem::parse(self).unwrap_or_else(|error| panic!("this is no link: {error}\n{}", error.excerpt(self)));
-        netem.to_link_config(&mut |_| None).unwrap_or_else(|error| panic!("`{self}` is no link: {error}")).into()
+        let netem = Netem::parse(self).unwrap_or_else(|error| panic!("this is not a link: {error}\n{}", error.excerpt(self)));
+        netem.to_link_config(&mut |_| None).unwrap_or_else(|error| panic!("`{self}` is not a link: {error}")).into()
     }
 
     fn words(&self) -> Option<String> {

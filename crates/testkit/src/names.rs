@@ -107,5 +107,5 @@ impl<N: Into<String>> FromIterator<N> for Names {
 pub(crate) fn name_fault(name: &str) -> Option<String> {
     let is_word =
         !name.is_empty() && !name.contains([':', '[', ']']) && !name.contains(char::is_whitespace) && name.parse::<std::net::IpAddr>().is_err();
-    (!is_word).then(|| format!("`{name}` is no name of a host; expected a word without `:`, `[` and `]` that is no address"))
+    (!is_word).then(|| format!("`{name}` is not a name of a host; expected a word without `:`, `[` and `]` that is not an address"))
 }

@@ -67,7 +67,7 @@ impl ToSocketAddrs for str {
         let wrong = || {
             io::Error::new(
                 io::ErrorKind::InvalidInput,
-                format!("`{self}` is no address; expected one like `10.0.0.1:80`, `[fd00::1]:80` or `server:80`"),
+                format!("`{self}` is not an address; expected one like `10.0.0.1:80`, `[fd00::1]:80` or `server:80`"),
             )
         };
         let (name, port) = self.rsplit_once(':').ok_or_else(wrong)?;

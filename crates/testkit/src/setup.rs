@@ -139,7 +139,7 @@ impl Setup {
     #[expect(clippy::panic, reason = "a test that says nonsense is to fail, with the place")]
     pub(crate) fn add_words(&mut self, ends: [&str; 2], words: &str) {
         let path = self.hit_path(ends);
-        let hits = hits_on(words).unwrap_or_else(|error| panic!("these are no words of hits: {error}"));
+        let hits = hits_on(words).unwrap_or_else(|error| panic!("these words do not describe hits: {error}"));
         hits.into_iter().for_each(|hit| self.settings.laws.add_hit(path, hit));
     }
 

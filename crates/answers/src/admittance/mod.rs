@@ -56,7 +56,7 @@ impl Curve {
     fn notes(&self) -> Vec<String> {
         let mut notes = self.admittance.notes().to_vec();
         if let Some(chance) = &self.chance {
-            notes.push("the admittance is that with every delay its mean and nothing lost".to_owned());
+            notes.push("the admittance is that with every delay at its mean and no losses".to_owned());
             if let Err(error) = chance {
                 notes.push(format!("the verdict is nominal: {error}"));
             }
@@ -69,15 +69,15 @@ impl Curve {
         match self.admittance.verdict() {
             Verdict::Stable => match &self.chance {
                 Some(Ok(moment)) if moment.verdict() == Verdict::Unstable => Some(
-                    "the scene is unstable in the mean square: these numbers are those with nothing left to chance, and around them the motion grows without end",
+                    "the scene is unstable in the mean square: these numbers hold for delays at their mean without losses, and the motion around them grows without end",
                 ),
                 _ => None,
             },
-            Verdict::Marginal | Verdict::Overflow => {
-                Some("the scene cannot be told from an unstable one: whether it has a steady state is open, and only that could be measured")
-            }
+            Verdict::Marginal | Verdict::Overflow => Some(
+                "the analysis cannot tell the scene from an unstable one. These numbers can be measured only if the scene has a steady state, which is not known",
+            ),
             Verdict::Unstable => {
-                Some("the scene is unstable and has no steady state: these numbers are what the formula says, and nothing that could be measured")
+                Some("the scene is unstable and has no steady state: the formula gives these numbers, and nobody could measure them")
             }
         }
     }

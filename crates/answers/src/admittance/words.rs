@@ -103,7 +103,7 @@ pub(super) fn verdicts(curve: &Curve) -> Vec<String> {
     let nominal = format!("spectral radius {} +- {:.1e}", figure(radius.value, 12), radius.error);
     match &curve.chance {
         None => vec![format!("the scene is {word}: {nominal}")],
-        Some(Err(_)) => vec![format!("with nothing left to chance the scene is {word}: {nominal}")],
+        Some(Err(_)) => vec![format!("with delays at their mean and no losses the scene is {word}: {nominal}")],
         Some(Ok(moment)) => vec![
             format!(
                 "in the mean square the scene is {}: mean-square radius {} +- {:.1e}",
@@ -111,7 +111,7 @@ pub(super) fn verdicts(curve: &Curve) -> Vec<String> {
                 figure(moment.radius.value, 12),
                 moment.radius.error
             ),
-            format!("with nothing left to chance it is {word}: {nominal}"),
+            format!("with delays at their mean and no losses it is {word}: {nominal}"),
         ],
     }
 }

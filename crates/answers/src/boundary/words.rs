@@ -42,9 +42,9 @@ pub(super) fn verdicts(searched: &Searched<'_>, rounded: fn(f64) -> f64) -> Vec<
     for stretch in &found.marginal {
         // A stretch of one value is a touch: the radius reaches 1 there and turns back, as far as the analysis can tell.
         if stretch.low < stretch.high {
-            line(format!("cannot be told from 1 from {} to {}", range.text(stretch.low), range.text(stretch.high)));
+            line(format!("too close to 1 for a verdict from {} to {}", range.text(stretch.low), range.text(stretch.high)));
         } else {
-            line(format!("touches 1, or comes closer than can be told, at {}", range.text(stretch.low)));
+            line(format!("touches 1, or comes too close to it for a verdict, at {}", range.text(stretch.low)));
         }
     }
     lines
@@ -57,7 +57,7 @@ pub(super) fn limits(searched: &Searched<'_>, is_ended: bool) -> Vec<String> {
     let mut line = |line: String| lines.push(line);
     let unit = &searched.range.unit;
     line(format!(
-        "{} looked at, {:.3e}{unit} to {:.3e}{unit} apart; crossings to {:.1e}{unit}. What comes and goes between two of them without a trace is not seen",
+        "{} checked, {:.3e}{unit} to {:.3e}{unit} apart; each crossing is located to {:.1e}{unit}. An island narrower than that spacing can be missed",
         Counted(found.samples, "value"),
         found.finest,
         found.coarsest,
@@ -66,9 +66,9 @@ pub(super) fn limits(searched: &Searched<'_>, is_ended: bool) -> Vec<String> {
     if !found.is_settled() {
         // With the limit of samples reached, a request of the user did not shorten the search.
         line(if found.samples < searched.options.most && is_ended {
-            "NOT SETTLED: it was ended before it had looked as closely as it should; what lies between two values is open".to_owned()
+            "NOT SETTLED: the search was stopped early, and may have missed crossings between two values; repeat the command to go on".to_owned()
         } else {
-            "NOT SETTLED: it ended after the most values that it may look at; --values allows more, and a larger tolerance or a shorter range decides"
+            "NOT SETTLED: the search reached its limit of values, and may have missed crossings; allow more with --values, or take a larger --tolerance or a shorter range"
                 .to_owned()
         });
     }

@@ -21,7 +21,7 @@ impl fmt::Debug for ByAnalysis<'_> {
 }
 
 /// Reason for a scene with a timeline to have no verdict.
-const TIMELINE: &str = "its timeline changes it on its way; simulate it instead, or take the timeline away";
+const TIMELINE: &str = "the timeline changes the scene during the run; simulate the scene instead, or remove the timeline";
 
 /// Most reasons listed in the notes.
 const MOST_REASONS: usize = 5;

@@ -22,7 +22,7 @@ pub fn words(finished: &Finished, wall_s: f64) -> String {
     };
     line(&format!("  {}", amount(finished)));
     if report.computed == 0 {
-        line("  all of them were there already: nothing was run");
+        line("  all results were in the folder already: nothing was run");
     } else {
         let before = report.runs - report.computed;
         let kept = if before > 0 { format!(", {before} {} there already", if before == 1 { "was" } else { "were" }) } else { String::new() };

@@ -54,11 +54,14 @@ fn head(finished: &Finished, wall_s: f64) -> Vec<String> {
     let each = plan.runs_of_each();
     let mut lines = vec![format!("  {} of {}{over}, {each} of each", Counted(report.runs, "run"), Counted(comparison.strategies.len(), "strategy"))];
     lines.push(if report.computed == 0 {
-        "  all of them were there already: nothing was run".to_owned()
+        "  all results were in the folder already: nothing was run".to_owned()
     } else {
         format!("  {} run in {wall_s:.3} s", report.computed)
     });
-    lines.push(format!("  ± is 95 % (Student); a difference is that to {}, seed by seed, where neither run diverged", comparison.strategies[0]));
+    lines.push(format!(
+        "  ± is the interval of 95 % of the mean (Student); a difference is that to {}, over the seeds of which neither run diverged",
+        comparison.strategies[0]
+    ));
     lines
 }
 

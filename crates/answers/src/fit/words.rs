@@ -52,7 +52,7 @@ pub fn words(answered: &Answered) -> String {
         line(format!("  * does not fit: its distance from the delays (Kolmogorov) is above {:.5}", goodness.kolmogorov_limit));
     }
     if goodness.laws.first().is_none_or(|law| !law.fits) {
-        line("no law fits: the link draws from the measured delays, a file that --out writes beside the link".to_owned());
+        line("no law fits: the link draws from the measured delays, a file that --out writes next to the link".to_owned());
     }
     match goodness.correlation {
         None => line("\ndelays are as good as independent".to_owned()),

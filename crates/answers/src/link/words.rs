@@ -7,9 +7,9 @@ use cohaptic_units::print::Counted;
 
 use super::{MOST_MEASURED, Measured};
 
-/// Returns the text about a link. `packets_per_s`: packets handled by the emulator per second of wall time.
+/// Returns the text about a link.
 #[must_use]
-pub fn words(measured: &Measured, packets_per_s: f64) -> String {
+pub fn words(measured: &Measured) -> String {
     let mut text = format!("{}\n", measured.said);
     // Writing to a string cannot fail.
     let mut line = |line: String| {
@@ -30,10 +30,10 @@ pub fn words(measured: &Measured, packets_per_s: f64) -> String {
         }
     }
     if measured.figures.iter().any(|figure| figure.outside) {
-        line("  * asked for is more than 4 standard errors away".to_owned());
+        line("  * more than 4 standard errors from what was asked".to_owned());
     }
     if measured.sent > MOST_MEASURED {
-        line(format!("  figures are of the first {MOST_MEASURED} packets, counts are of all"));
+        line(format!("  figures describe the first {MOST_MEASURED} packets, counts all packets"));
     }
     let fates = &measured.achieved.fates;
     let mut parts = vec![format!("{} sent", Counted(fates.offered, "packet")), format!("{} delivered", fates.delivered)];
@@ -41,7 +41,6 @@ pub fn words(measured: &Measured, packets_per_s: f64) -> String {
     parts.extend(counts.into_iter().filter(|(_, count)| *count > 0).map(|(name, count)| format!("{count} {name}")));
     parts.extend(fates.dropped.iter().filter(|(_, count)| **count > 0).map(|(cause, count)| format!("{count} dropped ({cause})")));
     line(format!("  {}", parts.join(", ")));
-    line(format!("  {packets_per_s:.0} packets a second"));
     text
 }
 

@@ -23,7 +23,7 @@ pub fn words(scene: &Scene, judgement: &Judgement, worst: Option<&SceneWorstCase
     let mut line = |line: String| text.push_str(&format!("  {line}\n"));
     if let Some(mean_square) = mean_square {
         line(format!("mean-square radius {} over a frame of {}", number(mean_square.radius), Span(mean_square.frame)));
-        line(format!("with nothing left to chance: {}", analysis.verdict().word()));
+        line(format!("with delays at their mean and no losses: {}", analysis.verdict().word()));
     }
     line(format!("spectral radius {} over a frame of {}", number(analysis.radius), Span(analysis.frame)));
     line(speed::words(analysis));
@@ -62,13 +62,13 @@ pub fn words(scene: &Scene, judgement: &Judgement, worst: Option<&SceneWorstCase
 fn sentence(verdict: Verdict, mean_square: bool) -> &'static str {
     match (verdict, mean_square) {
         (Verdict::Stable, false) => "STABLE: every disturbance of the relative motion dies out",
-        (Verdict::Marginal, false) => "MARGINAL: the spectral radius cannot be told from 1 within its error",
+        (Verdict::Marginal, false) => "MARGINAL: the spectral radius is too close to 1 for a verdict, given its error",
         (Verdict::Overflow, false) => {
             "OVERFLOW: nothing is known of the spectral radius, because the numbers, or their errors, left the range of the computation"
         }
         (Verdict::Unstable, false) => "UNSTABLE: some disturbance of the relative motion grows without end",
         (Verdict::Stable, true) => "STABLE in the mean square: the variance of every disturbance of the relative motion dies out",
-        (Verdict::Marginal, true) => "MARGINAL: the mean-square radius cannot be told from 1 within its error",
+        (Verdict::Marginal, true) => "MARGINAL: the mean-square radius is too close to 1 for a verdict, given its error",
         (Verdict::Overflow, true) => {
             "OVERFLOW: nothing is known of the mean-square radius, because the numbers, or their errors, left the range of the computation"
         }
@@ -88,7 +88,7 @@ pub fn worst_in_words(worst: &SceneWorstCase) -> String {
 fn worst_case(worst: &SceneWorstCase, said: &[String], line: &mut impl FnMut(String)) {
     let verdict = match worst.verdict() {
         WorstVerdict::Stable => "stable whatever the network does within these bounds",
-        WorstVerdict::Undecided => "not decided: 1 is between the bounds; --products and --accuracy may tell",
+        WorstVerdict::Undecided => "not decided: 1 lies between the bounds; a larger --products or a smaller --accuracy may decide",
         WorstVerdict::Unstable => "unstable under some pattern within these bounds",
     };
     line(String::new());
@@ -96,7 +96,7 @@ fn worst_case(worst: &SceneWorstCase, said: &[String], line: &mut impl FnMut(Str
     line(format!("  growth a sending period between {} and {}", figure(worst.lower, 6), figure(worst.upper, 6)));
     if worst.is_open() {
         let apart = 100.0 * (worst.upper / worst.lower - 1.0);
-        line(format!("  open: the bounds are {} % apart, more than 1 %; --products may bring them closer", figure(apart, 1)));
+        line(format!("  open: the bounds are {} % apart, more than 1 %; a larger --products may bring them closer", figure(apart, 1)));
     }
     if let Some(rate) = worst.certificate {
         line(format!("  a quadratic certificate, checked, proves {}", figure(rate, 6)));

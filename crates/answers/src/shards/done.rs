@@ -45,7 +45,7 @@ pub fn done_document(done: &Done) -> impl Serialize {
 pub fn done_words(done: &Done) -> String {
     let Done { shard, folder, names, pieces, units, computed, wall_s } = done;
     if *pieces == 0 {
-        return format!("shard {shard} in {folder}: there are fewer {}s than shards, and none is this one's\n", names.piece);
+        return format!("shard {shard} in {folder}: there are fewer {}s than shards, so this shard has nothing to do\n", names.piece);
     }
     let there = if computed < units { format!(", {} there already", units - computed) } else { String::new() };
     let (pieces, units) = (Counted(*pieces, names.piece), Counted(*units, names.unit));

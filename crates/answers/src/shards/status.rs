@@ -123,9 +123,9 @@ pub fn status_words(status: &Status<'_>) -> String {
     if !unassigned.is_empty() {
         // The largest number of shards among the workers is most likely the split in use.
         let missing = Missing { piece, count: all.0, pieces: unassigned };
-        let _ = writeln!(text, "no worker does these: {}", missing.words(workers.iter().map(|worker| worker.shard.count()).max()));
+        let _ = writeln!(text, "nobody works on these: {}", missing.words(workers.iter().map(|worker| worker.shard.count()).max()));
     } else if done.0 == all.0 {
-        let _ = writeln!(text, "all is done: --merge puts it together");
+        let _ = writeln!(text, "all is done: put it together with --merge");
     } else if let Some(end) = end {
         let _ = writeln!(text, "the rest is done in about {}", span(end));
     }

@@ -46,7 +46,7 @@ pub enum StrategiesError {
         expected: String,
     },
     /// The list has a strategy twice with equal settings.
-    #[error("{strategy} is there twice: expected different strategies, or one with different settings, such as extrapolated{{horizon=50ms}}")]
+    #[error("{strategy} stands twice: expected different strategies, or one with different settings, such as extrapolated{{horizon=50ms}}")]
     Twice {
         /// The strategy as written.
         strategy: String,
@@ -196,12 +196,12 @@ mod tests {
             ("average-position,extrapolatd", "did you mean \"extrapolated\"?"),
             ("average-position,extrapolated{horzon=50ms}", "extrapolated has no parameter \"horzon\": expected horizon"),
             ("average-position{damping=5},extrapolated", "average-position has no parameter \"damping\": expected none"),
-            ("average-position,average-position", "average-position is there twice"),
-            ("average-position,average-position{}", "average-position is there twice"),
-            ("extrapolated{horizon=1ms},extrapolated{ horizon = 1ms }", "extrapolated{horizon=1ms} is there twice"),
-            ("local-damping{age=1ms,damping=3},local-damping{damping=3,age=1ms}", "is there twice"),
-            ("average-position,extrapolated{horizon}", "is no strategy with settings"),
-            ("average-position,extrapolated{horizon=50ms", "is no strategy with settings"),
+            ("average-position,average-position", "average-position stands twice"),
+            ("average-position,average-position{}", "average-position stands twice"),
+            ("extrapolated{horizon=1ms},extrapolated{ horizon = 1ms }", "extrapolated{horizon=1ms} stands twice"),
+            ("local-damping{age=1ms,damping=3},local-damping{damping=3,age=1ms}", "stands twice"),
+            ("average-position,extrapolated{horizon}", "is not a strategy with settings"),
+            ("average-position,extrapolated{horizon=50ms", "is not a strategy with settings"),
         ] {
             let error = Strategies::parse(text).unwrap_err().to_string();
             assert!(error.contains(part) && error.contains("expected"), "{text}: {error}");

@@ -78,7 +78,7 @@ pub(super) fn read_gists(file: File, each: Gists<'_>) -> Result<(), TableError> 
     let mut record = csv::StringRecord::new();
     while reader.read_record(&mut record).map_err(unread)? {
         let discrepancy = record.get(discrepancy).unwrap_or_default();
-        let max_discrepancy = discrepancy.parse().map_err(|_| TableError::Content(format!("{discrepancy:?} is no number")))?;
+        let max_discrepancy = discrepancy.parse().map_err(|_| TableError::Content(format!("{discrepancy:?} is not a number")))?;
         each(Gist { diverged: record.get(ending) == Some(DIVERGED), max_discrepancy });
     }
     Ok(())
@@ -97,7 +97,7 @@ pub(super) fn read_columns(file: File, names: &[&str]) -> Result<RunColumns, Tab
         for (place, column) in places.iter().zip(&mut read.columns) {
             let cell = record.get(*place).unwrap_or_default();
             let number = if cell.is_empty() { Ok(f64::NAN) } else { cell.parse() };
-            column.push(number.map_err(|_| TableError::Content(format!("{cell:?} is no number")))?);
+            column.push(number.map_err(|_| TableError::Content(format!("{cell:?} is not a number")))?);
         }
     }
     Ok(read)

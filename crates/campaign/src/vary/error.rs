@@ -19,7 +19,7 @@ pub enum VaryError {
     },
     /// A range has no number of values, or something else in its place.
     #[error(
-        "no number of values in \"{text}\": expected a slash and a whole number of at least 2 behind the range, and :log for equal ratios, such as coordination.stiffness=0..6000/13 or coordination.stiffness=10..1000/5:log"
+        "the number of values is missing in \"{text}\": expected a slash and a whole number of at least 2 after the range, and :log for equal ratios, such as coordination.stiffness=0..6000/13 or coordination.stiffness=10..1000/5:log"
     )]
     NoCount {
         /// The text of the user.
@@ -40,7 +40,7 @@ pub enum VaryError {
         text: String,
     },
     /// An end of the range is not finite, or is no number with a unit.
-    #[error("\"{end}\" in \"{text}\" is no end of a range: expected a finite number, with a unit where the key takes one")]
+    #[error("\"{end}\" in \"{text}\" is not an end of a range: expected a finite number, with a unit where the key takes one")]
     End {
         /// The text of the user.
         text: String,
@@ -87,7 +87,7 @@ pub enum VaryError {
     },
     /// The braces after a strategy's name do not hold settings.
     #[error(
-        "\"{value}\" in \"{text}\" is no strategy with settings: expected NAME{{KEY=VALUE,...}}, such as local-damping{{damping=58}}, with parameters of that \
+        "\"{value}\" in \"{text}\" is not a strategy with settings: expected NAME{{KEY=VALUE,...}}, such as local-damping{{damping=58}}, with parameters of that \
          strategy or other keys of the scene by their dotted paths"
     )]
     Settings {
@@ -97,7 +97,7 @@ pub enum VaryError {
         value: String,
     },
     /// A list has a value twice.
-    #[error("{value} is there twice in \"{text}\": expected different values; for more runs of each, --runs")]
+    #[error("{value} stands twice in \"{text}\": expected different values; for more runs of each, use --runs")]
     Twice {
         /// The text of the user.
         text: String,

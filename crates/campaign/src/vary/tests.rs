@@ -61,14 +61,14 @@ fn anything_else_is_refused_and_says_why() {
         ("", "no key"),
         ("coordination.stiffness", "no key"),
         ("=0..1/3", "no key"),
-        ("a=0..1", "no number of values"),
-        ("a=0..1/x", "no number of values"),
-        ("a=0..1/-3", "no number of values"),
-        ("a=0..1/3:lin", "no number of values"),
+        ("a=0..1", "the number of values is missing"),
+        ("a=0..1/x", "the number of values is missing"),
+        ("a=0..1/-3", "the number of values is missing"),
+        ("a=0..1/3:lin", "the number of values is missing"),
         ("a=0..1/0", "a range of 0"),
         ("a=0..1/1", "a range of 1"),
         ("a=0..1/1000001", "too many"),
-        ("a=0..1/99999999999999999999999", "no number of values"),
+        ("a=0..1/99999999999999999999999", "the number of values is missing"),
         ("a=1..1/5", "is empty: 1 is not below 1"),
         ("a=2..1/5", "is empty: 2 is not below 1"),
         ("a=-1.7e308..1.7e308/5", "is empty"),
@@ -80,7 +80,7 @@ fn anything_else_is_refused_and_says_why() {
         ("a=", "is missing"),
         ("a=1,,2", "is missing"),
         ("a=1,2,", "is missing"),
-        ("a=1,2,1", "1 is there twice"),
+        ("a=1,2,1", "1 stands twice"),
     ] {
         assert!(message(text).contains(part), "{text}: {}", message(text));
         assert!(message(text).contains("expected"), "{text}");
@@ -105,7 +105,7 @@ fn a_strategy_may_have_settings() {
     assert_eq!(vary.overrides(2), ["coordination.strategy=extrapolated", "coordination.extrapolated.horizon=50ms", "object.mass=1"]);
     assert_eq!(vary.label(1), "coordination.strategy=local-damping{damping=58}");
     assert_eq!((vary.column(), vary.kind()), ("coordination.strategy".to_owned(), Kind::Text));
-    for (values, part) in [("a{b}", "is no strategy with settings"), ("a{b=1},a{ b=1 }", "is there twice")] {
+    for (values, part) in [("a{b}", "is not a strategy with settings"), ("a{b=1},a{ b=1 }", "stands twice")] {
         let error = Variation::parse(&format!("coordination.strategy={values}")).unwrap_err().to_string();
         assert!(error.contains(part) && error.contains("expected"), "{error}");
     }

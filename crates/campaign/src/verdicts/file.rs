@@ -176,7 +176,7 @@ fn read(file: File, plan: &CampaignPlan) -> Result<Vec<Judgement>, TableError> {
         // Row n must state combination n: a lost row would shift all later judgements.
         let in_place = cells.get(0) == Some(number.to_string().as_str());
         let found = judgement(&cells, 1 + plan.variations().len()).filter(|_| in_place);
-        judgements.push(words.all(found.ok_or_else(|| TableError::Content(format!("row {number} is no judgement")))?));
+        judgements.push(words.all(found.ok_or_else(|| TableError::Content(format!("row {number} is not a judgement")))?));
     }
     let (found, expected) = (judgements.len() as u64, plan.combinations());
     if found == expected { Ok(judgements) } else { Err(TableError::Content(format!("{found} rows: expected {expected}"))) }

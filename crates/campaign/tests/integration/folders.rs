@@ -8,7 +8,7 @@ use crate::bench::{Bench, SCENE, StopAfter, VARY};
 fn what_makes_no_sense_is_refused_and_nothing_is_written() {
     for (vary, runs, parts) in [
         (&["coordination.stifness=0..1/3"][..], 1, &["--set coordination.stifness=0", "stiffness"][..]),
-        (&["coordination.stiffness=0..1"], 1, &["no number of values"]),
+        (&["coordination.stiffness=0..1"], 1, &["the number of values is missing"]),
         (&["coordination.stiffness=1..1/3"], 1, &["is empty"]),
         (&["coordination.update=2ms..3ms/3"], 1, &["coordination.update=2.5ms", "^"]),
         (&["peers.nobody.contact=none,grasp"], 1, &["nobody", "left, right"]),
@@ -63,8 +63,8 @@ fn the_first_fault_is_shown() {
 fn a_folder_with_something_else_in_it_is_left_alone() {
     let bench = Bench::new(&VARY, 2);
     std::fs::write(bench.path("file"), "mine").unwrap();
-    assert!(matches!(bench.assert_refused("file", &["is no folder"]), CampaignError::NoFolder { .. }));
-    assert!(matches!(bench.assert_refused("file/below", &["is no folder"]), CampaignError::NoFolder { .. }));
+    assert!(matches!(bench.assert_refused("file", &["is not a folder"]), CampaignError::NoFolder { .. }));
+    assert!(matches!(bench.assert_refused("file/below", &["is not a folder"]), CampaignError::NoFolder { .. }));
     std::fs::create_dir(bench.path("thesis")).unwrap();
     std::fs::write(bench.path("thesis/chapter.tex"), "mine").unwrap();
     let error = bench.assert_refused("thesis", &["chapter.tex", "a folder of its own"]);

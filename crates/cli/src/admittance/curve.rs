@@ -32,7 +32,7 @@ impl Subject {
         let scene = input::with(file, |text, file| Scene::parse(text, file, &overrides));
         let scene = scene.map_err(|error| failure::of_variant(error, variant.option, &variant.overrides))?;
         let peer = place_of(&arguments.peer, &scene, &variant)?;
-        let ended = || Failure::Interrupted("the analysis was ended before its first point".to_owned());
+        let ended = || Failure::Interrupted("the analysis was stopped before its first point".to_owned());
         let [axis, seen] = [arguments.axis, arguments.seen].map(|axis| axis.map(Into::into));
         // Only a stopped analysis is an interruption. Every other error is a property of the scene, and the message names the scene's file.
         let admittance = Admittance::between_watched(&scene, peer, axis, seen, watch).map_err(|error| match error {

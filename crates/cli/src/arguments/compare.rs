@@ -14,36 +14,36 @@ use super::{SceneArguments, ShardArguments, TableFormat};
 pub(crate) struct CompareArguments {
     #[command(flatten)]
     pub(crate) scene: SceneArguments,
-    /// The strategies, with commas between them; the others are compared with the first. Parameters stand behind the name, and other keys by their
+    /// Strategies, with commas between them; the others are compared with the first. Parameters follow the name, and other keys have their
     /// dotted path: --strategies 'average-position,local-damping{damping=58},extrapolated{horizon=50ms,coordination.damping=0}'
     #[arg(long, value_name = "A,B{KEY=VALUE},...", required_unless_present = "preset", conflicts_with = "preset")]
     pub(crate) strategies: Option<String>,
-    /// Vary a key, as campaign does. The first one is along the pictures, the others have a panel for each of their values
+    /// Vary a key, as campaign does. The first key is the horizontal axis of the pictures, and each value of the others has a panel
     #[arg(long, value_name = "KEY=VALUES", conflicts_with = "preset")]
     pub(crate) vary: Vec<String>,
-    /// Strategies and values that are known by a name
+    /// Named set of strategies and values
     #[arg(long, value_enum, value_name = "NAME")]
     pub(crate) preset: Option<PresetName>,
-    /// How many runs there are of each combination, with the same seeds for all strategies [default: 10]
+    /// Number of runs of each combination, with the same seeds for all strategies [default: 10]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_integer, default_value_t = 10, hide_default_value = true)]
     pub(crate) runs: u64,
-    /// The folder of the comparison: the table of runs, verdicts, compare.csv and compare.html. The same command goes on from there
+    /// Folder of the comparison: the table of runs, verdicts, compare.csv and compare.html. Repeat the command to go on from there
     #[arg(long, value_name = "DIR", required_unless_present_any = ["merge", "status"])]
     pub(crate) out: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) shards: ShardArguments,
-    /// As what the table of runs is written
+    /// Format of the table of runs
     #[arg(long, value_enum, default_value_t = TableFormat::Parquet)]
     pub(crate) format: TableFormat,
-    /// How many runs are made at the same time [default: one a core]. Results do not depend on it
+    /// Number of runs made at the same time [default: one per core]. Results do not depend on it
     #[arg(long, value_name = "N", visible_alias = "jobs", allow_negative_numbers = true, value_parser = threads)]
     pub(crate) threads: Option<u16>,
-    /// How many runs are kept together, the most that a kill costs each thread [default: some seconds' worth]
+    /// Number of runs saved together: if the program is killed, each thread loses at most these [default: some seconds' worth]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<NonZeroU64>(1, u64::MAX))]
     pub(crate) part: Option<NonZeroU64>,
 }
 
-/// Strategies and values that are known by a name.
+/// Named set of strategies and values.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 pub(crate) enum PresetName {
     /// Every strategy with its parameters at their defaults, and a dead band of 10 % of the velocity, over link delays of 0 to 200 ms and losses of 0 to 30 %

@@ -18,29 +18,29 @@ pub(crate) struct FalconArguments {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum FalconCommand {
-    /// Which Falcons are plugged in, whether they may be opened, and how well they answer. No force
+    /// Lists the Falcons that are plugged in, and says whether they may be opened and how well they answer. No force
     Probe(ProbeArguments),
-    /// Guides through homing, and says where the grip is then. No force
+    /// Guides through homing, and says where the grip is afterwards. No force
     Home(HomeArguments),
-    /// Shows where the grip is, and pushes it gently if asked to
+    /// Shows where the grip is: as a drawing on a terminal, as rows of CSV elsewhere. Pushes it gently if asked to
     Watch(WatchArguments),
-    /// Runs the driver on a device that is not there, as fast as the machine goes and the same each time
+    /// Runs the driver on a simulated device, as fast as the machine goes and the same each time
     Simulate(SimulateArguments),
 }
 
 /// Which device, and how it gets its firmware.
 #[derive(Debug, Args)]
 pub(crate) struct WhichFalcon {
-    /// The Falcon with this serial number
+    /// Use the Falcon with this serial number
     #[arg(long, value_name = "SERIAL", conflicts_with = "simulated")]
     pub(crate) serial: Option<String>,
-    /// A simulated one, whose hand homes it and then sways
+    /// Use a simulated Falcon, whose hand homes it and then sways
     #[arg(long)]
     pub(crate) simulated: bool,
     /// Simulate as fast as the machine goes, and the same each time, in place of real time
     #[arg(long, requires = "simulated")]
     pub(crate) virtual_time: bool,
-    /// The firmware for a Falcon that has none yet (docs/falcon.md). A simulated one is switched on without any if this is given
+    /// Firmware for a Falcon that has none yet (docs/falcon.md). With this, a simulated Falcon begins without firmware too
     #[arg(long, value_name = "FILE")]
     pub(crate) firmware: Option<PathBuf>,
     /// Print one JSON document and nothing else
@@ -53,7 +53,7 @@ pub(crate) struct WhichFalcon {
 pub(crate) struct ProbeArguments {
     #[command(flatten)]
     pub(crate) which: WhichFalcon,
-    /// How long packets are exchanged with each
+    /// Time for which packets are exchanged with each Falcon
     #[arg(long = "for", value_name = "TIME", value_parser = some_time, default_value = "1s")]
     pub(crate) length: Duration,
 }
@@ -63,7 +63,7 @@ pub(crate) struct ProbeArguments {
 pub(crate) struct HomeArguments {
     #[command(flatten)]
     pub(crate) which: WhichFalcon,
-    /// How long it may take
+    /// Time that homing may take
     #[arg(long = "for", value_name = "TIME", value_parser = some_time, default_value = "2min")]
     pub(crate) length: Duration,
 }
@@ -73,19 +73,19 @@ pub(crate) struct HomeArguments {
 pub(crate) struct WatchArguments {
     #[command(flatten)]
     pub(crate) which: WhichFalcon,
-    /// How long [default: until Ctrl-C]
+    /// Time to watch [default: until Ctrl-C]
     #[arg(long = "for", value_name = "TIME", value_parser = some_time)]
     pub(crate) length: Option<Duration>,
     #[arg(help = "Push with this force [N], once the device is homed and its grip was pulled out")]
     #[arg(long, value_name = "X,Y,Z", value_parser = force, allow_hyphen_values = true, conflicts_with = "spring")]
     pub(crate) force: Option<Force>,
-    #[arg(help = "Pull to the origin as a spring of this stiffness [N/m], up to 3000, likewise")]
+    #[arg(help = "Pull to the origin as a spring of this stiffness [N/m], up to 3000, once the device is homed and its grip was pulled out")]
     #[arg(long, value_name = "STIFFNESS", value_parser = stiffness)]
     pub(crate) spring: Option<f64>,
-    #[arg(help = "What the spring damps [N·s/m], up to 20")]
+    #[arg(help = "Damp the spring by this much [N·s/m], up to 20")]
     #[arg(long, value_name = "DAMPING", value_parser = damping, requires = "spring", default_value_t = 0.0)]
     pub(crate) damping: f64,
-    #[arg(help = "No greater force [N], above 0 and up to 4. A device may push several times as hard (docs/falcon.md)")]
+    #[arg(help = "Give no greater force [N], above 0 and up to 4. A device may push several times as hard (docs/falcon.md)")]
     #[arg(long, value_name = "NEWTONS", value_parser = gentle, default_value_t = 0.5)]
     pub(crate) limit: f64,
     /// Write every exchange into this file
@@ -102,22 +102,22 @@ pub(crate) struct SimulateArguments {
     #[arg(help = "Ask the driver for this force [N] all the time")]
     #[arg(long, value_name = "X,Y,Z", value_parser = force, allow_hyphen_values = true)]
     pub(crate) force: Option<Force>,
-    #[arg(help = "No greater force [N], above 0 and up to 20")]
+    #[arg(help = "Give no greater force [N], above 0 and up to 20")]
     #[arg(long, value_name = "NEWTONS", value_parser = strong, default_value_t = 4.0)]
     pub(crate) limit: f64,
-    /// A byte to the host is changed, and one that nobody sent comes before it, each with this probability
+    /// Change a byte to the host with this probability, and insert a byte before it with the same probability
     #[arg(long, value_name = "PROBABILITY", value_parser = probability)]
     pub(crate) garbage: Option<cohaptic_units::Probability>,
-    /// A byte is lost, either way, with this probability
+    /// Lose a byte in either direction with this probability
     #[arg(long, value_name = "PROBABILITY", value_parser = probability)]
     pub(crate) drop: Option<cohaptic_units::Probability>,
-    /// The plug is pulled then
+    /// Pull the plug after this time
     #[arg(long, value_name = "TIME", value_parser = parse::duration)]
     pub(crate) unplug_after: Option<Duration>,
-    /// How long
+    /// Simulated time
     #[arg(long = "for", value_name = "TIME", value_parser = some_time, default_value = "6s")]
     pub(crate) length: Duration,
-    /// The seed of faults and of what encoders show before they are homed
+    /// Seed of the faults, and of the counts of encoders that are not homed
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_integer, default_value_t = 0)]
     pub(crate) seed: u64,
     /// Print one JSON document and nothing else
@@ -128,11 +128,11 @@ pub(crate) struct SimulateArguments {
 /// The hand on a simulated grip.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 pub(crate) enum HandName {
-    /// Nobody: the grip hangs free, and is never homed
+    /// No hand: the grip hangs free, and is never homed
     Still,
     /// Pulls the grip out, pushes it in, pulls it out again, and holds it in the middle
     Homing,
-    /// The same, and then moves it to and fro
+    /// As homing, and then moves the grip to and fro
     Swaying,
 }
 
@@ -150,7 +150,7 @@ fn force(text: &str) -> Result<Force, String> {
 
 fn some_time(text: &str) -> Result<Duration, String> {
     let time = parse::duration(text).map_err(|error| error.to_string())?;
-    if time.is_zero() { Err("expected more than nothing".to_owned()) } else { Ok(time) }
+    if time.is_zero() { Err("expected a time above zero".to_owned()) } else { Ok(time) }
 }
 
 fn stiffness(text: &str) -> Result<f64, String> {

@@ -16,31 +16,31 @@ pub(crate) struct LinkArguments {
     /// Replay a file of fates instead, as --fates writes it
     #[arg(long, value_name = "FATES.csv")]
     pub(crate) from: Option<PathBuf>,
-    /// How many packets are sent [default: 100000, with --from as many as the file has]
+    /// Number of packets to send [default: 100000, with --from as many as the file has]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<std::num::NonZeroU64>(1, u64::MAX))]
     pub(crate) packets: Option<std::num::NonZeroU64>,
-    /// The time from one packet to the next
+    /// Time from one packet to the next
     #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = cohaptic_units::parse::duration)]
     pub(crate) every: std::time::Duration,
-    /// The size of a packet
+    /// Size of a packet
     #[arg(long, value_name = "SIZE", default_value = "64B", value_parser = cohaptic_units::parse::size)]
     pub(crate) size: cohaptic_units::Bytes,
-    /// The seed of all random numbers
+    /// Seed of all random numbers
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_integer, default_value_t = 0)]
     pub(crate) seed: u64,
-    /// What words of tc-netem mean: what they say, or what Linux 6.6 does
+    /// Meaning of words of tc-netem: what they say, or what Linux 6.6 does
     #[arg(long, value_enum, default_value_t = Profile::Exact)]
     pub(crate) profile: Profile,
-    /// Packets can carry a congestion mark: they are marked where others would be dropped
+    /// Send packets that can carry a congestion mark: they are marked where others would be dropped
     #[arg(long)]
     pub(crate) ecn: bool,
     /// Print one JSON document and nothing else
     #[arg(long)]
     pub(crate) json: bool,
-    /// Write what became of every packet, for --from and for cohaptic fit
+    /// Write the fate of every packet, for --from and for cohaptic fit
     #[arg(long, value_name = "FILE.csv")]
     pub(crate) fates: Option<PathBuf>,
-    /// Write what became of every packet as a capture, for packet analysers
+    /// Write the fate of every packet as a capture, for packet analysers
     #[arg(long, value_name = "FILE")]
     pub(crate) pcapng: Option<PathBuf>,
 }
@@ -59,13 +59,13 @@ pub(crate) struct FitArguments {
     pub(crate) file: PathBuf,
     /// The capture of the receiver
     pub(crate) receiver: Option<PathBuf>,
-    /// Only datagrams to this UDP port, of captures
+    /// Read only datagrams to this UDP port from captures
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<u16>(0, 65_535), requires = "receiver")]
     pub(crate) port: Option<u16>,
-    /// Time that is added to the clock of the receiver, and so to every delay, where the clocks are known to be apart; may be negative, such as -20ms
+    /// Add this time to the clock of the receiver, and so to every delay, if the clocks are known to be apart; may be negative, such as -20ms
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = signed_duration, conflicts_with = "least")]
     pub(crate) offset: Option<f64>,
-    /// The least delay, where it is known: one time is added to every delay, after the drift is removed, so that the least of them is TIME
+    /// Take TIME as the least delay, if it is known: all delays are moved by one time, after the drift is removed
     #[arg(long, value_name = "TIME", value_parser = cohaptic_units::parse::duration)]
     pub(crate) least: Option<std::time::Duration>,
     /// Remove the linear drift of one clock against the other first, where it is significant at 1 %
@@ -77,7 +77,7 @@ pub(crate) struct FitArguments {
     /// End with status 1, and write nothing, where no law fits the delays
     #[arg(long)]
     pub(crate) require_law: bool,
-    /// Write the link table of a scene into this file, and the delays beside it where no law fits them
+    /// Write the link table of a scene into this file, and the delays into a file next to it if no law fits them
     #[arg(long, value_name = "SCENE_LINK.toml")]
     pub(crate) out: Option<PathBuf>,
 }

@@ -42,7 +42,7 @@ pub(crate) use stability::{
 #[derive(Debug, Parser)]
 #[command(name = "cohaptic", version, after_help = examples::of_program())]
 pub(crate) struct Arguments {
-    /// Say nothing on standard error but what goes wrong: no progress, and not which files were written
+    /// Print nothing but errors on standard error: no progress, and no names of written files
     #[arg(short, long, global = true)]
     pub(crate) quiet: bool,
     #[command(subcommand)]
@@ -55,11 +55,11 @@ pub(crate) enum Command {
     Run(RunArguments),
     #[command(about = "Runs scenes as tests: each against its own [expect]")]
     Check(CheckArguments),
-    /// Says what a scene makes the program model, what it leaves out and why, and what it costs
+    /// Lists what the program models for a scene, what it leaves out and why, and what a run costs
     Explain(ExplainArguments),
     /// Runs a scene many times, over values of its keys and over seeds, into one table: on all cores, and resumable
     Campaign(CampaignArguments),
-    /// Sets strategies side by side, over values of keys and with the same seeds: measures with their intervals, a table and a page
+    /// Compares strategies over values of keys and with the same seeds: measures with their intervals, a table and a page
     Compare(CompareArguments),
     /// Says whether a scene is stable without simulating it, maps where it is, and finds where that changes
     Stability(StabilityArguments),
@@ -67,7 +67,7 @@ pub(crate) enum Command {
     Admittance(AdmittanceArguments),
     /// Runs a scene by the wall clock, with other programs and Falcons attached, all through the emulated links
     Live(LiveArguments),
-    /// Opens a page on which people pull the object by mouse, finger or stick, and feel by eye what the network does
+    /// Opens a page on which people pull the object by mouse, finger or stick, and see what the network does to it
     Play(PlayArguments),
     /// Puts the emulator between programs that speak UDP to each other
     Relay(RelayArguments),
@@ -109,7 +109,7 @@ pub(crate) struct SceneArguments {
 
 #[derive(Debug, Args)]
 pub(crate) struct Overrides {
-    /// Override a key of the scene by its dotted path, again and again: --set coordination.stiffness=1000 --set link.delay=8ms
+    /// Override a key of the scene by its dotted path, repeatable: --set coordination.stiffness=1000 --set link.delay=8ms
     /// --set peers.left.contact=none
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub(crate) set: Vec<String>,

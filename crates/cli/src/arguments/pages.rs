@@ -11,16 +11,16 @@ use super::examples::{self, after};
 #[derive(Debug, Args)]
 #[command(after_help = after(examples::INIT))]
 pub(crate) struct InitArguments {
-    /// The file to write; - writes to standard output
+    /// File to write; - writes to standard output
     #[arg(value_name = "FILE", default_value = "scene.toml")]
     pub(crate) file: PathBuf,
-    /// The scene to begin with, such as paper/5-1 or network/jitter-normal; --list names all
+    /// Scene to begin with, such as paper/5-1 or network/jitter-normal; --list names all
     #[arg(long, value_name = "SCENE", default_value = "coordination/two-people")]
     pub(crate) from: String,
-    /// How many peers [default: as many as the scene has]. With another number what the scene expects is left out
+    /// Number of peers [default: as many as the scene has]. With another number the expectations of the scene are left out
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000))]
     pub(crate) peers: Option<u32>,
-    /// Write over a file that is there
+    /// Overwrite a file that exists
     #[arg(long)]
     pub(crate) force: bool,
     /// Print the names that --from takes, each with the title of its scene, and do nothing else
@@ -31,7 +31,7 @@ pub(crate) struct InitArguments {
 #[derive(Debug, Args)]
 #[command(after_help = after(examples::SCHEMA))]
 pub(crate) struct SchemaArguments {
-    /// Of which kind of file
+    /// Kind of file that the schema describes
     #[arg(value_enum, value_name = "KIND", default_value_t = FileKind::Scene)]
     pub(crate) kind: FileKind,
 }
@@ -39,18 +39,18 @@ pub(crate) struct SchemaArguments {
 /// A kind of file that the program reads.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 pub(crate) enum FileKind {
-    /// Of run, check and all other commands that take a scene
+    /// Scenes: for run, check and all other commands that take a scene
     Scene,
-    /// Of relay
+    /// Relay files: for relay
     Relay,
-    /// Of router
+    /// Router files: for router
     Router,
 }
 
 #[derive(Debug, Args)]
 #[command(after_help = after(examples::COMPLETIONS))]
 pub(crate) struct CompletionsArguments {
-    /// The shell whose completions are printed
+    /// Shell whose completions are printed
     #[arg(value_enum, value_name = "SHELL")]
     pub(crate) shell: Shell,
     /// The words that follow cohaptic in a command line: print what completes the last one, if that is a key, a peer or a scene. The script asks so
@@ -61,7 +61,7 @@ pub(crate) struct CompletionsArguments {
 #[derive(Debug, Args)]
 #[command(after_help = after(examples::MAN))]
 pub(crate) struct ManArguments {
-    /// The command whose page is printed, such as stability map [default: the program itself]
+    /// Command whose page is printed, such as stability map [default: the program itself]
     #[arg(value_name = "COMMAND", conflicts_with = "out")]
     pub(crate) command: Vec<String>,
     /// Write the page of the program and one of each command into this folder

@@ -16,25 +16,25 @@ use super::numbers::integer;
 /// How to be on time, and live control.
 #[derive(Debug, Args)]
 pub(crate) struct RealTimeArguments {
-    /// Wake earlier before each deadline and spin, at most for 120 µs: closer to it, for a core that is busy meanwhile
+    /// Wake up to 120 µs before each deadline and spin: more punctual, and keeps a core busy
     #[arg(long)]
     pub(crate) spin: bool,
     /// Do not ask the system for SCHED_FIFO and locked memory
     #[arg(long)]
     pub(crate) no_priority: bool,
-    /// A run is not valid if more than one in a thousand ticks or packets was later [default: that of the file, or 1ms]
+    /// Accept this lateness: a run is not valid if more than one in a thousand ticks or packets was later [default: that of the file, or 1ms]
     #[arg(long, value_name = "TIME", value_parser = parse::duration)]
     pub(crate) tolerance: Option<Duration>,
     /// Serve live control and /metrics over HTTP at this address [without one: a free port of 127.0.0.1]. The URL with its token is printed
     #[arg(long, value_name = "ADDRESS", value_parser = looked_up, num_args = 0..=1, default_missing_value = "127.0.0.1:0")]
     pub(crate) control: Option<SocketAddr>,
-    /// A file with the token of live control, which nobody but its owner may read [default: a random one]
+    /// Take the token of live control from this file, which only its owner may read [default: a random token]
     #[arg(long, value_name = "FILE", requires = "control")]
     pub(crate) token_file: Option<PathBuf>,
-    /// A folder whose files live control may name in keys of links [default: none, but those that a link names already]
+    /// Let live control name the files of this folder in keys of links [default: only files that a link names already]
     #[arg(long, value_name = "DIR", requires = "control")]
     pub(crate) control_files: Option<PathBuf>,
-    /// Listen on addresses that other machines reach, too
+    /// Also listen on addresses that other machines can reach
     #[arg(long)]
     pub(crate) allow_remote: bool,
 }
@@ -52,13 +52,13 @@ pub(crate) struct LiveArguments {
     pub(crate) json: bool,
     #[command(flatten)]
     pub(crate) real_time: RealTimeArguments,
-    /// How long, in place of the scene's duration
+    /// Length of the session, in place of the scene's duration
     #[arg(long = "for", value_name = "TIME", value_parser = parse::duration)]
     pub(crate) length: Option<Duration>,
-    /// Where peers in other programs (kind = "udp") send their samples
+    /// Address to which peers in other programs (kind = "udp") send their samples
     #[arg(long, value_name = "ADDRESS", value_parser = looked_up, default_value = "127.0.0.1:7400")]
     pub(crate) listen: SocketAddr,
-    /// The session key: every datagram must carry a tag made with it
+    /// File of the session key: every datagram must carry a tag made with this key
     #[arg(long, value_name = "FILE")]
     pub(crate) key_file: Option<PathBuf>,
     /// Make a session key, write it to a new file, and do nothing else
@@ -82,13 +82,13 @@ pub(crate) struct PlayArguments {
     pub(crate) overrides: Overrides,
     #[command(flatten)]
     pub(crate) real_time: RealTimeArguments,
-    /// Open no browser
+    /// Do not open a browser
     #[arg(long)]
     pub(crate) no_open: bool,
     /// End by itself after this time [default: on Ctrl-C]
     #[arg(long = "for", value_name = "TIME", value_parser = parse::duration)]
     pub(crate) length: Option<Duration>,
-    /// Keep scene and inputs of each part in this folder: run --inputs replays them
+    /// Keep the scene and the inputs of each part in this folder: run --inputs replays them
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 }
@@ -100,20 +100,20 @@ pub(crate) struct RelayArguments {
     /// tc-netem (delay 20ms 5ms 25% loss 1%), or keys (delay=24ms loss=1%)
     #[arg(required_unless_present = "listen", value_name = "FILE | SPEC", allow_negative_numbers = true)]
     pub(crate) words: Vec<OsString>,
-    /// Override a key of the relay file by its dotted path, again and again: --set relay.forget-after=10s --set link.delay=8ms
+    /// Override a key of the relay file by its dotted path, repeatable: --set relay.forget-after=10s --set link.delay=8ms
     /// --set links.left.right.loss=5% --set programs.left.port=127.0.0.1:7101
     #[arg(long, value_name = "KEY=VALUE")]
     pub(crate) set: Vec<String>,
     /// Print one JSON document and nothing else
     #[arg(long)]
     pub(crate) json: bool,
-    /// Where clients send datagrams for --to; port 0 is a free one
+    /// Address to which clients send datagrams for --to; port 0 takes any free port
     #[arg(long, value_name = "ADDRESS", value_parser = looked_up, requires = "to", conflicts_with = "set")]
     pub(crate) listen: Option<SocketAddr>,
-    /// The program that clients speak to
+    /// Address of the program that clients speak to
     #[arg(long, value_name = "ADDRESS", value_parser = looked_up, requires = "listen")]
     pub(crate) to: Option<SocketAddr>,
-    /// The link from there to the clients, up to the next option [default: the same in both directions]
+    /// Link from the program to the clients, up to the next option [default: the same in both directions]
     #[arg(long, value_name = "SPEC", num_args = 1.., requires = "listen", allow_negative_numbers = true)]
     pub(crate) back: Option<Vec<OsString>>,
     #[command(flatten)]
@@ -121,13 +121,13 @@ pub(crate) struct RelayArguments {
     /// End by itself after this time [default: on Ctrl-C]
     #[arg(long = "for", value_name = "TIME", value_parser = parse::duration)]
     pub(crate) length: Option<Duration>,
-    /// The seed of all random numbers [default: that of the file, or 0]
+    /// Seed of all random numbers [default: that of the file, or 0]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<u64>(0, i64::MAX.unsigned_abs()))]
     pub(crate) seed: Option<u64>,
-    /// The most datagrams in flight at once; those beyond are dropped [default: that of the file, or 262144]
+    /// Largest number of datagrams in flight at once; more are dropped [default: that of the file, or 262144]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<u64>(1, 1 << 24))]
     pub(crate) packets: Option<u64>,
-    /// The most bytes of them [default: that of the file, or 64MB]
+    /// Largest number of bytes in flight at once; more are dropped [default: that of the file, or 64MB]
     #[arg(long, value_name = "SIZE", value_parser = room)]
     pub(crate) bytes: Option<Bytes>,
 }
@@ -146,7 +146,7 @@ pub(crate) struct RouterArguments {
     /// A router file: two devices, the links between them, and rules that say which packets take which link; - reads it from
     /// standard input
     pub(crate) file: PathBuf,
-    /// Override a key of the router file by its dotted path, again and again: --set links.wan.delay=8ms --set router.default=drop
+    /// Override a key of the router file by its dotted path, repeatable: --set links.wan.delay=8ms --set router.default=drop
     /// --set router.memory.packets=1000
     #[arg(long, value_name = "KEY=VALUE")]
     pub(crate) set: Vec<String>,

@@ -14,7 +14,7 @@ use super::{Overrides, PictureArguments, SceneArguments, ShardArguments};
 pub(crate) struct RunArguments {
     #[command(flatten)]
     pub(crate) scene: SceneArguments,
-    /// The seed of all random numbers, in place of the key scene.seed [default: that of the scene]
+    /// Seed of all random numbers, in place of the key scene.seed [default: that of the scene]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<u64>(0, i64::MAX.unsigned_abs()))]
     pub(crate) seed: Option<u64>,
     /// Run the scene a second time with these keys overridden too, with the same random numbers, and show both:
@@ -26,7 +26,7 @@ pub(crate) struct RunArguments {
     /// Write trajectory.csv, packets.csv, links.csv, plots (SVG) and run.html, a page of all, into this folder; the second run into its folder against
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
-    /// Write one row a link, as in links.csv of --out, into this file or pipe: each link where there are more than 1,000
+    /// Write one row per link, as in links.csv of --out, into this file or pipe: all links, also where there are more than 1,000
     #[arg(long, value_name = "FILE", conflicts_with = "against")]
     pub(crate) links: Option<PathBuf>,
     #[command(flatten)]
@@ -40,10 +40,10 @@ pub(crate) struct RunArguments {
     /// Replay even if the scene or its --set are not those of the session, or the record is cut short, and say what differs
     #[arg(long, requires = "inputs")]
     pub(crate) force: bool,
-    /// Do not draw positions in the terminal, and do not write run.html. Without --out nothing is looked at then but counters, which is fastest
+    /// Do not draw positions in the terminal, and do not write run.html. Without --out only counters are kept then, which is fastest
     #[arg(long)]
     pub(crate) no_plot: bool,
-    /// How many threads share an unobserved run where that pays, as explain says [default: one a core]. Results do not depend on it
+    /// Number of threads that share an unobserved run where that pays, as explain says [default: one per core]. Results do not depend on it
     #[arg(long, value_name = "N", visible_alias = "jobs", allow_negative_numbers = true, value_parser = threads)]
     pub(crate) threads: Option<u16>,
     /// Simulate everything the program has, needed or not: slower, and the same answer to the last bit
@@ -62,10 +62,10 @@ pub(crate) struct CheckArguments {
     /// Print one JSON document and nothing else
     #[arg(long)]
     pub(crate) json: bool,
-    /// Write one page (HTML) into this file: each expectation with what came out, as numbers and as a bar
+    /// Write one page (HTML) into this file: each expectation with its result, as numbers and as a bar
     #[arg(long, value_name = "FILE")]
     pub(crate) page: Option<PathBuf>,
-    /// How many scenes run at the same time [default: one a core]. Results do not depend on it
+    /// Number of scenes that run at the same time [default: one per core]. Results do not depend on it
     #[arg(long, value_name = "N", visible_alias = "jobs", allow_negative_numbers = true, value_parser = threads)]
     pub(crate) threads: Option<u16>,
     /// Simulate everything the program has, needed or not: slower, and the same answer to the last bit
@@ -78,7 +78,7 @@ pub(crate) struct CheckArguments {
 pub(crate) struct ExplainArguments {
     #[command(flatten)]
     pub(crate) scene: SceneArguments,
-    /// Measure too what each method costs that the scene can choose, and how wrong it is: engines, axes, integrators, sampling, analysis. A second or two
+    /// Also measure the cost and the error of each method that the scene can choose: engines, axes, integrators, sampling, analysis. Takes a second or two
     #[arg(long)]
     pub(crate) cost: bool,
     /// With --cost, draw costs against errors (cost.svg) into this folder
@@ -100,15 +100,15 @@ pub(crate) struct CampaignArguments {
     #[arg(long)]
     pub(crate) json: bool,
     /// Vary a key: --vary coordination.stiffness=0..6000/13 (13 values, both ends among them), --vary coordination.stiffness=10..1000/5:log (equal ratios),
-    /// --vary link.delay=8ms,24ms (these values). Again and again: every combination is run, the last key varying fastest
+    /// --vary link.delay=8ms,24ms (these values). Repeatable: every combination is run, the last key varying fastest
     #[arg(long, value_name = "KEY=VALUES")]
     pub(crate) vary: Vec<String>,
-    /// How many runs there are of each combination: with the seed of the scene, with the next one, and so on
+    /// Number of runs of each combination: with the seed of the scene, with the next seed, and so on
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_integer, default_value_t = 1)]
     pub(crate) runs: u64,
     #[command(flatten)]
     pub(crate) measure: MeasureArguments,
-    /// The folder of the campaign: the table, pictures and campaign.html, a page of all, and until these are there the parts. The same command goes on
+    /// Folder of the campaign: the table, pictures and campaign.html, a page of all, and until the table is complete its parts. Repeat the command to go on
     /// from there
     #[arg(long, value_name = "DIR", required_unless_present_any = ["merge", "status"])]
     pub(crate) out: Option<PathBuf>,
@@ -117,13 +117,13 @@ pub(crate) struct CampaignArguments {
     /// Judge each combination as stability point does, and write the verdict into the rows of its runs
     #[arg(long)]
     pub(crate) verdicts: bool,
-    /// As what the table is written
+    /// Format of the table
     #[arg(long, value_enum, default_value_t = TableFormat::Parquet)]
     pub(crate) format: TableFormat,
-    /// How many runs are made at the same time [default: one a core]. Results do not depend on it
+    /// Number of runs made at the same time [default: one per core]. Results do not depend on it
     #[arg(long, value_name = "N", visible_alias = "jobs", allow_negative_numbers = true, value_parser = threads)]
     pub(crate) threads: Option<u16>,
-    /// How many runs are kept together, the most that a kill costs each thread [default: some seconds' worth]
+    /// Number of runs saved together: if the program is killed, each thread loses at most these [default: some seconds' worth]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<NonZeroU64>(1, u64::MAX))]
     pub(crate) part: Option<NonZeroU64>,
     /// Do not draw pictures, and do not write campaign.html
@@ -160,7 +160,7 @@ impl MeasureArguments {
     }
 }
 
-/// As what a table is written.
+/// Format of a table.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 pub(crate) enum TableFormat {
     /// runs.parquet

@@ -37,7 +37,7 @@ impl FromStr for ShardName {
                 return count
                     .parse()
                     .map(|count| Self::Auto(Some(count)))
-                    .map_err(|_| format!("\"{count}\" is no number of shards: expected auto/N, such as auto/8"));
+                    .map_err(|_| format!("\"{count}\" is not a number of shards: expected auto/N, such as auto/8"));
             }
             _ => text.parse(),
         };

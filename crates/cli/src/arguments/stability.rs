@@ -20,11 +20,11 @@ pub(crate) struct StabilityArguments {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum StabilityCommand {
-    /// The verdict for the scene as it stands: cohaptic stability FILE means this too
+    /// Judges the scene as it stands; cohaptic stability FILE is short for this
     Point(PointArguments),
-    /// The region of two keys in which the scene is stable
+    /// Maps where the scene is stable, over two keys
     Map(MapArguments),
-    /// Where the scene becomes stable and unstable along one key
+    /// Finds where the scene becomes stable and unstable along one key
     Boundary(BoundaryArguments),
 }
 
@@ -33,42 +33,42 @@ pub(crate) enum StabilityCommand {
 pub(crate) struct PointArguments {
     #[command(flatten)]
     pub(crate) scene: SceneArguments,
-    /// How the verdict is reached: equal peers together; long delays as roots of a determinant too (chosen anyway where it pays); or the whole state
+    /// Method of the analysis: equal peers together; long delays as roots of a determinant too (chosen anyway where it pays); or the whole state
     /// pushed through the code that simulates
     #[arg(long, value_enum, default_value_t = MethodName::Reduced)]
     pub(crate) method: MethodName,
-    /// What small motions are about: rest without forces; for an object that turns, rest under constant forces of the hands, or the steady spin under
-    /// their constant torques about one axis
+    /// Analyse small motions about this state: rest without forces; for an object that turns, rest under constant forces of the hands, or the steady
+    /// spin under their constant torques about one axis
     #[arg(long, value_enum, value_name = "REST", default_value_t = RestName::Unloaded, conflicts_with_all = ["graph", "losses_in_a_row", "delay_within"])]
     pub(crate) about: RestName,
-    /// Let each of equal peers hear only its neighbours: complete (as the scene is), ring, star, or a CSV file of mutual weights, one row a peer
+    /// Let each of equal peers hear only its neighbours: complete (as the scene is), ring, star, or a CSV file of mutual weights, one row per peer
     #[arg(long, value_name = "GRAPH", conflicts_with_all = ["method", "losses_in_a_row", "delay_within"])]
     pub(crate) graph: Option<String>,
-    /// The verdict for every number of equal peers too, proven: of those from 2 on, or FROM.., or FROM..TO
+    /// Also prove the verdict for every number of equal peers from 2 on, or FROM.., or FROM..TO
     #[arg(long, value_name = "FROM..TO", num_args = 0..=1, default_missing_value = "2..", value_parser = numbers, conflicts_with_all = ["graph", "method", "about"])]
     pub(crate) every_number: Option<(u64, Option<u64>)>,
-    /// With --every-number or --switching, write a file to check the verdicts by
+    /// With --every-number or --switching, write a file with which a checker confirms the verdicts
     #[arg(long, value_name = "FILE")]
     pub(crate) certificate: Option<PathBuf>,
-    /// Whether the scene is stable however its one-sided contacts and walls open and close, proven; or else a motion that grows
+    /// Prove that the scene is stable however its one-sided contacts and walls open and close, or find a motion that grows
     #[arg(long, conflicts_with_all = ["graph", "method", "about"])]
     pub(crate) switching: bool,
-    /// The worst case too: at most this number of samples lost in a row
+    /// Also judge the worst case with at most this number of samples lost in a row
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<u32>(0, u32::MAX.into()))]
     pub(crate) losses_in_a_row: Option<u32>,
-    /// The worst case too: every sample takes any time from LO to HI, such as 20ms..26ms
+    /// Also judge the worst case in which every sample takes any time from LO to HI, such as 20ms..26ms
     #[arg(long, value_name = "LO..HI", value_parser = delays)]
     pub(crate) delay_within: Option<(Duration, Duration)>,
     /// In the worst case, whether all links lose and delay together, or each on its own
     #[arg(long, value_enum, value_name = "WHICH", default_value_t = LinksName::Together)]
     pub(crate) links: LinksName,
-    /// How near the bounds of the worst case shall be
+    /// Largest distance between the bounds of the worst case
     #[arg(long, value_name = "DISTANCE", value_parser = real, default_value_t = 1e-3)]
     pub(crate) accuracy: f64,
-    /// How many products of matrices the search for the worst case may look at
+    /// Largest number of products of matrices in the search for the worst case
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_integer, default_value_t = 100_000)]
     pub(crate) products: u64,
-    /// The most memory that the matrices of a part of the scene may take; what takes more is refused before it is begun
+    /// Memory limit of the matrices of a part of the scene; larger parts are refused before they are begun
     #[arg(long, value_name = "SIZE", value_parser = memory, default_value = "8GiB")]
     pub(crate) memory: u64,
 }
@@ -155,13 +155,13 @@ impl From<MethodName> for Method {
 pub(crate) struct MapArguments {
     #[command(flatten)]
     pub(crate) scene: SceneArguments,
-    /// The key along the horizontal axis, and from where to where: --x coordination.stiffness=0..6000
+    /// Key along the horizontal axis, with its range: --x coordination.stiffness=0..6000
     #[arg(long, value_name = "KEY=LO..HI")]
     pub(crate) x: String,
-    /// The key along the vertical axis, and from where to where: --y coordination.damping=0..50
+    /// Key along the vertical axis, with its range: --y coordination.damping=0..50
     #[arg(long, value_name = "KEY=LO..HI")]
     pub(crate) y: String,
-    /// How many values of each, the ends among them
+    /// Number of values along each axis, the ends among them
     #[arg(long, value_name = "WxH", value_parser = GridSize::parse, required_unless_present = "prove")]
     pub(crate) grid: Option<GridSize>,
     /// In place of a grid, prove boxes of gains, masses, dampings or a delay stable or unstable throughout; sides are halved at most this number of
@@ -171,10 +171,10 @@ pub(crate) struct MapArguments {
     /// With --prove, for every number of equal peers from 2 on, or FROM.., or FROM..TO
     #[arg(long, value_name = "FROM..TO", num_args = 0..=1, default_missing_value = "2..", value_parser = numbers, requires = "prove", conflicts_with = "grid")]
     pub(crate) every_number: Option<(u64, Option<u64>)>,
-    /// With --prove, write certificate.json for each map into the folder of --out too: some 15 kB a box
+    /// With --prove, also write certificate.json for each map into the folder of --out: some 15 kB per box
     #[arg(long, requires = "prove", requires = "out")]
     pub(crate) certificate: bool,
-    /// Another map in the same picture, with these keys overridden too, again and again:
+    /// Draw another map into the same picture, with these keys overridden too, repeatable:
     /// --curve scene.count=3,coordination.strategy=proportional-derivative
     #[arg(long, value_name = "KEY=VALUE,...")]
     pub(crate) curve: Vec<String>,
@@ -188,7 +188,7 @@ pub(crate) struct MapArguments {
     pub(crate) shards: ShardArguments,
     #[command(flatten)]
     pub(crate) pictures: PictureArguments,
-    /// How many cells are computed at the same time [default: one a core]. Results do not depend on it
+    /// Number of cells computed at the same time [default: one per core]. Results do not depend on it
     #[arg(long, value_name = "N", visible_alias = "jobs", allow_negative_numbers = true, value_parser = threads)]
     pub(crate) threads: Option<u16>,
 }
@@ -198,10 +198,10 @@ pub(crate) struct MapArguments {
 pub(crate) struct BoundaryArguments {
     #[command(flatten)]
     pub(crate) scene: SceneArguments,
-    /// The key, and from where to where it is searched: --along coordination.stiffness=0..6000
+    /// Key along which to search, with its range: --along coordination.stiffness=0..6000
     #[arg(long, value_name = "KEY=LO..HI")]
     pub(crate) along: String,
-    /// How exactly a crossing is found, in the unit of the key [default: a billionth of the range; in the mean square a ten-millionth]
+    /// Tolerance of a crossing, in the unit of the key [default: a billionth of the range; in the mean square a ten-millionth]
     #[arg(long, value_name = "T", value_parser = real, allow_negative_numbers = true)]
     pub(crate) tolerance: Option<f64>,
     /// Prove which stretches of a gain, mass, damping or delay are stable or unstable, and enclose every crossing
@@ -210,10 +210,10 @@ pub(crate) struct BoundaryArguments {
     /// With --prove, write certificate.json into the folder of --out too
     #[arg(long, requires = "prove", requires = "out")]
     pub(crate) certificate: bool,
-    /// How many values are looked at first, the ends among them [default: 400]
+    /// Number of values checked first, the ends among them [default: 400]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<usize>(0, u64::MAX))]
     pub(crate) samples: Option<usize>,
-    /// How many values are looked at at most; the answer then says that it is not settled
+    /// Largest number of values to check; an answer that would need more says that it is not settled
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<usize>(2, u64::MAX), default_value_t = BoundaryArguments::VALUES, conflicts_with = "prove")]
     pub(crate) values: usize,
     /// Write boundary.csv, samples.csv, boundary.svg and boundary.html, a page of all, into this folder, and keep the finished part there if it is
@@ -268,32 +268,32 @@ impl std::fmt::Display for GridSize {
 pub(crate) struct AdmittanceArguments {
     #[command(flatten)]
     pub(crate) scene: SceneArguments,
-    /// The peer whose device is pushed
+    /// Peer whose device is pushed
     #[arg(long, value_name = "PEER")]
     pub(crate) peer: String,
-    /// The axis of the push, or of the twist of a device that turns [default: that of its own one-sided contact, or x]
+    /// Axis of the push, or of the twist of a device that turns [default: that of its own one-sided contact, or x]
     #[arg(long, value_enum, value_name = "AXIS")]
     pub(crate) axis: Option<AxisName>,
-    /// Along or about which axis its motion is looked at, where the object turns [default: that of the push]
+    /// Axis of the observed motion, along or about it, if the object turns [default: that of the push]
     #[arg(long, value_enum, value_name = "AXIS")]
     pub(crate) seen: Option<AxisName>,
-    /// The lowest frequency [default: 0.01]
+    /// Lowest frequency, in Hz [default: 0.01]
     #[arg(long, value_name = "HZ", value_parser = real, allow_negative_numbers = true)]
     pub(crate) from: Option<f64>,
-    /// The highest frequency, at most half the rate of the peer's ticks [default: 100, or that]
+    /// Highest frequency in Hz, at most half the rate of the peer's ticks [default: 100, or that]
     #[arg(long, value_name = "HZ", value_parser = real, allow_negative_numbers = true)]
     pub(crate) to: Option<f64>,
-    /// How many frequencies from the lowest to the highest, each the same factor above the one before [default: 60]
+    /// Number of frequencies from the lowest to the highest, in equal ratios [default: 60]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = some)]
     pub(crate) points: Option<NonZeroUsize>,
-    /// These frequencies instead: --at 0.01,1,10
+    /// Compute these frequencies, in Hz, instead: --at 0.01,1,10
     #[arg(long, value_name = "HZ,...", value_parser = real, value_delimiter = ',', allow_negative_numbers = true, conflicts_with_all = ["from", "to", "points"])]
     pub(crate) at: Vec<f64>,
-    /// Another curve beside it, with these keys overridden too, again and again:
+    /// Draw another curve, with these keys overridden too, repeatable:
     /// --curve scene.count=3,coordination.strategy=proportional-derivative
     #[arg(long, value_name = "KEY=VALUE,...")]
     pub(crate) curve: Vec<String>,
-    /// The most memory that the matrices of a part of the scene may take; what takes more is refused before it is begun
+    /// Memory limit of the matrices of a part of the scene; larger parts are refused before they are begun
     #[arg(long, value_name = "SIZE", value_parser = memory, default_value = "8GiB")]
     pub(crate) memory: u64,
     /// Write admittance.csv, a Bode plot, admittance.svg, and admittance.html, a page of all, into this folder

@@ -130,7 +130,7 @@ fn plan(arguments: &CampaignArguments, sharing: Sharing<'_>) -> Result<CampaignP
         // Without a scene, the command continues the campaign recorded in the folder. Options of a new campaign could contradict the record.
         let CampaignArguments { overrides, vary, measure, verdicts, .. } = arguments;
         if !overrides.set.is_empty() || !vary.is_empty() || measure.word().is_some() || *verdicts {
-            return Err(Failure::Input("the options of a campaign stand beside no scene: expected its scene too, or none of them".to_owned()));
+            return Err(Failure::Input("these options of a campaign need its scene: expected the scene too, or none of these options".to_owned()));
         }
         return Campaign::plan_in(sharing.folder().unwrap_or_else(|| Path::new(".")), PROGRAM).map_err(refused);
     };
@@ -193,9 +193,11 @@ pub(crate) fn not_all_judged(sharing: Sharing<'_>, judged: u64, combinations: u6
     let kept = format!("{judged} of {combinations} verdicts are kept in {}", output::path(out));
     match sharing {
         Sharing::Merge(_) => {
-            Failure::System(format!("{kept}: expected all. Do the shards again that are missing, or the command with --out and without --shard"))
+            Failure::System(format!("{kept}: expected all. Run the missing shards again, or the command with --out and without --shard"))
         }
-        Sharing::Whole(_) | Sharing::Shard(..) | Sharing::Status(_) => Failure::Interrupted(format!("{kept}; the same command goes on from there")),
+        Sharing::Whole(_) | Sharing::Shard(..) | Sharing::Status(_) => {
+            Failure::Interrupted(format!("{kept}; repeat the command to go on from there"))
+        }
     }
 }
 
@@ -227,12 +229,12 @@ pub(crate) fn run_to_end(campaign: &mut Campaign, out: &Path) -> Result<Report, 
         Ok(Outcome::Finished(report)) => Ok(report),
         Ok(Outcome::Interrupted { kept }) => {
             let out = output::path(out);
-            Err(Ended::Said(Failure::Interrupted(format!("{kept} of {runs} runs are kept in {out}; the same command goes on from there"))))
+            Err(Ended::Said(Failure::Interrupted(format!("{kept} of {runs} runs are kept in {out}; repeat the command to go on from there"))))
         }
         // An error of a file, such as a full disk, does not harm the runs that are kept, so the message tells how to continue.
         Err(error @ CampaignError::File { .. }) => {
             let kept = campaign.kept();
-            let going_on = format!("{error}\n{kept} of {runs} runs are kept: once that can be done, the same command goes on from there");
+            let going_on = format!("{error}\n{kept} of {runs} runs are kept: once the cause is removed, repeat the command to go on from there");
             Err(Ended::Said(Failure::System(going_on)))
         }
         Err(error) => Err(Ended::Error(error)),

@@ -39,7 +39,10 @@ fn work(
     judge: impl FnOnce(&mut SharedCampaign, &dyn Watch) -> Result<u64, CampaignError>,
 ) -> Result<Done, Ended> {
     let ended = |what: &str| {
-        Ended::Said(Failure::Interrupted(format!("shard {shard}: {what} is kept in {}; the same command goes on from there", output::path(folder))))
+        Ended::Said(Failure::Interrupted(format!(
+            "shard {shard}: {what} is kept in {}; repeat the command to go on from there",
+            output::path(folder)
+        )))
     };
     let judging = Shown::judging(shared.campaign().plan().combinations());
     let missing = judge(shared, &Working { shown: &judging, worker });
@@ -54,7 +57,9 @@ fn work(
         if !matches!(error, CampaignError::File { .. }) {
             return Ended::Error(error);
         }
-        Ended::Said(Failure::System(format!("{error}\nParts that are whole are kept: once that can be done, the same command goes on from there")))
+        Ended::Said(Failure::System(format!(
+            "{error}\nParts that are whole are kept: once the cause is removed, repeat the command to go on from there"
+        )))
     })?;
     if report.left > 0 {
         return Err(ended(&format!("all but {} of its {} runs", report.left, report.runs)));

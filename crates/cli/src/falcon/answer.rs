@@ -12,6 +12,7 @@ use serde::Serialize;
 use super::bench::{Bench, End};
 use super::reach::{FirmwareState, Target};
 use crate::documents::micros;
+use crate::realtime::counts;
 
 /// Identity of the device in an answer. The optional fields are absent for a simulated device, and where the system does not give the string.
 #[derive(Serialize)]
@@ -166,9 +167,9 @@ pub(super) fn traffic(traffic: &Traffic) -> [String; 2] {
     let Traffic { seconds, exchanges, reports_per_s, timeouts, garbage_bytes, faults, implausible, late_turns, worst_late_us, .. } = traffic;
     [
         format!(
-            "{exchanges} exchanges in {seconds:.2} s, {reports_per_s:.0} reports a second; {late_turns} turns were late, by {worst_late_us:.0} µs at most"
+            "{exchanges} exchanges in {seconds:.2} s, {reports_per_s:.0} reports a second; {late_turns} turns of the loop were late, the worst by {worst_late_us:.0} µs"
         ),
-        format!("{timeouts} time-outs, {garbage_bytes} bytes of garbage, {faults} failed transfers, {implausible} reports that cannot be"),
+        format!("{timeouts} time-outs, {garbage_bytes} bytes of garbage, {faults} failed transfers, {implausible} impossible reports"),
     ]
 }
 
@@ -186,14 +187,16 @@ pub(super) fn seen(seen: &Seen) -> [String; 2] {
 /// Returns the statistics of forces as one line of text.
 pub(super) fn forces(forces: &Forces) -> String {
     let Forces { limit_n, largest_n, limited, slewed, saturated, zeroed } = forces;
-    let zeroed: Vec<String> = zeroed.iter().map(|(cause, count)| format!("{count} {cause}")).collect();
-    let zeroed = if zeroed.is_empty() { "none".to_owned() } else { zeroed.join(", ") };
-    format!("force up to {largest_n:.3} N, limit {limit_n} N; {limited} limited, {slewed} slewed, {saturated} saturated; became zero: {zeroed}")
+    let words = |all: &[(&str, u64)]| counts(all).unwrap_or_else(|| "none".to_owned());
+    let changed = words(&[("limited", *limited), ("slowed", *slewed), ("more than a motor gives", *saturated)]);
+    let zeroed = words(&zeroed.iter().map(|(cause, count)| (*cause, *count)).collect::<Vec<_>>());
+    format!("largest force {largest_n:.3} N, limit {limit_n} N; forces changed: {changed}; set to zero: {zeroed}")
 }
 
 /// Formats a position \[m\] in millimetres, such as `x 1.2 mm, y -3.0 mm, z 45.6 mm`.
 pub(super) fn place(position: Triple) -> String {
-    let [x, y, z] = position.map(|part| 1e3 * part);
+    // Rounded here, because -0.04 would be shown as -0.0.
+    let [x, y, z] = position.map(|part| (1e4 * part).round() / 10.0 + 0.0);
     format!("x {x:.1} mm, y {y:.1} mm, z {z:.1} mm")
 }
 

@@ -119,7 +119,7 @@ impl Push {
                 // The driver would reduce such a force without an error, and the user would not get the force of the option.
                 if length > arguments.limit {
                     return Err(Failure::Input(format!(
-                        "the force of {length} N is above the limit of {} N: ask for less, or raise --limit (docs/falcon.md says what is uncertain about newtons)",
+                        "the force of {length:.3} N is above the limit of {} N: ask for less, or raise --limit (docs/falcon.md says what is uncertain about newtons)",
                         arguments.limit
                     )));
                 }
@@ -232,15 +232,44 @@ impl Task for Watching {
     }
 }
 
-/// Returns the state of the device as one line for a terminal. Encoders stand in for a position that is unknown.
+/// Returns the state of the device for a terminal: a line about the device, and a line per axis that shows where the grip is. Encoders stand in for a position
+/// that is unknown.
 fn shown(at: Duration, status: &Status) -> String {
     let seen = Seen::of(status);
-    let place = match (seen.position_m, seen.velocity_m_s) {
-        (Some(position), Some(velocity)) => format!("{}, {:.3} m/s", answer::place(position), answer::length(velocity)),
-        _ => format!("encoders {:?}", seen.encoders),
+    let pressed = if seen.buttons.is_empty() { "none".to_owned() } else { seen.buttons.join(", ") };
+    let mut text = format!("{:.1} s, {}, {} light, buttons pressed: {pressed}", at.as_secs_f64(), seen.phase, seen.light);
+    let (Some(position), Some(velocity)) = (seen.position_m, seen.velocity_m_s) else {
+        let [top, right, left] = seen.encoders;
+        return format!("{text}\n  encoders: top {top}, right {right}, left {left}; the position is known once the device is homed");
     };
-    let [x, y, z] = seen.force_n;
-    format!("{:.1} s {} ({}): {place}; force {x:.2}, {y:.2}, {z:.2} N; buttons {}", at.as_secs_f64(), seen.phase, seen.light, seen.buttons.join(" "))
+    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+        // Rounded here, because -0.04 would be shown as -0.0.
+        let place = (1e4 * position[axis]).round() / 10.0 + 0.0;
+        text.push_str(&format!("\n  {name} [{}] {place:>6.1} mm  force {:>5.2} N", ruler(place), seen.force_n[axis]));
+    }
+    format!("{text}\n  speed {:.3} m/s", answer::length(velocity))
+}
+
+/// Half of the length that a ruler shows \[mm\]. The grip of a Falcon moves by about that much to either side of the origin.
+const REACH_MM: f64 = 60.0;
+/// Number of places of a ruler, an odd number, so that the origin has one of its own.
+const PLACES: u8 = 31;
+
+/// Returns a ruler with the grip at `place` \[mm\] and the origin in the middle. A place beyond the ends is shown at the end.
+fn ruler(place: f64) -> String {
+    let last = f64::from(PLACES - 1);
+    let grip = ((place / REACH_MM + 1.0) * 0.5 * last).round().clamp(0.0, last);
+    (0..PLACES)
+        .map(|at| {
+            if (f64::from(at) - grip).abs() < 0.5 {
+                'o'
+            } else if at == PLACES / 2 {
+                '|'
+            } else {
+                '-'
+            }
+        })
+        .collect()
 }
 
 /// Header of the CSV rows. Times are in s, positions in m, velocities in m/s, forces in N. Unknown values are empty.
@@ -297,10 +326,38 @@ pub(super) fn print_row(row: &str) -> Result<(), Failure> {
 
 #[cfg(test)]
 mod tests {
-    use cohaptic_falcon::driver::{Driver, DriverConfig};
+    use cohaptic_falcon::driver::{Driver, DriverConfig, Reading};
     use cohaptic_falcon::simulator::{SimulatedTransport, Simulator, SimulatorConfig, StillHand};
+    use cohaptic_units::Instant;
 
     use super::*;
+
+    #[test]
+    fn people_see_where_the_grip_is() {
+        assert_eq!(ruler(0.0), "---------------o---------------");
+        assert_eq!(ruler(-20.0), "----------o----|---------------");
+        // The last place to the right is that of all places beyond.
+        assert_eq!((ruler(60.0), ruler(400.0)), (ruler(400.0), "---------------|--------------o".to_owned()));
+        assert_eq!(ruler(-60.0), "o--------------|---------------");
+        let simulator = Simulator::new(SimulatorConfig { running: true, ..SimulatorConfig::default() }, StillHand);
+        let driver = Driver::open(SimulatedTransport::in_virtual_time(simulator), DriverConfig::DEFAULT).unwrap();
+        let unknown = shown(Duration::ZERO, driver.status());
+        assert_eq!(
+            unknown,
+            "0.0 s, silent, red light, buttons pressed: none\n  encoders: top 0, right 0, left 0; the position is known once the device is homed"
+        );
+        let reading = Reading { at: Instant::ZERO, position: [0.0, -0.02, 0.0305], velocity: [0.0, 0.0, 0.5] };
+        let known = shown(Duration::from_millis(2500), &Status { reading: Some(reading), force: [0.0, 0.0, -0.3], ..*driver.status() });
+        assert_eq!(
+            known.lines().skip(1).collect::<Vec<_>>(),
+            [
+                "  x [---------------o---------------]    0.0 mm  force  0.00 N",
+                "  y [----------o----|---------------]  -20.0 mm  force  0.00 N",
+                "  z [---------------|-------o-------]   30.5 mm  force -0.30 N",
+                "  speed 0.500 m/s"
+            ]
+        );
+    }
 
     #[test]
     fn what_is_not_known_is_empty_and_every_row_has_all_columns() {

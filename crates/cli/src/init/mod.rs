@@ -76,7 +76,7 @@ fn parsed(text: &str) -> Result<Table, Failure> {
 
 fn refuse_to_overwrite(file: &Path, force: bool) -> Result<(), Failure> {
     match file.symlink_metadata() {
-        Ok(_) if !force => Err(Failure::Input(format!("{} is there already: expected another name, or --force to write over it", file.display()))),
+        Ok(_) if !force => Err(Failure::Input(format!("{} exists already: expected another name, or --force to overwrite it", file.display()))),
         // An error mostly means that no file has this name. Writing the file reports every other obstacle.
         Ok(_) | Err(_) => Ok(()),
     }

@@ -30,7 +30,7 @@ const PACKETS: u64 = 100_000;
 pub(crate) fn link(arguments: &LinkArguments) -> Result<ExitCode, Failure> {
     let (measured, written) = drive(arguments, Spec::read(arguments)?)?;
     let document = cohaptic_answers::link::document(&measured, Some(&written));
-    let words = || cohaptic_answers::link::words(&measured, written.packets_per_s);
+    let words = || cohaptic_answers::link::words(&measured);
     output::answer(arguments.json, DocumentSchema::LINK, &document, words, &written.files)?;
     Ok(if measured.is_interrupted() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }

@@ -51,8 +51,7 @@ fn is_keys(spec: &[String]) -> Result<bool, Failure> {
         return Ok(words.is_empty());
     }
     Err(Failure::Input(format!(
-        "a link is said either in words of tc-netem or in keys of a scene, not in both: {} is of the first kind, {} of the second. Expected all of one kind, such as \
-         delay 20ms loss 1%, or delay=20ms loss=1%; a value with spaces stands in quotes, 'jitter={{ sd = \"2ms\" }}'",
+        "a link is written either in words of tc-netem or in keys of a scene, not in both: {} is of the first kind, {} of the second. Write all in one kind, such as delay 20ms loss 1%, or delay=20ms loss=1%; put a value with spaces in quotes, 'jitter={{ sd = \"2ms\" }}'",
         words.join(" "),
         keys.join(" ")
     )))
@@ -82,7 +81,7 @@ pub(crate) fn link_and_keys(spec: &[String]) -> Result<(LinkModel, LinkKeys), Fa
 }
 
 fn parsed(said: &str) -> Result<Netem, Failure> {
-    Netem::parse(said).map_err(|error| Failure::Input(format!("these words are no link:\n{}", error.excerpt(said))))
+    Netem::parse(said).map_err(|error| Failure::Input(format!("these words do not describe a link:\n{}", error.excerpt(said))))
 }
 
 fn not_exact(said: &str, error: &ExactError) -> Failure {

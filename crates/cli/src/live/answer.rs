@@ -105,7 +105,7 @@ pub(super) fn describe(scene: &Scene, report: &Report) -> String {
     line(packets(summary));
     measured_lines(scene, &report.measures).into_iter().for_each(&mut line);
     if let Some((door, socket)) = &report.admission {
-        line(format!("session at {}: {} let in, {} sent", socket.address, Counted(door.admitted, "sample"), door.sent));
+        line(format!("session at {}: {} accepted, {} sent", socket.address, Counted(door.admitted, "sample"), door.sent));
         let refused: Vec<String> = door.refusals().filter(|(_, count)| *count > 0).map(|(cause, count)| format!("{count} {cause}")).collect();
         if !refused.is_empty() {
             line(format!("refused: {}", refused.join(", ")));
@@ -115,15 +115,15 @@ pub(super) fn describe(scene: &Scene, report: &Report) -> String {
             line(format!("lost at the socket: {}", Counted(lost, "datagram")));
         }
     }
-    text.push_str(&notes(&report.prepared));
+    text.push_str(&notes(&report.prepared, report.validity));
     text
 }
 
 fn came(seat: &SeatStats) -> String {
     let late = if seat.late > 0 { format!(", {} of them {:.0} µs late at most", seat.late, micros(seat.most_late)) } else { String::new() };
     match seat.joined {
-        0 => "; it never came".to_owned(),
+        0 => "; it never joined".to_owned(),
         1 => format!("; {} taken{late}", Counted(seat.taken, "sample")),
-        joined => format!("; it came {joined} times, {} taken{late}", Counted(seat.taken, "sample")),
+        joined => format!("; it joined {joined} times, {} taken{late}", Counted(seat.taken, "sample")),
     }
 }

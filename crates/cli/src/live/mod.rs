@@ -26,7 +26,7 @@ use crate::document_schema::DocumentSchema;
 use crate::failure::{self, Failure, INTERRUPTED};
 use crate::file::{own_folder, write_file};
 use crate::progress::Progress;
-use crate::realtime::{ControlFiles, KeyedLinks, LiveControl, loading, say};
+use crate::realtime::{ControlFiles, KeyedLinks, LiveControl, loading, own_address, say};
 use crate::run::page::edits;
 use crate::{input, interrupt, output};
 use onlookers::SessionConductor;
@@ -39,13 +39,15 @@ pub(crate) fn live(arguments: &LiveArguments) -> Result<ExitCode, Failure> {
     match (path, new_key) {
         (_, Some(file)) => make_key(file),
         (Some(path), None) => run(arguments, path),
-        (None, None) => Err(Failure::Input("no scene was given".to_owned())),
+        (None, None) => {
+            Err(Failure::Input("no scene was given: expected a file, such as cohaptic live scene.toml, or - for standard input".to_owned()))
+        }
     }
 }
 
 fn make_key(file: &Path) -> Result<ExitCode, Failure> {
     SessionKey::generate_to(file, &mut SystemEntropy).map_err(|error| Failure::System(error.to_string()))?;
-    output::text("a new session key; only its owner can read it. Anybody who has it can take part\n")?;
+    output::text("this is a new session key. Only you can read its file; anybody who has the key can take part\n")?;
     output::wrote([file]);
     Ok(ExitCode::SUCCESS)
 }
@@ -138,7 +140,7 @@ fn conduct(scene: &Scene, session: Session, mut host: SessionConductor, control:
     let progress = Progress::through_scene(&scene.title, scene.duration);
     let report = thread::scope(|scope| {
         let running = thread::Builder::new().name("live".to_owned()).spawn_scoped(scope, move || session.run(&mut host));
-        let running = running.map_err(|error| Failure::System(format!("the session gets no thread: {error}")))?;
+        let running = running.map_err(|error| Failure::System(format!("the system gives the session no thread: {error}")))?;
         while !running.is_finished() {
             // The session runs on its own thread, so this sleep does not delay its ticks.
             thread::sleep(Duration::from_millis(50));
@@ -205,4 +207,7 @@ fn announce(scene: &Scene, address: Option<SocketAddr>, has_key: bool) {
     let peers: Vec<String> = peers.map(|(place, peer)| format!("{} at place {place}", peer.name)).collect();
     let key = if has_key { "with its key" } else { "without a key" };
     say(&format!("listening on {address} for {}: session {}, {}, {key}", peers.join(", "), scene.seed, Counted(scene.axes.count(), "axis")));
+    if let Some(own) = own_address(address) {
+        say(&format!("programs on other machines send to {own}"));
+    }
 }

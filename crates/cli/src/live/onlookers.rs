@@ -17,7 +17,7 @@ use cohaptic_units::Instant;
 
 use crate::documents::micros;
 use crate::interrupt;
-use crate::realtime::{Edit, KeyedLinks, Look, counters, invalid, quantiles, quantiles_of};
+use crate::realtime::{Edit, KeyedLinks, Look, counters, quantiles, quantiles_of};
 
 /// Conductor of a session. Publishes snapshots and passes the changes of live control on to the session.
 pub(super) struct SessionConductor {
@@ -95,7 +95,7 @@ pub(crate) fn snapshot(status: &Status, axes: usize) -> Snapshot {
     let now = Instant::ZERO.saturating_add(status.elapsed);
     Snapshot {
         elapsed: status.elapsed,
-        invalid: invalid(&status.validity),
+        invalid: status.validity.reason(),
         lateness: vec![quantiles(&status.ticks), quantiles(&status.releases)],
         links: status.links.iter().map(link).collect(),
         peers: status.peers.iter().map(|peer| view(peer, axes, now)).collect(),

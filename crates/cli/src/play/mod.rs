@@ -12,7 +12,7 @@ mod scene;
 mod stage;
 
 use std::io::Write as _;
-use std::net::{IpAddr, SocketAddr, UdpSocket};
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -32,7 +32,7 @@ use self::stage::{Part, PartLinks, PlayStage};
 use crate::arguments::PlayArguments;
 use crate::failure::Failure;
 use crate::live::onlookers;
-use crate::realtime::{ControlFiles, Edit, KeyedLinks, Look, refused_server, say, token_of};
+use crate::realtime::{ControlFiles, Edit, KeyedLinks, Look, reached_from_elsewhere, refused_server, say, token_of};
 use crate::{input, interrupt};
 
 /// Text of the default scene: three users, average-position, a delay of 24 ms.
@@ -161,7 +161,7 @@ fn run_part(session: Session, mut conductor: PartConductor) -> Result<Report, Fa
     // The part is recorded from its first sample on, and the session asks the conductor 50 times a second.
     interrupt::has_results();
     let running = thread::Builder::new().name("play".to_owned()).spawn(move || session.run(&mut conductor));
-    let running = running.map_err(|error| Failure::System(format!("the session gets no thread: {error}")))?;
+    let running = running.map_err(|error| Failure::System(format!("the system gives the session no thread: {error}")))?;
     running.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)).map_err(crate::live::refused)
 }
 
@@ -247,21 +247,6 @@ impl Drop for Records {
     }
 }
 
-/// Returns `url` with this machine's own address in place of the loopback address, if the server listens on all addresses; otherwise `url` itself.
-fn reached_from_elsewhere(listening: SocketAddr, url: String) -> String {
-    let loopback = match listening.ip() {
-        IpAddr::V4(ip) if ip.is_unspecified() => "127.0.0.1",
-        IpAddr::V6(ip) if ip.is_unspecified() => "[::1]",
-        IpAddr::V4(_) | IpAddr::V6(_) => return url,
-    };
-    // Connecting a UDP socket sends nothing, but makes the system choose the network card and so the address that other machines can reach.
-    let own = UdpSocket::bind(("0.0.0.0", 0)).and_then(|socket| {
-        socket.connect(("192.0.2.1", 9))?;
-        socket.local_addr()
-    });
-    own.map_or_else(|_| url.clone(), |own| url.replacen(loopback, &own.ip().to_string(), 1))
-}
-
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeMap;
@@ -318,13 +303,5 @@ mod tests {
             }
         }
         assert!(refused.keys().all(|name| scenes.contains_key(*name)), "{refused:?}");
-    }
-
-    #[test]
-    fn a_link_for_others_has_an_address_that_they_can_ask_for() {
-        let url = "http://127.0.0.1:80/join?token=x".to_owned();
-        assert_eq!(reached_from_elsewhere("127.0.0.1:80".parse().unwrap(), url.clone()), url);
-        let elsewhere = reached_from_elsewhere("0.0.0.0:80".parse().unwrap(), url);
-        assert!(elsewhere.starts_with("http://") && elsewhere.ends_with(":80/join?token=x"), "{elsewhere}");
     }
 }

@@ -2,7 +2,7 @@
 //! Without `--control` the same snapshot feeds the progress line of the terminal.
 
 use std::fs::File;
-use std::io::{self, IsTerminal as _, Read as _, Write as _};
+use std::io::{self, IsTerminal as _, Read as _};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::Sender;
@@ -15,7 +15,7 @@ use cohaptic_realtime::LatenessSummary;
 use cohaptic_scene::LinkKeys;
 use cohaptic_wan::{DropCause, LinkModel, LinkStats};
 
-use super::ControlFiles;
+use super::{ControlFiles, reached_from_elsewhere, say};
 use crate::arguments::RealTimeArguments;
 use crate::failure::Failure;
 use crate::file;
@@ -33,8 +33,11 @@ impl LiveControl {
         let Some(address) = arguments.control else { return Ok(Self { board, server: None }) };
         let config = ServerConfig { token: token_of(arguments)?, allow_remote: arguments.allow_remote, ..ServerConfig::new(address) };
         let server = serve(config, Arc::clone(&board), editor).map_err(|error| refused_server(&error))?;
-        // A failed write to standard error does not keep the run from beginning.
-        let _ = writeln!(io::stderr(), "live control: {}", server.url());
+        say(&format!("live control: {}", server.url()));
+        let elsewhere = reached_from_elsewhere(server.address(), server.url());
+        if elsewhere != server.url() {
+            say(&format!("live control, from other machines: {elsewhere}"));
+        }
         Ok(Self { board, server: Some(server) })
     }
 
@@ -62,7 +65,7 @@ pub(crate) fn token_of(arguments: &RealTimeArguments) -> Result<Option<Token>, F
     if let Some(mode) = open_to_others(&file).map_err(unreadable)? {
         let path = path.display();
         return Err(Failure::Input(format!(
-            "the token file {path} is open to others than its owner (mode {mode:03o}); close it with: chmod 600 {path}"
+            "the token file {path} can be opened by others than its owner (mode {mode:03o}); close it with: chmod 600 {path}"
         )));
     }
     let mut bytes = Vec::new();

@@ -71,7 +71,7 @@ impl ControlFiles {
     /// Returns the error for a file that may not be named. The message is the same for every path, so that nobody learns which files exist.
     fn refusal(&self) -> io::Error {
         let message = match &self.folder {
-            Some(folder) => format!("live control reads the files of {} alone (--control-files)", folder.display()),
+            Some(folder) => format!("live control reads only the files in {} (--control-files)", folder.display()),
             None => "live control reads no files unless it is started with --control-files DIR".to_owned(),
         };
         io::Error::new(io::ErrorKind::PermissionDenied, message)
@@ -95,7 +95,7 @@ fn names(keys: &LinkKeys, base: &Path, path: &Path) -> bool {
 fn open_regular(path: &Path, also: OFlags) -> io::Result<File> {
     let file = File::from(rustix::fs::open(path, OFlags::RDONLY | OFlags::CLOEXEC | OFlags::NONBLOCK | also, Mode::empty())?);
     // The type is taken from the open file, because the path may name another file by now.
-    if file.metadata()?.is_file() { Ok(file) } else { Err(io::Error::other("it is no regular file")) }
+    if file.metadata()?.is_file() { Ok(file) } else { Err(io::Error::other("it is not a regular file")) }
 }
 
 fn read(file: File) -> io::Result<Vec<u8>> {
@@ -156,7 +156,7 @@ mod tests {
         assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
         for path in [pipe, desk.path().join("open/deep")] {
             let error = files.read(&LinkKeys::default(), Path::new(""), &path).unwrap_err();
-            assert_eq!(error.to_string(), "it is no regular file");
+            assert_eq!(error.to_string(), "it is not a regular file");
         }
     }
 

@@ -1,5 +1,6 @@
 //! Parts that the commands that run in real time share (`live`, `relay`, `router` and others): live control, messages, and the options for pacing and priority.
 
+mod addresses;
 mod control;
 mod control_files;
 mod words;
@@ -10,9 +11,10 @@ use cohaptic_realtime::{Pacing, Tolerance, Wishes};
 
 use crate::arguments::RealTimeArguments;
 
+pub(crate) use addresses::{own_address, reached_from_elsewhere};
 pub(crate) use control::{Edit, KeyedLinks, LiveControl, Look, counters, quantiles, quantiles_of, refused_server, token_of};
 pub(crate) use control_files::ControlFiles;
-pub(crate) use words::{ConfiguredDelay, Publisher, carried, counts, invalid, lasted, late, loading, notes, say, some_length, status};
+pub(crate) use words::{ConfiguredDelay, Publisher, carried, counts, lasted, late, loading, notes, say, some_length, status};
 
 impl RealTimeArguments {
     /// Returns how the thread waits for its next deadline: by spinning with `--spin`, otherwise by sleeping.

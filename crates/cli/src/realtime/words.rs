@@ -25,13 +25,9 @@ pub(crate) fn late(summary: &LatenessSummary) -> String {
     format!("p50 {p50}, p99 {p99}, p99.9 {p999}, worst {max}")
 }
 
-/// Returns why a run is not valid, without the words "not valid", which the pages write themselves; `None` for a valid run.
-pub(crate) fn invalid(validity: &Validity) -> Option<String> {
-    (!validity.is_valid()).then(|| validity.to_string().trim_start_matches("not valid: ").to_owned())
-}
-
-/// Lists the real-time privileges that the system granted, and each privilege that the system refused, with advice how to get it. One indented line each.
-pub(crate) fn notes(prepared: &Prepared) -> String {
+/// Lists the real-time privileges that the system granted, each privilege that the system refused, with advice how to get it, and what to do about a run that is
+/// not valid. One indented line each.
+pub(crate) fn notes(prepared: &Prepared, validity: Validity) -> String {
     let mut text = String::new();
     let granted: Vec<&str> = prepared.granted.iter().copied().map(Wish::name).collect();
     if !granted.is_empty() {
@@ -39,6 +35,17 @@ pub(crate) fn notes(prepared: &Prepared) -> String {
     }
     for refused in &prepared.refused {
         let _ = writeln!(text, "  {refused}");
+    }
+    if !validity.is_valid() {
+        let missing = match (prepared.refused.is_empty(), prepared.granted.contains(&Wish::Priority)) {
+            (false, _) => ", allow what the system refused above",
+            (true, false) => ", leave out --no-priority",
+            (true, true) => "",
+        };
+        let _ = writeln!(
+            text,
+            "  what to do: this machine was too busy to be on time. End other programs{missing}, try --spin, or accept later ones with --tolerance"
+        );
     }
     text
 }
@@ -48,7 +55,7 @@ pub(crate) fn loading(progress: Progress) -> Option<String> {
     match progress {
         Progress::Attempt(attempt) => Some(format!("loading the firmware, attempt {attempt}")),
         Progress::Greeted(_) => Some("the boot loader answers".to_owned()),
-        Progress::Loaded { done, of } => (done == of).then(|| format!("{of} bytes are over")),
+        Progress::Loaded { done, of } => (done == of).then(|| format!("all {of} bytes are sent")),
         Progress::Failed(error) => Some(error.to_string()),
         Progress::Running => Some("its firmware runs".to_owned()),
     }
@@ -67,7 +74,7 @@ pub(crate) fn say(line: &str) {
 /// [`Failure::Input`] if the length is zero.
 pub(crate) fn some_length(length: Option<Duration>) -> Result<Option<Duration>, Failure> {
     if length.is_some_and(|length| length.is_zero()) {
-        return Err(Failure::Input("--for 0s: expected more than nothing".to_owned()));
+        return Err(Failure::Input("--for 0s: expected a time above zero".to_owned()));
     }
     Ok(length)
 }
@@ -174,11 +181,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_reason_does_not_repeat_what_a_page_writes_before_it() {
-        let limit = Duration::from_millis(1);
-        let reason = invalid(&Validity::NotValid { late: 23, of: 1965, limit }).unwrap();
-        assert!(reason.starts_with("23 of 1965"), "{reason}");
-        assert_eq!(invalid(&Validity::Valid), None);
+    fn a_run_that_is_not_valid_says_what_to_do() {
+        let late = Validity::NotValid { late: 5066, of: 14_492, what: "ticks", limit: Duration::from_millis(1) };
+        let prepared = Prepared::default();
+        assert_eq!(notes(&prepared, Validity::Valid), "");
+        let advice = notes(&prepared, late);
+        assert!(
+            advice.contains("End other programs, leave out --no-priority, try --spin")
+                && advice.contains("--tolerance")
+                && !advice.contains("refused"),
+            "{advice}"
+        );
     }
 
     #[test]

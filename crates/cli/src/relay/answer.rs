@@ -117,7 +117,7 @@ pub(super) fn describe(setup: &Setup, report: &Report, asked: &[ConfiguredDelay]
     let Totals { packets, dropped, sent, unsent } = Totals::of(report);
     let held = report.held.0;
     line(format!(
-        "{} came in within {}, {sent} sent on, {dropped} dropped, {held} on the way at the end",
+        "{} arrived in {}: {sent} sent on, {dropped} dropped, {held} on the way at the end",
         Counted(packets, "datagram"),
         lasted(report.elapsed)
     ));
@@ -126,23 +126,23 @@ pub(super) fn describe(setup: &Setup, report: &Report, asked: &[ConfiguredDelay]
         line(format!("release error: {}", late(&report.release.summary())));
     }
     if report.clamped.count() > 0 {
-        line(format!("{} of them were offered to their link late: {}", report.clamped.count(), late(&report.clamped.summary())));
+        line(format!("{} came to their link late: {}", Counted(report.clamped.count(), "datagram"), late(&report.clamped.summary())));
     }
     links(&report.links, asked, &mut line);
     if let Some(refused) = counts(&refused(&report.intake)) {
         line(format!("dropped on arrival: {refused}"));
     }
     if report.without_socket > 0 {
-        line(format!("sent away, because no socket could be had (`ulimit -n`): {}", Counted(report.without_socket, "client")));
+        line(format!("turned away because the system gave no socket (raise `ulimit -n`): {}", Counted(report.without_socket, "client")));
     }
     if unsent > 0 {
-        line(format!("{unsent} had come out of their links and were not sent yet"));
+        line(format!("{} had left their links and were not sent yet", Counted(unsent, "datagram")));
     }
     report.ports.iter().for_each(|port| at(port, &mut line));
     if let Some(refused) = small_buffer(&report.ports) {
         line(refused);
     }
-    text.push_str(&notes(&report.prepared));
+    text.push_str(&notes(&report.prepared, report.validity));
     text
 }
 
@@ -170,7 +170,7 @@ fn at(port: &PortReport, line: &mut impl FnMut(String)) {
     let mut all = port.counts.failures.by_reason().map(|(reason, count)| (reason, count)).to_vec();
     all.extend([("oversized", port.counts.oversized), ("errors on reading", port.counts.receive_errors)]);
     if let Some(failed) = counts(&all) {
-        line(format!("at the port {}: not sent or not taken: {failed}", port.name));
+        line(format!("at the port {}: not sent or not read: {failed}", port.name));
     }
     match port.kernel_drops {
         Some(0) => {}
@@ -186,7 +186,7 @@ fn small_buffer(ports: &[PortReport]) -> Option<String> {
     let least = ports.iter().map(|port| port.receive_buffer).filter(|granted| *granted > 0).min()?;
     (least < wanted).then(|| {
         format!(
-            "the system lets {least} bytes wait at a port, {wanted} were asked for: more makes kernel drops rarer; allow it with `sysctl \
+            "the buffer of a port holds {least} bytes, and {wanted} were asked for; a larger buffer makes drops by the kernel rarer: allow it with `sysctl \
              net.core.rmem_max={}` or CAP_NET_ADMIN",
             wanted / 2
         )

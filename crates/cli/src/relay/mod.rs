@@ -20,7 +20,7 @@ use crate::arguments::RelayArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::progress::Progress;
-use crate::realtime::{self, ControlFiles, Edit, KeyedLinks, LiveControl, Publisher, counters, invalid, quantiles, quantiles_of, say, some_length};
+use crate::realtime::{self, ControlFiles, Edit, KeyedLinks, LiveControl, Publisher, counters, quantiles, quantiles_of, say, some_length};
 use crate::{interrupt, output};
 use setup::Setup;
 
@@ -78,7 +78,7 @@ fn conduct(
             let heard = heard;
             relay.run(options, &heard, &stop, |view| publisher.offer(|| snapshot(view, &setup.pairs, options.tolerance)))
         });
-        let running = running.map_err(|error| Failure::System(format!("the relay gets no thread: {error}")))?;
+        let running = running.map_err(|error| Failure::System(format!("the system gives the relay no thread: {error}")))?;
         while !running.is_finished() {
             match wanted.recv_timeout(GLANCE) {
                 Ok(Edit { link, model, .. }) => {
@@ -129,10 +129,10 @@ fn publish_every(links: usize) -> Duration {
 /// Takes a snapshot of the relay. `pairs` holds sender and receiver of each link in the order of the description.
 fn snapshot(view: &View<'_>, pairs: &[(NodeId, NodeId)], tolerance: Tolerance) -> Snapshot {
     let links = view.links();
-    let validity = tolerance.judge(view.release());
+    let validity = tolerance.judge(view.release(), "datagrams");
     Snapshot {
         elapsed: view.now().saturating_duration_since(Instant::ZERO),
-        invalid: invalid(&validity),
+        invalid: validity.reason(),
         lateness: vec![quantiles(&view.release().summary())],
         links: links.iter().zip(pairs).map(|(report, (from, to))| link(report, view.recent_delays(*from, *to))).collect(),
         peers: Vec::new(),

@@ -16,7 +16,7 @@ use crate::arguments::RelayArguments;
 use crate::failure::Failure;
 use crate::input;
 use crate::link::link_and_keys;
-use crate::realtime::ConfiguredDelay;
+use crate::realtime::{ConfiguredDelay, own_address};
 
 /// Configuration of a relay, with the names and keys that messages and live control need.
 pub(super) struct Setup {
@@ -39,7 +39,10 @@ impl Setup {
             (_, _, [file]) => Self::of_file(arguments, Path::new(file)),
             (_, _, more) => {
                 let more: Vec<_> = more.iter().map(|word| word.to_string_lossy()).collect();
-                Err(Failure::Input(format!("{:?} is no file: expected one relay file; a link in words goes with --listen and --to", more.join(" "))))
+                Err(Failure::Input(format!(
+                    "{:?} is not a file: expected one relay file; a link in words goes with --listen and --to",
+                    more.join(" ")
+                )))
             }
         }
     }
@@ -97,7 +100,7 @@ impl Setup {
     /// Returns the lines that tell programs where to send. Called after the ports are bound, because the system chooses a port that was given as 0 only then.
     pub(super) fn opened<'a>(&mut self, ports: impl Iterator<Item = (&'a str, SocketAddr)>) -> Vec<String> {
         let (title, form) = (&mut self.title, &self.config.form);
-        let line = |(place, (_, port)): (usize, (&str, SocketAddr))| match form {
+        let mut line = |(place, (_, port)): (usize, (&str, SocketAddr))| match form {
             Form::Proxy(proxy) => {
                 *title = format!("{port} -> {}", proxy.to);
                 format!("listening on {port} for datagrams to {}", proxy.to)
@@ -108,7 +111,11 @@ impl Setup {
                 format!("listening on {port} for datagrams to {}, which is at {address}", program.name)
             }
         };
-        ports.enumerate().map(line).collect()
+        let lines = |(place, port): (usize, (&str, SocketAddr))| {
+            let own = own_address(port.1).map(|own| format!("programs on other machines send to {own}"));
+            std::iter::once(line((place, port))).chain(own)
+        };
+        ports.enumerate().flat_map(lines).collect()
     }
 
     pub(super) fn name(&self, node: NodeId) -> &str {

@@ -87,7 +87,7 @@ pub(super) fn describe(file: &RouterFile, ran: &RouterRun) -> String {
     if let Ending::Failed(error) = ending {
         line(format!("FAILED after {span}: {error}"));
     }
-    line(format!("{} came in within {span}, {} dropped, {held} on the way at the end", Counted(report.packets(), "packet"), report.dropped()));
+    line(format!("{} arrived in {span}: {} dropped, {held} on the way at the end", Counted(report.packets(), "packet"), report.dropped()));
     line(format!("the run is {validity}"));
     if report.release.count > 0 {
         line(format!("release error: {}", late(&report.release)));
@@ -97,12 +97,12 @@ pub(super) fn describe(file: &RouterFile, ran: &RouterRun) -> String {
         line(format!("{}: {}", attached(file, side), side_in_words(received, written)));
     }
     report.counters.lanes.iter().zip(asked).for_each(|(lane, asked)| line(lane_in_words(lane, asked)));
-    text.push_str(&notes(prepared));
+    text.push_str(&notes(prepared, *validity));
     text
 }
 
 fn side_in_words(received: &Received, written: &Written) -> String {
-    let mut text = format!("{} came from it, {} were handed to it", received.all.packets, written.packets);
+    let mut text = format!("{} came from it, {} were handed to it", Counted(received.all.packets, "packet"), written.packets);
     let apart = [
         ("passed by a rule", received.passed),
         ("passed because they are not IP", received.not_ip),
@@ -110,9 +110,9 @@ fn side_in_words(received: &Received, written: &Written) -> String {
         ("malformed", received.malformed),
     ];
     if let Some(apart) = counts(&apart) {
-        let _ = write!(text, "; of what came {apart}");
+        let _ = write!(text, "; of those that came {apart}");
     }
-    if let Some(lost) = counts(&[("for want of room", written.full), ("too long", written.too_long), ("refused", written.refused)]) {
+    if let Some(lost) = counts(&[("because its queue was full", written.full), ("too long", written.too_long), ("refused", written.refused)]) {
         let _ = write!(text, "; its device did not take {lost}");
     }
     text

@@ -19,9 +19,7 @@ use crate::arguments::RouterArguments;
 use crate::document_schema::DocumentSchema;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::progress::Progress;
-use crate::realtime::{
-    self, ConfiguredDelay, ControlFiles, Edit, KeyedLinks, LiveControl, Publisher, counters, invalid, quantiles, say, some_length,
-};
+use crate::realtime::{self, ConfiguredDelay, ControlFiles, Edit, KeyedLinks, LiveControl, Publisher, counters, quantiles, say, some_length};
 use crate::{input, interrupt, output};
 
 /// Runs a router between two devices and prints its report.
@@ -104,7 +102,7 @@ fn conduct(
         let running = thread::Builder::new()
             .name("router".to_owned())
             .spawn_scoped(scope, || route(router, file, arguments, until, &stop, wanted, publisher))
-            .map_err(|error| Failure::System(format!("the router gets no thread: {error}")))?;
+            .map_err(|error| Failure::System(format!("the system gives the router no thread: {error}")))?;
         while !running.is_finished() {
             thread::sleep(GLANCE);
             stop.store(interrupt::requested(), Ordering::Relaxed);
@@ -130,6 +128,7 @@ fn route(
     const LOOK: Duration = Duration::from_millis(20);
     let prepared = prepare_thread(&arguments.real_time.wishes());
     let tolerance = arguments.real_time.tolerance();
+    let judged = |router: &Router| tolerance.judge(router.lateness(), "packets");
     let mut asked: Vec<ConfiguredDelay> = file.links.iter().flat_map(|link| [ConfiguredDelay::of(&link.model); 2]).collect();
     let ended = router.run(stop, until, LOOK, |router| {
         for Edit { link: lane, model, .. } in wanted.try_iter() {
@@ -139,7 +138,7 @@ fn route(
             asked.changes += u64::from(changed.is_ok());
         }
         publisher.offer(|| {
-            let validity = tolerance.judge(router.lateness());
+            let validity = judged(router);
             snapshot(&router.report(), validity)
         });
     });
@@ -148,7 +147,7 @@ fn route(
         Ok(()) if interrupt::requested() => Ending::Interrupted,
         Ok(()) => Ending::Complete,
     };
-    RouterRun { report: router.report(), prepared, validity: tolerance.judge(router.lateness()), asked, ending }
+    RouterRun { report: router.report(), prepared, validity: judged(router), asked, ending }
 }
 
 /// Returns the description of the router, in which every link stands twice: from the left and from the right.
@@ -175,7 +174,7 @@ fn description(file: &RouterFile) -> Description {
 fn snapshot(report: &Report, validity: Validity) -> Snapshot {
     Snapshot {
         elapsed: elapsed(report),
-        invalid: invalid(&validity),
+        invalid: validity.reason(),
         lateness: vec![quantiles(&report.release)],
         links: report.counters.lanes.iter().map(link).collect(),
         peers: Vec::new(),

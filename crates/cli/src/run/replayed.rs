@@ -30,7 +30,7 @@ pub(super) fn read(file: &Path, scene: &Scene, arguments: &RunArguments, overrid
             let now = RecordedScene::of(scene, input::with(path, |text, file| scene_content_of_text(text, file, overrides))?);
             recorded.differences(&now).iter().map(ToString::to_string).collect()
         }
-        None => vec!["not known: the record is of a version that did not say with which scene it was made".to_owned()],
+        None => vec!["unknown: the record is of an older version, which did not keep the scene that it was made with".to_owned()],
     };
     if !differences.is_empty() {
         let said = listed(&differences);

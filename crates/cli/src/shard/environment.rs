@@ -125,7 +125,7 @@ impl Source {
             Count::Upto { last, step } => {
                 let (last, step) = (needed(last)?, needed(step)?.max(1));
                 if last < index || place % step != 0 {
-                    return Err(format!("{}: {index} is no index from {first} to {last} in steps of {step}: expected --shard I/N", self.name));
+                    return Err(format!("{}: {index} is not an index from {first} to {last} in steps of {step}: expected --shard I/N", self.name));
                 }
                 Ok(Some(Task { of: self, place: place / step, count: Some((last - first) / step + 1) }))
             }

@@ -44,7 +44,7 @@ pub(crate) fn logs_in(folder: &Path) -> Vec<PathBuf> {
 pub(crate) fn missing(folder: &Path, missing: &Missing) -> Failure {
     let shards = workers(folder).ok().and_then(|workers| workers.iter().map(|worker| worker.shard.count()).max());
     Failure::System(format!(
-        "{} is not whole: {}.\nDo them with --shard, or all that is missing by the command with --out and without --shard",
+        "{} is not complete: {}.\nRun them with --shard, or all that is missing with --out and without --shard",
         output::path(folder),
         missing.words(shards)
     ))

@@ -42,7 +42,7 @@ impl Worker {
         // The lease is taken before this check, and a process that takes the whole folder checks in the opposite order. At least one of the two sees the other.
         if OwnFolder::is_taken(folder) {
             let folder = output::path(folder);
-            return Err(Failure::System(format!("another process works on all shards in {folder}: expected to be the only one; wait for it")));
+            return Err(Failure::System(format!("another process works on all shards in {folder}: wait until it has ended")));
         }
         let path = folder.join(worker_log(&owner.name()));
         let head = format!("shard {shard} process {} host {}\n", owner.pid, owner.host);
@@ -98,7 +98,7 @@ impl Worker {
             return outcome;
         }
         Err(said(Failure::System(format!(
-            "another process has shard {} in {} now: this one stood still for more than {} s. What it had done is kept; expected one process for a shard",
+            "another process has taken over shard {} in {}, because this one stood still for more than {} s. What it had done is kept; expected one process for a shard",
             self.shard,
             output::path(&self.folder),
             STALE.as_secs()
@@ -164,11 +164,7 @@ fn words(holder: &Holder) -> String {
 }
 
 fn busy(folder: &Path, shard: Shard, holder: &Holder) -> Failure {
-    Failure::System(format!(
-        "{} works on shard {shard} in {}: expected to be the only one; wait for it, or do another shard",
-        words(holder),
-        output::path(folder)
-    ))
+    Failure::System(format!("{} works on shard {shard} in {}: wait until it has ended, or do another shard", words(holder), output::path(folder)))
 }
 
 fn say_that_it_waits(folder: &Path, shard: Shard, holder: &Holder) {

@@ -61,4 +61,4 @@ pub(super) fn left_open(pieces: usize) -> Option<String> {
 }
 
 /// What is said of a proof that was ended before all pieces were looked at.
-pub(super) const UNFINISHED: &str = "the proof was ended; pieces that it had not looked at are undecided, all others hold";
+pub(super) const UNFINISHED: &str = "the proof was stopped; pieces that it had not reached are undecided, all others hold";

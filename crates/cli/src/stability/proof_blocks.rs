@@ -163,7 +163,7 @@ impl Proofs<'_> {
         }
         if interrupt::requested() || !worker.goes_on() {
             let kept = format!("what was looked at is kept in {}", output::path(self.kept.folder));
-            return Err(Failure::Interrupted(format!("shard {shard}: {kept}; the same command goes on from there")));
+            return Err(Failure::Interrupted(format!("shard {shard}: {kept}; repeat the command to go on from there")));
         }
         Ok([mine, computed])
     }

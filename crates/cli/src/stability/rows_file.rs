@@ -209,7 +209,7 @@ struct Difference {
 fn refused(path: &Path, Difference { found, expected }: &Difference) -> Failure {
     let shorten = |line: &str| line.chars().flat_map(char::escape_debug).take(200).collect::<String>();
     Failure::Input(format!(
-        "{} keeps the rows of something else: it says \"{}\", and this command \"{}\": expected the command that began it, another folder, or no such file",
+        "{} holds the rows of another command: it says \"{}\", and this command \"{}\": repeat the command that began it, choose another folder, or remove the file",
         output::path(path),
         shorten(found),
         shorten(expected)
@@ -305,7 +305,7 @@ mod tests {
         for text in ["a map\ngrid 3x2\n0.0 0.5\n", "notes\n", "a map\ngrid 2x2 \n"] {
             fs::write(&path, text).unwrap();
             let Err(Failure::Input(message)) = RowsFile::open(path.clone(), &header()) else { panic!("{text:?} was taken") };
-            assert!(message.contains("rows.partial keeps the rows of something else"), "{message}");
+            assert!(message.contains("rows.partial holds the rows of another command"), "{message}");
             assert_eq!(fs::read_to_string(&path).unwrap(), text);
         }
     }

@@ -127,7 +127,7 @@ fn an_array_of_slurm_whose_task_was_killed_is_submitted_again_and_merged() {
     assert!(nodes.contains("one") && nodes.contains("two"), "{nodes}");
     assert_eq!(cluster.end_of(&merge), ["FAILED"]);
     let said = fs::read_to_string(work.path(&format!("slurm-{merge}.out"))).unwrap();
-    assert!(said.contains("losses is not whole") && said.contains(&format!("of {SHARDS} shards, these do them: ")), "{said}");
+    assert!(said.contains("losses is not complete") && said.contains(&format!("of {SHARDS} shards, these do them: ")), "{said}");
     work.assert_killed(killed);
     // The same array again: tasks whose shards are done end at once.
     let shards = cluster.submit(&[&array, "array.sh"]);

@@ -7,7 +7,7 @@ use crate::integration::scenes::TWO;
 use crate::integration::svg;
 
 fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+    value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
 }
 
 /// The paper's scene with one who touches.

@@ -122,7 +122,7 @@ fn a_campaign_that_is_finished_is_left_as_it_is() {
     desk.text(&format!("{SIX} --out out"));
     let before = fs::read(desk.path("out/runs.parquet")).unwrap();
     let again = desk.text(&format!("{SIX} --out out --threads 1"));
-    assert!(again.contains("all of them were there already: nothing was run") && again.contains("6 runs of 2 combinations"), "{again}");
+    assert!(again.contains("all results were in the folder already: nothing was run") && again.contains("6 runs of 2 combinations"), "{again}");
     let document = desk.json(&format!("{SIX} --out out --json"));
     assert_eq!((document["runs"].as_u64(), document["runs_computed"].as_u64()), (Some(6), Some(0)));
     assert_eq!(
@@ -149,7 +149,7 @@ fn what_makes_no_sense_is_refused_and_nothing_is_written() {
     for (rest, parts) in [
         ("--vary coordination.stifness=0..1/3", &["--vary coordination.stifness=0", "unknown key", "stiffness", "^"][..]),
         ("--vary peers.nobody.contact=none,grasp", &["--vary peers.nobody.contact=none", "left, right"]),
-        ("--vary coordination.stiffness=0..1", &["--vary: no number of values", "/13"]),
+        ("--vary coordination.stiffness=0..1", &["--vary: the number of values is missing", "/13"]),
         ("--vary coordination.stiffness=5..5/3", &["--vary: the range of", "is empty"]),
         ("--vary coordination.stiffness=5..1/3", &["--vary: the range of", "is empty"]),
         ("--vary coordination.stiffness=1..5/0", &["--vary: a range of 0"]),
@@ -176,7 +176,7 @@ fn what_makes_no_sense_is_refused_and_nothing_is_written() {
     desk.cohaptic("campaign random.toml --vary peers.right.hand.file=gone.csv --out out")
         .assert_refused(3, &["gone.csv", "note: in the combination"]);
     desk.write("file", "mine");
-    desk.cohaptic("campaign random.toml --out file").assert_refused(2, &["--out: file is no folder"]);
+    desk.cohaptic("campaign random.toml --out file").assert_refused(2, &["--out: file is not a folder"]);
     desk.write("thesis/chapter.tex", "mine");
     desk.cohaptic("campaign random.toml --out thesis").assert_refused(2, &["--out: thesis holds files, chapter.tex among them"]);
     assert_eq!((desk.read("file"), desk.files("thesis")), ("mine".to_owned(), vec!["chapter.tex".to_owned()]));
@@ -244,7 +244,7 @@ pub(crate) mod interrupted {
         let outcome = interrupted(&desk, &line, |_| parts(&desk) > 2);
         assert_eq!((outcome.status, outcome.stdout.as_str()), (Some(130), ""));
         let kept = parts(&desk) * 500;
-        for part in ["interrupted: ".to_owned(), format!("{kept} of 20000 runs are kept in out; the same command goes on from there")] {
+        for part in ["interrupted: ".to_owned(), format!("{kept} of 20000 runs are kept in out; repeat the command to go on from there")] {
             assert!(outcome.stderr.contains(&part), "no {part:?} in {}", outcome.stderr);
         }
         assert!(desk.files("out").iter().all(|name| name == "campaign.json" || name.starts_with("part-")), "{:?}", desk.files("out"));
@@ -287,7 +287,7 @@ pub(crate) mod interrupted {
         let line = "campaign random.toml --vary link.loss=0%,10% --runs 100 --format csv --part";
         // A row has some 300 bytes, so 16 of them fit into 16 blocks, whichever size these have, and 100 or 200 do not.
         let outcome = cramped(&desk, 16, &format!("{line} 100 --out parts"));
-        outcome.assert_refused(3, &["cannot write parts/part-0000", "File too large", "0 of 200 runs are kept", "the same command goes on"]);
+        outcome.assert_refused(3, &["cannot write parts/part-0000", "File too large", "0 of 200 runs are kept", "repeat the command to go on"]);
         assert_eq!(desk.files("parts"), ["campaign.json"]);
         let outcome = cramped(&desk, 16, &format!("{line} 16 --out table"));
         outcome.assert_refused(3, &["cannot write table/runs.csv", "200 of 200 runs are kept"]);

@@ -102,11 +102,11 @@ fn what_analysis_refuses_has_no_verdict_and_its_reason_is_counted() {
     for combination in &combinations[1..] {
         assert_eq!(judged(combination), [const { Value::Null }; 4], "{combination}");
         let is_timeline = combination["vary"][1] != "timeline=[]";
-        let part = if is_timeline { "its timeline changes it" } else { "everything repeats only after" };
+        let part = if is_timeline { "the timeline changes the scene" } else { "everything repeats only after" };
         assert!(combination["reason"].as_str().unwrap().contains(part), "{combination}");
     }
     let notes: Vec<&str> = document["notes"].as_array().unwrap().iter().map(|note| note.as_str().unwrap()).collect();
-    assert!(notes.iter().any(|note| note.starts_with("3 combinations have no verdict: its timeline")), "{notes:?}");
+    assert!(notes.iter().any(|note| note.starts_with("3 combinations have no verdict: the timeline")), "{notes:?}");
     assert_eq!(desk.json(&format!("{command} --json"))["combinations"], document["combinations"], "read back from the folder");
     assert!(desk.read("out/runs.csv").lines().nth(2).unwrap().contains(",,,,,complete,"));
     // Without verdicts there are no such keys.
@@ -138,7 +138,7 @@ fn verdicts_that_were_interrupted_are_kept_and_end_with_the_same_bytes() {
     let outcome = interrupted(&desk, &format!("{line} --set scene.count=2 --threads 1 --out out"), |_| lines() > 2);
     assert_eq!((outcome.status, outcome.stdout.as_str()), (Some(130), ""));
     let kept = lines();
-    assert!(outcome.stderr.contains(&format!("{kept} of 30 verdicts are kept in out; the same command goes on from there")), "{}", outcome.stderr);
+    assert!(outcome.stderr.contains(&format!("{kept} of 30 verdicts are kept in out; repeat the command to go on from there")), "{}", outcome.stderr);
     assert_eq!(desk.files("out"), ["campaign.json", "verdicts.part.csv"]);
     desk.text(&format!("{line} --set scene.count=2 --threads 2 --out out"));
     desk.text(&format!("{line} --set scene.count=2 --threads 3 --out whole"));

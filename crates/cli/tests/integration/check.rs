@@ -187,7 +187,7 @@ fn a_second_moment_that_takes_long_is_told_by_a_simulation_and_that_is_said() {
     assert!(matches!(outcome.status, Some(0 | 1)), "{outcome:?}");
     let checked = parse(&outcome.stdout)["scenes"][0].clone();
     let note = checked["notes"][0].as_str().unwrap();
-    assert!(note.starts_with("stable: told by a simulation") && note.contains("operations"), "{note}");
+    assert!(note.starts_with("stable: judged by a simulation") && note.contains("operations"), "{note}");
     // A scene without chance has nothing to note.
     assert_eq!(folder().json("check scenes/a.toml --json")["scenes"][0]["notes"], Value::Array(Vec::new()));
 }

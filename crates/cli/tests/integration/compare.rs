@@ -28,7 +28,7 @@ fn rows(desk: &Desk, file: &str) -> Vec<std::collections::BTreeMap<String, Strin
 }
 
 fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+    value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
 }
 
 fn count(values: &[f64]) -> f64 {
@@ -177,7 +177,7 @@ fn people_are_told_what_came_out() {
     let text = desk.text(&format!("{SIX} --out out"));
     for part in [
         "Three users, far apart\n  36 runs of 2 strategies at 3 combinations of link.loss, 6 of each\n",
-        "a difference is that to average-position, seed by seed",
+        "a difference is that to average-position, over the seeds of which neither run diverged",
         "  1  average-position  0 of 18 (0 to 18 %)",
         "max discrepancy [mm]: Largest distance along an axis between two copies, over instants\n",
         "           0%  average-position  ",
@@ -214,7 +214,7 @@ fn what_makes_no_sense_is_refused_and_nothing_is_written() {
             &["--strategies: unknown strategy \"extrapolatd\"", "did you mean \"extrapolated\"?"],
         ),
         ("--strategies average-position,extrapolated{horzon=5ms} --out out", &["extrapolated has no parameter \"horzon\"", "expected horizon"]),
-        ("--strategies average-position,average-position --out out", &["average-position is there twice"]),
+        ("--strategies average-position,average-position --out out", &["average-position stands twice"]),
         ("--strategies average-position,extrapolated{horizon} --out out", &["NAME{KEY=VALUE,...}"]),
         (
             "--strategies average-position,extrapolated{horizon=5} --out out",

@@ -82,7 +82,7 @@ fn what_makes_no_sense_is_refused_before_a_device_is_touched() {
         ("falcon fly", 2, &["'fly'"]),
         ("falcon probe --simulated --serial A", 2, &["--serial"]),
         ("falcon probe --virtual-time", 2, &["--simulated"]),
-        ("falcon home --simulated --for 0s", 2, &["more than nothing"]),
+        ("falcon home --simulated --for 0s", 2, &["a time above zero"]),
         ("falcon watch --simulated --force 1,2", 2, &["three numbers"]),
         ("falcon watch --simulated --force 0,0,1 --spring 3", 2, &["--spring"]),
         ("falcon watch --simulated --force -0.4,0,-0.4", 2, &["limit of 0.5 N", "--limit"]),
@@ -150,7 +150,11 @@ fn a_device_that_was_just_switched_on_gets_its_firmware() {
     for command in ["probe", "home", "watch --for 1s"] {
         let outcome = desk.cohaptic(&format!("falcon {command} {VIRTUAL} --firmware firmware.bin --json"));
         assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
-        assert!(outcome.stderr.contains("loading the firmware, attempt 1") && outcome.stderr.contains("8492 bytes are over"), "{}", outcome.stderr);
+        assert!(
+            outcome.stderr.contains("loading the firmware, attempt 1") && outcome.stderr.contains("all 8492 bytes are sent"),
+            "{}",
+            outcome.stderr
+        );
         let document = parse(&outcome.stdout);
         let falcon = document["falcons"].get(0).unwrap_or(&document);
         assert_eq!((&falcon["firmware"], falcon["timeouts"].as_u64()), (&"loaded".into(), Some(0)), "{falcon:#}");

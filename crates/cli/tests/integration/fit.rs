@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::integration::desk::Desk;
 
 fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+    value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
 }
 
 /// 40 000 packets. The mean of AR(1) delays with ρ = 0.5 has the standard error 4 ms·√(3/40 000) = 35 µs, the deviation 4 ms·√(5/6/40 000) = 18 µs, ρ

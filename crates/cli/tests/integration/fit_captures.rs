@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::integration::desk::Desk;
 
 fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+    value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
 }
 
 /// A pcap of raw IPv4 with UDP to port 5000: (microseconds, number of the packet), the number being identification and payload.

@@ -48,7 +48,7 @@ const ARGUMENTS: &[Bad] = &[
     ),
     bad(
         "relay --listen localhost:0 --to 127.0.0.1:65536",
-        "invalid value '127.0.0.1:65536' for '--to <ADDRESS>': is no address with a port: expected an address with a port, such as 127.0.0.1:7000, [::1]:7000 \
+        "invalid value '127.0.0.1:65536' for '--to <ADDRESS>': is not an address with a port: expected an address with a port, such as 127.0.0.1:7000, [::1]:7000 \
          or localhost:7000",
     ),
     bad("check two.toml --jobs 1\u{202e}0", "invalid value '1\\u{202e}0' for '--threads <N>': expected an integer from 1 to 1024"),
@@ -96,22 +96,20 @@ const OTHERS: &[Bad] = &[
     ),
     bad(
         "link delay 20parsecs",
-        "these words are no link:\ndelay 20parsecs\n      ^^^^^^^^^ expected a time such as 10ms, 250us or 1.5s, below 292 years (units: s, ms, us, ns)",
+        "these words do not describe a link:\ndelay 20parsecs\n      ^^^^^^^^^ expected a time such as 10ms, 250us or 1.5s, below 292 years (units: s, ms, us, ns)",
     ),
     bad(
         "link rate 10xbit",
-        "these words are no link:\nrate 10xbit\n     ^^^^^^ expected a rate of at least 8bit such as 10mbit, 64kbit or 1.5mbps (units: bit, kbit, mbit, gbit, tbit and, \
+        "these words do not describe a link:\nrate 10xbit\n     ^^^^^^ expected a rate of at least 8bit such as 10mbit, 64kbit or 1.5mbps (units: bit, kbit, mbit, gbit, tbit and, \
          for bytes per second, bps, kbps, mbps, gbps, tbps)",
     ),
     bad(
         "link delay 20ms loss=1%",
-        "a link is said either in words of tc-netem or in keys of a scene, not in both: delay 20ms is of the first kind, loss=1% of the second. Expected all of one \
-         kind, such as delay 20ms loss 1%, or delay=20ms loss=1%; a value with spaces stands in quotes, 'jitter={ sd = \"2ms\" }'",
+        "a link is written either in words of tc-netem or in keys of a scene, not in both: delay 20ms is of the first kind, loss=1% of the second. Write all in one kind, such as delay 20ms loss 1%, or delay=20ms loss=1%; put a value with spaces in quotes, 'jitter={ sd = \"2ms\" }'",
     ),
     bad(
         "relay --listen localhost:0 --to localhost:9 delay 20ms --back loss=1% delay 2ms",
-        "a link is said either in words of tc-netem or in keys of a scene, not in both: delay 2ms is of the first kind, loss=1% of the second. Expected all of one \
-         kind, such as delay 20ms loss 1%, or delay=20ms loss=1%; a value with spaces stands in quotes, 'jitter={ sd = \"2ms\" }'",
+        "a link is written either in words of tc-netem or in keys of a scene, not in both: delay 2ms is of the first kind, loss=1% of the second. Write all in one kind, such as delay 20ms loss 1%, or delay=20ms loss=1%; put a value with spaces in quotes, 'jitter={ sd = \"2ms\" }'",
     ),
     bad("fit bin", "bin:2: not UTF-8: expected a text file"),
 ];

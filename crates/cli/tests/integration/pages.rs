@@ -37,7 +37,7 @@ fn every_scene_of_the_list_is_written_and_accepted() {
 #[test]
 fn nothing_is_written_over_unless_forced() {
     let desk = Desk::with("scene.toml", "mine");
-    desk.cohaptic("init").assert_refused(2, &["scene.toml is there already", "--force"]);
+    desk.cohaptic("init").assert_refused(2, &["scene.toml exists already", "--force"]);
     assert_eq!(desk.read("scene.toml"), "mine");
     assert_eq!(desk.cohaptic("init --force").status, Some(0));
     assert!(desk.read("scene.toml").contains("[coordination]"));

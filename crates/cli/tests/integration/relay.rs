@@ -109,8 +109,8 @@ fn a_signal_gives_the_report_in_words() {
     assert_eq!(outcome.status, Some(130), "{}", outcome.stderr);
     for part in [
         format!("{port} -> {server}\n").as_str(),
-        "2 datagrams came in within ",
-        ", 2 sent on, 0 dropped, 0 on the way at the end\n",
+        "2 datagrams arrived in ",
+        ": 2 sent on, 0 dropped, 0 on the way at the end\n",
         "the run is ",
         "release error: p50 ",
         "client -> server: 1 offered, 1 delivered; mean delay 1.000 ms, asked 1.000 ms\n",
@@ -263,16 +263,16 @@ fn bad_arguments_are_refused() {
     let proxy = "relay --listen 127.0.0.1:0 --to 127.0.0.1:9";
     for (line, parts) in [
         ("relay", &["<FILE | SPEC>"][..]),
-        ("relay delay 24ms", &["\"delay 24ms\" is no file", "--listen and --to"]),
+        ("relay delay 24ms", &["\"delay 24ms\" is not a file", "--listen and --to"]),
         ("relay --listen 127.0.0.1:0", &["--to <ADDRESS>"]),
         ("relay lab.toml --to 127.0.0.1:9", &["--listen <ADDRESS>"]),
         ("relay lab.toml --back delay=1ms", &["--listen <ADDRESS>"]),
         ("relay lab.toml", &["lab.toml:5:18: link.delay: unknown unit \"parsecs\"", "link = { delay = \"24 parsecs\" }", "^"]),
         ("relay lab.toml --set link.delay=1ms --set los=1", &["--set los=1", "unknown key"]),
-        ("relay lab.toml --set link.delay=1ms --for 0s", &["--for 0s", "more than nothing"]),
+        ("relay lab.toml --set link.delay=1ms --for 0s", &["--for 0s", "a time above zero"]),
         ("relay lab.toml --packets 0", &["--packets"]),
         ("relay lab.toml --bytes 10B", &["--bytes", "65535B"]),
-        (&format!("{proxy} delay 24 parsecs"), &["these words are no link", "^"]),
+        (&format!("{proxy} delay 24 parsecs"), &["these words do not describe a link", "^"]),
         (&format!("{proxy} los=1%"), &["los=1%", "unknown key"]),
         (&format!("{proxy} delay=1ms --back delay=1"), &["delay=1", "expected"]),
         (&format!("{proxy} --set link.delay=1ms"), &["--set", "cannot be used with"]),
@@ -301,9 +301,16 @@ fn a_port_that_is_taken_is_an_error_of_the_system() {
 fn other_machines_are_let_in_only_if_that_is_said() {
     let desk = Desk::with("lab.toml", "programs = [{ name = \"a\", port = \"0.0.0.0:0\" }, { name = \"b\", port = \"127.0.0.1:0\" }]\n");
     for line in ["relay --listen 0.0.0.0:0 --to 127.0.0.1:9", "relay lab.toml"] {
-        let outcome = desk.cohaptic(&format!("{line} --allow-remote --no-priority --for 10ms --json"));
+        let outcome = desk.cohaptic(&format!("{line} --allow-remote --no-priority --for 10ms --json --control 0.0.0.0:0"));
         assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
         assert!(outcome.stderr.starts_with("listening on 0.0.0.0:"), "{}", outcome.stderr);
+        // The address that others use, on a machine that has a network.
+        let has_network = UdpSocket::bind("0.0.0.0:0").and_then(|socket| socket.connect("192.0.2.1:9")).is_ok();
+        for said in ["programs on other machines send to ", "live control, from other machines: http://"] {
+            let address = outcome.stderr.lines().find_map(|line| line.strip_prefix(said));
+            assert_eq!(address.is_some(), has_network, "{}", outcome.stderr);
+            assert!(address.is_none_or(|address| !address.starts_with("0.0.0.0") && !address.starts_with("127.")), "{}", outcome.stderr);
+        }
         let document = parse(&outcome.stdout);
         assert_contract(&document);
         assert_eq!((&document["ending"], &document["packets"]), (&"complete".into(), &0.into()));

@@ -138,7 +138,7 @@ fn a_record_that_does_not_know_its_scene_is_refused_without_force() {
         .collect();
     desk.write("out/inputs.csv", record);
     let line = format!("run two.toml {SET} --inputs out/inputs.csv --no-plot");
-    let unknown = "  not known: the record is of a version that did not say with which scene it was made\n";
+    let unknown = "  unknown: the record is of an older version, which did not keep the scene that it was made with\n";
     let outcome = desk.cohaptic(&line);
     assert_eq!((outcome.status, outcome.stderr), (Some(2), message(unknown)));
     let outcome = desk.cohaptic(&format!("{line} --force"));
@@ -183,7 +183,7 @@ fn a_record_that_is_cut_short_is_refused_without_force() {
     // A line in the middle is missing.
     let mut holed = lines;
     holed.remove(3);
-    let said = format!("it is not whole: the last line says that {} rows stand before it, and there are {}", last + 1, last);
+    let said = format!("it is not complete: the last line says that {} rows stand before it, and there are {}", last + 1, last);
     replayed(&holed, "").assert_refused(2, &[&said, "; --force replays the rows that are there\n"]);
     let forced = replayed(&holed, " --force");
     assert_eq!((forced.status, &parse(&forced.stdout)["duration_s"]), (Some(0), &json!(0.012)));

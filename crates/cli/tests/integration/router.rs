@@ -211,8 +211,7 @@ fn it_ends_by_itself_and_says_what_it_did_in_words() {
     let outcome = desk.cohaptic("router lab.toml --for 100ms --set links.wan.delay=1ms");
     assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
     assert_eq!(outcome.stderr, "between left (tun left0) and right (tun right0)\n");
-    for part in ["lab.toml\n", " packets came in within ", "the run is ", "  left (tun left0): ", "  wan, left -> right: ", "  wan, right -> left: "]
-    {
+    for part in ["lab.toml\n", " packets arrived in ", "the run is ", "  left (tun left0): ", "  wan, left -> right: ", "  wan, right -> left: "] {
         assert!(outcome.stdout.contains(part), "no {part:?} in:\n{}", outcome.stdout);
     }
     // A device that somebody has already is refused.
@@ -243,7 +242,7 @@ fn bad_arguments_are_refused() {
         ("router", &["<FILE>"][..]),
         ("router lab.toml", &["lab.toml:12:9: links.wan.delay: unknown unit \"parsecs\"", "delay = \"10 parsecs\"", "^"]),
         ("router lab.toml --set links.wan.delay=1ms --set router.default=lan", &["--set router.default=lan", "lan"]),
-        ("router lab.toml --set links.wan.delay=1ms --for 0s", &["--for 0s", "more than nothing"]),
+        ("router lab.toml --set links.wan.delay=1ms --for 0s", &["--for 0s", "a time above zero"]),
         ("router lab.toml --token-file token", &["--control"]),
     ] {
         desk.cohaptic_within(PATIENCE, line).assert_refused(2, parts);

@@ -86,7 +86,7 @@ fn a_folder_knows_its_campaign() {
         assert!(merged.contains("12 runs of 2 combinations"), "{merged}");
         assert_same(&desk, out, &format!("{out}-whole"));
     }
-    desk.cohaptic("campaign --merge here --vary link.delay=8ms,24ms").assert_refused(2, &["expected its scene too"]);
+    desk.cohaptic("campaign --merge here --vary link.delay=8ms,24ms").assert_refused(2, &["expected the scene too"]);
     desk.cohaptic("campaign --merge nowhere").assert_refused(2, &["nowhere holds no campaign"]);
     desk.cohaptic("campaign --out here").assert_refused(2, &["<SCENE>"]);
 }
@@ -104,11 +104,11 @@ fn while_anything_is_missing_a_merge_says_what_and_by_which_shard_it_is_done() {
         let before = desk.files(out);
         let refused = desk.cohaptic(&format!("{line} --merge {out}"));
         let missing =
-            format!("{out} is not whole: 6 of 8 {piece}s are missing, counted from 0: 0, 2 to 4, 6 to 7; of 4 shards, these do them: 1, 3 to 4");
-        refused.assert_refused(3, &[&missing, "Do them with --shard"]);
+            format!("{out} is not complete: 6 of 8 {piece}s are missing, counted from 0: 0, 2 to 4, 6 to 7; of 4 shards, these do them: 1, 3 to 4");
+        refused.assert_refused(3, &[&missing, "Run them with --shard"]);
         assert_eq!(desk.files(out), before);
         let status = desk.text(&format!("{line} --status {out}"));
-        for part in [&format!("{out}: 2 of 8 {piece}s are done, "), "  2/4   done", "no worker does these: 6 of 8"] {
+        for part in [&format!("{out}: 2 of 8 {piece}s are done, "), "  2/4   done", "nobody works on these: 6 of 8"] {
             assert!(status.contains(part), "no {part:?} in {status}");
         }
         let document = parse(&desk.text(&format!("{line} --status {out} --json")));
@@ -126,7 +126,7 @@ fn a_proof_that_lacks_blocks_is_refused_and_goes_on_with_what_there_is() {
     let desk = desk();
     desk.text(&format!("{PROVEN_MAP} --out out --shard 2/3"));
     let refused = desk.cohaptic(&format!("{PROVEN_MAP} --merge out"));
-    refused.assert_refused(3, &["out is not whole: ", " of 64 blocks are missing", "Do them with --shard"]);
+    refused.assert_refused(3, &["out is not complete: ", " of 64 blocks are missing", "Run them with --shard"]);
     let document = parse(&desk.text(&format!("{PROVEN_MAP} --status out --json")));
     let worker = &document["workers"][0];
     assert_eq!((&document["pieces"], &worker["state"], &worker["pieces"]), (&64.into(), &"done".into(), &21.into()));
@@ -167,7 +167,7 @@ fn a_worker_that_is_killed_is_done_again_by_whichever_split_and_the_table_is_the
     let desk = desk();
     let mut child = begun(&desk, &format!("{LONG} --out out --shard 1/2"));
     let status = desk.text(&format!("{LONG} --status out"));
-    assert!(status.contains("  1/2  working") && status.contains("no worker does these"), "{status}");
+    assert!(status.contains("  1/2  working") && status.contains("nobody works on these"), "{status}");
     desk.cohaptic(&format!("{LONG} --out out")).assert_refused(3, &["works on the campaign in out, shard 1/2"]);
     child.kill().unwrap();
     child.wait().unwrap();
@@ -194,13 +194,13 @@ fn of_two_workers_with_the_same_shard_the_second_is_refused() {
     let mut child = begun(&desk, &line);
     let second = desk.cohaptic(&line);
     let process = format!("process {} of ", child.id());
-    second.assert_refused(3, &["waiting until it is heard of again", &process, "works on shard 1/2 in out: expected to be the only one"]);
+    second.assert_refused(3, &["waiting until it is heard of again", &process, "works on shard 1/2 in out: wait until it has ended"]);
     child.kill().unwrap();
     child.wait().unwrap();
     // It is ended in good order too.
     let outcome = interrupted(&desk, &line, |_| logs(&desk).matches("shard 1/2").count() > 1 && logs(&desk).ends_with('\n'));
     assert_eq!(outcome.status, Some(130), "{}", outcome.stderr);
-    assert!(outcome.stderr.contains("the same command goes on from there") && logs(&desk).contains("end interrupted"), "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("repeat the command to go on from there") && logs(&desk).contains("end interrupted"), "{}", outcome.stderr);
     assert!(!desk.path("out/shard-1-of-2.lock").exists());
 }
 
@@ -225,7 +225,7 @@ fn a_disk_that_fills_is_said_and_the_same_shard_goes_on() {
     let desk = desk();
     let line = "campaign random.toml --vary link.loss=0%,10% --runs 100 --format csv --part 100";
     let outcome = cramped(&desk, 16, &format!("{line} --out out --shard 1/1"));
-    outcome.assert_refused(3, &["cannot write out/part-0000", "File too large", "Parts that are whole are kept", "the same command goes on"]);
+    outcome.assert_refused(3, &["cannot write out/part-0000", "File too large", "Parts that are whole are kept", "repeat the command to go on"]);
     assert!(desk.files("out").iter().all(|name| name == "campaign.json" || name.starts_with("worker-")), "{:?}", desk.files("out"));
     assert!(logs(&desk).contains("end failed"));
     desk.text(&format!("{line} --out out --shard 1/1"));
@@ -238,7 +238,7 @@ fn a_disk_that_fills_is_said_and_the_same_shard_goes_on() {
 fn more_shards_than_parts_are_done_too() {
     let desk = desk();
     let said = desk.text(&format!("{CAMPAIGN} --out out --shard 9/9"));
-    assert_eq!(said, "shard 9/9 in out: there are fewer parts than shards, and none is this one's\n");
+    assert_eq!(said, "shard 9/9 in out: there are fewer parts than shards, so this shard has nothing to do\n");
     let document = desk.json(&format!("{CAMPAIGN} --out out --shard 8/9 --json"));
     assert_eq!((&document["schema"], &document["units"], &document["units_computed"]), (&"cohaptic/shard".into(), &3.into(), &3.into()));
 }
@@ -275,7 +275,7 @@ fn what_makes_no_sense_together_is_refused() {
     campaign("--shard 1/2").assert_refused(2, &["--out <DIR>"]);
     campaign("--merge out --out out").assert_refused(2, &["cannot be used with"]);
     campaign("--merge out --shard 1/2").assert_refused(2, &["cannot be used with"]);
-    campaign("--merge out").assert_refused(2, &["out holds no campaign: expected the folder in which shards of it were done"]);
+    campaign("--merge out").assert_refused(2, &["out holds no campaign: expected a folder in which shards were run"]);
     campaign("--status out").assert_refused(2, &["out holds no campaign"]);
     // A merge takes what its shards are of, and no other proof.
     desk.text(&format!("{PROVEN_MAP} --out proof --shard 1/1"));

@@ -89,7 +89,7 @@ fn people_get_the_same_in_words() {
         let line = format!("{} from link.delay={value}ms (before: {})", crossing["to"].as_str().unwrap(), crossing["from"].as_str().unwrap());
         assert!(text.contains(&line), "no {line} in {text}");
     }
-    assert!(text.contains(&format!("{} values looked at", document["samples"])), "{text}");
+    assert!(text.contains(&format!("{} values checked", document["samples"])), "{text}");
     let none = desk.text("stability boundary two.toml --along coordination.stiffness=100..101 --samples 5");
     assert!(none.contains("no crossing up to coordination.stiffness=101"), "{none}");
 }
@@ -107,7 +107,7 @@ fn what_makes_no_sense_is_refused_and_nothing_is_written() {
         (format!("{along} --samples 1000000000"), &["--samples 1000000000", "from 2"]),
         ("--along coordination.stifness=0..1".to_owned(), &["--along coordination.stifness=", "unknown key"]),
         ("--along peers.nobody.device.mass=1..2".to_owned(), &["--along peers.nobody.device.mass=1", "nobody"]),
-        ("--along coordination.strategy=0..1".to_owned(), &["coordination.strategy is no number"]),
+        ("--along coordination.strategy=0..1".to_owned(), &["coordination.strategy is not a number"]),
         ("--along link.delay=0..1".to_owned(), &["link.delay"]),
         ("--along coordination.stiffness=1".to_owned(), &["--along: ", "KEY=LOW..HIGH"]),
         (format!("{along} --set peers.left.clock.drift=0.0123456789"), &["two.toml: ", "clocks"]),
@@ -124,7 +124,10 @@ fn a_search_ends_after_the_values_that_it_may_look_at_and_says_so() {
     let line = "stability boundary two.toml --along link.delay=1ms..200ms";
     let document = desk.json(&format!("{line} --values 5 --json"));
     assert_eq!((document["samples"].as_u64(), document["settled"].as_bool()), (Some(5), Some(false)));
-    assert!(desk.text(&format!("{line} --values 5")).contains("NOT SETTLED: it ended after the most values that it may look at; --values"));
+    assert!(
+        desk.text(&format!("{line} --values 5"))
+            .contains("NOT SETTLED: the search reached its limit of values, and may have missed crossings; allow more with --values")
+    );
     desk.cohaptic(&format!("{line} --values 5 --samples 6")).assert_refused(2, &["--samples 6: expected from 2 to 5"]);
 }
 
@@ -140,7 +143,7 @@ fn a_search_that_is_ended_says_what_it_has_found() {
     let said = std::fs::read_to_string(error).unwrap();
     assert_eq!(outcome.status, Some(130), "{said}");
     assert!(said.contains("the search ends after 1000000 at the latest") && said.contains("looked at: nothing is kept"), "{said}");
-    assert!(outcome.stdout.contains("stable") && outcome.stdout.contains("NOT SETTLED: it was ended before"), "{}", outcome.stdout);
+    assert!(outcome.stdout.contains("stable") && outcome.stdout.contains("NOT SETTLED: the search was stopped early"), "{}", outcome.stdout);
 }
 
 #[cfg(unix)]
@@ -152,9 +155,9 @@ fn an_interrupted_search_goes_on_and_ends_with_the_same_bytes() {
     let line = "stability boundary paper.toml --along link.delay=1ms..40ms --samples 20000 --tolerance 0.0001 --out out";
     let outcome = crate::integration::interrupt::interrupted(&desk, line, |_| desk.path("out/boundary.rows.partial").exists());
     assert_eq!(outcome.status, Some(130));
-    assert!(outcome.stdout.is_empty() || outcome.stdout.contains("NOT SETTLED: it was ended before"), "{}", outcome.stdout);
+    assert!(outcome.stdout.is_empty() || outcome.stdout.contains("NOT SETTLED: the search was stopped early"), "{}", outcome.stdout);
     assert!(outcome.stderr.contains("interrupted: ") && outcome.stderr.contains("kept in out/boundary.rows.partial"), "{}", outcome.stderr);
-    desk.cohaptic(&line.replace("40ms", "41ms")).assert_refused(2, &["boundary.rows.partial keeps the rows of something else"]);
+    desk.cohaptic(&line.replace("40ms", "41ms")).assert_refused(2, &["boundary.rows.partial holds the rows of another command"]);
     // A slow machine is told how long the search takes.
     for line in [line.to_owned(), line.replace("--out out", "--out whole")] {
         let outcome = desk.cohaptic(&line);

@@ -183,7 +183,7 @@ fn what_makes_no_sense_is_refused_and_nothing_is_written() {
         (format!("{x} {same} --grid 5x5"), &["coordination.stiffness", "twice"]),
         (format!("--x coordination.stifness=0..1 {y} --grid 5x5"), &["--x coordination.stifness=", "unknown key", "stiffness"]),
         (format!("{x} --y peers.nobody.device.mass=1..2 --grid 5x5"), &["--y peers.nobody.device.mass=1", "nobody", "left, right"]),
-        (format!("--x coordination.strategy=0..1 {y} --grid 5x5"), &["coordination.strategy is no number"]),
+        (format!("--x coordination.strategy=0..1 {y} --grid 5x5"), &["coordination.strategy is not a number"]),
         (format!("--x coordination.stiffness=-5..1 {y} --grid 5x5"), &["--x coordination.stiffness=-5", "^"]),
         (format!("--x coordination.stiffness=5..1 {y} --grid 5x5"), &["--x: ", "5 is not below 1"]),
         (format!("--x coordination.stiffness {y} --grid 5x5"), &["--x: ", "KEY=LOW..HIGH"]),
@@ -250,7 +250,7 @@ mod interrupted {
             line.replace("scene.count=4", "scene.count=5"),
             format!("{line} --set object.damping=1"),
         ] {
-            desk.cohaptic(&other).assert_refused(2, &["out/map.rows.partial keeps the rows of something else"]);
+            desk.cohaptic(&other).assert_refused(2, &["out/map.rows.partial holds the rows of another command"]);
             assert_eq!(desk.read(ROWS), before, "{other}");
         }
 

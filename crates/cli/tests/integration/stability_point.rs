@@ -140,7 +140,7 @@ fn links_that_leave_something_to_chance_have_a_mean_square() {
     let (mean_square, radius) = (number(&document, "mean_square_radius"), number(&certain, "spectral_radius"));
     assert!((mean_square - radius * radius).abs() < 1e-7 && number(&document, "mean_square_error_bound") < 1e-6, "{document:#}");
     let text = desk.text("stability point paper.toml --set link.loss=5%");
-    assert!(text.contains("STABLE in the mean square") && text.contains("with nothing left to chance: stable"), "{text}");
+    assert!(text.contains("STABLE in the mean square") && text.contains("with delays at their mean and no losses: stable"), "{text}");
     // What cannot be followed is said, and the verdict is nominal.
     let refused = desk.json("stability point paper.toml --json --set scene.count=9 --set link.loss={gilbert-elliott={p=0.1,r=0.5}}");
     assert!(refused.get("mean_square_radius").is_none());
@@ -212,7 +212,7 @@ fn what_is_not_followed_in_the_mean_square_says_so() {
         let notes = |options: &str| desk.json(&format!("{command} --json {options}"))["notes"].as_array().unwrap().len();
         assert_eq!((notes(""), notes("--set link.loss=5%") > 0), (0, true), "{command}");
         let text = desk.text(&format!("{command} --set link.loss=5%"));
-        assert!(text.contains("with every delay its mean and nothing lost"), "{text}");
+        assert!(text.contains("with every delay at its mean and no losses"), "{text}");
     }
 }
 
@@ -250,10 +250,15 @@ fn a_note_says_which_radius_it_is_about() {
     assert!(document["mean_square_radius"].is_number(), "{document:#}");
     let notes: Vec<&str> = document["notes"].as_array().unwrap().iter().map(|note| note.as_str().unwrap()).collect();
     let named = |note: &&str| {
-        ["the spectral radius, with nothing left to chance: ", "the mean-square radius: ", "both radii: "].iter().any(|which| note.starts_with(which))
+        ["the spectral radius, with delays at their mean and no losses: ", "the mean-square radius: ", "both radii: "]
+            .iter()
+            .any(|which| note.starts_with(which))
     };
     assert!(!notes.is_empty() && notes.iter().all(named), "{notes:?}");
-    assert!(notes[0].starts_with("the spectral radius, with nothing left to chance: ") && notes[0].contains("random loss is left out"), "{notes:?}");
+    assert!(
+        notes[0].starts_with("the spectral radius, with delays at their mean and no losses: ") && notes[0].contains("random loss is left out"),
+        "{notes:?}"
+    );
     assert!(desk.text("stability point two.toml --set link.loss=5%").contains(&format!("note: {}\n", notes[0])));
     // With one radius there is nothing to tell apart.
     let one = desk.json("stability point two.toml --json --set 'timeline=[{ at = \"100ms\", link = \"all\", set = { delay = \"8ms\" } }]'");

@@ -250,7 +250,7 @@ fn sets_that_cannot_be_proven_are_refused_with_a_way_out() {
         (format!("map {} {GAINS} --prove 2 --every-number", set("client-server")), "client-server coordination: a box of keys holds for"),
         (format!("map equal.toml {GAINS} --prove 2 --every-number --set {ring}"), "expected no --every-number, and one number at a time"),
         (format!("map {} {GAINS} --prove 2 --every-number", set("wave")), "wave coordination: a box of keys holds for"),
-        (format!("point {} --losses-in-a-row 1", set("client-server")), "client-server coordination is followed as a whole alone"),
+        (format!("point {} --losses-in-a-row 1", set("client-server")), "client-server coordination is analysed only as a whole"),
         (format!("point {} --switching", set("set-position")), "set-position coordination has no analysis: simulations tell"),
         (format!("point {} --every-number", set("passivity-control")), "passivity-control coordination has no analysis: simulations tell"),
         (format!("point {} --losses-in-a-row 1", set("extrapolated")), "the worst case does not follow extrapolated coordination"),

@@ -101,7 +101,7 @@ fn a_link_in_the_place_of_the_partial_file_is_left_alone() {
     fs::create_dir(desk.path("out")).unwrap();
     symlink("../victim", desk.path("out/map.rows.partial")).unwrap();
     let map = "stability map two.toml --x coordination.stiffness=100..6000 --y coordination.damping=0..60 --grid 2x2 --out out";
-    desk.cohaptic(map).assert_refused(3, &["cannot write out/map.rows.partial: it is no regular file"]);
+    desk.cohaptic(map).assert_refused(3, &["cannot write out/map.rows.partial: it is not a regular file"]);
     assert_eq!(desk.read("victim"), "precious");
 }
 

@@ -42,7 +42,7 @@ fn a_folder_takes_one_process_at_a_time() {
         #[cfg(target_os = "linux")]
         "play --no-open --for 1s --out out",
     ] {
-        desk.cohaptic(line).assert_refused(3, &["out: another process writes into this folder", "wait for it, or choose another folder"]);
+        desk.cohaptic(line).assert_refused(3, &["out: another process writes into this folder", "wait until it has ended, or choose another folder"]);
     }
     let shard = format!("stability map two.toml {ranges} --grid 2x2 --out out --shard 1/2");
     desk.cohaptic(&shard).assert_refused(3, &["another process works on all shards in out"]);

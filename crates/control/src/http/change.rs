@@ -59,7 +59,7 @@ async fn keys(app: &App, body: Body) -> Result<Vec<(String, String)>, Refusal> {
 fn pair(key: String, value: &Value) -> Result<(String, String), Refusal> {
     let bare = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_');
     if key.is_empty() || !key.chars().all(bare) {
-        return Err(unprocessable(format!("{key:?} is no name of a link key: expected letters, digits, \"-\" and \"_\"")));
+        return Err(unprocessable(format!("{key:?} is not a name of a link key: expected letters, digits, \"-\" and \"_\"")));
     }
     let value = typed::from_json(value).map_err(|reason| unprocessable(format!("{key}: {reason}")))?;
     Ok((key, value))

@@ -339,9 +339,9 @@ fn a_change_that_cannot_be_is_422_with_the_reason() {
         ("\"delay\"", "JSON"),
         ("{}", "no keys"),
         ("{\"delay\": null}", "delay: null"),
-        ("{\"a b\": 1}", "no name"),
-        ("{\"a=1\\nb\": 1}", "no name"),
-        ("{\"\": 1}", "no name"),
+        ("{\"a b\": 1}", "not a name"),
+        ("{\"a=1\\nb\": 1}", "not a name"),
+        ("{\"\": 1}", "not a name"),
         ("{\"limit\": 18446744073709551615}", "too large"),
     ] {
         let answer = site.ask("PATCH", "/api/links/0", body);

@@ -75,9 +75,9 @@ pub enum BootError {
     },
     #[error("byte {at} of the firmware is {sent:#04x} and came back as {found:#04x}: try again, with another cable or port if it stays so")]
     Echo { at: usize, sent: u8, found: u8 },
-    #[error("the boot loader sent back {back} of the {of} bytes of the firmware, and no more")]
+    #[error("the boot loader sent back only {back} of the {of} bytes of the firmware: try again, with another cable or port if it stays so")]
     EchoStopped { back: usize, of: usize },
-    #[error("the firmware is over, and the device does not answer: is the file a firmware for the Novint Falcon?")]
+    #[error("the firmware is sent, and the device does not answer: is the file a firmware for the Novint Falcon?")]
     NotRunning,
 }
 

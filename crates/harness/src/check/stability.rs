@@ -45,7 +45,7 @@ impl Stability {
             Self::Stable => "a small disturbance dies out".to_owned(),
             Self::Unstable => "a small disturbance grows".to_owned(),
             Self::Undecided { ratio } => format!(
-                "that cannot be told within the scene's duration: from its second to its last quarter a small disturbance changes by a factor of {ratio:.3}; \
+                "the scene's duration is too short to tell: from its second to its last quarter a small disturbance changes by a factor of {ratio:.3}; \
                  a longer duration decides"
             ),
             Self::Interrupted => "the simulation was interrupted".to_owned(),

@@ -61,7 +61,7 @@ pub enum InputsError {
         at: Instant,
     },
     /// Lines are missing: the last line gives a larger number of rows.
-    #[error("it is not whole: the last line says that {said} rows stand before it, and there are {found}")]
+    #[error("it is not complete: the last line says that {said} rows stand before it, and there are {found}")]
     Rows {
         /// Number of rows in the last line.
         said: u64,

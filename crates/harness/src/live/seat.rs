@@ -28,7 +28,7 @@ pub enum Presence {
 #[non_exhaustive]
 pub enum SampleError {
     /// The peer is not in another process.
-    #[error("peer {peer} is no peer of kind \"udp\" of this scene")]
+    #[error("peer {peer} is not a peer of kind \"udp\" of this scene")]
     NoSeat {
         /// Index of the peer.
         peer: usize,

@@ -47,7 +47,7 @@ pub(super) fn read_bottleneck(table: &mut TableReader<'_>, recorded: Option<Deli
         // A queue written beside a missing rate is a fault. An inherited queue disappears without a fault, together with the rate that was taken away.
         let beside = |line: Option<&crate::document::Entry>| line.is_none_or(|line| written_together(line, entry));
         if !context.partial && beside(rate_entry) && beside(trace_entry) {
-            let message = format!("{} means nothing on a link without a rate: expected a key rate such as \"1Mbit\" beside it", entry.name);
+            let message = format!("{} means nothing on a link without a rate: expected a key rate such as \"1Mbit\" too", entry.name);
             context.fault(entry.key, &entry.node.path, message);
             return None;
         }

@@ -22,7 +22,7 @@ pub(super) fn read_corruption(node: &Node, context: Context<'_>) -> Option<Optio
         let text = values::text(node, context, EXPECTED)?;
         let range = read_range(text);
         if range.is_none() {
-            context.fault_at(node, format!("{} is no row of bytes: expected {EXPECTED}", quote(text)));
+            context.fault_at(node, format!("{} is not a row of bytes: expected {EXPECTED}", quote(text)));
         }
         range
     });
@@ -35,7 +35,10 @@ pub(super) fn read_corruption(node: &Node, context: Context<'_>) -> Option<Optio
             table.finish();
             if let Some(other) = others.into_iter().flatten().next() {
                 let (first, last) = if other.key < rate_entry.key { (other, rate_entry) } else { (rate_entry, other) };
-                let message = format!("{} beside {}: expected either a bit-error-rate, or a probability for each packet", last.name, first.name);
+                let message = format!(
+                    "{} and {} exclude each other: expected either a bit-error-rate, or a probability for each packet",
+                    last.name, first.name
+                );
                 context.fault(last.key, &last.node.path, message);
                 return None;
             }

@@ -95,6 +95,6 @@ mod tests {
         }
         let fault = dist_table("1 2\n3 x").unwrap_err();
         assert_eq!(fault.span, 4..7);
-        assert!(fault.message.starts_with("column 3: `x` is no integer"), "{}", fault.message);
+        assert!(fault.message.starts_with("column 3: `x` is not an integer"), "{}", fault.message);
     }
 }

@@ -26,7 +26,7 @@ pub(super) fn read_loss(node: &Node, context: Context<'_>) -> Option<Loss> {
     let chosen = only_one(node, context, &models, EXPECTED)?;
     let value = &*chosen.node;
     if let Some(every) = every.filter(|_| !matches!(chosen.name.as_str(), "packets" | "times")) {
-        context.fault(every.key, &every.node.path, format!("every means nothing beside {}: expected it beside packets or times", chosen.name));
+        context.fault(every.key, &every.node.path, format!("every means nothing with {}: expected it with packets or times", chosen.name));
         return None;
     }
     match chosen.name.as_str() {
@@ -49,7 +49,8 @@ fn read_gilbert_elliott(node: &Node, context: Context<'_>) -> Option<Loss> {
         let (good, bad) = (table.value("mean-good"), table.value("mean-bad"));
         table.finish();
         if let Some(entry) = p.or(r) {
-            let message = format!("{} beside mean times: expected either p and r, for each packet, or mean-good and mean-bad", entry.name);
+            let message =
+                format!("{} and mean times exclude each other: expected either p and r, for each packet, or mean-good and mean-bad", entry.name);
             context.fault(entry.key, &entry.node.path, message);
             return None;
         }

@@ -43,7 +43,7 @@ fn read_numbers(node: &Node, context: Context<'_>) -> Option<Range<u64>> {
     if let Value::Text(text) = &node.value {
         let span = read_range(text);
         if span.is_none() {
-            context.fault_at(node, format!("{} is no row of packets: expected {EXPECTED}", quote(text)));
+            context.fault_at(node, format!("{} is not a row of packets: expected {EXPECTED}", quote(text)));
         }
         return span;
     }

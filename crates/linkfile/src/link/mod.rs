@@ -161,7 +161,7 @@ fn in_force<'a>(node: &'a Node, context: Context<'_>) -> Option<Cow<'a, Node>> {
         if index > place || written_together(entry, whole) {
             let (first, last) = if entry.key < whole.key { (entry, whole) } else { (whole, entry) };
             let message = format!(
-                "{} beside {}: {} says everything about this link: expected only one of them, or {} = \"none\"",
+                "{} and {} exclude each other: {} says everything about this link; expected only one of them, or {} = \"none\"",
                 last.name, first.name, whole.name, whole.name
             );
             context.fault(last.key, &last.node.path, message);

@@ -20,7 +20,7 @@ pub(super) fn read_netem(table: &mut TableReader<'_>, context: Context<'_>) -> O
     let Some(node) = table.get("netem").filter(|node| !is_none(node)) else {
         // A profile beside `netem = "none"` may be inherited and is ignored. A profile without any key `netem` is a mistake.
         if let Some(entry) = profile_entry.filter(|_| !context.partial && table.get("netem").is_none()) {
-            context.fault(entry.key, &entry.node.path, "netem-profile means nothing without words: expected a key netem beside it");
+            context.fault(entry.key, &entry.node.path, "netem-profile means nothing without words: expected a key netem too");
             return None;
         }
         return profile.map(|_| None);

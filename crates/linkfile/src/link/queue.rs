@@ -37,7 +37,7 @@ pub(super) fn read_limit(node: &Node, context: Context<'_>) -> Option<QueueLimit
     let time = || cohaptic_units::parse::duration(text).ok().map(QueueLimit::Time);
     let limit = packets().or_else(bytes).or_else(time);
     if limit.is_none() {
-        context.fault_at(node, format!("{} is no limit of a queue: expected {LIMIT}", quote(text)));
+        context.fault_at(node, format!("{} is not a limit of a queue: expected {LIMIT}", quote(text)));
     }
     limit
 }
@@ -48,7 +48,7 @@ pub(super) fn read_packets(node: &Node, context: Context<'_>) -> Option<u64> {
     let text = values::text(node, context, EXPECTED)?;
     let packets = values::packets(text);
     if packets.is_none() {
-        context.fault_at(node, format!("{} is no number of packets: expected {EXPECTED}", quote(text)));
+        context.fault_at(node, format!("{} is not a number of packets: expected {EXPECTED}", quote(text)));
     }
     packets
 }

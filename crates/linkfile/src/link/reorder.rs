@@ -30,7 +30,7 @@ pub(super) fn read_reorder(node: &Node, context: Context<'_>) -> Option<Option<R
     table.finish();
     let how = if how.iter().all(Option::is_none) { None } else { Some(only_one(node, context, &how, "gap, behind and later")?) };
     if let Some(at_most) = at_most_entry.filter(|_| how.is_none_or(|how| how.name != "behind")) {
-        context.fault(at_most.key, &at_most.node.path, "at-most says how long a packet is held: expected it beside behind");
+        context.fault(at_most.key, &at_most.node.path, "at-most says how long a packet is held: expected it together with behind");
         return None;
     }
     let count = |how: &Entry| {

@@ -18,7 +18,7 @@ pub(super) fn read_slots(node: &Node, context: Context<'_>) -> Option<Slots> {
     let slots = match (ends.into_iter().flatten().next(), law.into_iter().flatten().next()) {
         (Some(end), Some(law)) => {
             let (first, last) = if end.key < law.key { (end, law) } else { (law, end) };
-            let message = format!("{} beside {}: expected either min and max, or delay and jitter", last.name, first.name);
+            let message = format!("{} and {} exclude each other: expected either min and max, or delay and jitter", last.name, first.name);
             context.fault(last.key, &last.node.path, message);
             None
         }

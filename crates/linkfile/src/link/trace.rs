@@ -66,8 +66,8 @@ pub(super) fn read_trace(node: &Node, context: Context<'_>) -> Option<Option<Tra
     };
     if let Some(entry) = misplaced {
         let message = match &trace {
-            Trace::Delivery(_) => "is for a recorded path: expected only bytes beside instants of delivery, which always repeat",
-            Trace::Path(_) => "is for instants of delivery: expected between, repeat and start beside a recorded path",
+            Trace::Delivery(_) => "is for a recorded path: expected only bytes with instants of delivery, which always repeat",
+            Trace::Path(_) => "is for instants of delivery: expected between, repeat and start with a recorded path",
         };
         context.fault(entry.key, &entry.node.path, format!("{} {message}", entry.name));
         return None;

@@ -138,7 +138,7 @@ fn parse_toml(text: &str, sources: Sources<'_>) -> Result<Node, FileError> {
 /// Returns the message of the TOML parser, with an expected text where the parser gives none.
 fn syntax_message(message: &str) -> String {
     match message {
-        "duplicate key" => "this key or table is there already: expected it once".to_owned(),
+        "duplicate key" => "this key or table was given before: expected it once".to_owned(),
         "recursion limit" => TOO_DEEP.to_owned(),
         other if other.contains("expected") => format!("not TOML: {other}"),
         other => format!("not TOML: {other}: expected a key and its value, such as delay = \"8ms\""),

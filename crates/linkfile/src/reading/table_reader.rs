@@ -189,11 +189,11 @@ pub fn only_one<'a>(node: &Node, context: Context<'_>, entries: &[Option<&'a Ent
     match given.as_slice() {
         [only] => Some(only),
         [] => {
-            context.missing(node.place, &node.path, format!("nothing is given: expected {expected}"));
+            context.missing(node.place, &node.path, format!("no key is given: expected {expected}"));
             None
         }
         [first, second, ..] => {
-            let message = format!("\"{}\" is given already: expected only one of {expected}", first.name);
+            let message = format!("\"{}\" was given before: expected only one of {expected}", first.name);
             context.fault(second.key, &second.node.path, message);
             None
         }

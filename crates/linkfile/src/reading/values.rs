@@ -250,7 +250,7 @@ pub fn refuse(context: Context<'_>, nodes: &[Option<&Node>], fallback: &Node, er
 
 /// Reads a probability: a number from 0 to 1, or a text such as "1.5%".
 pub fn probability(node: &Node, context: Context<'_>) -> Option<Probability> {
-    const EXPECTED: &str = "a probability: a number from 0 to 1 or a text such as \"1.5%\"";
+    const EXPECTED: &str = "a probability, a number from 0 to 1 or a text such as \"1.5%\"";
     if node.as_text().is_some() {
         return quantity(node, context, parse::probability);
     }

@@ -64,7 +64,7 @@ fn read_program<'a>(entry: &'a Node, allow_remote: Option<bool>, names: &mut Nam
         const EXPECTED: &str = "an address with a port above zero, such as \"127.0.0.1:9001\"; without this key it is learnt";
         let address = read_address(node, EXPECTED, allow_remote, context)?;
         if address.port() == 0 || address.ip().is_unspecified() {
-            context.fault_at(node, format!("nobody can be reached at {address}: expected {EXPECTED}"));
+            context.fault_at(node, format!("no program can be reached at {address}: expected {EXPECTED}"));
             return None;
         }
         Some(address)

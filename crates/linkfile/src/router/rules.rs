@@ -159,7 +159,7 @@ fn read_ports(node: &Node, context: Context<'_>) -> Option<Ports> {
     let (first, last) = text.split_once('-').unwrap_or((text, text));
     let range = port(first.trim()).zip(port(last.trim())).filter(|(first, last)| first <= last);
     if range.is_none() {
-        context.fault_at(node, format!("{} is no range of ports: expected {PORTS}", quote(text)));
+        context.fault_at(node, format!("{} is not a range of ports: expected {PORTS}", quote(text)));
     }
     range.map(|(first, last)| Ports { first, last })
 }

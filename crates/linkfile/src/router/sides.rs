@@ -48,7 +48,7 @@ pub(super) fn read_side(node: &Node, context: Context<'_>) -> Option<Attachment>
     if existing == Some(true)
         && let Some(given) = addresses_node.or(mtu_node)
     {
-        context.fault_at(given, "an existing device is left as it is: expected no such key beside existing = true");
+        context.fault_at(given, "an existing device is left as it is: expected no such key together with existing = true");
         return None;
     }
     let mtu = mtu?.and_then(|mtu| u16::try_from(mtu).ok());
@@ -86,7 +86,7 @@ fn read_namespace(node: &Node, context: Context<'_>) -> Option<String> {
     const EXPECTED: &str = "a network namespace: its name, or a path such as \"/proc/4711/ns/net\"";
     let name = values::text(node, context, EXPECTED)?;
     if name.is_empty() || matches!(name, "." | "..") || name.contains(char::is_control) {
-        context.fault_at(node, format!("{} is no namespace: expected {EXPECTED}", quote(name)));
+        context.fault_at(node, format!("{} is not a namespace: expected {EXPECTED}", quote(name)));
         return None;
     }
     Some(name.to_owned())
@@ -105,7 +105,7 @@ pub(super) fn read_network(node: &Node, context: Context<'_>, expected: &str) ->
     let text = values::text(node, context, expected)?;
     let network = text.parse().ok();
     if network.is_none() {
-        context.fault_at(node, format!("{} is no address: expected {expected}", quote(text)));
+        context.fault_at(node, format!("{} is not an address: expected {expected}", quote(text)));
     }
     network
 }

@@ -117,7 +117,7 @@ pub enum AdmissionConfigError {
         found: usize,
     },
     /// A span is zero, or too long for nanoseconds in 64 bits.
-    #[error("{name} is {found:?}; expected more than nothing and less than 584 years")]
+    #[error("{name} is {found:?}; expected a time above zero and below 584 years")]
     Span {
         /// Name of the span: `tick`, `update` or `stale_after`.
         name: &'static str,

@@ -25,7 +25,7 @@ const BODY_LEN: usize = 72;
 #[non_exhaustive]
 pub enum HandshakeError {
     /// The datagram begins with other bytes than a hello or a welcome does.
-    #[error("it is no such datagram")]
+    #[error("it is not a datagram of the handshake")]
     Magic,
     /// The datagram has another version of the protocol.
     #[error("version {found} of the protocol; expected {VERSION}")]

@@ -64,7 +64,7 @@ pub enum KeyFileError {
         source: io::Error,
     },
     /// Other users than the owner may read or change the file.
-    #[error("the key file {0} is open to others than its owner (mode {mode:03o}); close it with: chmod 600 {0}", path.display())]
+    #[error("the key file {0} can be opened by others than its owner (mode {mode:03o}); close it with: chmod 600 {0}", path.display())]
     Open {
         /// Path of the key file.
         path: PathBuf,
@@ -72,7 +72,7 @@ pub enum KeyFileError {
         mode: u32,
     },
     /// The file does not hold a key.
-    #[error("{} is no key file: it must hold 64 hexadecimal digits and nothing else; make one with: cohaptic live --new-key FILE", path.display())]
+    #[error("{} is not a key file: it must hold 64 hexadecimal digits and nothing else; make one with: cohaptic live --new-key FILE", path.display())]
     Content {
         /// Path of the key file.
         path: PathBuf,

@@ -82,12 +82,12 @@ pub enum SessionError {
     #[error(transparent)]
     Bind(#[from] BindError),
     /// The admission control cannot be made from the scene, or the system has no random bytes.
-    #[error("nobody can be let in: {0}")]
+    #[error("the session can accept nobody: {0}")]
     AdmissionControl(#[from] AdmissionConfigError),
     /// The record cannot be created or written.
     #[error(transparent)]
     Record(#[from] RecordError),
     /// The system does not let the loop wait, or refuses to receive.
-    #[error("the session had to end: {0}")]
+    #[error("the session cannot go on: {0}")]
     System(#[from] io::Error),
 }

@@ -210,7 +210,9 @@ impl Session {
         // A histogram can be merged only into another histogram, and both are still needed alone.
         let mut all = self.watch.ticks.clone();
         all.merge(&self.watch.releases);
-        self.config.tolerance.judge(&all)
+        // Ticks are those of the peers simulated here, and of Falcons; only peers in other programs are sent datagrams.
+        let what = if self.watch.releases.count() > 0 { "ticks and datagrams" } else { "ticks" };
+        self.config.tolerance.judge(&all, what)
     }
 
     fn peers(&self) -> Vec<PeerStatus> {

@@ -132,7 +132,7 @@ fn a_sample_counts_from_when_the_kernel_had_it_and_not_from_when_it_was_read() {
     assert!(late("tick") >= pairs * (most - 1), "{} ticks were late", late("tick"));
     // Late releases count as well.
     let (late, of) = (late("tick") + late("release"), counts("tick") + counts("release"));
-    assert_eq!(report.validity, Validity::NotValid { late, of, limit: TOLERANCE.limit });
+    assert_eq!(report.validity, Validity::NotValid { late, of, what: "ticks and datagrams", limit: TOLERANCE.limit });
     // Peers that tick at the same instant are one tick of the loop.
     let instants: BTreeSet<_> = read(folder.path(), "trajectory.csv").into_iter().map(|line| line[0].clone()).collect();
     assert_eq!(report.ticks.count, instants.len() as u64);

@@ -36,7 +36,7 @@ pub enum ProofError {
     },
     /// Gains or the mass of a copy depend on the number of peers.
     #[error(
-        "gains or the mass of a copy depend on the number of peers, and a box of keys holds no such: expected average-position coordination without scaling and object.split-mass = false; or one number at a time, by `--curve scene.count=N`"
+        "gains or the mass of a copy depend on the number of peers, which no box of keys covers: expected average-position coordination without scaling and object.split-mass = false; or one number at a time, by `--curve scene.count=N`"
     )]
     Scaled,
     /// A verdict for every number of peers was asked for, of scenes that are followed for their own number of peers only.

@@ -226,8 +226,8 @@ fn scenes_without_a_proof_are_refused_by_name() {
         (&["peer.contact=\"none\"", "peer.device.damping=0"], "touches nothing"),
         (&["coordination.strategy=\"extrapolated\"", "link.loss=10%"], "extrapolated coordination uses the ages of samples"),
         (&["coordination.strategy=\"passivity-control\""], "passivity-control"),
-        (&["coordination.strategy=\"client-server\""], "client-server coordination is followed as a whole alone"),
-        (&["coordination.strategy=\"wave\"", "link.loss=10%"], "wave coordination is followed as a whole alone"),
+        (&["coordination.strategy=\"client-server\""], "client-server coordination is analysed only as a whole"),
+        (&["coordination.strategy=\"wave\"", "link.loss=10%"], "wave coordination is analysed only as a whole"),
         (&["scene.axes=3", "object.inertia=2.7e-4", "peers.peer1.grasp=[0.03, 0, 0]"], "`map` and `boundary` take all components together"),
     ] {
         let message = refused(set);

@@ -148,7 +148,7 @@ impl Relay {
             held: self.engine.held(),
             without_socket: self.ports.without_socket(),
             refused_changes: self.refused_changes,
-            validity: options.tolerance.judge(&self.release),
+            validity: options.tolerance.judge(&self.release, "datagrams"),
             release: self.release.clone(),
         })
     }

@@ -186,7 +186,7 @@ impl Failed {
 /// Returns the permission that most refused steps need, for the message.
 fn way_out(error: &io::Error) -> &'static str {
     if error.kind() == io::ErrorKind::PermissionDenied {
-        ": it takes root, CAP_NET_ADMIN (and CAP_NET_RAW for an interface), or namespaces of your own: `unshare --map-root-user --net`"
+        ": this needs root, CAP_NET_ADMIN (and CAP_NET_RAW for an interface), or namespaces of your own: `unshare --map-root-user --net`"
     } else {
         ""
     }

@@ -109,7 +109,7 @@ fn read_drift(node: &Node, context: Context<'_>) -> Option<Drift> {
         Value::Text(text) => {
             let fraction = parts_per_million(text);
             if fraction.is_none() {
-                context.fault_at(node, format!("{} is no drift: expected {EXPECTED}", quote(text)));
+                context.fault_at(node, format!("{} is not a drift: expected {EXPECTED}", quote(text)));
             }
             fraction?
         }

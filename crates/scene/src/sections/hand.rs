@@ -69,7 +69,7 @@ pub(crate) fn read_hand(node: &Node, context: SceneContext<'_>) -> Option<Option
     }
     let chosen = only_one(node, *context, &[force, sine, file, arm], EXPECTED)?;
     if let (Some(follows), None) = (follows, arm) {
-        context.fault(follows.key, &follows.node.path, "only an arm follows a wanted motion: expected arm = { mass, damping, stiffness } beside it");
+        context.fault(follows.key, &follows.node.path, "only an arm follows a wanted motion: expected arm = { mass, damping, stiffness } too");
         return None;
     }
     let value = &*chosen.node;
@@ -109,7 +109,7 @@ pub(super) fn read_hand_torque(hand: &Node, context: SceneContext<'_>) -> Option
     let torque = table.get("torque");
     if let (Some(torque), true) = (torque, sine.is_some() || file.is_some()) {
         let other = if sine.is_some() { "sine.torque" } else { "the torques of a file" };
-        context.fault(torque.key, &torque.node.path, format!("a torque stands beside {other}: expected one of the two"));
+        context.fault(torque.key, &torque.node.path, format!("a torque and {other} exclude each other: expected one of the two"));
         return None;
     }
     if let Some(torque) = torque {

@@ -119,7 +119,7 @@ fn read_device(node: &Node, context: Context<'_>) -> Option<FalconDevice> {
         // A serial number is printable ASCII without spaces.
         serial if !serial.is_empty() && serial.chars().all(|c| c.is_ascii_graphic()) => Some(FalconDevice::Serial(serial.to_owned())),
         other => {
-            context.fault_at(node, format!("{} is no serial number: expected {EXPECTED}", quote(other)));
+            context.fault_at(node, format!("{} is not a serial number: expected {EXPECTED}", quote(other)));
             None
         }
     }

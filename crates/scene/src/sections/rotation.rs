@@ -110,7 +110,7 @@ pub(super) fn read_orientation(node: &Node, context: Context<'_>) -> Option<[f64
         (largest > 0.0).then(|| scaled.map(|component| component / norm))
     });
     if unit.is_none() {
-        context.fault_at(node, format!("{} is no quaternion: expected {EXPECTED}", values::written(node)));
+        context.fault_at(node, format!("{} is not a quaternion: expected {EXPECTED}", values::written(node)));
     }
     unit
 }
@@ -129,7 +129,7 @@ pub(super) fn read_device_rotation(table: &mut TableReader<'_>) -> Option<Option
         let inertia = read_triple(INERTIA, node, context)?;
         check_triangle(&inertia, "a moment of inertia", node, context).then_some(inertia)
     });
-    let needs = "a device without an inertia does not turn: expected device.inertia beside it";
+    let needs = "a device without an inertia does not turn: expected device.inertia too";
     let damping = table.only_if(inertia != Some(None), "rotational-damping", needs).and_then(|()| triple(table, "rotational-damping"));
     let (inertia, damping) = (inertia?, damping?);
     Some(inertia.map(|inertia| Spin { inertia, damping }))
@@ -138,7 +138,7 @@ pub(super) fn read_device_rotation(table: &mut TableReader<'_>) -> Option<Option
 /// Reads `rotational-stiffness` and `rotational-damping` of a coupling; `Some(None)` without a stiffness.
 pub(super) fn read_coupling_rotation(table: &mut TableReader<'_>) -> Option<Option<Gains>> {
     let stiffness = table.maybe_value("rotational-stiffness");
-    let needs = "a coupling that turns needs a stiffness: expected rotational-stiffness beside it";
+    let needs = "a coupling that turns needs a stiffness: expected rotational-stiffness too";
     let damping = table.only_if(stiffness != Some(None), "rotational-damping", needs).and_then(|()| table.value("rotational-damping"));
     let (stiffness, damping) = (stiffness?, damping?);
     Some(stiffness.map(|stiffness| Gains { stiffness, damping }))

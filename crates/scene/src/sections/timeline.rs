@@ -140,7 +140,7 @@ fn read_entry<'a>(node: &'a Node, duration: Option<Duration>, context: SceneCont
     let target = only_one(node, *context, &[link, peer, coordination], TARGETS)?;
     if target.name == "coordination" {
         if let Some(set) = set {
-            context.fault(set.key, &set.node.path, "coordination holds its own keys: expected no key set beside it");
+            context.fault(set.key, &set.node.path, "coordination holds its own keys: expected no key set with it");
             return None;
         }
         let what = read_coordination_changes(&target.node, *context);

@@ -81,7 +81,7 @@ pub(crate) fn read_topology(node: &Node, context: Context<'_>) -> Option<Ways> {
     // A star whose hub is a relay is a topology of all to all: the relay hands on each sample to everybody.
     if role == Some(Role::Relay) {
         if let Some((_, node)) = hub {
-            context.fault_at(node, "a relay passes on what it hears, and is no peer: expected no hub, or role = \"peer\"");
+            context.fault_at(node, "a relay passes on what it hears and is not a peer: expected no hub, or role = \"peer\"");
             return None;
         }
         return Some(Ways { neighbours: None, relay: true });

@@ -29,8 +29,8 @@ fn what_is_no_toml_is_refused_in_the_same_form() {
     check_replaced(&[
         ("\"24ms\"", "24ms", "17:9: link.delay: not TOML: "),
         ("delay =", "delay", "17:7: link: not TOML: "),
-        ("mass = 0.45", "mass = 0.45\nmass = 0.5", "5:1: object.mass: this key or table is there already: expected it once"),
-        ("[link]", "[link]\n[link]", "17:2: link: this key or table is there already"),
+        ("mass = 0.45", "mass = 0.45\nmass = 0.5", "5:1: object.mass: this key or table was given before: expected it once"),
+        ("[link]", "[link]\n[link]", "17:2: link: this key or table was given before"),
         ("[link]", "[link", "16:6: link: not TOML: "),
         ("\"7s\"", "\"7s", "2:15: scene.duration: not TOML: "),
     ]);
@@ -72,8 +72,8 @@ fn a_line_of_any_length_is_cut_around_the_place() {
 fn an_override_that_leads_nowhere_is_refused() {
     for (given, expected) in [
         ("link.delay", "--set link.delay: no = in the override: expected KEY=VALUE"),
-        ("=1", "--set =1: the key is no dotted path"),
-        ("link..delay=1ms", "--set link..delay=1ms: link..delay: the key is no dotted path"),
+        ("=1", "--set =1: the key is not a dotted path"),
+        ("link..delay=1ms", "--set link..delay=1ms: link..delay: the key is not a dotted path"),
         (
             "peers.lefft.tick=1ms",
             "--set peers.lefft.tick=1ms: peers.lefft: there is no peer \"lefft\": expected one of left, right; did you mean \"left\"?",

@@ -67,7 +67,10 @@ fn what_is_no_topology_is_refused_at_its_place() {
         ("kind = \"ring\"\nneighbours = 0", "7:14: topology.neighbours: "),
         ("neighbours = 2", "6:14: topology.neighbours: only a topology of kind = \"ring\" has this key: expected that kind, or no such key"),
         ("kind = \"star\"\nhub = \"peer9\"", "7:7: topology.hub: there is no peer \"peer9\": expected"),
-        ("kind = \"star\"\nhub = \"peer1\"\nrole = \"relay\"", "7:7: topology.hub: a relay passes on what it hears, and is no peer: expected no hub"),
+        (
+            "kind = \"star\"\nhub = \"peer1\"\nrole = \"relay\"",
+            "7:7: topology.hub: a relay passes on what it hears and is not a peer: expected no hub",
+        ),
         ("kind = \"ring\"\nrole = \"relay\"", "7:8: topology.role: only a topology of kind = \"star\" has this key"),
         ("kind = \"graph\"", "6:1: topology.file: missing key"),
         ("kind = \"ring\"\nfile = \"x.csv\"", "7:8: topology.file: only a topology of kind = \"graph\" has this key"),

@@ -117,8 +117,8 @@ fn a_hand_file_gives_torques_beside_forces_and_wanted_motions() {
     assert_eq!(torque("{ file = \"force.csv\", torque = [0, 0, 7] }"), Some([0.0, 0.0, 7.0]));
     assert_eq!(torque("{ file = \"force.csv\" }"), None);
     for (hand, overrides, expected) in [
-        ("{ file = \"hand.csv\", torque = [0, 0, 7] }", &[][..], "peers.a.hand.torque: a torque stands beside the torques of a file"),
-        (&format!("{{ {arm}, torque = [0, 0, 7] }}"), &[], "beside the torques of a file"),
+        ("{ file = \"hand.csv\", torque = [0, 0, 7] }", &[][..], "peers.a.hand.torque: a torque and the torques of a file exclude each other"),
+        (&format!("{{ {arm}, torque = [0, 0, 7] }}"), &[], "and the torques of a file exclude each other"),
         (
             "{ file = \"hand.csv\" }",
             &["peers.a.device={mass=0.1}", "peer={device={mass=0.1},coupling={stiffness=1}}"],

@@ -337,7 +337,7 @@ fn what_cannot_be_is_refused_with_the_reason() {
         ("jitter = { distribution = \"gamma\" }", "6:10: link.jitter.sd: missing key"),
         (
             "jitter = { sd = \"1ms\", correlation = 0.1, correlation-time = \"1s\" }",
-            "6:43: link.jitter.correlation-time: \"correlation\" is given already",
+            "6:43: link.jitter.correlation-time: \"correlation\" was given before",
         ),
         ("jitter = { sd = \"1ms\", correlation = 1 }", "6:38: link.jitter.correlation: 1 is out of range: expected a number from -1 to below 1"),
         (
@@ -346,7 +346,10 @@ fn what_cannot_be_is_refused_with_the_reason() {
         ),
         ("delay = \"1ms\"\njitter = { sd = \"1ms\", floor = \"2ms\" }", "7:10: link.jitter: the mean delay of 1ms is below the least delay of 2ms"),
         ("loss = { gilbert-elliott = { p = 0.1, r = 1.5 } }", "6:43: link.loss.gilbert-elliott.r: 1.5 is out of range"),
-        ("loss = { gilbert-elliott = { p = 0.1, mean-good = \"1s\", mean-bad = \"1s\" } }", "6:30: link.loss.gilbert-elliott.p: p beside mean times"),
+        (
+            "loss = { gilbert-elliott = { p = 0.1, mean-good = \"1s\", mean-bad = \"1s\" } }",
+            "6:30: link.loss.gilbert-elliott.p: p and mean times exclude each other",
+        ),
         ("loss = { gilbert-elliott = { mean-good = \"0s\", mean-bad = \"1s\" } }", "6:42: link.loss.gilbert-elliott.mean-good: zero is out of range"),
         ("loss = { states = { p13 = 0.6, p14 = 0.6 } }", "6:19: link.loss.states: p13 = 60% and p14 = 60% are more than 1 together: expected a sum"),
         ("loss = { bursts = { loss = 0.5, length = 2, density = 0.4 } }", "6:19: link.loss.bursts: bursts need 0 ≤ isolated ≤ loss < density"),
@@ -354,16 +357,16 @@ fn what_cannot_be_is_refused_with_the_reason() {
             "loss = { correlated = { probability = 0.1, correlation = -0.5 } }",
             "6:58: link.loss.correlated.correlation: events of probability 10% cannot",
         ),
-        ("loss = { packets = [3, \"9-8\"] }", "6:24: link.loss.packets.1: \"9-8\" is no row of packets"),
+        ("loss = { packets = [3, \"9-8\"] }", "6:24: link.loss.packets.1: \"9-8\" is not a row of packets"),
         ("loss = { packets = [3, 1] }", "6:24: link.loss.packets.1: span 1 begins before the one listed before it has ended"),
         ("loss = { packets = [3], every = 2 }", "6:33: link.loss.every: the pattern begins anew after 2"),
-        ("loss = { correlated = 0.1, every = 2 }", "6:28: link.loss.every: every means nothing beside correlated"),
-        ("loss = { packets = [], times = [] }", "6:24: link.loss.times: \"packets\" is given already"),
-        ("corrupt = { bit-error-rate = 0.1, bits = 3 }", "6:35: link.corrupt.bits: bits beside bit-error-rate"),
-        ("corrupt = { probability = 0.1, bytes = \"8\\u2013\" }", "6:40: link.corrupt.bytes: \"8–\" is no row of bytes"),
+        ("loss = { correlated = 0.1, every = 2 }", "6:28: link.loss.every: every means nothing with correlated"),
+        ("loss = { packets = [], times = [] }", "6:24: link.loss.times: \"packets\" was given before"),
+        ("corrupt = { bit-error-rate = 0.1, bits = 3 }", "6:35: link.corrupt.bits: bits and bit-error-rate exclude each other"),
+        ("corrupt = { probability = 0.1, bytes = \"8\\u2013\" }", "6:40: link.corrupt.bytes: \"8–\" is not a row of bytes"),
         ("corrupt = { probability = 0.1, bits = 0 }", "6:39: link.corrupt.bits: 0 is out of range"),
         ("reorder = { probability = 0.1, behind = 1 }", "6:11: link.reorder.at-most: missing key"),
-        ("reorder = { probability = 0.1, gap = 2, later = \"1s\" }", "6:41: link.reorder.later: \"gap\" is given already"),
+        ("reorder = { probability = 0.1, gap = 2, later = \"1s\" }", "6:41: link.reorder.later: \"gap\" was given before"),
         ("reorder = { probability = 0.1, at-most = \"1s\" }", "6:32: link.reorder.at-most: at-most says how long a packet is held"),
         (
             "rate = \"1Mbit\"\nqueue = { limit = \"9 packets\", discipline = \"red\" }",
@@ -384,17 +387,17 @@ fn what_cannot_be_is_refused_with_the_reason() {
         ("rate = \"1Mbit\"\ntrace = \"line.trace\"", "7:1: link.trace: a line cannot have a rate and a recording"),
         ("token-bucket = { rate = \"1Mbit\" }", "6:16: link.token-bucket.burst: missing key"),
         ("slots = { min = \"2ms\", max = \"1ms\" }", "6:30: link.slots.max: gaps between slots of 2ms to 1ms"),
-        ("slots = { min = \"2ms\", delay = \"1ms\" }", "6:24: link.slots.delay: delay beside min"),
-        ("limit = \"64kB\"", "6:9: link.limit: \"64kB\" is no number of packets"),
+        ("slots = { min = \"2ms\", delay = \"1ms\" }", "6:24: link.slots.delay: delay and min exclude each other"),
+        ("limit = \"64kB\"", "6:9: link.limit: \"64kB\" is not a number of packets"),
         ("outage = { random = { up = \"0s\", down = \"1s\" } }", "6:28: link.outage.random.up: a span that cannot be drawn"),
         ("outage = { random = { up = { uniform = [\"1s\"] }, down = \"1s\" } }", "6:40: link.outage.random.up.uniform: a list of 1"),
         ("netem = \"delay 20ms loss 250%\"", "6:26: link.netem: \"250%\" is not what loss takes here: expected a percentage"),
         ("netem = \"dealy 20ms\"", "6:10: link.netem: unknown word \"dealy\""),
         ("netem = \"loss 1% delay 1ms 2ms\"", "6:18: link.netem: delay: uniform jitter of 2ms around 1ms begins below zero"),
-        ("delay = \"1ms\"\nnetem = \"delay 2ms\"", "7:1: link.netem: netem beside delay: netem says everything about this link"),
+        ("delay = \"1ms\"\nnetem = \"delay 2ms\"", "7:1: link.netem: netem and delay exclude each other: netem says everything about this link"),
         ("netem-profile = \"exact\"", "6:1: link.netem-profile: netem-profile means nothing without words"),
         ("netem = \"delay 300s\"\nnetem-profile = \"kernel-6.6\"", "6:9: link.netem: a delay of 300s: expected less than"),
-        ("replay = \"fates.csv\"\nnetem = \"delay 2ms\"", "7:1: link.netem: netem beside replay"),
+        ("replay = \"fates.csv\"\nnetem = \"delay 2ms\"", "7:1: link.netem: netem and replay exclude each other"),
         ("modulated = { by = \"nobody\" }", "6:20: link.modulated.by: there is no modulator \"nobody\": expected an entry [[modulators]]"),
         ("modulated = { good = {} }", "6:13: link.modulated: missing key by"),
     ] {
@@ -447,7 +450,7 @@ fn a_word_of_tc_is_found_in_an_override_too() {
 #[test]
 fn what_is_laid_over_words_of_tc_is_refused() {
     let found = refused("link.netem = \"delay 5ms\"\n[[timeline]]\nat = \"1s\"\nlink = \"all\"\nset = { loss = 0.1 }", &[]);
-    assert!(found.starts_with("links.toml:9:9: timeline.0.set.loss: loss beside netem"), "{found}");
+    assert!(found.starts_with("links.toml:9:9: timeline.0.set.loss: loss and netem exclude each other"), "{found}");
 }
 
 #[test]
@@ -469,10 +472,10 @@ fn a_recording_that_makes_no_sense_is_shown_in_its_line() {
         ("replay = \"bad-fates.csv\"", "bad-fates.csv:2:1: link.replay: column fate: found \"vanished\", expected delivered, duplicated"),
         (
             "jitter = { sd = \"1ms\", distribution = { table = \"bad.dist\" } }",
-            "bad.dist:2:1: link.jitter.distribution.table: column 3: `x` is no integer",
+            "bad.dist:2:1: link.jitter.distribution.table: column 3: `x` is not an integer",
         ),
-        ("netem = \"delay 9ms 1ms distribution bad\"", "bad.dist:2:1: link.netem: column 3: `x` is no integer"),
-        ("netem = \"delay 9ms 1ms distribution bad\"\nnetem-profile = \"kernel-6.6\"", "bad.dist:2:1: link.netem: column 3: `x` is no integer"),
+        ("netem = \"delay 9ms 1ms distribution bad\"", "bad.dist:2:1: link.netem: column 3: `x` is not an integer"),
+        ("netem = \"delay 9ms 1ms distribution bad\"\nnetem-profile = \"kernel-6.6\"", "bad.dist:2:1: link.netem: column 3: `x` is not an integer"),
         (
             "jitter = { distribution = { empirical = \"path.csv\" } }",
             "path.csv:1:1: link.jitter.distribution.empirical: the header is \"t,delay,loss\": expected delay",

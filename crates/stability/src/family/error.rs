@@ -15,7 +15,7 @@ pub enum FamilyError {
     #[error(transparent)]
     Analysis(#[from] AnalysisError),
     /// A key of the scene does not take a number.
-    #[error("{key} is no number that can be varied: {message}")]
+    #[error("{key} is not a number that can be varied: {message}")]
     NoNumber {
         /// The key.
         key: String,

@@ -33,7 +33,7 @@ pub enum KeyRangeError {
         text: String,
     },
     /// An end of the range is not a number with an optional unit, or is not finite.
-    #[error("\"{end}\" in \"{text}\" is no end of a range: expected a finite number, with a unit where the key takes one")]
+    #[error("\"{end}\" in \"{text}\" is not an end of a range: expected a finite number, with a unit where the key takes one")]
     End {
         /// The text as given.
         text: String,

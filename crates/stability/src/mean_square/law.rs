@@ -137,7 +137,7 @@ impl LinkLaw {
             Loss::GilbertElliott(chain) => (0.0, Some(LossChain::GilbertElliott(*chain))),
             Loss::GilbertElliottInTime(chain) => (0.0, Some(LossChain::InTime(*chain))),
             Loss::FourState(chain) => (0.0, Some(LossChain::FourState(*chain))),
-            Loss::Pattern(_) => return Err("its losses are chosen by a pattern beside something random"),
+            Loss::Pattern(_) => return Err("its losses are chosen by a pattern and by chance"),
         };
         let discarded = match &config.corruption {
             None => 0.0,
@@ -159,7 +159,7 @@ impl LinkLaw {
                 Displacement::Jump { gap } if gap.get() == 1 => Some((reorder.packets.probability().get(), None)),
                 Displacement::Later { by } => Some((reorder.packets.probability().get(), Some(nanos(by)))),
                 Displacement::Jump { .. } => return Err("its packets jump only now and then"),
-                Displacement::Behind { .. } => return Err("its packets are put behind others"),
+                Displacement::Behind { .. } => return Err("its packets are held until others have passed"),
             },
         };
         let law = config.delay.law().cloned();
@@ -249,7 +249,7 @@ fn refuse(config: &LinkConfig) -> Result<(), &'static str> {
         return Err("it has an impairment without a law here");
     }
     if queues && spread {
-        return Err("it has a queue beside jitter, reordering or duplicates");
+        return Err("it has a queue together with jitter, reordering or duplicates");
     }
     if config.marks_instead_of_loss {
         return Err("it marks packets instead of losing them");

@@ -1,4 +1,4 @@
-//! A link with nothing left to chance: each random part is replaced by a stated part.
+//! A link with delays at their mean and no losses: each random part is replaced by a stated part.
 
 use std::time::Duration;
 

@@ -79,7 +79,7 @@ impl Drive {
             }
         }
         if let Some(late) = scene.peers.iter().find(|spec| spec.compute_delay) {
-            return Err(none(format!("{} applies forces a tick late, and what waits is no state here", late.name)));
+            return Err(none(format!("{} applies forces a tick late, and what waits is not a state here", late.name)));
         }
         let sum = torques.iter().fold([0.0; 3], |sum, torque| add(sum, *torque));
         let begun = rotation.peers[0].attitude;

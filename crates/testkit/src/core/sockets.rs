@@ -189,7 +189,7 @@ impl Core {
     /// Checks that a socket of `host` can be bound to the address `ip`.
     pub(super) fn check_owned(&self, host: NodeId, ip: IpAddr) -> io::Result<()> {
         if !ip.is_unspecified() && !ip.is_loopback() && !self.plan.of(host).has(ip) {
-            let text = format!("{ip} is no address of host `{}`, which has {}", self.plan.names()[host.index()], self.plan.of(host).like(ip));
+            let text = format!("{ip} is not an address of host `{}`, which has {}", self.plan.names()[host.index()], self.plan.of(host).like(ip));
             return Err(io::Error::new(io::ErrorKind::AddrNotAvailable, text));
         }
         Ok(())

@@ -303,7 +303,7 @@ fn is_down<T>(name: &str) -> T {
 
 #[expect(clippy::panic, reason = "a misuse, and the way out")]
 pub(super) fn is_another<T>(name: &str) -> ! {
-    panic!("node `{name}` is no `{}`", type_name::<T>())
+    panic!("node `{name}` is not a `{}`", type_name::<T>())
 }
 
 impl Drop for NodeRun {

@@ -62,7 +62,7 @@ impl fmt::Display for BoundsError {
             Self::OnlyZero { stage } => {
                 write!(f, "{stage}: a range with nothing but zero: expected LinkBounds::never(Stage::{stage:?}), or an end above zero")
             }
-            Self::Percentage { stage, found } => write!(f, "{stage}: {found} is no percentage: expected 0 to 100"),
+            Self::Percentage { stage, found } => write!(f, "{stage}: {found} is not a percentage: expected 0 to 100"),
             Self::TooLong { stage, found } => write!(f, "{stage}: {found:?} is too long: expected at most 1 hour"),
             Self::Rate { found } => write!(f, "rate: {found} bit/s: expected 8 bit/s to 1 Tbit/s"),
             Self::JitterAboveDelay { jitter, delay } => write!(

@@ -79,7 +79,7 @@ fn action(words: &str) -> Action {
     match hits_on(&format!("{words} packet 0")).as_deref() {
         Ok([Hit { action, .. }]) => *action,
         Ok(_) => panic!("`{words}` is more than one action: expected one such as `drop`"),
-        Err(error) => panic!("`{words}` is no action: {}", error.message()),
+        Err(error) => panic!("`{words}` is not an action: {}", error.message()),
     }
 }
 

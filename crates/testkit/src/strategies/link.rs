@@ -80,7 +80,7 @@ impl ImpairedLink {
     #[track_caller]
     #[expect(clippy::panic, reason = "documented: for words that stand in a test")]
     pub fn words(words: &str) -> Self {
-        words.parse().unwrap_or_else(|error| panic!("not the words of a link:\n{error}"))
+        words.parse().unwrap_or_else(|error| panic!("these words do not describe a link:\n{error}"))
     }
 
     /// Creates a link from parsed words.

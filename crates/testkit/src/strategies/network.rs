@@ -81,8 +81,8 @@ impl fmt::Display for NetworkTextError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Hosts { found } => write!(f, "\"{found}\" does not count hosts: expected a first line such as \"3 hosts\", with 1 to {MOST}"),
-            Self::Line { found } => write!(f, "\"{found}\" is no link: expected a line such as \"a -> b: delay 24ms\""),
-            Self::NoLink { found, first, last } => write!(f, "\"{found}\" is no link between two of the hosts {first} to {last}"),
+            Self::Line { found } => write!(f, "\"{found}\" is not a link: expected a line such as \"a -> b: delay 24ms\""),
+            Self::NoLink { found, first, last } => write!(f, "\"{found}\" is not a link between two of the hosts {first} to {last}"),
             Self::Repeated { from, to } => write!(f, "the link {from} -> {to} is said twice: expected it once"),
             Self::Link { from, to, reason } => write!(f, "{from} -> {to}:\n{reason}"),
         }
@@ -113,7 +113,7 @@ impl ImpairedNetwork {
     #[track_caller]
     #[expect(clippy::panic, reason = "documented: for text that stands in a test")]
     pub fn words(text: &str) -> Self {
-        text.parse().unwrap_or_else(|error| panic!("not the words of a network: {error}"))
+        text.parse().unwrap_or_else(|error| panic!("these words do not describe a network: {error}"))
     }
 
     /// Returns the network with the given link replaced.

@@ -163,16 +163,16 @@ fn outside_of_a_test_bed_nothing_can_be_bound_and_no_time_passes() {
 fn a_test_bed_that_is_none_is_refused_where_it_is_said() {
     says(|| drop(Testbed::new(Vec::<String>::new())), &["without hosts"]);
     says(|| drop(Testbed::new(["a", "a"])), &["two hosts are called `a`"]);
-    says(|| drop(Testbed::new(["a:b"])), &["`a:b` is no name of a host"]);
-    says(|| drop(Testbed::new(["10.0.0.1"])), &["`10.0.0.1` is no name of a host"]);
+    says(|| drop(Testbed::new(["a:b"])), &["`a:b` is not a name of a host"]);
+    says(|| drop(Testbed::new(["10.0.0.1"])), &["`10.0.0.1` is not a name of a host"]);
     says(|| drop(bed().link("a", "c", "delay 1ms")), &["there is no host `c`; the hosts are a, b"]);
     says(|| drop(bed().link("a", "a", "delay 1ms")), &["host `a` has no link to itself"]);
-    says(|| drop(bed().links("delay 24ms loss 250%")), &["this is no link", "^^^^ expected a percentage from 0 to 100"]);
+    says(|| drop(bed().links("delay 24ms loss 250%")), &["this is not a link", "^^^^ expected a percentage from 0 to 100"]);
     says(|| drop(bed().hit("a", "c", "drop packet 1")), &["there is no host `c`; the hosts are a, b"]);
     says(|| drop(bed().hit("a", "a", "drop packet 1")), &["host `a` has no link to itself"]);
     says(
         || drop(bed().hit("a", "b", "drop third packet")),
-        &["these are no words of hits: 1:6: unknown word \"third\": expected `packet 3`", "^^^^^"],
+        &["these words do not describe hits: 1:6: unknown word \"third\": expected `packet 3`", "^^^^^"],
     );
     says(|| drop(bed().on_packet("c", "b", |_| Verdict::Drop)), &["there is no host `c`"]);
     says(|| drop(bed().hits(&Hits::words("a -> x: drop packet 1"))), &["there is no host `x`"]);

@@ -326,7 +326,7 @@ fn misuse_says_what_to_do() {
     fine.run_until(ms(5));
     assert_eq!(message(|| fine.run_until(ms(4))), "0.004 s has passed: it is 0.005 s");
     assert_eq!(message(|| drop(fine.record())), "nothing was recorded; `Nodes::recorded` asks for it");
-    assert!(message(|| _ = fine.node::<Echo>("a")).starts_with("node `a` is no `"));
+    assert!(message(|| _ = fine.node::<Echo>("a")).starts_with("node `a` is not a `"));
     assert_eq!(message(|| _ = fine.counts("c")), "there is no host `c`; the hosts are a, b");
     assert!(message(|| fine.restart("a", Wrong::Answers)).contains("is up; `crash` it before"));
     let _: Wrong = fine.crash("a");

@@ -36,12 +36,10 @@ pub enum Contradiction {
 impl fmt::Display for Contradiction {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::ReorderWithoutDelay => f.write_str("reorder sends packets before those that wait: expected a delay above zero beside it"),
-            Self::GapWithoutReorder => f.write_str("gap says which packets are reordered: expected reorder above 0 % beside it"),
-            Self::EcnWithoutLoss => f.write_str("ecn marks packets that would be lost: expected a loss above 0 % beside it"),
-            Self::DistributionWithoutJitter => {
-                f.write_str("a distribution is that of the jitter: expected delay TIME JITTER, both above zero, beside it")
-            }
+            Self::ReorderWithoutDelay => f.write_str("reorder sends packets before those that wait: expected a delay above zero too"),
+            Self::GapWithoutReorder => f.write_str("gap says which packets are reordered: expected reorder above 0 % too"),
+            Self::EcnWithoutLoss => f.write_str("ecn marks packets that would be lost: expected a loss above 0 % too"),
+            Self::DistributionWithoutJitter => f.write_str("a distribution is that of the jitter: expected delay TIME JITTER, both above zero, too"),
             Self::WaysOutOfState1 => f.write_str("p13 and p14 are the ways out of state 1: expected a sum of at most 100 %"),
             Self::WaysOutOfState3 => f.write_str("p31 and p32 are the ways out of state 3: expected a sum of at most 100 %"),
             Self::ProbabilitySkipped => f.write_str("a loss model's probabilities can only be said in order: expected those before it too"),

@@ -203,9 +203,9 @@ fn interrupted(found: &Boundary, rows: Option<RowsFile>, known: &[Row], kept: Op
             if let Err(failure) = new.try_for_each(|(number, (value, cell))| rows.add(known.len() + number, &row(*value, cell))) {
                 return failure;
             }
-            format!("they are kept in {}, and the same command goes on from there", output::path(&kept.path(None)))
+            format!("they are kept in {}; repeat the command to go on from there", output::path(&kept.path(None)))
         }
-        _ => "nothing is kept; with --out DIR they are, and the same command goes on from there".to_owned(),
+        _ => "nothing is kept; with --out DIR they are; repeat the command to go on from there".to_owned(),
     };
     Failure::Interrupted(format!("{} looked at: {kept}", Counted(found.samples, "value")))
 }

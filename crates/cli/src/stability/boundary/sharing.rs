@@ -95,7 +95,7 @@ fn search(order: &Order, arguments: &BoundaryArguments, shard: Shard, kept: Kept
     if whole < wanted.len() as u64 {
         let done = pieces - wanted.len() as u64 + whole;
         let kept = format!("{done} of its {pieces} blocks are whole, and what was looked at is kept in {}", output::path(kept.folder));
-        return Err(Failure::Interrupted(format!("shard {shard}: {kept}; the same command goes on from there")));
+        return Err(Failure::Interrupted(format!("shard {shard}: {kept}; repeat the command to go on from there")));
     }
     Ok(Done { shard, folder: output::path(kept.folder), names: NAMES, pieces, units: all, computed, wall_s: worker.wall_s() })
 }

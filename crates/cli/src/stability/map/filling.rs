@@ -128,7 +128,7 @@ fn rows_of_shard(order: &Order, arguments: &MapArguments, shard: Shard, kept: Ke
     let (maps, computed) = filled.map_err(|(variant, error)| order.failure(variant, arguments, error))?;
     if maps.len() < order.variants.len() || !maps.iter().all(Map::is_complete) {
         let kept = format!("{} of {} finished are kept in {}", there + computed / columns, output::are(mine, "row"), output::path(kept.folder));
-        return Err(Failure::Interrupted(format!("shard {shard}: {kept}; the same command goes on from there")));
+        return Err(Failure::Interrupted(format!("shard {shard}: {kept}; repeat the command to go on from there")));
     }
     Ok([mine, mine * columns, computed].map(|number| number as u64))
 }
@@ -250,9 +250,9 @@ fn interrupted(maps: &[Map], order: &Order, folder: Option<&Path>) -> Failure {
     let all = order.grid.rows() * order.variants.len();
     let kept = match folder {
         Some(folder) => {
-            format!("they are kept in {}, and the same command goes on from there", output::path(&folder.join(format!("{ROWS}{PARTIAL}"))))
+            format!("they are kept in {}; repeat the command to go on from there", output::path(&folder.join(format!("{ROWS}{PARTIAL}"))))
         }
-        None => "nothing is kept; with --out DIR finished rows are, and the same command goes on from there".to_owned(),
+        None => "nothing is kept; with --out DIR finished rows are; repeat the command to go on from there".to_owned(),
     };
     Failure::Interrupted(format!("{finished} of {} finished: {kept}", output::are(all, "row")))
 }

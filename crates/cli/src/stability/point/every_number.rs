@@ -99,7 +99,7 @@ fn with_reasons(every: &EveryNumber) -> impl Iterator<Item = (NumberSpan, Option
 /// Returns the reason for which the numbers from `from` on are undecided.
 fn reason(from: u64, why: Openness) -> String {
     match why {
-        Openness::Ended => "the proof was ended".to_owned(),
+        Openness::Ended => "the proof was stopped".to_owned(),
         Openness::Exhausted => "too many pieces were looked at".to_owned(),
         Openness::Beyond => format!("numbers were followed to {MOST_FOLLOWED}"),
         Openness::Moment => format!("no second moment was found that decides N = {from}"),

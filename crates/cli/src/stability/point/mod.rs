@@ -26,13 +26,13 @@ use crate::{file, input, output};
 
 /// Returns the failure of an analysis that the user interrupted.
 fn ended() -> Failure {
-    Failure::Interrupted("the analysis was ended before its verdict".to_owned())
+    Failure::Interrupted("the analysis was stopped before its verdict".to_owned())
 }
 
 /// Like [`ended`], but the message includes the worst case if its analysis was complete before the interruption.
 fn ended_after(worst: Option<&SceneWorstCase>) -> Failure {
     let Some(worst) = worst else { return ended() };
-    Failure::Interrupted(format!("the analysis was ended before its verdict; before that,{}", cohaptic_answers::point::worst_in_words(worst)))
+    Failure::Interrupted(format!("the analysis was stopped before its verdict; before that,{}", cohaptic_answers::point::worst_in_words(worst)))
 }
 
 /// Judges the scene, runs the proofs that the arguments ask for, and writes the answer.
@@ -93,7 +93,7 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
 /// Returns the judgement of an analysis without second moment. If the network has chance, a note says that the verdict is nominal.
 fn nominal(scene: &Scene, mut analysis: Analysis, place: &str) -> Judgement {
     if has_chance(scene) {
-        analysis.notes.push(format!("the verdict is nominal, with every delay its mean and nothing lost: the second moment is not followed {place}"));
+        analysis.notes.push(format!("the verdict is nominal, with every delay at its mean and no losses: the second moment is not followed {place}"));
     }
     Judgement::nominal(scene, analysis)
 }

@@ -86,7 +86,7 @@ fn assert_metrics(control: &Control) {
             "{line}"
         );
         assert!(series.len() == name.len() || series.ends_with('}'), "{line}");
-        assert!(values.insert(series.to_owned(), value.parse::<f64>().unwrap()).is_none(), "{line} is there twice");
+        assert!(values.insert(series.to_owned(), value.parse::<f64>().unwrap()).is_none(), "{line} stands twice");
     }
     let delivered = values[r#"cohaptic_link_delivered_packets_total{link="left->right",from="left",to="right"}"#];
     #[expect(clippy::cast_precision_loss, reason = "some hundred packets")]
@@ -131,7 +131,7 @@ fn a_change_names_files_of_the_folder_alone_and_is_shown_none_of_them() {
     }
     // Without a writer at its other end, a pipe that is waited for stops the server for ever.
     let (status, answer) = change(&control, 0, "trace", "given/pipe");
-    assert!(status == 422 && answer.contains("no regular file"), "{answer}");
+    assert!(status == 422 && answer.contains("not a regular file"), "{answer}");
     let (status, answer) = change(&control, 0, "replay", "given/shadow");
     assert!(status == 422 && answer.contains("line 1") && !answer.contains("secret"), "{answer}");
     session.end();
@@ -146,7 +146,7 @@ fn the_token_may_be_ones_own() {
     desk.set_mode("token", 0o644);
     for line in ["live two.toml", "play two.toml"] {
         let line = format!("{line} --no-priority --for 1ms --control --token-file token");
-        desk.cohaptic(&line).assert_refused(2, &["the token file token is open to others than its owner (mode 644)", "chmod 600 token"]);
+        desk.cohaptic(&line).assert_refused(2, &["the token file token can be opened by others than its owner (mode 644)", "chmod 600 token"]);
     }
     desk.set_mode("token", 0o600);
     let mut session = Session::begin(&desk, "two.toml --json --for 1h --control 127.0.0.1:0 --token-file token");

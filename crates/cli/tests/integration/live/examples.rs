@@ -93,7 +93,7 @@ fn come_to_rest(languages: &[Language], with_key: bool) {
     let desk = Desk::with("scene.toml", &scene(languages.len()));
     if with_key {
         let said = desk.text("live --new-key session.key");
-        assert!(said.starts_with("a new session key"), "{said}");
+        assert!(said.starts_with("this is a new session key"), "{said}");
     }
     for seconds in [2.0, 8.0, 40.0] {
         let Some((settled, summaries, document)) = taken_part(&desk, languages, with_key, seconds) else { return };

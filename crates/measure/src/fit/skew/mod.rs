@@ -76,7 +76,7 @@ pub enum SkewError {
     },
     /// The delays have a too long memory, or change in other ways than by drift.
     #[error(
-        "the delays hang together over about {memory_s:.3} s of the {span_s:.3} s measured, so that drift cannot be told from chance: \
+        "the delays depend on each other over about {memory_s:.3} s of the {span_s:.3} s measured, so drift and chance look alike: \
          expected a measurement of {needed_s:.0} s or more (or leave the drift in)"
     )]
     LongMemory {

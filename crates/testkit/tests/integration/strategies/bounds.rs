@@ -149,8 +149,8 @@ fn bounds_that_make_no_sense_are_refused() {
     let refused = [
         (LinkBounds::any().delay(us(5)..=us(2)), "delay: the range from 5µs to 2µs is empty: expected its end at or above its beginning"),
         (LinkBounds::any().loss(3.0..=1.0), "loss: the range from 3% to 1% is empty: expected its end at or above its beginning"),
-        (LinkBounds::any().loss(0.0..=101.0), "loss: 101 is no percentage: expected 0 to 100"),
-        (LinkBounds::any().reorder(f64::NAN..=1.0), "reorder: NaN is no percentage: expected 0 to 100"),
+        (LinkBounds::any().loss(0.0..=101.0), "loss: 101 is not a percentage: expected 0 to 100"),
+        (LinkBounds::any().reorder(f64::NAN..=1.0), "reorder: NaN is not a percentage: expected 0 to 100"),
         (LinkBounds::any().limit(0..=0), "limit: a range with nothing but zero: expected LinkBounds::never(Stage::Limit), or an end above zero"),
         (LinkBounds::any().rate(0..=100), "rate: 0 bit/s: expected 8 bit/s to 1 Tbit/s"),
         (LinkBounds::any().rate(9..=15), "rate: the range from 9bit to 15bit is empty: expected its end at or above its beginning"),
@@ -170,7 +170,7 @@ fn bounds_that_make_no_sense_are_refused() {
 }
 
 #[test]
-#[should_panic(expected = "bounds of links that make no sense: loss: 101 is no percentage")]
+#[should_panic(expected = "bounds of links that make no sense: loss: 101 is not a percentage")]
 fn a_strategy_within_no_bounds_is_not_made() {
     let _ = networks_like(3, LinkBounds::any().loss(0.0..=101.0));
 }

@@ -79,7 +79,7 @@ fn outside_of_a_run_nothing_is_opened_and_the_place_is_told() {
 fn constants_that_cannot_be_are_refused_where_they_are_said() {
     let text = |act: &dyn Fn()| *catch_unwind(AssertUnwindSafe(act)).unwrap_err().downcast::<String>().unwrap();
     let bad = TcpConfig { mtu: 5, ..TcpConfig::default() };
-    assert_eq!(text(&|| drop(Testbed::new(["a"]).tcp(bad.clone()))), "these constants of TCP cannot be: the MTU 5 is below 128 bytes");
+    assert_eq!(text(&|| drop(Testbed::new(["a"]).tcp(bad.clone()))), "these constants of TCP make no sense: the MTU 5 is below 128 bytes");
     assert!(text(&|| drop(Testbed::new(["a"]).tcp_of("b", TcpConfig::default()))).contains("there is no host `b`"));
 }
 

@@ -53,7 +53,7 @@ impl fmt::Display for DistTableError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NotAnInteger { line, column, word } => {
-                write!(f, "line {line}, column {column}: `{word}` is no integer: expected one from -32768 to 32767, decimal, 0x… or 0… in octal")
+                write!(f, "line {line}, column {column}: `{word}` is not an integer: expected one from -32768 to 32767, decimal, 0x… or 0… in octal")
             }
             Self::OutOfRange { line, column, word } => {
                 write!(f, "line {line}, column {column}: `{word}` is out of range: expected an integer from -32768 to 32767")
@@ -201,9 +201,9 @@ mod tests {
     #[test]
     fn a_bad_word_is_shown_with_its_place() {
         let reason = |text: &str| DistTable::parse(text).unwrap_err().to_string();
-        assert_eq!(reason("1 2\n µ  3x"), "line 2, column 2: `µ` is no integer: expected one from -32768 to 32767, decimal, 0x… or 0… in octal");
+        assert_eq!(reason("1 2\n µ  3x"), "line 2, column 2: `µ` is not an integer: expected one from -32768 to 32767, decimal, 0x… or 0… in octal");
         assert_eq!(reason("1\n2 40000"), "line 2, column 3: `40000` is out of range: expected an integer from -32768 to 32767");
-        assert!(reason("09").contains("`09` is no integer"));
+        assert!(reason("09").contains("`09` is not an integer"));
         assert!(reason("99999999999999999999").contains("out of range"));
         assert_eq!(reason(" # nothing\n"), "a table without entries: expected 1 to 16384");
         assert_eq!(reason(&"1 ".repeat(16_385)), "line 1, column 32769: entry 16385 begins here: expected at most 16384");

@@ -74,7 +74,7 @@ pub(super) const DOCUMENTS: [Document; 24] = [
                 "scenes[].expectations[].low, scenes[].expectations[].high",
                 "the limits or `null`. A stable scene has a radius of at most 1, an unstable one of at least 1",
             ),
-            ("scenes[].expectations[].measured", "what came out; `null` if that is no number"),
+            ("scenes[].expectations[].measured", "what came out; `null` if that is not a number"),
         ],
     },
     Document {
@@ -510,10 +510,15 @@ pub(super) const DOCUMENTS: [Document; 24] = [
         lines: &["cohaptic paper --quick --json"],
         rows: &[
             (
-                "claims[].id, claims[].claim, claims[].paper, claims[].ours, claims[].verdict",
-                "what the paper says, what was computed, and the verdict",
+                "claims[].id, claims[].claim, claims[].paper, claims[].says, claims[].ours, claims[].verdict",
+                "the claim, its place in the paper, what the paper says there, what was computed, and the verdict",
             ),
-            ("claims[].scene, claims[].how", "text of its scene, or `null`; how it was computed"),
+            (
+                "claims[].tables[].title, claims[].tables[].groups[].name, claims[].tables[].groups[].columns, claims[].tables[].head, claims[].tables[].rows",
+                "tables of the computed numbers: title, groups of columns with their names and numbers of columns, names of the columns, and cells; ✗ marks where the claim fails",
+            ),
+            ("claims[].why", "why paper and result differ, as far as it is known; empty if they do not"),
+            ("claims[].scene, claims[].how, claims[].commands", "text of a scene that shows the result, and commands for it with what they show"),
             ("figures[].id, figures[].file, figures[].title", "`file` is `null` without `--out`"),
             ("wall_s", "the time it took"),
         ],
