@@ -12,7 +12,7 @@ pub(crate) struct Group<'a> {
     pub(crate) rows: Vec<&'a Row>,
 }
 
-/// Returns all groups, in the order of their first rows.
+/// Groups rows by subject, case, and the units of error and cost. The groups stand in the order of their first rows.
 pub(crate) fn groups(rows: &[Row]) -> Vec<Group<'_>> {
     let mut groups: Vec<Group<'_>> = Vec::new();
     for row in rows {

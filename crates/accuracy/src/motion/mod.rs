@@ -59,7 +59,7 @@ pub(crate) struct Work {
     pub(crate) reference: Vec<[Motion<Quad>; 4]>,
     /// Critical stiffness of the reference \[N/m\]; `None` for a scene without a boundary.
     pub(crate) critical: Option<Quad>,
-    /// Rounds in which costs are measured.
+    /// Number of timed runs of each method. The median of their times gives the cost.
     rounds: usize,
 }
 

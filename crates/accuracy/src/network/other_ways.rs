@@ -141,7 +141,7 @@ impl KernelTable {
     }
 }
 
-/// Returns the delay of a table entry \[ms\]. Entries are in units of 1/8192 deviation.
+/// Returns the delay of a table entry \[ms\]: the mean plus the entry, which counts 8192ths of the standard deviation.
 fn delay(entry: i16) -> f64 {
     MEAN + SD / 8192.0 * f64::from(entry)
 }
