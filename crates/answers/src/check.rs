@@ -64,7 +64,7 @@ pub fn check(scene: &Scene, model: Model, watch: &dyn Watch) -> Answered {
     Answered { failures, expectations, notes: notes.into_inner() }
 }
 
-/// Most time for the analysis, by its estimate \[s\].
+/// Longest time of the analysis, by its estimate \[s\].
 const QUICK: f64 = 10.0;
 
 /// Tells by analysis whether a scene is as stable as expected. A scene without a [quick verdict](quick_verdict()) is left to a simulation; `note` is called if

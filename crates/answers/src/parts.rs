@@ -47,7 +47,7 @@ pub fn rotation(summary: &Summary) -> Option<impl Serialize + use<>> {
     summary.max_rotation_discrepancy.map(|angle| document! { max_rotation_discrepancy_rad: angle })
 }
 
-/// Most links listed one by one.
+/// Greatest number of links listed one by one.
 pub(crate) const MOST_LINKS: u64 = 1000;
 
 /// Returns the document of each link between two peers at the end of a run; `None` if the scene has more than 1000 links.

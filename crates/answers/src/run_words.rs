@@ -46,7 +46,7 @@ pub fn run_words(scene: &Scene, summary: &Summary, measured: &[MeasuredValue], w
     text
 }
 
-/// Most peers named in the text.
+/// Greatest number of peers named in the text.
 const MOST_PEERS: usize = 8;
 
 /// Returns how a run [diverged](Summary::has_diverged), in words; `None` if the run did not diverge.
@@ -118,7 +118,7 @@ pub fn packets(summary: &Summary) -> String {
     parts.join(", ")
 }
 
-/// Most measures in the text. The document has all.
+/// Greatest number of measures in the text. The document has all.
 const MOST_MEASURES: usize = 40;
 
 /// Returns a line per measure, with aligned names and values.

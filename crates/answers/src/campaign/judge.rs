@@ -23,7 +23,7 @@ impl fmt::Debug for ByAnalysis<'_> {
 /// Reason for a scene with a timeline to have no verdict.
 const TIMELINE: &str = "the timeline changes the scene during the run; simulate the scene instead, or remove the timeline";
 
-/// Most reasons listed in the notes.
+/// Greatest number of reasons listed in the notes.
 const MOST_REASONS: usize = 5;
 
 impl Judge for ByAnalysis<'_> {

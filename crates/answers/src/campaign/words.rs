@@ -8,7 +8,7 @@ use cohaptic_units::print::Counted;
 use super::Finished;
 use crate::{figure, length};
 
-/// Most combinations listed in the text. The table of runs has all.
+/// Greatest number of combinations listed in the text. The table of runs has all.
 const MOST_COMBINATIONS: usize = 20;
 
 /// Returns the text about a campaign. `wall_s`: wall time of this call \[s\].

@@ -10,7 +10,7 @@ use cohaptic_stability::Watch;
 
 use crate::{Quick, quick_verdict};
 
-/// Most time for the analysis, by its estimate \[s\]. Two runs judge instead if the analysis would take longer.
+/// Longest time of the analysis, by its estimate \[s\]. Two runs judge instead if the analysis would take longer.
 const QUICK: f64 = 0.25;
 
 /// Word for the kind of a verdict by two runs.

@@ -8,7 +8,7 @@ use cohaptic_units::print::Counted;
 use super::Finished;
 use super::figures::{self, Shown};
 
-/// Most rows of a measure in the text. A larger comparison is summed up per strategy; compare.csv and compare.html have all rows.
+/// Greatest number of rows of a measure in the text. A larger comparison is summed up per strategy; compare.csv and compare.html have all rows.
 const MOST_ROWS: usize = 24;
 
 /// Cell without a number.

@@ -12,7 +12,7 @@ use cohaptic_wan::PacketRecord;
 pub use document::{Written, document};
 pub use words::words;
 
-/// Most packets in the figures. Each packet takes 127 bytes during the computation, half a gigabyte in all.
+/// Greatest number of packets in the figures. Each packet takes 127 bytes during the computation, half a gigabyte in all.
 pub const MOST_MEASURED: u64 = 4_000_000;
 
 /// Measures a link from the records of its packets. Packets beyond [`MOST_MEASURED`] are only counted.

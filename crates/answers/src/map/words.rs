@@ -8,7 +8,7 @@ use cohaptic_units::print::Counted;
 use super::{Filled, Speed, VariantMap, glance};
 use crate::{are, figure, label};
 
-/// Most pictures in the text, as many as fit on a screen.
+/// Greatest number of pictures in the text, as many as fit on a screen.
 const MOST_PICTURES: usize = 4;
 
 /// Returns the text about maps. `pictures`: whether the text contains small pictures of the maps.

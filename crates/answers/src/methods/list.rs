@@ -40,9 +40,9 @@ const ANALYSES: [(&str, AnalysisMethod); 3] = [
 
 /// Number of events in the simulated part of a scene (ticks along three axes, and packets): up to a tenth of a second of the slowest engine.
 const EVENTS: f64 = 6e5;
-/// Most events of a measured run which has an event per tick and packet, with each link's set-up counted as two events: some seconds.
+/// Greatest number of events of a measured run that has an event per tick and packet: some seconds. The set-up of a link counts as two events.
 const MOST_EVENTS: f64 = 2e6;
-/// Shortest simulated span.
+/// Shortest simulated span of a measured run.
 const SHORTEST: Duration = Duration::from_millis(20);
 
 /// Returns the methods selectable in the scene, kind by kind.

@@ -11,11 +11,11 @@ use crate::quick_verdict::OPERATIONS_A_SECOND;
 
 /// Time spent on the cost of one method; at least one round is run.
 const BUDGET: Duration = Duration::from_millis(50);
-/// Most rounds of one method. The median of 31 rounds is steady.
+/// Greatest number of rounds of one method. The median of 31 rounds is steady.
 const MOST_ROUNDS: usize = 31;
 /// Time after which further methods get no figures: in scenes of thousands of peers one run takes seconds.
 const MOST_TIME: Duration = Duration::from_secs(6);
-/// Most operations of a measured analysis, by its own estimate: about a second.
+/// Greatest number of operations of a measured analysis, by its own estimate: about a second.
 const MOST_OPERATIONS: f64 = OPERATIONS_A_SECOND;
 
 /// Observer of a measurement, which can also stop the measurement.
@@ -215,9 +215,11 @@ fn once(work: &Work, watch: &dyn MeasurementWatch) -> Option<()> {
     if watch.stops() { None } else { Some(()) }
 }
 
-/// A watch of an analysis, which stops an analysis with a too large estimate, and every analysis if the measurement must stop.
+/// Watch of an analysis. Stops the analysis if its estimate exceeds [`MOST_OPERATIONS`], if it is the first analysis of a method that takes too long, or if the
+/// measurement must stop.
 struct Limited<'a> {
     watch: &'a dyn MeasurementWatch,
+    /// Estimate of the analysis so far \[operations\].
     expected: Mutex<f64>,
     /// `true` if this is the first analysis of a method. Later analyses are never late, because the first was not.
     is_first: bool,

@@ -53,7 +53,7 @@ struct Picture<'a> {
 /// Largest radius in a picture. Larger radii are cut off, because their size tells nothing about the place of a crossing.
 const HIGHEST: f64 = 2.0;
 
-/// Most crossings named in the legend.
+/// Greatest number of crossings named in the legend.
 const MOST_NAMED: usize = 20;
 
 impl Picture<'_> {

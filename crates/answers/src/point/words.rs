@@ -8,7 +8,7 @@ use cohaptic_units::print::Span;
 use super::{speed, worst_mode};
 use crate::{figure, notes};
 
-/// Most listed modes of contact. The worst mode is always listed.
+/// Greatest number of listed modes of contact. The worst mode is always listed.
 const MOST_MODES: usize = 16;
 
 /// Returns the text about a verdict. `worst`: the worst case over the network, if requested.

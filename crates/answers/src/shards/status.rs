@@ -93,7 +93,7 @@ pub fn status_document(status: &Status<'_>) -> impl Serialize {
     }
 }
 
-/// Most workers listed in the text. Further workers are only counted.
+/// Greatest number of workers listed in the text. Further workers are only counted.
 const MOST_WORKERS: usize = 100;
 
 /// Returns the text about the status of shared work.

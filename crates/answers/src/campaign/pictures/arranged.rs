@@ -5,11 +5,11 @@ use cohaptic_picture::{Axis, cell_edges};
 
 use crate::axis_of_key;
 
-/// Most panels of a picture.
+/// Greatest number of panels of a picture.
 const MOST_PANELS: usize = 12;
-/// Most combinations in a picture.
+/// Greatest number of combinations in a picture.
 const MOST_CELLS: usize = 100_000;
-/// Most named rows of a panel.
+/// Greatest number of named rows of a panel.
 const MOST_NAMES: usize = 24;
 
 /// The keys of a campaign, arranged in a picture.

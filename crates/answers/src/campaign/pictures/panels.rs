@@ -8,7 +8,7 @@ use super::arranged::Along;
 use super::scale::Scale;
 use super::{SHARE, Sheet};
 
-/// Most values whose points are marked on a line.
+/// Greatest number of values whose points are marked on a line.
 const MOST_MARKED: usize = 60;
 
 /// Draws the median and the bands of quantiles over a key of numbers.

@@ -4,7 +4,7 @@ use cohaptic_campaign::Variation;
 
 use crate::campaign::Along;
 
-/// Most panels of a picture.
+/// Greatest number of panels of a picture.
 const MOST_PANELS: usize = 16;
 
 /// The varied keys other than the strategy, arranged in pictures.

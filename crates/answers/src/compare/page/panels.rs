@@ -10,12 +10,12 @@ use super::scale::Scale;
 use crate::campaign::Along;
 use crate::compare::{Finished, judge};
 
-/// Most values along x whose points are marked.
+/// Greatest number of values along x whose points are marked.
 const MOST_MARKED: usize = 24;
 /// Half height of the bar of an interval, in rows.
 const HALF_BAR: f64 = 0.16;
 
-/// Most panels of one picture of all measures, so that the legend stays close to the panels.
+/// Greatest number of panels in one of the pictures that show all measures. More panels would stand too far from the legend.
 const PANELS: usize = 6;
 
 /// Returns the number of panels side by side.
