@@ -17,7 +17,7 @@ use crate::verdicts::{Journal, Judge, Judgement, Lines, judge, read_whole, write
 use crate::watch::{NoWatch, Watch};
 use crate::work::{Keep, Work};
 
-/// Most attempts of one call to merge the parts. After each attempt but the last, a part found damaged is computed again.
+/// Greatest number of attempts of one call to merge the parts. After each attempt but the last, a part found damaged is computed again.
 const MOST_MERGES: u32 = 3;
 
 /// Advice to the user about a damaged table, printed with the error.

@@ -141,9 +141,9 @@ impl<'a> Tally<'a> {
     }
 }
 
-/// Most runs per combination with quantiles: all discrepancies of a combination are in memory at once, at most 128 MB.
+/// Greatest number of runs per combination with quantiles: all discrepancies of a combination are in memory at once, at most 128 MB.
 pub const MOST_RUNS_OF_QUANTILES: u64 = 16_000_000;
-/// Most combinations with quantiles: at most 144 MB.
+/// Greatest number of combinations with quantiles: at most 144 MB.
 pub const MOST_COMBINATIONS_OF_QUANTILES: u64 = 3_000_000;
 
 /// Quantiles of the largest discrepancy \[m\], over the runs of a combination without divergence.

@@ -33,7 +33,7 @@ impl Shard {
         piece % self.count == self.index - 1
     }
 
-    /// Returns the number of shards.
+    /// Returns the number of shards into which the work is divided, at least 1.
     #[must_use]
     pub const fn count(self) -> u64 {
         self.count
@@ -131,7 +131,7 @@ impl fmt::Display for Missing {
     }
 }
 
-/// Most ranges in a message. Further numbers are only counted.
+/// Greatest number of ranges in a message. Further numbers are only counted.
 const MOST_RANGES: usize = 20;
 
 /// Returns rising numbers as a list of ranges: `1, 3 to 5`.

@@ -151,7 +151,7 @@ impl Work<'_> {
 }
 
 impl Scenes {
-    /// Most scenes kept at once.
+    /// Greatest number of scenes kept at once.
     const MOST: usize = 64;
 
     fn get(&self, combination: u64, plan: &CampaignPlan) -> Result<Arc<Scene>, CampaignError> {

@@ -12,7 +12,7 @@ use crate::error::CampaignError;
 use crate::plan::{Accepted, CampaignPlan, Refused};
 use crate::table::{Column, RunColumns};
 
-/// Most numbers in a comparison, runs times measures: 800 MB of memory.
+/// Greatest number of numbers in a comparison, runs times measures: 800 MB of memory.
 pub const MOST_NUMBERS_COMPARED: u64 = 100_000_000;
 
 /// A comparison of strategies.

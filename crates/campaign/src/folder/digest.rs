@@ -17,7 +17,7 @@ use sha2::{Digest as _, Sha256};
 /// End of the name of a digest, after the name of its part.
 pub(crate) const DIGEST: &str = ".sha256";
 
-/// Most bytes read from a digest, several times the length of a digest \[bytes\].
+/// Greatest number of bytes read from a digest, several times the length of a digest \[bytes\].
 const MOST: u64 = 4096;
 
 /// Returns the SHA-256 of some bytes, in 64 hexadecimal digits.

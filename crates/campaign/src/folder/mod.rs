@@ -112,7 +112,7 @@ impl Folder {
         if Lock::is_held(&self.path.join(FOLDER_LOCK)) { Err(CampaignError::Busy { path: self.path.clone() }) } else { Ok(()) }
     }
 
-    /// Checks that no worker does a shard in the folder.
+    /// Fails with [`CampaignError::Shards`] if a worker does a shard in the folder at present: its lease is not stale.
     pub(crate) fn has_no_shards(&self) -> Result<(), CampaignError> {
         let held = cohaptic_files::leases(&self.path, &Owner::here(0), is_lease);
         let held = held.map_err(|error| CampaignError::File { verb: "read", path: self.path.clone(), error })?;

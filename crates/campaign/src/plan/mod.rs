@@ -21,10 +21,10 @@ pub use accepted::Refused;
 pub(crate) use check::Checked;
 pub(crate) use parts::{CHUNK, Parts};
 
-/// Most combinations of values of a plan.
+/// Greatest number of combinations of values of a plan.
 pub const MOST_COMBINATIONS: u64 = 10_000_000;
 
-/// Most runs of a campaign.
+/// Greatest number of runs of a campaign.
 pub const MOST_RUNS: u64 = 1_000_000_000;
 
 /// The request of a user, from which a [`CampaignPlan`] is made.

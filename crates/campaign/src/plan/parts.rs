@@ -11,17 +11,17 @@ use crate::error::CampaignError;
 pub(crate) const CHUNK: u64 = 8;
 /// Approximate number of events per part: some seconds of one thread.
 const EVENTS: u64 = 200_000_000;
-/// Most runs of a part with a size chosen by the number of events.
+/// Greatest number of runs of a part with a size chosen by the number of events.
 const MOST_FOR_EVENTS: u64 = 16_384;
-/// Most runs of a part with a size chosen by the program.
+/// Greatest number of runs of a part with a size chosen by the program.
 const MOST: u64 = 65_536;
-/// Most values of a part with a size chosen by the program: about 200 MB while the part is collected.
+/// Greatest number of values of a part with a size chosen by the program: about 200 MB while the part is collected.
 const MOST_VALUES: u64 = 8_000_000;
 /// Usual bound on the number of parts: a kill then costs a thousandth of the campaign.
 const USUAL_PARTS: u64 = 1000;
 /// Usual bound on the number of column chunks in the table. Each chunk takes some hundred bytes in the index of a Parquet file.
 const USUAL_STRETCHES: u64 = 100_000;
-/// Most parts in a folder.
+/// Greatest number of parts in a folder.
 const MOST_PARTS: u64 = 100_000;
 
 /// The runs of a campaign, cut into parts of equal size. The last part may be smaller.

@@ -8,7 +8,7 @@ fn place(columns: &[Column], name: &str) -> Result<usize, TableError> {
     columns.iter().position(|column| column.name == name).ok_or_else(|| TableError::Content(format!("no column {name}")))
 }
 
-/// Returns the text of a cell; empty for other types.
+/// Returns the text of a cell; empty for a cell without text.
 fn word(row: &Row, place: usize) -> &str {
     match row.get(place) {
         Some(Value::Text(text)) => text,
@@ -16,7 +16,7 @@ fn word(row: &Row, place: usize) -> &str {
     }
 }
 
-/// Returns the number in a cell; NaN for other types.
+/// Returns the floating-point number in a cell; NaN for a cell without such a number.
 fn number(row: &Row, place: usize) -> f64 {
     match row.get(place) {
         Some(Value::Number(number)) => *number,

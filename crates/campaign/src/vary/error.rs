@@ -2,7 +2,7 @@
 
 use cohaptic_units::print::SixDigits;
 
-/// Most values of one key.
+/// Greatest number of values of one key.
 pub const MOST_VALUES: usize = 1_000_000;
 
 /// Why a text is no variation of a key.

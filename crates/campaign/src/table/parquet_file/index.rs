@@ -30,7 +30,7 @@ const NEXT_LIST: u8 = 1 << 4 | LIST;
 /// An index being read. In `FileMetaData`, the third field is the number of rows and the fourth the list of row groups.
 struct Fields<R> {
     from: Compact<R>,
-    /// Bytes of the fields before the number of rows, and the header of the third field.
+    /// Bytes of the fields before the number of rows, and the header of the number of rows.
     head: Vec<u8>,
     /// Number of row groups not yet read.
     left: u64,
@@ -88,7 +88,7 @@ pub(super) struct IndexWriter {
 }
 
 impl IndexWriter {
-    /// Creates the index of the table at this path.
+    /// Begins the index of the table at the path `table`. Row groups are collected in a temporary file next to the table.
     pub(super) fn create(table: &Path, schema: SchemaDescPtr) -> io::Result<Self> {
         Ok(Self { schema, groups: ScratchFile::create(table, "index")?, count: 0, rows: 0 })
     }
