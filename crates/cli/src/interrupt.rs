@@ -131,7 +131,7 @@ fn say(line: &str) {
     let _ = writeln!(std::io::stderr(), "interrupted: {line}");
 }
 
-/// Does the last actions and ends the program at once.
+/// Does the actions in [`LAST`], and ends the program with the status of an interruption, [`LAST_MOMENT`] later if there are such actions.
 fn end() -> ! {
     let last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
     last.iter().for_each(|act| act());

@@ -32,7 +32,7 @@ pub(super) fn asked<'a>(program: &'a Command, words: &'a [String]) -> Option<Ask
     Some(Asked { command: state.command.get_name(), arg, option: option.to_owned(), typed, file: state.positionals.first().copied() })
 }
 
-/// What a word of a command line is.
+/// Part that a word has in a command line.
 enum Word<'a, 'w> {
     /// The value of the option before the word.
     Value(&'a Arg),

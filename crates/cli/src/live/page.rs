@@ -109,7 +109,7 @@ fn attached(scene: &Scene, report: &Report) -> Html {
     if table.is_empty() { Html::default() } else { Html::heading(3, "Attached from outside").and(Html::table(&table)) }
 }
 
-/// Returns what the session got from the system, and what it refused at its socket.
+/// Returns the wishes that the system granted and refused to the session, and the numbers of datagrams that the session refused at its socket.
 fn notes(report: &Report) -> Vec<String> {
     let granted: Vec<&str> = report.prepared.granted.iter().copied().map(Wish::name).collect();
     let granted = (!granted.is_empty()).then(|| format!("granted by the system: {}", granted.join(", ")));

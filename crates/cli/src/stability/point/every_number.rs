@@ -87,7 +87,7 @@ pub(super) fn document(scene: &Scene, Proof { every, certificate }: &Proof) -> i
     }
 }
 
-/// Returns each span, with the reason if the span is undecided.
+/// Returns each span of numbers of peers, with the reason if the span is undecided.
 fn with_reasons(every: &EveryNumber) -> impl Iterator<Item = (NumberSpan, Option<String>)> {
     let mut open = every.open.iter();
     every
