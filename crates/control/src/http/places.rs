@@ -11,11 +11,11 @@ use crate::Role;
 /// Limits of open connections. Connections share the process's limit of open files, often 1024, with the real-time side.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
-    /// Most connections without a shown token.
+    /// Greatest number of connections that have not shown a token.
     pub(super) strangers: usize,
-    /// Most connections with the token of guests.
+    /// Greatest number of connections with the token of guests.
     pub(super) guests: usize,
-    /// Most connections with the token of the host.
+    /// Greatest number of connections with the token of the host.
     pub(super) hosts: usize,
 }
 
@@ -37,8 +37,8 @@ pub(super) struct Places {
     taken: Mutex<Taken>,
 }
 
-#[derive(Debug, Default)]
 /// Taken places. Each connection counts once: as a stranger, a guest or a host.
+#[derive(Debug, Default)]
 struct Taken {
     /// Strangers in order of arrival, and so in ascending order of `number`.
     strangers: VecDeque<Stranger>,

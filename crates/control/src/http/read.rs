@@ -80,7 +80,7 @@ const EVERY: Duration = Duration::from_millis(100);
 /// Number of checks without a new snapshot, after which a comment line shows that the server is alive: 1 s.
 const QUIET: u32 = 10;
 
-/// State of a stream of events.
+/// State of one answer to `GET /api/events`.
 struct Listener {
     app: Arc<App>,
     ticks: Interval,
