@@ -21,7 +21,7 @@ impl<T: Copy> Mailbox<T> {
         Self { newest: AtomicU64::new(0), places: [const { RwLock::new(None) }; 3] }
     }
 
-    /// Leaves a value. Only one thread may write. A value is dropped if readers occupy both other places at all attempts.
+    /// Makes `value` the newest value. Only one thread may write. A value is dropped if readers occupy both other places at all attempts.
     pub(super) fn write(&self, value: T) {
         // Relaxed is enough: only this thread writes `newest`.
         let newest = self.newest.load(Ordering::Relaxed);
@@ -40,7 +40,8 @@ impl<T: Copy> Mailbox<T> {
         }
     }
 
-    /// Returns the newest value and its number if the number is greater than `seen`; 0 is before the first value.
+    /// Returns the newest value and its number, if the number is greater than `seen`. With 0 for `seen`, every value is newer. Returns `None` also if the
+    /// newest value is being replaced at all attempts.
     pub(super) fn read_newer(&self, seen: u64) -> Option<(T, u64)> {
         for _ in 0..TRIES {
             let newest = self.newest.load(Ordering::Acquire);

@@ -25,9 +25,9 @@ use crate::safety::{ForceGate, Moment, MotorCounts, Verdict};
 use crate::transport::{Transport, TransportError};
 use velocity::VelocityFilter;
 
-/// Packets of zero force at a stop.
+/// Number of packets of zero force that a stop sends.
 const FAREWELLS: u32 = 5;
-/// Time between two packets of zero force.
+/// Time between two packets of zero force of a stop.
 const BETWEEN_FAREWELLS: Duration = Duration::from_millis(2);
 /// Consecutive failed transfers after which the driver fails.
 const PATIENCE_WITH_FAULTS: u32 = 10;
