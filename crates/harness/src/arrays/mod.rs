@@ -320,7 +320,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         self.earliest_send = self.next_send.iter().copied().min().unwrap_or(u64::MAX);
     }
 
-    /// Sends the gathered samples over the links to the members. A broadcast was sent by [`Arrays::gather`].
+    /// Sends the gathered samples over the links whose receivers are in `members`. A broadcast was sent by [`Arrays::gather`].
     fn send(&mut self, tick: u64, now: Instant) {
         if let Samples::PerPacket(samples) = &mut self.samples {
             // Links may look ahead only to the next sample or the next change of the timeline, whichever is earlier.

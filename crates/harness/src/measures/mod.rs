@@ -84,7 +84,7 @@ impl Asked<'_> {
     }
 }
 
-/// Kinds of rows of an observer.
+/// Kinds of rows that an observer wants: `true` for each wanted kind.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Rows {
     ticks: bool,

@@ -40,10 +40,10 @@ struct Shown {
     dropped: u64,
 }
 
-/// Most links in a picture: the first by sender, then receiver. Enough for all links of three users.
+/// Greatest number of links in a picture: the first by sender, then receiver. Enough for all links of three users.
 pub(super) const MOST_LINKS: usize = 6;
 
-/// Most names of links without a panel in a note.
+/// Greatest number of names of links without a panel in a note.
 const MOST_NAMED: usize = 20;
 
 /// Resolution of the distribution of delays \[ns\], far below a pixel.

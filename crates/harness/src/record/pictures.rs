@@ -32,7 +32,7 @@ pub struct Pictures {
 
 /// Spans of time in a plot, as long as its curves are few.
 const SPANS: usize = 1000;
-/// Most numbers in all curves of a plot together. With many curves, spans are fewer.
+/// Greatest number of numbers in all curves of a plot together. With many curves, spans are fewer.
 const MOST_NUMBERS: usize = 200_000;
 
 /// Force \[N\] beyond the abilities of desktop devices and of people at them.

@@ -30,7 +30,7 @@ pub(crate) struct Panel<'a> {
     pub(crate) sane: f64,
 }
 
-/// Most curves with names and different looks. More curves have one look and no names.
+/// Greatest number of curves with names and different looks. More curves have one look and no names.
 pub(super) const MOST_NAMED: usize = 10;
 
 /// Writes a picture to a file and returns its path.
