@@ -11,7 +11,7 @@ use statrs::distribution::{ContinuousCDF as _, StudentsT};
 
 use crate::series::{NORMAL_975, count, floor, mean, variance, wilson, wilson_of_effective};
 
-/// Most batches used: Schmeiser (1982, Operations Research 30(3)) found 10 to 30 to be enough for any length.
+/// Greatest number of batches used: Schmeiser (1982, Operations Research 30(3)) found 10 to 30 to be enough for any length.
 pub(crate) const MOST: usize = 30;
 /// Fewest numbers in a batch whose mean is used.
 const LEAST_LENGTH: usize = 10;

@@ -16,7 +16,8 @@ const PREFIX: usize = 16;
 
 /// Grouping key: length, identification and beginning of a payload.
 type Content<'a> = (usize, Option<u16>, &'a [u8]);
-/// Packets with possible further views: number of the first view, and hashes of the places seen.
+/// Packets of which further views may follow, oldest first. Each is the number of its first view among the datagrams, and the hashes of the capture places at
+/// which the packet was seen.
 type Open = VecDeque<(usize, Vec<u64>)>;
 
 /// Keeps the first view of each packet seen at several places. Returns the number of views dropped.

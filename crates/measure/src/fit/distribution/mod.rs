@@ -211,7 +211,7 @@ fn farther(x: f64) -> f64 {
         return 1.0;
     }
     let term = |k: u32| (-2.0 * (f64::from(k) * x).powi(2)).exp();
-    // Terms of opposite signs in pairs. Terms beyond the 40th are zero in floating point.
+    // Terms of opposite signs in pairs. Terms beyond the 40th are below 10⁻⁵⁵ for these x, and change no digit of the sum.
     (2.0 * (1..40).step_by(2).map(|k| term(k) - term(k + 1)).sum::<f64>()).clamp(0.0, 1.0)
 }
 
