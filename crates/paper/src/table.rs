@@ -6,7 +6,7 @@ pub const FAILS: &str = "✗";
 /// A small table of text.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Table {
-    /// What the table shows, with the unit of its numbers.
+    /// Title: the subject of the table, with the unit of its numbers.
     pub title: String,
     /// Groups of neighbouring columns: name, and number of columns. Empty for a table without groups; otherwise the numbers sum up to the length of `head`.
     pub groups: Vec<(String, usize)>,

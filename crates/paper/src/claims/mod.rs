@@ -30,7 +30,7 @@ pub struct Claim {
     pub is_own: bool,
     /// Place in the paper: a figure, an equation or a section.
     pub paper: &'static str,
-    /// What the paper says there, as a sentence.
+    /// Sentence that the paper states at that place.
     pub says: &'static str,
     /// Computed result in words.
     pub ours: String,
@@ -44,7 +44,7 @@ pub struct Claim {
     pub why: &'static str,
     /// Scene file that shows the result: the smallest counterexample found, if the claim fails in a scene.
     pub scene: String,
-    /// What `commands` show.
+    /// Result that `commands` show, in words.
     pub how: String,
     /// Commands for the scene, each a line. The scene is in a file with the name of the claim, such as `any-number.toml`.
     pub commands: String,

@@ -112,7 +112,7 @@ fn larger(atlas: &Atlas) -> Claim {
     claim.shown_by(scene, how, &[map])
 }
 
-/// Returns whether PD is clearly stable and AP clearly unstable: a point of PD's region outside AP's.
+/// Returns whether a case with AP and more than two peers is clearly unstable, and the same case with PD clearly stable: a point of PD's region outside AP's.
 fn only_pd_is_stable(case: &Case) -> Result<bool, PaperError> {
     Ok(case.peers > 2 && is_stable(&case.with(Strategy::Pd))? && is_unstable(case)?)
 }
