@@ -22,7 +22,7 @@ pub struct SetPosition<const A: usize> {
     stiffness: f64,
     /// Period h of the tick \[s\].
     period: f64,
-    /// β/h − KT/2 [N/m] in the tick just over.
+    /// β/h − KT/2 [N/m] in the tick that has ended.
     gain: f64,
     /// β/h − KT/2 [N/m] in the next tick.
     next_gain: f64,

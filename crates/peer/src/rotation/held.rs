@@ -69,7 +69,8 @@ impl HeldAttitudes {
         self.held[place] = held;
     }
 
-    /// Returns M̄ and w̄ [rad/s], as of the last [`HeldAttitudes::refresh`]; zero without other peers.
+    /// Returns the mean M̄ of the attitude matrices and the mean rate w̄ [rad/s] of the other peers, as of the last [`HeldAttitudes::refresh`]; zero without
+    /// other peers.
     #[must_use]
     pub const fn mean(&self) -> (&Matrix3, Triple) {
         (&self.mean.matrix, self.mean.rate)
