@@ -47,7 +47,7 @@ pub struct MotionRun {
 pub struct MotionHand {
     /// Index of the copy that the hand moves.
     pub copy: usize,
-    /// Positions like those of [`MotionRun::frames`], indexed by frame.
+    /// Positions of the hand along the first two axes \[m\], y upwards, indexed by frame.
     pub frames: Vec<[f64; 2]>,
 }
 

@@ -5,7 +5,7 @@ use super::Html;
 /// A table: rows below named columns. The first cell of a row is the row's heading.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Table {
-    /// What the table shows; empty for a table without a title.
+    /// Title of the table; empty for a table without a title.
     pub(super) title: String,
     /// Names of groups of neighbouring columns, each with its number of columns.
     pub(super) groups: Vec<(String, usize)>,

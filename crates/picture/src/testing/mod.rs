@@ -81,7 +81,7 @@ fn numbers(text: &str) -> Vec<f64> {
 const ABOVE: f64 = 0.93;
 const BELOW: f64 = 0.24;
 
-/// Returns the box of a text with the widest and tallest common fonts.
+/// Returns the box of a text node as it would be in the widest and tallest of the common fonts, and so a box that holds the text in any common font.
 fn estimated(node: roxmltree::Node<'_, '_>) -> TextBox {
     let number = |node: roxmltree::Node<'_, '_>, name: &str| node.attribute(name).and_then(|text| text.parse::<f64>().ok());
     let size = number(node, "font-size").unwrap_or(16.0);
