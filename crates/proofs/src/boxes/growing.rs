@@ -199,7 +199,7 @@ fn larger(one: f64, other: f64) -> f64 {
     if other > one || other.is_nan() { other } else { one }
 }
 
-/// Returns the body with the effects of a force divided by a factor.
+/// Returns the body with the effects of a force divided by `by`. A body whose ticks differ in length stays as it is.
 fn heavier(body: &Body, by: f64) -> Body {
     let of = |map: StepMap| {
         let (e, g) = map.coefficients();

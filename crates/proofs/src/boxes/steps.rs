@@ -40,7 +40,7 @@ pub(super) struct Plan {
     live: Vec<Vec<SampleName>>,
     /// Place of the first step of each kind, indexed by kind. All steps of a kind have the same matrix.
     firsts: Vec<usize>,
-    /// Kind of each step, indexed by step.
+    /// Kind of each step as an index in `firsts`, indexed by step.
     kinds: Vec<usize>,
     /// Age of the oldest sample that is held at a tick \[s\]; 0 where laws do not use ages.
     oldest: f64,
@@ -249,7 +249,7 @@ impl Plan {
         self.firsts.iter().map(|step| self.matrix(*step, numbers)).collect()
     }
 
-    /// Returns the kind of each step of the frame, in order.
+    /// Returns the index in `firsts` of the kind of each step, indexed by step. Steps of one kind have the same matrix.
     pub(super) fn kinds(&self) -> &[usize] {
         &self.kinds
     }
