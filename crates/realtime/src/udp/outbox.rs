@@ -34,7 +34,7 @@ pub(super) struct Run<'a> {
     pub(super) ecn: Option<Ecn>,
     /// Payloads, one after the other.
     pub(super) bytes: &'a [u8],
-    /// Length of the first payload \[bytes\].
+    /// Length of every payload \[bytes\], of which only the last payload may be shorter.
     pub(super) segment: usize,
     /// Number of datagrams, at least one.
     pub(super) count: usize,
