@@ -106,7 +106,7 @@ impl Relay {
         Ok(Self { engine: Engine::new(config)?, ports, release: Lateness::new(), refused_changes: 0 })
     }
 
-    /// Returns the name of each program with the port standing for the program; for a proxy, `listen` with the listening port.
+    /// Returns the name of each program with the address at which the relay stands in for the program; for a proxy, `listen` with the listening address.
     pub fn ports(&self) -> impl Iterator<Item = (&str, SocketAddr)> {
         self.ports.addresses()
     }

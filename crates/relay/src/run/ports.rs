@@ -61,7 +61,7 @@ enum Layout {
     Proxy { clients: SocketAddr },
 }
 
-/// Sums over several sockets.
+/// Sums of the counters of several sockets.
 #[derive(Clone, Copy, Debug, Default)]
 struct Tally {
     counts: EndpointCounts,
