@@ -44,7 +44,7 @@ impl Rules {
         self.rules.len()
     }
 
-    /// Returns whether the file has defaults only.
+    /// Returns whether the file has no rules, so that the defaults hold for all packets.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.rules.is_empty()

@@ -27,7 +27,7 @@ pub(crate) fn cut(bytes: &[u8], packets: &mut Vec<Packet>) {
     }
 }
 
-/// Returns the packet of bytes without a segment. Computes a checksum left to the device.
+/// Returns `packet` as it is, for bytes that hold a single packet and no segment to cut. Computes the checksum if the sender left the checksum to the device.
 fn alone(offload: Offload, packet: &[u8], headers: Headers) -> Result<Packet, Malformed> {
     let mut bytes = packet.to_vec();
     let (begin, field) = offload.field();
