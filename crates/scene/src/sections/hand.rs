@@ -45,7 +45,7 @@ static FOLLOWS: Table = Table::of(&[&[
 
 const EXPECTED: &str = "\"none\", { force = … }, { sine = … }, { file = … } or { arm = …, follows = … }";
 
-/// Reads a hand; `Some(None)` for "none".
+/// Reads a hand. Returns `Some(None)` for "none", and `None` if the hand was refused.
 pub(crate) fn read_hand(node: &Node, context: SceneContext<'_>) -> Option<Option<Hand>> {
     match node.as_text() {
         Some("none") => return Some(None),
