@@ -36,7 +36,7 @@ pub enum AnalysisError {
     TooManyModes {
         /// Number of combinations.
         modes: u128,
-        /// How many are looked at at most.
+        /// Greatest number of combinations that an analysis looks at.
         most: u128,
     },
     /// The strategy has no linear form.
@@ -45,13 +45,13 @@ pub enum AnalysisError {
          without --graph, --every-number, --switching, --losses-in-a-row and --delay-within; --prove of `map` and `boundary` follows it too, and of waves --every-number"
     )]
     OtherStrategy {
-        /// Its name.
+        /// Name of the strategy.
         strategy: &'static str,
     },
     /// The strategy is not linear.
     #[error("{strategy} coordination has no analysis: simulations tell whether it is stable, as in `cohaptic check` and `cohaptic run`")]
     NoAnalysis {
-        /// Its name.
+        /// Name of the strategy.
         strategy: &'static str,
     },
     /// The object turns, and its motion does not split into scenes of one axis.
@@ -60,21 +60,21 @@ pub enum AnalysisError {
          simulations tell what the scene does"
     )]
     Turns {
-        /// The analysis.
+        /// Analysis that was asked for, in words.
         what: &'static str,
-        /// Why it does not split.
+        /// Reason why the motion does not split.
         why: &'static str,
     },
     /// The object has no rest under the forces and torques of the hands.
     #[error("there is no rest under the forces of the hands: {why}; expected constant forces and torques that cancel, or arms")]
     NoRest {
-        /// Why.
+        /// Reason why there is no rest.
         why: String,
     },
     /// The object has no steady spin.
     #[error("there is no steady spin: {why}; expected hands with constant torques about one axis and without forces")]
     NoSpin {
-        /// Why.
+        /// Reason why there is no steady spin.
         why: String,
     },
     /// The object turns, its motion does not split into scenes of one axis, and this analysis needs such scenes.
@@ -83,15 +83,15 @@ pub enum AnalysisError {
          `cohaptic stability point`, `map` and `boundary` take all components together where nothing else is asked for"
     )]
     Unsplit {
-        /// The analysis.
+        /// Analysis that was asked for, in words.
         what: &'static str,
-        /// Why it does not split.
+        /// Reason why the motion does not split.
         why: &'static str,
     },
     /// The object turns, and this analysis does not follow rotation.
     #[error("{what} does not follow an object that turns: expected a scene without object.inertia")]
     NoTurns {
-        /// The analysis.
+        /// Analysis that was asked for, in words.
         what: &'static str,
     },
     /// The scene has a topology, and this analysis does not follow topologies.
@@ -100,13 +100,13 @@ pub enum AnalysisError {
          `cohaptic stability point`, `map` and `boundary` follow a topology where nothing but --prove is asked for"
     )]
     Topology {
-        /// The analysis.
+        /// Analysis that was asked for, in words.
         what: &'static str,
     },
     /// The scene has a topology on which these peers cannot be analysed.
     #[error("on the [topology] of this scene: {why}")]
     OnTopology {
-        /// Why.
+        /// Reason why the peers cannot be analysed.
         why: String,
     },
     /// The scene sends a sample only if the motion since the last sent sample is large enough.
@@ -118,7 +118,7 @@ pub enum AnalysisError {
     /// The strategy uses the ages of samples, and the clocks drift apart.
     #[error("{strategy} coordination uses the ages of samples, which do not repeat where clocks drift apart: expected one drift for all peers")]
     AgesByClocks {
-        /// Its name.
+        /// Name of the strategy.
         strategy: &'static str,
     },
     /// The scene has several combinations of contacts, and so no single matrix.
@@ -129,9 +129,9 @@ pub enum AnalysisError {
     Overloaded {
         /// Name of the line.
         line: String,
-        /// The rate offered [bit/s].
+        /// Rate offered to the line [bit/s].
         load: f64,
-        /// The rate of the line [bit/s].
+        /// Rate of the line [bit/s].
         rate: f64,
     },
     /// The pattern of delays and losses of a link does not repeat soon enough.
@@ -139,27 +139,27 @@ pub enum AnalysisError {
         "what becomes of samples from {from} to {to} does not repeat within {most} of them: expected a link of constant delay, or periods that meet sooner"
     )]
     NoPattern {
-        /// The sender.
+        /// Name of the sending peer.
         from: String,
-        /// The receiver.
+        /// Name of the receiving peer.
         to: String,
-        /// Within how many it should, with all other links.
+        /// Greatest number of samples after which the patterns of all links together may repeat.
         most: usize,
     },
     /// Too many peers have access lines that do more than delay.
     #[error("{peers} peers whose samples share access lines: expected at most {most}, or access lines that only delay")]
     TooManyShare {
-        /// How many.
+        /// Number of peers whose samples share access lines.
         peers: usize,
-        /// How many are looked at at most.
+        /// Greatest number of such peers that an analysis looks at.
         most: usize,
     },
     /// A link has a random part whose second moment cannot be followed.
     #[error("the mean square of link {link} cannot be followed: {why}; simulate the scene with several seeds instead")]
     ChanceWithoutMoments {
-        /// Which link, or whose access line.
+        /// The link, or the peer with the access line, in words.
         link: String,
-        /// What it does.
+        /// Property of the link for which no second moment can be followed, in words.
         why: &'static str,
     },
     /// The second moment takes too long.
@@ -168,9 +168,9 @@ pub enum AnalysisError {
          the scene with several seeds instead"
     )]
     TooManyOperations {
-        /// How many it takes, by an estimate that is good to a factor of about three.
+        /// Number of operations of the computation, by an estimate that is good to a factor of about three.
         operations: f64,
-        /// How many are allowed.
+        /// Greatest number of operations allowed.
         most: f64,
     },
     /// The matrices of a part take more memory than the watch allows.
@@ -185,7 +185,7 @@ pub enum AnalysisError {
         states: usize,
         /// Memory of the part's matrices \[bytes\].
         bytes: f64,
-        /// How much is allowed \[bytes\]: see [`Watch::most_memory`](crate::Watch::most_memory).
+        /// Memory allowed \[bytes\]: see [`Watch::most_memory`](crate::Watch::most_memory).
         most: u64,
     },
     /// The watch stopped the analysis.
@@ -197,9 +197,9 @@ pub enum AnalysisError {
         Many(*.unknowns), Many(*.joint)
     )]
     TooManyMoments {
-        /// How many joint states the chains of all links have; `None` beyond measure.
+        /// Number of joint states of the chains of all links; `None` if the number exceeds `usize`.
         joint: Option<usize>,
-        /// How many numbers; `None` beyond measure.
+        /// Number of unknowns of the second moment; `None` if the number exceeds `usize`.
         unknowns: Option<usize>,
         /// Largest number of unknowns allowed.
         most: usize,

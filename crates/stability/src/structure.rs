@@ -45,7 +45,7 @@ pub struct Structure {
     pub apart: Vec<Option<Timetable>>,
     /// The weight of each class's average (column) in the target of each class (row).
     pub weights: Matrix,
-    /// Whether something ties the object to ground: an arm's stiffness, a wall, or a peer that holds its initial samples forever.
+    /// `true` if something ties the object to ground: an arm's stiffness, a wall, or a peer that holds its initial samples forever.
     pub tied: bool,
     /// `true` if some peer never receives a sample over a link and holds its initial sample forever.
     pub silent: bool,
@@ -58,7 +58,7 @@ impl Structure {
     ///
     /// # Errors
     ///
-    /// Those of [`check_laws`], and [`AnalysisError::NoFrame`] or [`AnalysisError::FrameTooLong`] where clocks do not meet soon enough.
+    /// The errors of [`check_laws`], and [`AnalysisError::NoFrame`] or [`AnalysisError::FrameTooLong`] if clocks do not meet soon enough.
     pub fn of(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts) -> Result<Self, AnalysisError> {
         Self::with_apart(scenes, network, contacts, |_, _| false)
     }

@@ -70,7 +70,7 @@ impl NodeClock {
         offset + (local * 1_000_000_000).div_euclid(i128::try_from(self.speed()).unwrap_or(i128::MAX))
     }
 
-    /// Time that the clock shows at a tick of its own, at the instant to which [`instant`](Self::instant) rounds that tick \[ns\].
+    /// Returns the time that the clock shows at one of its ticks \[ns\]. `at` is the instant to which [`instant`](Self::instant) rounds the tick.
     fn local(&self, at: i128) -> i64 {
         let tick = i128::try_from(self.clock.tick.as_nanos()).unwrap_or(i128::MAX);
         let offset = i128::try_from(self.clock.offset.as_nanos()).unwrap_or(i128::MAX);
@@ -80,7 +80,7 @@ impl NodeClock {
         i64::try_from(number * tick).unwrap_or(i64::MAX)
     }
 
-    /// The first tick at or after an instant.
+    /// Returns the number of the first tick at or after the instant `at` \[ns\].
     fn first_tick(&self, at: i128) -> i128 {
         let span = i128::try_from(self.clock.tick.as_nanos()).unwrap_or(i128::MAX) * 1_000_000_000;
         let speed = i128::try_from(self.speed()).unwrap_or(i128::MAX);
@@ -115,7 +115,7 @@ pub enum Event {
     Tick {
         /// The node.
         node: usize,
-        /// The instant after the frame's beginning \[ns\].
+        /// Instant of the tick, since the beginning of the frame \[ns\].
         at: u64,
         /// Span until the node's next tick.
         span: Duration,
@@ -155,11 +155,11 @@ impl Timetable {
         self.frame.as_secs_f64() * crate::rounding::real(frames)
     }
 
-    /// The frame of nodes that send to each other over those links: (from, to, timing).
+    /// Returns the frame of nodes that send to each other over `links`. Each link is (sending node, receiving node, timing).
     ///
     /// # Errors
     ///
-    /// [`AnalysisError::NoFrame`] or [`AnalysisError::FrameTooLong`] where clocks do not meet soon enough.
+    /// [`AnalysisError::NoFrame`] or [`AnalysisError::FrameTooLong`] if the clocks and patterns do not meet soon enough.
     pub fn new(clocks: &[NodeClock], links: &[(usize, usize, LinkTiming)]) -> Result<Self, AnalysisError> {
         Self::with_use_of_held(clocks, links, UseOfHeld::Ticks)
     }
@@ -203,7 +203,7 @@ impl Timetable {
             let (from, to) = (*from, *to);
             let arrivals = arrivals(&clocks[from], &clocks[to], timing, first_sample[from], end);
             let mut need = |sample: i64| depth[from] = depth[from].max(usize::try_from(-sample).unwrap_or(0));
-            // The sample held when the frame begins matters if the node ticks before anything arrives. It samples before that.
+            // The sample held when the frame begins is used if the node ticks before the first arrival. A node samples right before it ticks.
             let is_used_before = |at: i128| match uses {
                 UseOfHeld::Ticks => at > first_tick_at[to],
                 UseOfHeld::SamplesAndTicks => at >= first_tick_at[to],
@@ -241,7 +241,7 @@ pub struct Instants {
 }
 
 impl Instants {
-    /// Returns those of a frame.
+    /// Returns the instants of the samplings and ticks in the frame of `timetable`.
     #[must_use]
     pub fn of(timetable: &Timetable) -> Self {
         let nodes = timetable.clocks.len();
@@ -263,20 +263,22 @@ impl Instants {
         Self { sends, ticks, clocks: timetable.clocks.clone() }
     }
 
-    /// The age of a sample at an instant of the frame at which its holder ticks \[s\]: what the clock of the holder shows less what that of the sender showed,
-    /// and at least zero. Clocks of one drift show the same ages in every frame.
+    /// Returns the age of a sample of `from` at the instant `at` of the frame, at which the holder `to` ticks \[s\]: the time on the clock of the holder minus
+    /// the time on the clock of the sender when the sample was sent, and at least zero. Clocks of equal drift show the same ages in every frame.
     #[expect(clippy::cast_precision_loss, reason = "a span of at most some frames is far below 2^53 ns")]
     pub fn age(&self, (to, from): (usize, usize), sample: i64, at: u64, frame: Duration) -> f64 {
         let now = self.local(to, i64::try_from(at).unwrap_or(i64::MAX));
         now.saturating_sub(self.local(from, self.sent_at(from, sample, frame))).max(0) as f64 * 1e-9
     }
 
-    /// Time that the clock of a node shows at a tick of its own, counted from the beginning of the frame, before which the clock shows less than zero \[ns\].
+    /// Returns the time that the clock of a node shows at the instant `at` of one of its ticks \[ns\]. Times are counted from the beginning of the frame, so
+    /// that the clock shows less than zero before.
     pub(crate) fn local(&self, node: usize, at: i64) -> i64 {
         self.clocks[node].local(i128::from(at))
     }
 
-    /// When a sample of a node was sent, before the beginning of the frame too \[ns\]: from 0 if it is of this frame, −1 is the last one of the frame before.
+    /// Returns the instant at which a sample of a node was sent, since the beginning of the frame \[ns\]; negative for samples of earlier frames. `sample` is
+    /// the number of the sample: samples of this frame count from 0, and −1 is the last sample of the frame before.
     pub(crate) fn sent_at(&self, node: usize, sample: i64, frame: Duration) -> i64 {
         let whole = |number: u128| i64::try_from(number).unwrap_or(i64::MAX);
         let sends = &self.sends[node];
@@ -294,7 +296,8 @@ struct Arrivals {
     new: Vec<(i128, i64)>,
 }
 
-/// What arrives in the frame from 0 to `end`; samples are numbered from the frame's first one, `first` in the sender's own count.
+/// Returns the samples that arrive in the frame from 0 to `end` \[ns\]. Samples are numbered from the first sample of the frame, which has the number `first`
+/// in the sender's own count.
 fn arrivals(from: &NodeClock, to: &NodeClock, timing: &LinkTiming, first: i128, end: i128) -> Arrivals {
     let sent_at = |number: i128| from.instant(i128::from(from.phase) + number * i128::from(from.every));
     let delay = |number: i128| match timing {

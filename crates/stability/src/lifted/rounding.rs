@@ -20,7 +20,7 @@ pub(crate) struct Rounding {
 const TICK: f64 = 10.0 * f64::EPSILON;
 
 impl Rounding {
-    /// Returns the state before the first tick. `step` is the largest sum of absolute values of a row of one tick's matrix, over all nodes.
+    /// Returns a bound that counts no tick yet. `step` is the largest sum of absolute values of a row of one tick's matrix, over all nodes.
     pub(crate) const fn new(step: f64) -> Self {
         Self { growth: 1.0, ticks: 0, step }
     }

@@ -168,7 +168,8 @@ impl<'a> Loaded<'a> {
         springs.fold(f64::MIN_POSITIVE, f64::max)
     }
 
-    /// Returns the number of coordinates of a peer's pose that the rest determines. A device that touches nothing does not count.
+    /// Returns the number of unknown coordinates of a peer's pose in the equations of the state of rest: six of the copy, and those of a device that touches
+    /// the object.
     fn unknowns(&self, place: usize) -> usize {
         let node = &self.nodes[place];
         6 + if node.touching { node.device.len() } else { 0 }
