@@ -96,7 +96,7 @@ pub struct Info {
     pub recoveries: u64,
     /// Number of reductions of the window taken back because nothing had been lost.
     pub undone: u64,
-    /// Most data per segment at present, apart from the room for selective acknowledgements \[byte\].
+    /// Largest amount of data per segment at present, apart from the room for selective acknowledgements \[byte\].
     pub segment_size: usize,
     /// Window offered by the peer, from the first unacknowledged octet on \[byte\].
     pub send_window: u64,

@@ -34,7 +34,7 @@ pub(super) struct Send {
     /// Size of the buffer \[byte\]. Never shrinks.
     pub(super) capacity: usize,
     pub(super) board: Scoreboard,
-    /// Most octets of data that a segment may carry beside timestamps.
+    /// Greatest number of octets of data that a segment may carry beside timestamps.
     pub(super) mss: usize,
     /// End of the last segment below the full size (for Minshall's form of Nagle's algorithm).
     pub(super) small_end: Position,
