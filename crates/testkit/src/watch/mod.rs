@@ -119,7 +119,7 @@ pub(crate) struct Watched {
     shared: OnceLock<Weak<Shared>>,
 }
 
-/// Kind of a run. It tells who has the thread while no runner is noted.
+/// Kind of a run. While no task or node is noted as running, the kind tells whose code holds the thread, for the complaint about a run that hangs.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Kind {
     /// Run of nodes: the test has the thread, for as long as it wants.
