@@ -576,7 +576,7 @@ impl<T: Clone> Staged<T> {
     }
 }
 
-/// How a packet is delayed.
+/// Delay of a packet on the line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Travel {
     /// By the delay of the line.

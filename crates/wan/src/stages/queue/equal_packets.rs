@@ -15,7 +15,7 @@ use super::{Bottleneck, Discipline, QueueLimit, Service};
 pub(crate) struct EqualPackets {
     /// Transmission time of a packet \[ns\].
     service: u64,
-    /// Most work \[ns\] that an admitted packet may find. A packet that finds more is dropped.
+    /// Largest amount of work \[ns\] that an admitted packet may find. A packet that finds more is dropped.
     most: u64,
 }
 

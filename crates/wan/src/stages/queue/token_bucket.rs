@@ -50,7 +50,7 @@ pub struct Peak {
 struct Bucket {
     /// Rate at which tokens come.
     rate: Rate,
-    /// Most tokens that the bucket holds.
+    /// Greatest number of tokens that the bucket holds.
     size: u128,
     /// Tokens in the bucket at `since`; at most `size`.
     tokens: u128,
