@@ -223,7 +223,7 @@ mod tests {
         }
     }
 
-    /// How many keys below these name a file.
+    /// Returns the number of keys that name a file, among `keys` and the keys of their tables and lists.
     fn files_below(keys: &[Key]) -> usize {
         fn of(form: &Form) -> usize {
             match form {

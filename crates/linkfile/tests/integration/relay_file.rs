@@ -1,4 +1,4 @@
-//! Relay files: what they say, and how they are refused.
+//! Relay files: the configuration that a file describes, and the message of each refusal.
 
 use std::path::Path;
 use std::time::Duration;
@@ -139,7 +139,7 @@ fn remote_addresses_are_taken_where_they_are_allowed() {
 }
 
 proptest! {
-    /// No text makes it panic: neither any text nor a relay file with a piece cut out or put in.
+    /// The parser panics neither at arbitrary text nor at a relay file with a piece cut out or put in.
     #[test]
     fn no_text_makes_it_panic(noise in "\\PC{0,60}", at in 0_usize..WHOLE.len(), cut in 0_usize..40) {
         let _ = parse(&noise);

@@ -1,4 +1,4 @@
-//! The file of a router, with all its keys and with what may be wrong in it.
+//! Router files: a file with every key, and the faults that a file may have.
 
 use std::path::Path;
 use std::time::Duration;
@@ -113,7 +113,7 @@ fn what_is_not_said_has_a_default() {
     assert_eq!(file.right.namespace(), Some("/run/x"));
 }
 
-/// Each of these edits, and where and how the file is refused then.
+/// Each edit of a valid file is refused with a message that begins with the line, the column and the key of the fault.
 #[test]
 fn a_fault_is_shown_where_it_is() {
     let cases = [
@@ -196,7 +196,7 @@ fn a_file_is_read_and_one_that_is_not_there_is_named() {
 }
 
 proptest! {
-    /// Whatever is cut out of a file, or put into it, reading it ends in a router or in an error that can be shown.
+    /// A file with a piece cut out or put in is a router, or is refused with an error that can be shown.
     #[test]
     fn no_text_causes_a_panic(at in 0..EVERY_KEY.len(), length in 0_usize..60, splice in prop::sample::select(vec![
         "", "nan", "\"\"", "-1", "{}", "[]", "true", "\"all\"", "=", "\n[left]\n", "99999999999999999999999999999999999999999", "\"1-\"", "\"/0\"",
@@ -209,7 +209,7 @@ proptest! {
     }
 }
 
-/// What the page shows can be read.
+/// Every TOML block of the manual's page about routers is a router file.
 #[test]
 fn the_files_of_the_manual_are_routers() {
     let page = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/router.md")).unwrap();
@@ -220,7 +220,7 @@ fn the_files_of_the_manual_are_routers() {
     }
 }
 
-/// Before the parser, whose tree would take fifty times as much memory. Line breaks are TOML.
+/// The length is checked before the parser runs, whose tree would take fifty times as much memory as the text. Line breaks alone are valid TOML.
 #[test]
 fn a_text_of_more_than_16_mebibytes_is_refused() {
     let parse = |bytes: usize| RouterFile::parse(&"\n".repeat(bytes), Path::new("router.toml"), &[]).unwrap_err().to_string();
