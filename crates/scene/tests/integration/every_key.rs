@@ -1,4 +1,4 @@
-//! A scene that uses every key says what its file says.
+//! A scene file with every key: each key sets the field of the scene that belongs to it.
 
 use core::time::Duration;
 use std::path::{Path, PathBuf};

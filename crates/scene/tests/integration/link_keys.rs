@@ -1,4 +1,4 @@
-//! Every key of a link says what is written: from a scene's text to the emulator's configuration.
+//! Keys of a link: from the text of a scene to the configuration of the emulator.
 
 use core::num::{NonZeroU32, NonZeroU64};
 use core::time::Duration;
@@ -17,11 +17,11 @@ use cohaptic_wan::{
 
 const MS: Duration = Duration::from_millis(1);
 
-/// Two peers; the keys of the link come last.
+/// Scene of two peers, to which the keys of the link are appended.
 const SCENE: &str = "scene = { duration = \"9s\", count = 2 }\nobject.mass = 1\npeer = { contact = \"none\", device.mass = 1 }\n\
                      coordination = { strategy = \"average-position\", stiffness = 1, update = \"8ms\" }\n";
 
-/// The files of this folder are there to be named.
+/// Returns the path of the scene. Keys of the tests name files in the same folder.
 fn path() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/integration/data/links.toml"))
 }
@@ -39,7 +39,7 @@ fn config(keys: &str) -> LinkConfig {
     model(keys).as_fixed().unwrap().clone()
 }
 
-/// What is refused, without the beginning of the path.
+/// Returns the message with which a scene is refused, without the folders in paths.
 fn refused(text: &str, overrides: &[&str]) -> String {
     let overrides: Vec<String> = overrides.iter().map(|text| (*text).to_owned()).collect();
     let error = Scene::parse(&format!("{SCENE}{text}"), path(), &overrides).expect_err(text).to_string();
@@ -47,7 +47,7 @@ fn refused(text: &str, overrides: &[&str]) -> String {
     error.replace(&format!("{folder}/"), "")
 }
 
-/// What is found where the message should begin as expected, and does not.
+/// Returns the expected beginning and the found message if the message does not begin as expected; `None` if it does.
 fn misses(text: &str, expected: &str) -> Option<String> {
     let found = refused(text, &[]);
     (!found.starts_with(expected)).then(|| format!("expected {expected}\nfound    {found}\n"))

@@ -1,4 +1,4 @@
-//! Scenes as other crates read them: whole files, and files that something happened to.
+//! Scenes read through the public functions of the crate: whole files, and damaged files.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test may fail")]
 #![expect(clippy::float_cmp, reason = "what is written is what is read, to the bit")]
 

@@ -1,4 +1,4 @@
-//! What the manual of scene files shows is what this crate does.
+//! The examples in the manual of scene files, as this crate reads them.
 
 use std::fs;
 use std::path::Path;

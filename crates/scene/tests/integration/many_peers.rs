@@ -51,7 +51,7 @@ fn a_ring_of_many_peers_is_read_in_time_that_grows_with_their_number() {
     assert_eq!((later.configs().len(), later.exceptions().count()), (COUNT + 1, COUNT));
 }
 
-/// A fault for each of many links, each of which would have the names of all peers searched for the nearest: that would take minutes.
+/// Each of many links names an unknown peer. A search for the most similar name among all peers at each fault would take minutes.
 #[test]
 fn many_misspelt_names_are_refused_as_fast_as_one() {
     let mut text = "scene = { duration = \"1s\", count = 20000 }\nobject.mass = 1\npeer = { contact = \"none\", device.mass = 1 }\n\
@@ -86,7 +86,7 @@ fn tables_are_equal_if_their_links_are() {
     assert!(all.is_uniform());
 }
 
-/// What is said about links, in order: one or all of them, and which key takes which value.
+/// Statement of a scene about its links: `key` takes `value` on the link `ends`, or on all links for `None`.
 #[derive(Clone, Copy, Debug)]
 struct Said {
     ends: Option<(usize, usize)>,
@@ -99,7 +99,7 @@ fn said(peers: usize, may_be_all: bool) -> impl Strategy<Value = Said> {
     (ends, 0..4_u8, 0..2_usize, 1..4_u64).prop_map(move |(ends, all, key, value)| Said { ends: (all > 0 || !may_be_all).then_some(ends), key, value })
 }
 
-/// The dense definition: for every pair, delay \[ms\] and limit \[packets\].
+/// Dense table of links: delay \[ms\] and limit \[packets\], indexed by sender and then by receiver.
 type Dense = Vec<Vec<[u64; 2]>>;
 
 fn lay(dense: &mut Dense, said: Said) {
@@ -121,7 +121,7 @@ fn link(model: &LinkModel) -> [u64; 2] {
     [u64::try_from(config.delay.mean().as_millis()).unwrap(), config.limit.unwrap_or(0)]
 }
 
-/// Every pair, the order of the configurations, and how many links have each.
+/// Checks that both tables agree on every pair, on the order of the configurations, and on the number of links of each configuration.
 fn same(table: &LinkTable, dense: &Dense) {
     let pairs = (0..dense.len()).flat_map(|from| (0..dense.len()).filter(move |to| *to != from).map(move |to| (from, to)));
     let (mut order, mut counts) = (Vec::new(), Vec::new());

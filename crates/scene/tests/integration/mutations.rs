@@ -1,4 +1,4 @@
-//! Whatever happens to a file, reading it ends in a scene or in an error that can be shown.
+//! Damaged scene files: the result is a scene or an error that can be shown.
 
 use std::path::{Path, PathBuf};
 
@@ -7,7 +7,7 @@ use proptest::prelude::*;
 
 use crate::every_key::path;
 
-/// Something that happens to a text. Numbers choose the place, modulo its length.
+/// Edit of a text. Numbers choose the place, modulo the length of the text.
 #[derive(Clone, Debug)]
 enum Edit {
     FlipBit(usize, u8),
@@ -142,7 +142,7 @@ fn apply(text: &str, edit: &Edit) -> String {
     }
 }
 
-/// Replaces one of the runs of such bytes.
+/// Replaces a run of bytes for which `belongs` is true by `new`. `at` chooses the run, modulo the number of runs.
 fn replaced(text: &str, at: usize, new: &str, belongs: impl Fn(u8) -> bool) -> String {
     let bytes = text.as_bytes();
     let starts: Vec<usize> = (0..bytes.len()).filter(|&at| belongs(bytes[at]) && (at == 0 || !belongs(bytes[at - 1]))).collect();
@@ -151,12 +151,12 @@ fn replaced(text: &str, at: usize, new: &str, belongs: impl Fn(u8) -> bool) -> S
     String::from_utf8_lossy(&[&bytes[..start], new.as_bytes(), &bytes[start + length..]].concat()).into_owned()
 }
 
-/// The scenes of the repository.
+/// Returns the paths of the scenes of the repository.
 fn shipped() -> Vec<PathBuf> {
     scene_files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios")).unwrap()
 }
 
-/// Every error can be shown, says where it is, and holds no control characters but the ends of its lines.
+/// Checks that an error can be shown, shows the line of the fault, and holds no control characters but line breaks.
 fn check(text: &str, overrides: &[String]) -> Result<(), TestCaseError> {
     let Err(error) = Scene::parse(text, &path(), overrides) else { return Ok(()) };
     let shown = error.to_string();

@@ -1,4 +1,4 @@
-//! Every key of a scene with values that it does not take: the answer is in words of scenes, and never what Rust says of a number.
+//! Every key of a scene with values that the key does not take: the messages are in words of scenes, and no message is one of the standard library.
 
 use std::panic::catch_unwind;
 use std::path::Path;
@@ -8,7 +8,7 @@ use cohaptic_scene::{Scene, scene_content};
 
 use crate::every_key::path;
 
-/// What the standard library says of texts that it does not read, and how it shows its own types.
+/// Pieces of the standard library's parse errors, and of the debug form of its types, one per line.
 const RAW: &str = include_str!("raw_texts.txt");
 
 const VALUES: [&str; 32] = [
@@ -46,7 +46,7 @@ const VALUES: [&str; 32] = [
     "'a\u{202e}b'",
 ];
 
-/// The longest run of digits in a text.
+/// Returns the length of the longest run of digits in a text.
 fn digits(text: &str) -> usize {
     text.split(|c: char| !c.is_ascii_digit()).map(str::len).max().unwrap_or(0)
 }
