@@ -1,4 +1,4 @@
-//! Whatever arrives: no panic, no octet lost or invented, nothing acknowledged that has not come.
+//! Connections under arbitrary segments: no panic, no octet lost or invented, and no acknowledgement of data that has not arrived.
 
 use std::borrow::Cow;
 use std::time::Duration;
@@ -20,7 +20,8 @@ fn any_options() -> impl Strategy<Value = Options> {
     )
 }
 
-/// A segment near the numbers that are expected, with the octets that belong there.
+/// Random segment. `sequence` and `acknowledgement` are offsets from the numbers that the end expects, so that many segments are close to valid. The payload
+/// has the octets of its place in the stream.
 #[derive(Clone, Debug)]
 struct Shot {
     sequence: i32,
@@ -54,10 +55,10 @@ fn any_shot() -> impl Strategy<Value = Shot> {
     )
 }
 
-/// What a peer would know that sees all that the end sends.
+/// Knowledge of a peer that sees every segment of the end.
 struct Observer {
     now: Instant,
-    /// The first octets' numbers of both directions, as the peer's SYN and the end's SYN say.
+    /// Sequence number of the first octet from the peer, as its SYN tells. `ours` is the sequence number of the first octet from the end.
     theirs: u32,
     ours: u32,
     expected: u32,
@@ -102,7 +103,7 @@ fn fire(config: TcpConfig, shots: Vec<Shot>) {
             seen.written += count as u64;
         }
         let sequence = seen.expected.wrapping_add_signed(shot.sequence);
-        // Before the stream there is nothing, so that any octet will do.
+        // Places before the beginning of the stream have no octet, so any value will do.
         let from = i64::from(sequence.wrapping_sub(seen.theirs).cast_signed());
         let end_at = from + i64::from(shot.length);
         let payload: Vec<u8> = (from..end_at).map(|at| u64::try_from(at).map_or(0, octet)).collect();
@@ -150,13 +151,13 @@ fn fire(config: TcpConfig, shots: Vec<Shot>) {
 }
 
 impl World {
-    /// How an end has failed. A program that has read the end hears of an error no more.
+    /// Returns the error with which an end has failed. The connection is asked too, because a program that has read the end of the stream gets no later error.
     fn failure(&self, side: usize) -> Option<Error> {
         self.programs[side].error.map(|(_, error)| error).or_else(|| self.ends[side].as_ref()?.error())
     }
 
-    /// Returns whether an end may fail so: it has heard nothing for as long as it repeats its SYN with ACK, the least of all limits; or it was reset by one
-    /// that is over.
+    /// Returns whether an end may fail with `error`. A time-out needs at least 63 s without a segment, the time for which an end repeats its SYN
+    /// with ACK and the least of all limits. A reset needs a peer that was over before.
     fn is_legitimate(&self, side: usize, error: Error) -> bool {
         let silence = self.closed_at[side].map(|at| at.saturating_duration_since(self.heard_at[side]));
         let is_peer_over = self.closed_at[1 - side].is_some_and(|over| self.closed_at[side].is_some_and(|at| over <= at));

@@ -1,4 +1,4 @@
-//! The engine against figures that do not come from it: RFCs, closed forms, Linux.
+//! The engine against figures from other sources: RFCs, closed forms and Linux.
 #![allow(
     clippy::unwrap_used,
     clippy::cast_possible_truncation,

@@ -1,4 +1,4 @@
-//! Losses, and how they are repaired.
+//! Repair of lost segments: time and number of retransmissions.
 
 use std::time::Duration;
 
@@ -8,7 +8,8 @@ use cohaptic_wan::{LinkConfig, Loss, Pattern};
 
 use crate::world::{Program, World, link, millis};
 
-/// How long the server's data takes, beyond the run without a loss, if these first transmissions of full segments are lost.
+/// Returns by how much the last octet of the server's data is later than in a run without a loss, and the world after the run. `lost` are the numbers of the
+/// data segments, from 0, whose first transmission is lost.
 fn delay_by(config: &TcpConfig, lost: &[usize], octets: u64) -> (Duration, World) {
     let run = |lost: Vec<usize>| {
         let (mut count, mut highest) = (0, 0);
@@ -44,7 +45,7 @@ fn sack_repairs_a_window_in_one_round_trip() {
     }
 }
 
-/// NewReno repairs one loss a round trip (RFC 6582).
+/// NewReno repairs one loss per round trip (RFC 6582).
 #[test]
 fn newreno_repairs_one_loss_a_round_trip() {
     let config = TcpConfig { initial_window: 40, ..TcpConfig::textbook() };
@@ -61,7 +62,7 @@ fn newreno_repairs_one_loss_a_round_trip() {
     assert_eq!(took, expected);
 }
 
-/// Without selective acknowledgements or duplicates, only the timer helps: the whole flight is lost.
+/// The whole flight is lost, so that no acknowledgement tells of the loss and only the retransmission timer repairs it.
 #[test]
 fn a_whole_flight_that_is_lost_costs_a_timeout() {
     let (delay, world) = delay_by(&TcpConfig::textbook(), &[0, 1, 2], 3 * 1460);

@@ -1,4 +1,4 @@
-//! This engine against smoltcp, an implementation by others, over the same links.
+//! This engine against smoltcp, an independent implementation, over links of the emulator.
 
 use std::collections::VecDeque;
 
@@ -14,7 +14,7 @@ use smoltcp::wire::{HardwareAddress, IpAddress, IpCidr};
 
 use crate::world::{link, octet};
 
-/// A device of packets that have arrived and packets that leave.
+/// Network device of smoltcp: queues of the packets that have arrived and of the packets that leave.
 #[derive(Default)]
 struct Packets {
     arrived: VecDeque<Vec<u8>>,
@@ -58,7 +58,7 @@ impl Device for Packets {
     }
 }
 
-/// Their end: an interface with one listening socket.
+/// End of smoltcp: an interface with one listening socket.
 struct Theirs {
     packets: Packets,
     interface: Interface,
@@ -68,7 +68,7 @@ struct Theirs {
     written: u64,
 }
 
-/// Their time counts whole microseconds.
+/// Converts an instant to an instant of smoltcp, rounded down to a microsecond.
 fn their_time(now: Instant) -> TheirInstant {
     TheirInstant::from_micros(i64::try_from(now.as_nanos() / 1000).unwrap())
 }
@@ -113,7 +113,7 @@ impl Theirs {
     }
 }
 
-/// Our end, which connects, writes and reads.
+/// End of this engine, which connects, writes and reads.
 struct Ours {
     end: Connection,
     read: u64,
@@ -135,7 +135,8 @@ impl Ours {
     }
 }
 
-/// When all was read; `None`: not within an hour.
+/// Returns the instant at which both ends have read all octets, or `None` if an hour is not enough. `there` and `back` are the octets written by this engine
+/// and by smoltcp.
 fn dialogue(words: &str, seed: u64, config: TcpConfig, [there, back]: [u64; 2]) -> Option<Instant> {
     let mut now = Instant::ZERO;
     let mut links = [0, 1].map(|side| Link::new(seed, &LinkName::between("ours", if side == 0 { "there" } else { "back" }), link(words)));

@@ -1,4 +1,4 @@
-//! Instants that are known exactly.
+//! Runs over links without randomness, whose instants follow from the delays and timers exactly.
 
 use std::time::Duration;
 
@@ -64,7 +64,8 @@ fn no_listener_refuses_after_a_round_trip() {
     assert_eq!(world.programs[0].error, Some((millis(20), Error::ConnectionRefused)));
 }
 
-/// R·(1 + ⌈log₂(N/(10·MSS) + 1)⌉) where the line is free, the data leaves the server at 1.5 R and the window doubles.
+/// N octets take R·(1 + ⌈log₂(N/(10·MSS) + 1)⌉ over a link without a rate limit: one round trip R for the handshake, and one for each window, of which each is
+/// twice the window before.
 #[test]
 fn slow_start_doubles_every_round_trip() {
     for octets in [1, 10 * 1448, 10 * 1448 + 1, 30 * 1448, 30 * 1448 + 1, 100_000, 1_000_000] {

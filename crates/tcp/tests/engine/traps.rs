@@ -1,4 +1,4 @@
-//! What other implementations have fallen into.
+//! Situations in which other implementations have failed.
 
 use std::borrow::Cow;
 use std::time::Duration;
@@ -8,14 +8,14 @@ use cohaptic_units::Instant;
 
 use crate::world::{Program, World, millis, octet};
 
-/// An established pair after a second without anything to do.
+/// Returns a connection that was established and has been idle since, at 1 s.
 fn pair(words: &str) -> World {
     let mut world = World::new(words, 1).logged().connect();
     world.run_until(millis(1000));
     world
 }
 
-/// A segment of the client's that the client did not send, `ahead` of what the server expects.
+/// Returns a segment in the client's name that the client did not send. Its sequence number is by `ahead` larger than the number that the server expects.
 fn forged(world: &World, flags: Flags, ahead: u32, payload: &'static [u8]) -> Segment<'static> {
     let last = world.log.iter().flatten().rfind(|left| left.from == 1).unwrap();
     Segment {
@@ -337,7 +337,7 @@ fn an_acknowledgement_waits_40_milliseconds_when_quick_ones_are_used_up() {
     assert_eq!(*world.left(1, |segment| segment.flags == Flags::ACK).last().unwrap(), millis(30 + 40));
 }
 
-/// All memory of an end that has sent and received 100,000 octets and is idle now, after some losses.
+/// An end that has sent and received 100,000 octets with some losses, and is idle now, keeps little memory.
 #[test]
 fn an_idle_connection_is_small() {
     let mut kept = None;
@@ -364,20 +364,20 @@ fn segments_fit_the_mtu_of_both_versions() {
     assert_eq!(lengths, [1500, 1500, 1500, 788]);
 }
 
-/// Asks for ECN, with that fallback.
+/// Returns the configuration of an end that asks for ECN with the given fallback.
 fn asks(fallback: EcnFallback) -> TcpConfig {
     TcpConfig { ecn: true, ecn_fallback: fallback, ..TcpConfig::default() }
 }
 
 const ASKS: [u8; 2] = [Flags::SYN.bits() | Flags::ECE.bits() | Flags::CWR.bits(), Flags::SYN.bits()];
 
-/// The flags of the SYNs of the client, and when each left.
+/// Returns the instant of sending and the flags of each SYN of the client.
 fn syns(world: &World) -> Vec<(Instant, u8)> {
     let left = world.log.iter().flatten().filter(|left| left.from == 0 && left.segment.flags.has(Flags::SYN));
     left.map(|left| (left.at, left.segment.flags.bits())).collect()
 }
 
-/// Returns whether data of the server's was marked as capable.
+/// Returns whether the server has sent a segment marked as ECN-capable.
 fn is_capable(world: &World) -> bool {
     world.log.iter().flatten().any(|left| left.from == 1 && left.segment.ecn == Ecn::Capable0)
 }
@@ -402,7 +402,7 @@ fn behind_a_box_that_drops_syns_with_ecn_the_second_syn_gets_through_without() {
     assert_eq!(world.programs[0].error, Some((millis(131_000), Error::TimedOut)));
 }
 
-/// As Linux does it: the answer counts, whichever SYN it answers.
+/// As in Linux, an answer that grants ECN counts even if the client has sent a SYN without ECN in the meantime.
 #[test]
 fn an_answer_that_grants_ecn_after_the_second_syn_counts() {
     let mut answers = 0;

@@ -1,4 +1,4 @@
-//! Two ends, two links and the time: programs that write and read, in virtual time.
+//! World of the tests: two ends with programs that write and read, two links between the ends, and a virtual time.
 
 use std::time::Duration;
 
@@ -7,7 +7,8 @@ use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::netem::Netem;
 use cohaptic_wan::{Fate, Link, LinkConfig, LinkName};
 
-/// What a program does once its connection is up: it writes so many octets, shuts its half if it should, and reads whatever comes.
+/// Program on one end, and its progress. Once connected, the program writes `to_write` octets, shuts its half if `shuts` is set, and reads all data if `reads`
+/// is set.
 #[derive(Clone, Debug)]
 pub(crate) struct Program {
     pub(crate) to_write: u64,
@@ -15,7 +16,7 @@ pub(crate) struct Program {
     pub(crate) reads: bool,
     pub(crate) written: u64,
     pub(crate) read: u64,
-    /// When the connection was established, when the last octet was read, and when the end was.
+    /// Instant at which the connection was established. The next two are the instants of the last octet read, and of the end of the stream.
     pub(crate) connected_at: Option<Instant>,
     pub(crate) last_read_at: Option<Instant>,
     pub(crate) end_at: Option<Instant>,
@@ -42,12 +43,12 @@ impl Program {
     }
 }
 
-/// The octet at a place of any stream, so that what was lost, doubled or invented is seen.
+/// Returns the octet at the place `at` of every stream. Neighbouring places differ, so that a lost, doubled or invented octet is noticed.
 pub(crate) fn octet(at: u64) -> u8 {
     u8::try_from((at * 31 + at / 251) % 251).unwrap()
 }
 
-/// A segment that left: when, from which end, and of what it consists.
+/// Segment that an end has sent.
 #[derive(Clone, Debug)]
 pub(crate) struct Left {
     pub(crate) at: Instant,
@@ -57,23 +58,23 @@ pub(crate) struct Left {
 
 type Filter = Box<dyn FnMut(usize, &Segment<'static>) -> bool>;
 
-/// End 0 is the client, end 1 the server.
+/// Both ends of a connection, their programs and links. Arrays are indexed by end: 0 is the client, 1 the server.
 pub(crate) struct World {
     pub(crate) now: Instant,
     pub(crate) ends: [Option<Connection>; 2],
     pub(crate) programs: [Program; 2],
     pub(crate) configs: [TcpConfig; 2],
     pub(crate) is_listening: bool,
-    /// When a segment last came to each end, and when the end was over.
+    /// Instant at which a segment last arrived at each end. `closed_at` is the instant at which the end was over.
     pub(crate) heard_at: [Instant; 2],
     pub(crate) closed_at: [Option<Instant>; 2],
-    /// Everything that left, if it is kept.
+    /// Every segment sent by either end, in order; `None` if segments are not logged.
     pub(crate) log: Option<Vec<Left>>,
-    /// Says which segments are lost on the way.
+    /// Returns `true` for a segment that is lost on the way, given its sending end.
     pub(crate) drops: Filter,
-    /// `true` if packets cross the links as octets; otherwise as they are, which is faster.
+    /// `true` if packets cross the links as octets; `false` if they cross as segments, which is faster.
     pub(crate) is_encoded: bool,
-    /// `true` if every octet is looked at.
+    /// `true` if every octet read is compared with [`octet`], and every packet with its parsed segment.
     pub(crate) is_checked: bool,
     pub(crate) marks: bool,
     links: [Link<Packet>; 2],
@@ -94,7 +95,7 @@ pub(crate) fn link(words: &str) -> LinkConfig {
 }
 
 impl World {
-    /// The links are the same both ways, in the words of netem.
+    /// Creates a world whose links are equal in both directions. `words` are options of netem.
     pub(crate) fn new(words: &str, seed: u64) -> Self {
         Self::with_links([link(words), link(words)], seed)
     }
@@ -146,7 +147,7 @@ impl World {
         self
     }
 
-    /// Both programs act, and all that may leave leaves.
+    /// Lets both programs act, and sends every segment that may leave now.
     pub(crate) fn flush(&mut self) {
         for side in 0..2 {
             self.flush_one(side);
@@ -252,7 +253,7 @@ impl World {
         links.chain(self.ends.iter().flatten().filter_map(Connection::poll_timeout)).min()
     }
 
-    /// The next instant at which something happens. `false`: nothing ever will.
+    /// Goes to the next instant at which something happens, and handles its events. Returns `false` if nothing will ever happen.
     pub(crate) fn step(&mut self) -> bool {
         let Some(at) = self.next_at() else { return false };
         assert!(at >= self.now, "time went back from {} to {at}", self.now);
@@ -299,7 +300,7 @@ impl World {
         self.flush_one(side);
     }
 
-    /// Runs until `end` or until nothing happens any more.
+    /// Runs until `end`. If nothing happens before, only the time advances.
     pub(crate) fn run_until(&mut self, end: Instant) {
         while self.next_at().is_some_and(|at| at <= end) {
             self.step();
@@ -307,7 +308,7 @@ impl World {
         self.now = self.now.max(end);
     }
 
-    /// Runs until all that is to be written was read, within `limit`.
+    /// Runs until both programs have read all octets of the other one. Panics if that takes longer than `limit`.
     pub(crate) fn run_to_the_last_octet(&mut self, limit: Duration) {
         let end = self.now + limit;
         while !self.is_all_read() {
@@ -320,7 +321,7 @@ impl World {
         self.programs[0].read >= self.programs[1].to_write && self.programs[1].read >= self.programs[0].to_write
     }
 
-    /// When segments left `side` that `which` holds for.
+    /// Returns the instants at which `side` sent the segments for which `which` is true. The world must be logged.
     pub(crate) fn left(&self, side: usize, which: impl Fn(&Segment<'static>) -> bool) -> Vec<Instant> {
         self.log.iter().flatten().filter(|left| left.from == side && which(&left.segment)).map(|left| left.at).collect()
     }
