@@ -1,4 +1,4 @@
-//! Peers whose device is in somebody's hand.
+//! Live sessions with peers whose device is real and held by a person.
 
 use std::convert::Infallible;
 use std::sync::{Arc, Mutex};
@@ -14,11 +14,12 @@ use crate::scenes::{Written, read};
 
 const COUPLING: f64 = 900.0;
 
-/// The forces that a device was made to hold.
+/// Forces \[N\] that a device was told to hold, with the instants.
 type HeldForces = Arc<Mutex<Vec<(Instant, [f64; 3])>>>;
 
-/// A device that shows what it is told to at each millisecond, and writes down what it is made to hold.
+/// Device whose position follows a script, and which records the forces that it is told to hold.
 struct Told {
+    /// Position along x \[m\] at a millisecond; `None` while nobody holds the device.
     shows: fn(u64) -> Option<f64>,
     held: HeldForces,
 }
@@ -42,7 +43,8 @@ fn duo() -> Written {
     ))
 }
 
-/// FC at the hand, FT here, and where the hand's copy is, at each tick.
+/// Numbers of each tick. First of the peer with the device: instant, coupling force FC \[N\] and position of the copy \[m\]. Then of the simulated peer: the
+/// coordination force FT \[N\].
 #[derive(Default)]
 struct Forces(Vec<(Instant, f64, f64)>, Vec<f64>);
 

@@ -1,4 +1,4 @@
-//! Live sessions, driven by a made-up clock: against virtual time, against their own replays, and against what the manual promises.
+//! Live sessions under a clock of the test: against runs in virtual time, against replays of their records, and against the rules of the manual.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail as tests do")]
 #![allow(clippy::float_cmp, reason = "what must agree to the bit is compared so")]
 
@@ -19,7 +19,7 @@ mod virtual_time;
 
 use proptest::prelude::ProptestConfig;
 
-/// A property test of this number of cases that leaves no files behind.
+/// Returns the configuration of a property test with `count` cases that leaves no files behind.
 fn cases(count: u32) -> ProptestConfig {
     ProptestConfig { cases: count, failure_persistence: None, max_shrink_iters: 200, ..ProptestConfig::default() }
 }

@@ -1,10 +1,10 @@
-//! Scenes of so many peers that no list of their links would fit into memory.
+//! Scenes with so many peers that a list of all links would not fit into memory.
 
 use cohaptic_harness::record::links_csv;
 use cohaptic_harness::{Model, NoObserver, Simulation, Summary, too_large};
 use cohaptic_scene::Scene;
 
-/// That number of peers with copies of 1 kg over a constant delay of 24 ms; the first begins elsewhere.
+/// Runs a scene of `peers` peers with copies of 1 kg over a constant delay of 24 ms. The first peer begins 0.5 m away from all others.
 fn run(peers: usize, duration: &str, link: &str) -> Summary {
     let text = format!(
         "scene = {{ duration = \"{duration}\", count = {peers} }}\nobject = {{ mass = {peers}.0, damping = 1.0 }}\nlink = {{ delay = \"24ms\", {link} }}\n\
@@ -17,7 +17,7 @@ fn run(peers: usize, duration: &str, link: &str) -> Summary {
     summary
 }
 
-/// 10¹⁰ links, more than 32 bits count, between more peers than 16 bits do.
+/// The scene has 10¹⁰ links, a number beyond 32 bits, between a number of peers beyond 16 bits.
 #[test]
 fn a_hundred_thousand_peers_run_and_their_links_are_counted() {
     const PEERS: usize = 100_000;
@@ -34,7 +34,7 @@ fn a_hundred_thousand_peers_run_and_their_links_are_counted() {
     assert!(at(1) > 0.0 && at(1) < 0.5 / 99_999.0 && at(0) > 0.3 && at(0) < 0.5, "{} {}", at(0), at(1));
 }
 
-/// A table with an entry for each link and one with an entry for each sender come to the same text, which has every link.
+/// A table with an entry per link and a table with an entry per sender are written as the same text, which has every link.
 #[test]
 fn each_link_is_written_however_links_are_kept() {
     let text = |summary: &Summary| {

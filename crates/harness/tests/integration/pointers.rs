@@ -1,4 +1,4 @@
-//! Peers whose simulated device is pulled by a pointer.
+//! Peers with a simulated device that a pointer, such as a mouse, pulls.
 
 use std::convert::Infallible;
 use std::time::Duration;
@@ -16,7 +16,7 @@ const COUPLING: f64 = 900.0;
 const ARM: f64 = 400.0;
 const FADE: f64 = 250.0;
 
-/// A pointer that shows a place at each millisecond.
+/// Pointer whose position along x \[m\] is a function of the millisecond; `None` while it holds nothing.
 struct Shown(fn(u64) -> Option<f64>);
 
 impl LiveDevice for Shown {
@@ -27,7 +27,7 @@ impl LiveDevice for Shown {
     fn hold(&mut self, _now: Instant, _span: Duration, _coupling_force: [f64; 3]) {}
 }
 
-/// Two peers; `hand` has keys of the one that a pointer pulls.
+/// Returns a scene of two peers. `hand` has further keys of the second peer, which a pointer pulls.
 fn duo(hand: &str) -> Written {
     read(format!(
         "scene = {{ duration = \"3s\" }}\nobject = {{ mass = 0.4, damping = 2.0 }}\n\
@@ -37,7 +37,8 @@ fn duo(hand: &str) -> Written {
     ))
 }
 
-/// Device and copy of the pointer's peer, the force that its hand feels, and the copy of the other, at each tick.
+/// State of a tick: device and copy of the peer with the pointer, each as position \[m\] and velocity [m/s], the coupling force of this peer \[N\], and the
+/// position of the other peer's copy \[m\].
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 struct Row {
     device: [f64; 2],
@@ -77,7 +78,7 @@ fn run(written: &Written, shows: fn(u64) -> Option<f64>, until: u64) -> (Vec<Row
     (rows.0, live)
 }
 
-/// Nobody holds the device, but it is there: it stays coupled to its copy, which the others feel, as a grip that is let go.
+/// A device that nobody holds is simulated all the same: it stays coupled to its copy, and its mass is felt by the other peer.
 #[test]
 fn a_pointer_that_never_comes_leaves_a_device_that_follows() {
     let written = duo("device-position = 0.02");
@@ -87,7 +88,7 @@ fn a_pointer_that_never_comes_leaves_a_device_that_follows() {
     assert_eq!((live.presence(1), live.seat_stats(1).unwrap().joined), (Some(Presence::Absent), 0));
 }
 
-/// It comes at 300 ms, 5 cm off; lets go at 1000 ms; comes back at 1200 ms on the other side, and goes at 1900 ms for good.
+/// The pointer takes hold at 300 ms, 5 cm off, and lets go at 1000 ms. It takes hold again at 1200 ms on the other side, and goes at 1900 ms.
 #[test]
 fn a_hand_takes_hold_and_lets_go_without_a_jump() {
     let written = duo("");
@@ -120,7 +121,7 @@ fn a_hand_takes_hold_and_lets_go_without_a_jump() {
     assert_eq!(live.presence(1), Some(Presence::Stale(millis(1999))));
 }
 
-/// A scene that begins where another one has stopped, with the hand on the device, goes on with the force that was felt there.
+/// A scene that begins with the state in which another scene has stopped, with the pointer holding the device, continues with the force of that state.
 #[test]
 fn a_scene_begun_anew_in_the_middle_goes_on_without_a_jump() {
     fn shows(_: u64) -> Option<f64> {

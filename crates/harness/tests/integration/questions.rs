@@ -1,4 +1,4 @@
-//! How often an observer is asked whether to go on: often enough that a run ends soon after a signal, however many peers it has.
+//! Frequency of the question whether to go on. A run of any number of peers must end soon after a signal.
 
 use std::convert::Infallible;
 use std::path::Path;
@@ -8,7 +8,7 @@ use cohaptic_harness::{Ending, Model, Observer, Simulation};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
-/// Ends a run as soon as it is asked.
+/// Observer that ends a run at the first question.
 struct Impatient;
 
 impl Observer for Impatient {
@@ -29,14 +29,14 @@ fn scene(peers: usize, keys: &[&str]) -> Scene {
     Scene::parse(&text, Path::new("many.toml"), &keys).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Ticks of the run before the first question.
+/// Returns the number of ticks of a run before the first question.
 fn asked_after(scene: &Scene, model: Model) -> u64 {
     let Ok(summary) = Simulation::new(scene, model).run(&mut Impatient);
     assert!(matches!(summary.ending, Ending::Interrupted(_)), "{:?}", summary.ending);
     summary.ticks
 }
 
-/// 300 peers have 90,000 links: 2²² packets are 46 instants at which all send, rounded down to a power of two.
+/// 300 peers have 90,000 links, so that 2²² packets are sent at 46 instants. Rounded down to a power of two, the question comes after 32.
 #[test]
 fn a_run_of_many_peers_is_asked_before_it_has_done_much() {
     let many = scene(300, &[]);

@@ -1,4 +1,4 @@
-//! The files of a session, and sessions driven by a list of things that happen.
+//! Sessions with all their files, and replays of these sessions.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -11,12 +11,12 @@ use cohaptic_scene::{Scene, SceneContent};
 
 use crate::scenes::Written;
 
-/// Every byte that was written, by the name of the file.
+/// Content of each written file, by the name of the file.
 pub(crate) type Files = BTreeMap<String, Vec<u8>>;
 
 pub(crate) type Observing = (Recorder, InputRecorder);
 
-/// What came of a session.
+/// Everything that a session has produced.
 #[derive(PartialEq, Debug)]
 pub(crate) struct Session {
     pub(crate) files: Files,
@@ -29,7 +29,7 @@ fn files(folder: &Path) -> Files {
     entries.map(|entry| (entry.file_name().into_string().unwrap(), fs::read(entry.path()).unwrap())).collect()
 }
 
-/// A session with everything recorded; `drive` does what it likes with it, and the rest of the scene follows.
+/// Runs a session with all records. `drive` drives the session up to any instant, and the rest of the scene runs without inputs.
 pub(crate) fn session(
     scene: &Scene,
     devices: impl FnMut(usize) -> Option<Box<dyn LiveDevice>>,
@@ -55,7 +55,7 @@ pub(crate) fn drain(live: &mut LiveScene, transmits: &mut Vec<Transmit>) {
     transmits.extend(std::iter::from_fn(|| live.poll_transmit()));
 }
 
-/// The session again from its own record.
+/// Replays a session from its record of inputs.
 pub(crate) fn again(written: &Written, session: &Session) -> (Files, Summary) {
     let text = std::str::from_utf8(&session.files["inputs.csv"]).unwrap();
     let inputs = Inputs::read(text, &written.scene, &written.keys).unwrap_or_else(|error| panic!("{error}\n{text}"));
@@ -69,7 +69,7 @@ pub(crate) fn again(written: &Written, session: &Session) -> (Files, Summary) {
     (files(folder.path()), summary)
 }
 
-/// The scene in virtual time, every peer simulated.
+/// Runs the scene in virtual time. All its peers must be simulated.
 pub(crate) fn simulated(scene: &Scene) -> (Files, Summary) {
     let folder = tempfile::tempdir().unwrap();
     let mut recorder = Recorder::create(folder.path(), scene).unwrap();
@@ -78,7 +78,7 @@ pub(crate) fn simulated(scene: &Scene) -> (Files, Summary) {
     (files(folder.path()), summary)
 }
 
-/// The first line of the first file in which the two differ; `None` if all bytes are the same.
+/// Returns the first line of the first file in which `one` and `other` differ; `None` if all bytes are equal.
 pub(crate) fn first_difference(one: &Files, other: &Files) -> Option<String> {
     if !one.keys().eq(other.keys()) {
         return Some(format!("files {:?} and {:?}", one.keys(), other.keys()));

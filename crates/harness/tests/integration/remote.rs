@@ -1,4 +1,4 @@
-//! A process elsewhere, made up: what it sends, and when.
+//! Samples of a process on another machine, which the tests play.
 
 use cohaptic_peer::State;
 use cohaptic_peer::rotation::Attitude;
@@ -10,7 +10,7 @@ pub(crate) fn millis(millis: u64) -> Instant {
     Instant::from_nanos(millis * 1_000_000)
 }
 
-/// A sample of a peer of a scene, as its process writes it.
+/// Returns the datagram with which the process of a peer sends its sample number `sequence`.
 pub(crate) fn sample(scene: &Scene, peer: usize, sequence: u64, x: f64, v: f64) -> Vec<u8> {
     let state = State { position: [x, -x, x / 2.0], velocity: [v, v, -v] };
     let sample = Sample { session: scene.seed, sender: u32::try_from(peer).unwrap(), sequence, sent: millis(sequence), state };

@@ -1,4 +1,4 @@
-//! A recorded session is the same session again in virtual time, and the steps in which time passed do not show.
+//! Replays of recorded sessions: the same bytes in virtual time, whatever the steps in which the driver of the session called.
 
 use cohaptic_harness::live::{LiveDevice, LiveScene, Transmit};
 use cohaptic_peer::State;
@@ -12,7 +12,7 @@ use crate::records::{Observing, again, drain, first_difference, session};
 use crate::remote::sample;
 use crate::scenes::{LINKS, Written, link, read, scene};
 
-/// Something that comes from outside: so long after the one before it \[us\].
+/// Input of a session, `after` microseconds after the input before.
 #[derive(Clone, Debug)]
 struct Event {
     after: u64,
@@ -30,7 +30,7 @@ enum What {
     Restart {
         peer: usize,
     },
-    /// Something that is no sample of that peer.
+    /// A datagram that is no sample of the peer.
     Junk {
         peer: usize,
     },
@@ -39,7 +39,7 @@ enum What {
         step: usize,
         keys: &'static str,
     },
-    /// The driver was busy for so long \[us\]: time is handled up to then before what came in meanwhile.
+    /// The driver was busy for this time \[us\]: time passes before the inputs of the meantime are handed in.
     Busy(u64),
 }
 
@@ -55,7 +55,7 @@ fn events() -> impl Strategy<Value = Vec<Event>> {
     vec((after, what).prop_map(|(after, what)| Event { after, what }), 1..80)
 }
 
-/// A device that comes and goes, and moves.
+/// Device that moves, and that is gone from time to time.
 struct Moving {
     gone: Option<u64>,
 }
@@ -71,7 +71,7 @@ impl LiveDevice for Moving {
     fn hold(&mut self, _now: Instant, _span: Duration, _force: [f64; 3]) {}
 }
 
-/// Lets the events happen; between them time passes in steps of `step`. With `punctual` the driver is never busy.
+/// Hands the events to a session. Between events, time passes in steps of `step` \[ns\]. With `punctual` the driver is never busy.
 fn drive(written: &Written, events: &[Event], step: u64, punctual: bool, live: &mut LiveScene, observer: &mut Observing, out: &mut Vec<Transmit>) {
     let peers = written.scene.peers.len();
     let mut sequences = vec![0; peers];
@@ -122,7 +122,7 @@ fn devices(gone: Option<u64>) -> impl FnMut(usize) -> Option<Box<dyn LiveDevice>
     move |_| Some(Box::new(Moving { gone }) as Box<dyn LiveDevice>)
 }
 
-/// A summary as text: bits that are flipped unseen make some runs diverge, and what is not a number is not equal to itself.
+/// Returns a summary as text. Undetected flipped bits make some runs diverge, and a NaN in a summary is not equal to itself.
 fn written_out(summary: &cohaptic_harness::Summary) -> String {
     format!("{summary:?}")
 }
@@ -130,7 +130,7 @@ fn written_out(summary: &cohaptic_harness::Summary) -> String {
 proptest! {
     #![proptest_config(crate::cases(120))]
 
-    /// Jitter, loss, queues, damage, changes of links in the timeline and by hand, rejoining, busy drivers, devices that come and go.
+    /// Scenes with jitter, loss, queues, damage, changes of links in the timeline and by hand, rejoining, busy drivers, and devices that come and go.
     #[test]
     #[ignore = ".ci/nightly runs it: it takes long"]
     fn a_session_is_the_same_again(
@@ -149,7 +149,7 @@ proptest! {
         prop_assert_eq!(written_out(&summary), written_out(&live.summary));
     }
 
-    /// A driver that is never late sees the same session however often it comes.
+    /// A session has the same results for every driver that is never late, however often the driver calls.
     #[test]
     #[ignore = ".ci/nightly runs it: it takes long"]
     fn the_steps_of_a_punctual_driver_do_not_show(
@@ -166,7 +166,7 @@ proptest! {
     }
 }
 
-/// The links of the tests do what they are for: with each of them a session that takes every packet has other fates than one with no impairment.
+/// Each link of these tests has an effect: the fates of packets differ from the fates on a link without impairments.
 #[test]
 fn the_links_of_these_tests_do_something() {
     for keys in &LINKS[1..] {

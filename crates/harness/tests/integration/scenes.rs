@@ -1,4 +1,4 @@
-//! Scenes at random, as text.
+//! Random scenes, as text.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use proptest::option;
 use proptest::prelude::*;
 use proptest::sample::select;
 
-/// A scene with its text.
+/// Scene with its text, and the keys of its links for later changes.
 #[derive(Debug)]
 pub(crate) struct Written {
     pub(crate) scene: Scene,
@@ -37,7 +37,7 @@ pub(crate) const LINKS: [&str; 10] = [
     "delay = \"2ms\"\noutage = { random = { up = \"20ms\", down = \"10ms\" } }",
 ];
 
-/// A link of the list, one key a line.
+/// Returns a strategy for the links of [`LINKS`].
 pub(crate) fn link() -> impl Strategy<Value = &'static str> {
     select(&LINKS[..])
 }
@@ -46,7 +46,7 @@ fn inline(keys: &str) -> String {
     format!("{{ {} }}", keys.replace('\n', ", "))
 }
 
-/// Two to four peers of these kinds, with clocks, hands, lines and changes of all sorts.
+/// Returns a strategy for scenes of two to four peers of the given kinds, with clocks, hands, access lines and changes of all sorts.
 pub(crate) fn scene(kinds: &'static [&'static str]) -> impl Strategy<Value = String> {
     let header = (30..120_u64, any::<u32>(), 1..=3_usize, select(&["average-position", "proportional-derivative"][..]), any::<bool>());
     let peer = (

@@ -1,4 +1,4 @@
-//! Joining, leaving, coming back, and what is refused.
+//! Peers of a live session that join, leave and come back, and the inputs that a session refuses.
 
 use std::convert::Infallible;
 
@@ -14,7 +14,7 @@ use crate::records::session;
 use crate::remote::{millis, sample};
 use crate::scenes::{Written, read};
 
-/// A peer here, one in another process and one who holds a device; 3 ms between any two.
+/// Returns a scene of three peers: one simulated, one in another process, and one with a device. Each link delays by 3 ms.
 pub(crate) fn trio() -> Written {
     read(
         "scene = { duration = \"2s\", seed = 5 }\nobject = { mass = 0.3 }\n\
@@ -100,7 +100,7 @@ fn what_the_network_delivers_to_a_process_comes_out_at_its_arrival() {
     assert_eq!(live.poll_transmit().map(|transmit| transmit.at), Some(millis(11)));
 }
 
-/// Sender, receiver and instant of what arrives.
+/// Sender, receiver and instant of each packet that arrives.
 #[derive(Default)]
 struct Arrivals(Vec<(NodeId, NodeId, Instant)>);
 
@@ -119,7 +119,7 @@ impl Observer for Arrivals {
     }
 }
 
-/// A driver may keep a session in a thread of its own.
+/// A driver may move a session to another thread.
 #[test]
 fn a_session_can_be_sent_to_another_thread() {
     fn can_be_sent<T: Send>(_: &T) {}
@@ -264,7 +264,7 @@ fn a_record_with_a_fault_is_refused_with_its_line_and_what_was_expected() {
     assert!(Inputs::read(&format!("{header}\n0,closed,,,0"), &scene, &keys).unwrap().is_empty());
 }
 
-/// Cut at any byte, and with any line gone, a record is not taken for a whole one; what is whole of it is read.
+/// A record that is cut at any byte, or that lacks any line, is not taken for a whole record. Its whole lines can be read.
 #[test]
 fn a_record_that_is_cut_anywhere_is_not_whole() {
     let Written { scene, keys, .. } = trio();
@@ -311,7 +311,7 @@ proptest! {
     }
 }
 
-/// Counts the packets that were dropped.
+/// Number of dropped packets.
 #[derive(Default)]
 struct Drops(usize);
 
@@ -328,7 +328,7 @@ impl Observer for Drops {
     }
 }
 
-/// With nobody here nobody ticks: silence and drops are noticed all the same, when something comes in and at once.
+/// A session without a simulated peer or device has no ticks. Silence is noticed with the next input all the same, and drops at once.
 #[test]
 fn a_session_of_nothing_but_processes_goes_without_ticks() {
     let Written { scene, .. } = read(

@@ -1,4 +1,4 @@
-//! What a peer's silence does to the force on the others.
+//! Effect of a peer's silence on the coordination forces of the others.
 
 use std::convert::Infallible;
 
@@ -15,7 +15,7 @@ use crate::scenes::{Written, read};
 const STIFFNESS: f64 = 1000.0;
 const DAMPING: f64 = 5.0;
 
-/// A peer here, whose user holds on to a place, and one elsewhere.
+/// Returns a scene of a simulated peer, whose hand is an arm, and a peer in another process. `delay` has the keys of the links.
 fn two(delay: &str) -> Written {
     read(format!(
         "scene = {{ duration = \"4s\", seed = 5 }}\nobject = {{ mass = 0.3, damping = 1.0 }}\n\
@@ -25,7 +25,7 @@ fn two(delay: &str) -> Written {
     ))
 }
 
-/// Where the copy is, how fast, and the force of the coordination, tick by tick, of the peer here.
+/// Instant, position \[m\] and velocity [m/s] of the copy, and coordination force \[N\] of the simulated peer, for each tick.
 #[derive(Default)]
 struct Ticks(Vec<(Instant, f64, f64, f64)>);
 
@@ -42,7 +42,7 @@ impl Observer for Ticks {
     }
 }
 
-/// The ticks of a session in which the other peer sends from these places at these times \[ms\].
+/// Returns the ticks of a session up to `until` \[ms\]. `sent` are the samples of the other peer: instant \[ms\], sequence number and position \[m\].
 fn ticks(scene: &Scene, sent: &[(u64, u64, f64)], until: u64) -> Vec<(Instant, f64, f64, f64)> {
     let mut live = LiveScene::new(scene, |_| None);
     let mut ticks = Ticks::default();
@@ -53,7 +53,7 @@ fn ticks(scene: &Scene, sent: &[(u64, u64, f64)], until: u64) -> Vec<(Instant, f
     ticks.0
 }
 
-/// Where the copy here begins elsewhere than the other one's, and moves.
+/// The copy of the simulated peer begins away from the copy of the absent peer, and moves.
 #[test]
 fn a_peer_that_never_joins_exerts_no_force_at_all() {
     let Written { text, .. } = two("delay = \"1ms\"");
@@ -84,7 +84,7 @@ fn the_pull_falls_and_rises_linearly_from_when_it_was_heard_and_when_it_arrives(
     }
 }
 
-/// How the force may change in a tick: what silence makes, by the manual's bound, and what the motion makes.
+/// Returns by how much the largest change of force in a tick exceeds its bound \[N\]: the manual's bound for silence plus the change due to the motion.
 fn largest_excess(ticks: &[(Instant, f64, f64, f64)], places: &[f64]) -> f64 {
     let share = 1.0 / 250.0;
     let excess = ticks.windows(2).map(|pair| {
@@ -97,7 +97,7 @@ fn largest_excess(ticks: &[(Instant, f64, f64, f64)], places: &[f64]) -> f64 {
     excess.fold(f64::MIN, f64::max)
 }
 
-/// A sender that is there and moves 9 cm from one sample to the next makes the force jump; the bound is no bound of everything.
+/// A present sender that moves by 9 cm between two samples makes the force jump beyond the bound, so that the bound can fail.
 #[test]
 fn the_bound_would_see_a_jump() {
     let Written { scene, .. } = two("delay = \"2ms\"");
@@ -109,7 +109,7 @@ fn the_bound_would_see_a_jump() {
 proptest! {
     #![proptest_config(crate::cases(60))]
 
-    /// Whenever it comes and goes, wherever it turns up, however the network treats it: only while it is there does it stay where it is.
+    /// The other peer comes and goes at random times and places, over several networks. It stays at one place during each visit.
     #[test]
     fn no_coming_back_makes_the_force_jump(
         visits in vec((101..600_u64, 1..400_u64, -0.05..0.05), 1..6),

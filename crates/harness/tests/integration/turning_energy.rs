@@ -1,4 +1,4 @@
-//! The energy that the coordination injects into turns, against kinetic energies and closed forms.
+//! Energy that the coordination injects into rotation, against kinetic energies and closed forms.
 
 use std::convert::Infallible;
 
@@ -8,7 +8,7 @@ use cohaptic_scene::Scene;
 
 use crate::turning_laws::{INERTIA, LAWS, MASS, read, run, untouched};
 
-/// Kinetic energy of a copy at the end \[J\].
+/// Returns the kinetic energy of a copy at the end of a run \[J\].
 fn kinetic(summary: &Summary, peer: usize) -> f64 {
     let rate = summary.peers[peer].attitude.unwrap().rate;
     let square = |velocity: &[f64]| velocity.iter().map(|velocity| velocity * velocity).sum::<f64>();
@@ -23,7 +23,7 @@ fn value(scene: &Scene, name: &str) -> f64 {
     Measures::run(&scene, Model::Least).1[0].value.unwrap()
 }
 
-/// What nobody touches and ground does not damp has the energy of the coordination alone.
+/// A copy that nobody touches and that ground does not damp gets energy from the coordination alone.
 #[test]
 fn the_energy_injected_is_what_the_kinetic_energy_changes_by() {
     for law in LAWS {
@@ -49,7 +49,7 @@ fn the_energy_injected_is_what_the_kinetic_energy_changes_by() {
     }
 }
 
-/// What each tick shows of the first peer.
+/// Angular velocity [rad/s] and coordination torque \[N·m\] of the first peer, indexed by tick.
 #[derive(Default)]
 struct Spins {
     rates: Vec<[f64; 3]>,
@@ -72,7 +72,8 @@ impl Observer for Spins {
     }
 }
 
-/// β takes its share of what all damping takes from a free top about each axis, whatever the gyroscopic term moves between them.
+/// β takes from a free top, about each axis, its share of the energy that all damping takes. The gyroscopic term, which moves energy between the axes, changes
+/// nothing in that.
 #[test]
 fn the_damping_of_a_law_takes_its_share_of_the_energy() {
     let ground = [1e-5, 4e-5, 2e-5];

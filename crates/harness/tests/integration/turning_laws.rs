@@ -1,4 +1,4 @@
-//! Laws on turns, against their own translations.
+//! Coordination laws on rotation, against the same laws on translation.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ pub(crate) const LAWS: [&str; 8] = [
     "local-damping\"\nlocal-damping.damping = BETA\nscaling = \"none",
     "local-lag\"\nlocal-lag.lag = \"3ms\"\nscaling = \"none",
 ];
-/// m [kg] and J [kg·m²].
+/// Mass m of the object \[kg\]. The next constant is its inertia J about each axis [kg·m²].
 pub(crate) const MASS: f64 = 0.4;
 pub(crate) const INERTIA: [f64; 3] = [3e-5, 5e-5, 4e-5];
 
@@ -30,7 +30,7 @@ pub(crate) fn run(scene: &Scene) -> Summary {
     summary
 }
 
-/// A scene whose peers touch nothing. `object` and `gains`: keys of the object and of the coordination; `peers`: keys of each.
+/// Returns a scene whose peers touch nothing. `object` and `gains` have the keys of the object and of the coordination; `peers` has the keys of each peer.
 pub(crate) fn untouched(axes: u8, law: &str, object: &str, gains: &str, peers: &[String]) -> String {
     let mut text = format!(
         "[scene]\nduration = \"200ms\"\naxes = {axes}\n[object]\n{object}\n[coordination]\nupdate = \"2ms\"\n{gains}\nstrategy = \"{law}\"\n\
@@ -117,7 +117,7 @@ fn at_one_grasp_each_law_is_that_of_a_translation() {
     }
 }
 
-/// What the timeline sets at the beginning is what was set before it.
+/// Parameters that the timeline sets at instant zero act as parameters of the scene.
 #[test]
 fn parameters_that_change_at_once_are_those_of_the_beginning() {
     for (law, table, changed) in [
