@@ -1,4 +1,4 @@
-//! What a test that fails leaves behind.
+//! Files that a failing test writes.
 
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -12,7 +12,7 @@ use cohaptic_testkit::{ARTEFACTS_VARIABLE, Bed, Happening, Instant, Record, SEED
 
 const WORDS: &str = "delay 30ms 9ms loss 20% duplicate 20%";
 
-/// Sends fifty numbers, one a millisecond, and has them sent back; then fails, with packets on their way still.
+/// Sends fifty numbers, one per millisecond, which an echo server sends back. Then fails if `fails` is set, while packets are in flight.
 async fn program(bed: Bed, fails: bool) {
     let echo = bed.host("b").bind("0.0.0.0:7").unwrap();
     bed.host("b").spawn(async move {
@@ -76,7 +76,7 @@ fn a_run_that_fails_leaves_all_that_happened() {
     assert_eq!(frames(&capture), logs[0].records().len());
 }
 
-/// How many enhanced packet blocks (type 6) a capture has.
+/// Returns the number of enhanced packet blocks (type 6) of a capture.
 fn frames(mut capture: &[u8]) -> usize {
     let mut frames = 0;
     while !capture.is_empty() {
@@ -87,7 +87,8 @@ fn frames(mut capture: &[u8]) -> usize {
     frames
 }
 
-/// What the hosts have sent and got. In which order a link says at one instant that it lost a packet and copied it is its own affair.
+/// Returns the packets that the hosts have sent and received. Other events are left out, because the order in which a link reports the loss and the copy of a
+/// packet at one instant is not specified.
 fn met(record: &Record) -> Vec<(Instant, Happening)> {
     let events = record.trace().events().iter().filter(|event| matches!(event.what, Happening::Sent { .. } | Happening::Arrived { .. }));
     events.map(|event| (event.at, event.what.clone())).collect()
@@ -138,7 +139,7 @@ fn what_cannot_be_written_does_not_hide_why_the_test_failed() {
     assert!(matches!(record.write(base.path()), Err(WriteError::NotOurs { .. })));
 }
 
-/// Sends for ever, once a millisecond.
+/// Node that sends a packet every millisecond, without end.
 struct Beat(Instant);
 
 impl Node for Beat {
@@ -197,7 +198,7 @@ fn a_host_that_did_not_hear_a_packet_is_in_the_trace_and_not_in_the_fates() {
     let _ = Testbed::new(["a", "b"]).links(replayed);
 }
 
-/// Says that the child is to fail.
+/// Variable whose presence makes the test in the child process fail.
 const CHILD: &str = "COHAPTIC_TESTKIT_CHILD";
 
 #[test]

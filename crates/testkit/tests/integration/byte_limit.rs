@@ -1,4 +1,4 @@
-//! A sender whose bytes pile up is named before they take all memory; bytes that were read or lost count no more.
+//! Limit of the bytes in flight and unread: a run beyond the limit ends and names the sender. Bytes that were read or lost no longer count.
 
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -20,7 +20,7 @@ fn says(way: &str, text: &str, parts: &[&str]) {
     }
 }
 
-/// Datagrams that pile up: on what links, and by what program of host `a`.
+/// Sends datagrams without end, which pile up. `way` names the place where they wait, and the program of host `a`.
 async fn piles_up(bed: Bed, way: &'static str) {
     let socket = bed.host("a").bind("0.0.0.0:0").unwrap();
     let _unread = [bed.host("a").bind("0.0.0.0:7").unwrap(), bed.host("b").bind("0.0.0.0:7").unwrap()];
@@ -70,7 +70,7 @@ fn datagrams_that_pile_up_are_named_with_host_socket_and_task() {
     }
 }
 
-/// A task that holds connections of which nobody reads, and writes as much as each takes.
+/// Opens connections without end, which nobody reads, and writes to each as much as it takes.
 async fn fills_streams(bed: Bed) {
     let _listener = bed.host("b").listen("0.0.0.0:80").unwrap();
     let mut streams = Vec::new();
@@ -102,7 +102,7 @@ fn streams_that_nobody_reads_are_named() {
     );
 }
 
-/// Sends without end, to itself or to the other.
+/// Node that sends without end to the node with this number, which may be the node itself.
 struct Floods(u16);
 
 impl Node for Floods {
@@ -113,7 +113,7 @@ impl Node for Floods {
     }
 }
 
-/// Gets what it is sent.
+/// Node that receives packets and sends nothing.
 struct Quiet;
 
 impl Node for Quiet {
@@ -224,7 +224,7 @@ fn values_that_are_dropped_while_a_run_fails_may_send() {
     says("dropped", &text, &["too many bytes are on their way"]);
 }
 
-/// A limit is there without being said.
+/// A test bed without a configured limit has a limit of one gibibyte.
 #[test]
 #[ignore = ".ci/nightly runs it: it takes long"]
 fn a_gibibyte_is_the_limit_that_is_not_said() {

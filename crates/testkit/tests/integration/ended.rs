@@ -1,4 +1,4 @@
-//! Sockets are their run's: after it, in another test bed and on another thread they give errors.
+//! Sockets belong to their run. After the run, in another test bed and on another thread, all their methods return errors.
 
 use std::fmt::Debug;
 use std::io;
@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use cohaptic_testkit::{Bed, Host, TcpListener, TcpSocket, TcpStream, Testbed, ToSocketAddrs, UdpSocket, time};
 
-/// Sockets, listeners and streams that a run has left.
+/// Sockets, listeners and streams that have outlived their run.
 struct Left {
     udp: UdpSocket,
     listener: TcpListener,
@@ -34,7 +34,7 @@ async fn leave(bed: Bed) -> Left {
     Left { udp, listener, stream, socket, host, bed }
 }
 
-/// Polls a future that must not wait.
+/// Returns the output of a future that is ready at its first poll, as it must be.
 fn now<F: Future>(future: F) -> F::Output {
     match pin!(future).poll(&mut Context::from_waker(Waker::noop())) {
         std::task::Poll::Ready(outcome) => outcome,
@@ -42,7 +42,7 @@ fn now<F: Future>(future: F) -> F::Output {
     }
 }
 
-/// All that the sockets can be asked: each must fail.
+/// Calls every method of the sockets, and returns the errors. Each call must fail.
 fn errors(left: &Left) -> Vec<io::Error> {
     let Left { udp, listener, stream, host, .. } = left;
     let mut errors = Vec::new();

@@ -87,7 +87,7 @@ fn datagrams_and_options_arrive() {
     });
 }
 
-/// Counts how often it is stopped.
+/// Task of another executor that counts how often the task was stopped.
 struct Counted(Arc<AtomicU32>);
 
 impl Stop for Counted {

@@ -1,4 +1,4 @@
-//! Hosts that crash, come back, lose sight of each other and move.
+//! Hosts that crash, come back, are cut off from each other and move.
 
 use std::cell::Cell;
 use std::io::ErrorKind;
@@ -14,7 +14,7 @@ fn beds() -> [Testbed; 2] {
     [bed.clone(), bed.on_tokio()]
 }
 
-/// Counts what comes to port 5 of a host.
+/// Returns a counter of the datagrams that arrive at port 5 of a host.
 fn count(host: &Host) -> Rc<Cell<u32>> {
     let (socket, count) = (host.bind("0.0.0.0:5").unwrap(), Rc::new(Cell::new(0)));
     let counted = Rc::clone(&count);

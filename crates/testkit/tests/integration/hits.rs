@@ -1,4 +1,4 @@
-//! Packets that are hit: which ones, how, and what is left of it.
+//! Packets that the laws of a test hit: the packets chosen, the effect, and the records of the effect.
 
 use std::fs;
 use std::time::Duration;
@@ -8,12 +8,12 @@ use cohaptic_testkit::node::{Node, Nodes, Packet, Transmit};
 use cohaptic_testkit::wan::{DropCause, Fate};
 use cohaptic_testkit::{Bed, Happening, Instant, Record, Testbed, time};
 
-/// Milliseconds.
+/// Returns the instant `count` milliseconds after the beginning.
 const fn ms(count: u64) -> Instant {
     Instant::from_nanos(count * 1_000_000)
 }
 
-/// Sends the bytes 0, 1, 2 ... from `a` to `b`, one a millisecond, and gives what came, and when.
+/// Sends the bytes 0, 1, 2 ... from `a` to `b`, one per millisecond. Returns the bytes that have arrived, with the instants of arrival.
 async fn count_up(bed: Bed, until: u8) -> Vec<(Instant, u8)> {
     let (from, to) = (bed.host("a").bind("0.0.0.0:1").unwrap(), bed.host("b").bind("0.0.0.0:1").unwrap());
     for byte in 0..until {
@@ -90,7 +90,7 @@ fn a_function_sees_the_packet_and_begins_anew_with_each_run() {
     }
 }
 
-/// Drops with a chance.
+/// Law that drops a packet with this probability.
 #[derive(Clone)]
 struct Chance(f64);
 
@@ -115,7 +115,7 @@ fn a_law_of_ones_own_draws_by_packet_and_seed() {
     assert_eq!(second("drop packet 3"), without(second("drop packet 200")));
 }
 
-/// What the links did to all packets but some.
+/// Returns the fates of the packets from `a` to `b`, except of those with the sequence numbers `without`.
 fn fates_without(record: &Record, without: &[u64]) -> Vec<(u64, Fate)> {
     let log = record.fates("a", "b");
     log.records().iter().filter(|record| !without.contains(&record.sequence)).map(|record| (record.sequence, record.fate)).collect()
@@ -197,7 +197,7 @@ fn a_file_says_hits_and_a_value_does() {
     assert_eq!(came, expected);
 }
 
-/// Sends a byte to the next node whenever it is asked to, and keeps what comes.
+/// Node with packets to send, and with the bytes of all packets that have arrived.
 #[derive(Default)]
 struct Counter(Vec<Transmit>, Vec<u8>);
 
@@ -309,7 +309,7 @@ fn a_failing_set_of_packets_shrinks_to_the_least() {
     assert!(drawn.iter().any(|hits| hits.to_string().contains("behind 2 packets")));
 }
 
-/// The numbers of all hits of a line.
+/// Returns the numbers of all packets that a printed line names as hit.
 #[cfg(feature = "strategies")]
 fn numbers(line: &str) -> Vec<u64> {
     let lists = line.split("packet").skip(1).map(|list| list.trim_start_matches('s').split(';').next().unwrap());

@@ -1,4 +1,4 @@
-//! The same program on tokio's sockets, on the loopback interface of this machine, and on virtual ones: it sees the same.
+//! One program on tokio's sockets, over the loopback interface of this machine, and on virtual sockets: all its results are equal.
 
 use std::fmt::Debug;
 use std::io;
@@ -6,7 +6,7 @@ use std::io;
 use cohaptic_testkit::Testbed;
 use tokio::io::Interest;
 
-/// What a program saw, in words. Ports are free ones, so they are left out.
+/// Results that a program saw, in words. Ports are left out, because the system chooses free ports.
 #[derive(Default)]
 pub(crate) struct Log(pub(crate) Vec<String>);
 

@@ -1,4 +1,4 @@
-//! Misuse is told, with the way out.
+//! Misuse of the test kit ends with a message that says how to do it right.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
@@ -10,7 +10,7 @@ fn bed() -> Testbed {
     Testbed::new(["a", "b"]).links("delay 1ms").seed(1)
 }
 
-/// What it says when it gives up.
+/// Returns the message with which `act` panics.
 fn complaint(act: impl FnOnce()) -> String {
     let payload = catch_unwind(AssertUnwindSafe(act)).expect_err("it gives up");
     payload.downcast_ref::<String>().cloned().or_else(|| payload.downcast_ref::<&str>().map(|text| (*text).to_owned())).unwrap()

@@ -15,12 +15,13 @@ const fn ms(count: u64) -> Instant {
     Instant::from_nanos(count * 1_000_000)
 }
 
-/// Go-Back-N: sends numbers from 0, a window of them at a time, and all of the window again when nothing was acknowledged for a while.
+/// Sender of Go-Back-N: sends the numbers from 0 to `count`, at most `window` of them unacknowledged. Sends the whole window again after `wait` without an
+/// acknowledgement.
 struct GoBackN {
     count: u32,
     window: u32,
     wait: Duration,
-    /// The least that is not acknowledged.
+    /// Least number that is not acknowledged.
     base: u32,
     next: u32,
     deadline: Option<Instant>,
@@ -60,7 +61,7 @@ impl Node for GoBackN {
     }
 }
 
-/// Takes numbers in order, and says which is the next.
+/// Receiver that accepts numbers in order, and answers with the next number that it expects.
 #[derive(Default)]
 struct InOrder {
     got: Vec<u32>,
@@ -169,7 +170,7 @@ fn what_the_test_makes_a_node_send_leaves_at_once_and_links_change_when_they_are
     assert_eq!(run.now(), Instant::from_nanos(1_011_234_567));
 }
 
-/// Keeps the order of what happens to it, and wakes at instants.
+/// Node that wakes at given instants, and records wake-ups and packets in order.
 #[derive(Default)]
 struct Watch {
     wakes: VecDeque<Instant>,
@@ -269,7 +270,7 @@ fn two_runs_that_differ_are_told_apart() {
     assert!(text.starts_with("the nodes do not do the same twice: the runs part at 0.001 s, with event 1:\n  first : 0.001 s  note: here"), "{text}");
 }
 
-/// Does one wrong thing for ever.
+/// Node that does one thing without end at a single instant.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Wrong {
     Sends,
@@ -351,7 +352,7 @@ impl Node for Echo {
     }
 }
 
-/// Wakes every millisecond.
+/// Node that wakes every millisecond.
 struct Beat(Instant);
 
 impl Node for Beat {

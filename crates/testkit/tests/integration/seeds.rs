@@ -1,11 +1,11 @@
-//! Where a test bed is run makes its seed, and no thread does.
+//! Seed of a test bed: it follows from the function in which the test bed is run, and does not depend on threads.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::Command;
 
 use cohaptic_testkit::{SEED_VARIABLE, Testbed, node};
 
-/// Says that the child is to fail.
+/// Variable whose presence makes the test in the child process fail.
 const CHILD: &str = "COHAPTIC_TESTKIT_CHILD_SEEDS";
 
 #[test]
@@ -35,7 +35,7 @@ impl node::Node for Silent {
     }
 }
 
-/// The seeds and the names that a child prints.
+/// Returns the seeds and the names of tests that a child process prints.
 fn printed(threads: &str) -> Vec<(String, String)> {
     let output = Command::new(std::env::current_exe().unwrap())
         .args(["--exact", "seeds::fails_in_a_child_of_this_process_only", "--nocapture", "--test-threads", threads])

@@ -1,4 +1,4 @@
-//! Sockets do what tokio's do.
+//! UDP sockets of the test bed behave as those of tokio.
 
 use std::time::Duration;
 

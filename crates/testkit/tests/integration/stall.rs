@@ -1,4 +1,4 @@
-//! What spins is found by the wall clock. It ends the process, and so it does in a child of this one.
+//! Code that spins or blocks is found by the wall clock. The watch ends the process, so that each test stalls in a child process.
 
 use std::fs;
 use std::hint::black_box;
@@ -10,13 +10,13 @@ use cohaptic_testkit::hit::Verdict;
 use cohaptic_testkit::node::{Node, Nodes, Packet, Transmit};
 use cohaptic_testkit::{ARTEFACTS_VARIABLE, Bed, Instant, STALL_VARIABLE, Testbed, time};
 
-/// Says how the child is to stall.
+/// Variable that names the way in which the child process stalls.
 const CHILD: &str = "COHAPTIC_TESTKIT_CHILD_STALLS";
 
-// Ten processes start at once, on a machine that may be busy: less would be over before a program has come to where it stalls.
+// Ten processes start at once, on a machine that may be busy. A shorter limit could end before a program reaches the place where it stalls.
 const LIMIT: Duration = Duration::from_secs(1);
 
-/// As good as for ever, and yet the test ends if nobody finds it.
+/// Spins for much longer than the limit, but not for ever, so that the test ends even if nothing finds the stall.
 fn spin() {
     for turn in 0..20_000_000_000_u64 {
         black_box(turn);
@@ -29,7 +29,7 @@ async fn wake_again_and_again() {
     }
 }
 
-/// Loops when it gets something.
+/// Node that spins when a packet arrives.
 struct Loops(Option<Transmit>);
 
 impl Node for Loops {
@@ -42,7 +42,7 @@ impl Node for Loops {
     }
 }
 
-/// A program in which something stalls after 7 ms.
+/// Program that stalls after 7 ms in the given way.
 async fn stalls(bed: Bed, way: String) {
     time::sleep(Duration::from_millis(7)).await;
     let host = bed.host("b");

@@ -11,7 +11,7 @@ fn bed() -> Testbed {
     Testbed::new(["a", "b"]).links("delay 1ms")
 }
 
-/// Runs a program in all ways: what it gives is the same in all.
+/// Runs a program on both executors, with and without a second run for comparison. Returns its result, which must be the same in all ways.
 fn in_all_ways<T: PartialEq + std::fmt::Debug + 'static, F: Future<Output = T> + 'static>(program: impl Fn(Bed) -> F + Copy) -> T {
     let given = bed().run(program);
     assert_eq!(bed().run_twice(program), given);

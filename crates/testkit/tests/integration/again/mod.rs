@@ -1,4 +1,4 @@
-//! A failure prints a test that fails again, once, and little else.
+//! Output of a failing test: a test that fails again, printed once, and little else.
 
 mod programs;
 // As it was printed.
@@ -17,7 +17,7 @@ use cohaptic_testkit::{ARTEFACTS_VARIABLE, Instant, SEED_VARIABLE, Testbed};
 
 use programs::{five_letters, letters_in_order};
 
-/// Says which test of the child is to fail.
+/// Variable that names the test that fails in the child process.
 const CHILD: &str = "COHAPTIC_TESTKIT_CHILD_AGAIN";
 
 fn is_child(name: &str) -> bool {
@@ -73,7 +73,7 @@ proptest! {
     }
 }
 
-/// Sends five packets at the beginning.
+/// Node that sends five packets at the beginning.
 struct Beats(u8);
 
 impl Node for Beats {
@@ -87,7 +87,7 @@ impl Node for Beats {
     }
 }
 
-/// Output of a child of this process whose test of that name fails.
+/// Returns the output of a child process in which the test `test` fails.
 fn printed(test: &str, environment: &[(&str, &str)]) -> String {
     let output = Command::new(std::env::current_exe().unwrap())
         .args(["--exact", &format!("again::{test}"), "--nocapture"])
@@ -102,7 +102,7 @@ fn printed(test: &str, environment: &[(&str, &str)]) -> String {
     String::from_utf8(output.stderr).unwrap()
 }
 
-/// The test among what is printed.
+/// Returns the code of the test in an output.
 fn test_in(printed: &str) -> &str {
     let begin = printed.find("#[test]\n").unwrap_or_else(|| panic!("no test in\n{printed}"));
     let end = printed[begin..].find("\n}\n").unwrap() + begin + 3;
@@ -126,7 +126,7 @@ fn the_printed_tests_are_saved_in_saved_rs_and_fail_there() {
     );
 }
 
-/// The test bed with the calls that a printed test makes.
+/// Returns the test bed after the calls that a printed test makes.
 fn with_calls(mut bed: Testbed, test: &str) -> Testbed {
     for line in test.lines().map(str::trim) {
         let Some((method, arguments)) = line.strip_prefix('.').and_then(|line| line.split_once('(')) else { continue };
@@ -142,7 +142,7 @@ fn with_calls(mut bed: Testbed, test: &str) -> Testbed {
     bed
 }
 
-/// Test beds with other hosts and links besides, in other orders.
+/// Returns test beds with further hosts and links, and with the hosts and links in other orders.
 fn others() -> Vec<Testbed> {
     let more = |hosts: &[&str]| Testbed::new(hosts.to_vec()).links("delay 3ms 1ms loss 10%");
     let exact = |bed: Testbed| bed.link("client", "server", "").link("server", "client", "");

@@ -1,10 +1,10 @@
-//! Programs with bugs: they trust the network.
+//! Programs with the fault that they rely on the network.
 
 use std::time::Duration;
 
 use cohaptic_testkit::{Bed, time};
 
-/// Number of letters that arrive, of five that are sent once, 10 ms apart.
+/// Returns the number of letters that arrive. Five letters are sent, each once, 10 ms apart.
 pub(super) async fn count_letters(bed: Bed) -> u8 {
     arrived(&bed).await.len().try_into().unwrap()
 }
@@ -28,7 +28,7 @@ pub(super) async fn five_letters(bed: Bed) {
     assert_eq!(arrived.len(), 5, "letters are missing");
 }
 
-/// Expects that letters arrive in their order.
+/// Expects that letters arrive in the order of sending.
 pub(super) async fn letters_in_order(bed: Bed) {
     let arrived = arrived(&bed).await;
     assert!(arrived.is_sorted(), "letters are out of order");

@@ -6,7 +6,7 @@ use cohaptic_testkit::{Bed, Instant, Testbed, time};
 
 use super::programs::echo;
 
-/// Asks every 100 ms until there is an answer, and gives when it was there.
+/// Asks every 100 ms until there is an answer. Returns the instant of the answer.
 async fn ask_until_answered(bed: Bed) -> Instant {
     bed.host("server").spawn(echo());
     let phone = bed.host("phone").bind("0.0.0.0:0").unwrap();

@@ -1,4 +1,4 @@
-//! What comes when the test kit is used wrongly stands in messages.txt.
+//! Messages about wrong use of the test kit, each of which stands in messages.txt.
 
 use std::net::Ipv4Addr;
 use std::time::Duration;
@@ -18,7 +18,7 @@ fn pair() -> Testbed {
     Testbed::new(["client", "server"])
 }
 
-/// Fails unless the file has how a message begins, up to where it names a place in a file.
+/// Fails unless the file has the beginning of a message, up to `rest`, where the message names a place in a file.
 fn assert_begin_shown(message: &str, rest: &str) {
     let (begin, _) = message.split_once(rest).unwrap_or_else(|| panic!("{message}"));
     assert_shown(begin);

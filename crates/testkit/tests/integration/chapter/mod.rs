@@ -1,4 +1,4 @@
-//! docs/testing.md says what is true: its blocks are tests, and what it shows comes out.
+//! Checks of docs/testing.md: its blocks of code are tests, and the outputs that it shows are the outputs of these tests.
 
 mod files;
 mod misuse;
@@ -9,7 +9,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 const CHAPTER: &str = include_str!("../../../../../docs/testing.md");
 
-/// The code in which the blocks must stand as they are. Blocks that use axum are among the tests of programs of others, a workspace of its own: they are compared
+/// Files of code in which the blocks must stand word for word. Blocks that use axum are among the tests of programs of others, a workspace of its own: they are compared
 /// here, and compiled and run there. Blocks that need the feature `scenes` are among the tests across crates, which always have it.
 const CODE: [&str; 6] = [
     include_str!("programs.rs"),
@@ -20,10 +20,10 @@ const CODE: [&str; 6] = [
     include_str!("../../../../../tests/testkit/chapter.rs"),
 ];
 
-/// The test that the page begins with.
+/// Test with which the page begins.
 const FIRST_TEST: &str = include_str!("../../../../../docs/examples/first-test/src/lib.rs");
 
-/// The blocks of a language.
+/// Returns the blocks of code in a language.
 fn blocks(language: &str) -> Vec<&'static str> {
     let fence = format!("```{language}\n");
     CHAPTER.split(&fence).skip(1).map(|rest| rest.split("```").next().unwrap()).collect()
@@ -54,21 +54,21 @@ fn the_page_begins_with_a_service_and_its_test_in_ten_lines() {
     assert_eq!(blocks[..2].iter().flat_map(|block| block.lines()).filter(is_code).count(), 10);
 }
 
-/// Those that the blocks read.
+/// The files that the blocks of code read are shown on the page.
 #[test]
 fn the_files_that_are_shown_are_there() {
     assert!(blocks("text").contains(&include_str!("../../home.links")));
     assert_eq!(blocks("toml"), [include_str!("../../../../../tests/testkit/room.toml")]);
 }
 
-/// What a program panics with.
+/// Returns the message with which a program panics.
 fn message_of(program: impl FnOnce()) -> String {
     let panic = catch_unwind(AssertUnwindSafe(program)).unwrap_err();
     let text = panic.downcast_ref::<String>().cloned();
     text.or_else(|| panic.downcast_ref::<&str>().map(|text| (*text).to_owned())).unwrap()
 }
 
-/// Fails unless the chapter shows a text.
+/// Fails unless docs/testing.md shows the text.
 fn assert_shown(text: &str) {
     assert!(CHAPTER.contains(text), "docs/testing.md does not show:\n{text}");
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use cohaptic_testkit::Instant;
 use cohaptic_testkit::node::{Node, Nodes, Packet, Transmit};
 
-/// Sends back what it gets.
+/// Server that sends back each packet.
 #[derive(Default)]
 struct Echo(Vec<Transmit>);
 
@@ -18,7 +18,7 @@ impl Node for Echo {
     }
 }
 
-/// Asks every 100 ms until there is an answer.
+/// Client that asks every 100 ms until there is an answer.
 #[derive(Default)]
 struct Client {
     next: Instant,

@@ -164,7 +164,7 @@ fn what_happened_is_kept() {
     assert!(kept.join("packets-client-to-server.pcapng").exists());
 }
 
-/// What the program that differs panics with, in a test of that name.
+/// Returns the panic message of a program whose two runs differ, run in a thread with the name of a test.
 fn difference(test: &str) -> String {
     std::thread::Builder::new().name(test.into()).spawn(|| message_of(differs)).unwrap().join().unwrap()
 }
@@ -179,7 +179,7 @@ fn the_seed_is_told_with_the_name_of_the_test() {
     super::assert_shown(difference("lossy").lines().last().unwrap());
 }
 
-/// When the client, which asks every 100 ms, has its answer.
+/// Returns the time after which a client that asks every 100 ms has its answer, in milliseconds.
 fn answered(bed: Testbed) -> u64 {
     bed.links("delay 10ms").run(|bed| async move {
         bed.host("server").spawn(echo());

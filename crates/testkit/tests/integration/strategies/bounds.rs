@@ -1,4 +1,4 @@
-//! Bounds are obeyed, and those that make no sense are refused.
+//! Bounds of random links: drawn links obey them, and contradictory bounds are refused.
 
 use std::ops::RangeInclusive;
 use std::time::Duration;
@@ -21,7 +21,7 @@ fn percents() -> impl Strategy<Value = RangeInclusive<f64>> {
     (1..500_u32, 0..500_u32).prop_map(|(low, more)| f64::from(low) / 10.0..=f64::from(low + more) / 10.0)
 }
 
-/// A jitter that a delay can have is among them: the longest delay is at least twice the least jitter.
+/// Returns random ranges in which some delay allows some jitter: the longest delay is at least twice the least jitter.
 fn ranges() -> impl Strategy<Value = Ranges> {
     let times = (times(50_000), times(1_000), times(10_000));
     let percents = (percents(), percents(), percents(), percents());

@@ -1,4 +1,4 @@
-//! What is drawn: every stage in every form, the same from the same seed, and links that keep account of their packets.
+//! Drawn links: every stage occurs in every form, equal seeds give equal links, and the links account for every packet.
 
 use cohaptic_testkit::proptest::prelude::*;
 use cohaptic_testkit::strategies::{ImpairedLink, ImpairedNetwork, Stage, any_link, any_network};

@@ -1,4 +1,4 @@
-//! Links and networks at random: their text, what is drawn, and what they shrink to.
+//! Random links and networks: their text, the drawn values, and the results of shrinking.
 
 mod bounds;
 mod drawn;
@@ -13,7 +13,7 @@ use std::cell::Cell;
 use cohaptic_testkit::proptest::strategy::{Strategy, ValueTree};
 use cohaptic_testkit::proptest::test_runner::{Config, RngAlgorithm, TestCaseError, TestError, TestRng, TestRunner};
 
-/// A runner that draws the same every time.
+/// Returns a runner whose draws depend on the seed alone.
 pub(crate) fn runner(seed: u64, cases: u32) -> TestRunner {
     let mut bytes = [0; 32];
     bytes[..8].copy_from_slice(&seed.to_le_bytes());
@@ -21,21 +21,21 @@ pub(crate) fn runner(seed: u64, cases: u32) -> TestRunner {
     TestRunner::new_with_rng(config, TestRng::from_seed(RngAlgorithm::ChaCha, &bytes))
 }
 
-/// The first values that a strategy draws.
+/// Returns the first `count` values that a strategy draws.
 pub(crate) fn sample<S: Strategy>(strategy: &S, seed: u64, count: u32) -> Vec<S::Value> {
     let mut runner = runner(seed, count);
     (0..count).map(|_| strategy.new_tree(&mut runner).unwrap().current()).collect()
 }
 
-/// The first value for which `fails` says so, and what the runner shrinks it to.
+/// First failing value of a property test, and the value to which the runner shrinks it.
 pub(crate) struct Shrunk<V> {
     pub(crate) first: V,
     pub(crate) least: V,
-    /// How often it was asked while shrinking.
+    /// Number of calls of the test while shrinking.
     pub(crate) asked: u32,
 }
 
-/// Runs a property test that fails where `fails` says so; `None` if nothing that is drawn does.
+/// Runs a property test that fails for the values for which `fails` is true. Returns `None` if no drawn value fails.
 pub(crate) fn shrink<S: Strategy>(strategy: &S, seed: u64, fails: impl Fn(&S::Value) -> bool) -> Option<Shrunk<S::Value>>
 where
     S::Value: Clone,

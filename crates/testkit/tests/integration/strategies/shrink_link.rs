@@ -1,4 +1,4 @@
-//! Links shrink to the least impaired one that still fails, in few steps.
+//! Links shrink in few steps to the least impaired link that still fails.
 
 use std::time::Duration;
 
@@ -21,7 +21,7 @@ fn jitter(netem: &Netem) -> Duration {
     netem.delay.as_ref().and_then(|delay| delay.jitter.as_ref()).map_or(Duration::ZERO, |jitter| jitter.time)
 }
 
-/// The long-run loss \[%\].
+/// Returns the long-run loss of a link \[%\].
 fn loss(link: &ImpairedLink) -> f64 {
     link.config().loss.mean().unwrap() * 100.0
 }
@@ -30,7 +30,7 @@ fn percent(chance: Option<cohaptic_wan::netem::ChanceSpec>) -> f64 {
     chance.map_or(0.0, |chance| chance.percent.get())
 }
 
-/// What any link comes down to from a hundred beginnings if the test fails where `fails` says so, and how often it is asked at most.
+/// Checks that every link for which `fails` is true, of a hundred seeds, shrinks to the link `words`, in at most `most` calls of `fails`.
 fn comes_down_to(words: &str, most: u32, fails: impl Fn(&ImpairedLink) -> bool) {
     let mut found = 0;
     for seed in 0..100 {

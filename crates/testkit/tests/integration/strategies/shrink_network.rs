@@ -1,4 +1,4 @@
-//! Networks shrink to few links, and these to little.
+//! Networks shrink to few links with small impairments.
 
 use std::time::Duration;
 
@@ -17,7 +17,7 @@ fn link(network: &ImpairedNetwork, from: u16, to: u16) -> &ImpairedLink {
     network.link(NodeId(from), NodeId(to)).unwrap()
 }
 
-/// What any network of five comes down to from fifty beginnings, and how often the test is asked at most.
+/// Checks that every failing network of five hosts, of fifty seeds, shrinks to the network `words`, in at most `most` runs of the test.
 fn comes_down_to(words: &str, most: u32, fails: impl Fn(&ImpairedNetwork) -> bool) {
     let mut found = 0;
     for seed in 0..50 {
@@ -81,7 +81,7 @@ fn required_stages_stay_in_every_link() {
     }
 }
 
-/// What a program cannot stand on a link, and the least link that has it.
+/// Impairment of a link with which a program fails: at least this delay, jitter, loss, share of copies or share of reordered packets, or at most this rate.
 #[derive(Clone, Copy, Debug)]
 enum Weakness {
     Delay(u64),

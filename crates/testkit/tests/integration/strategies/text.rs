@@ -1,4 +1,4 @@
-//! What is printed reads back, and what is no link or network is refused with the place to blame.
+//! Text of links and networks: printed links read back, and any other text is refused with the place of the fault.
 
 use cohaptic_testkit::proptest::prelude::*;
 use cohaptic_testkit::strategies::{ImpairedLink, ImpairedNetwork, Stage, any_link, any_network};

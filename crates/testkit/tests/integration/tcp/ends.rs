@@ -1,4 +1,4 @@
-//! How connections end.
+//! Ends of connections.
 
 use std::io::ErrorKind;
 use std::time::Duration;
@@ -9,7 +9,7 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 
 use crate::tcp::{R, beds, millis, octets, read_all, send_all};
 
-/// A connection between the hosts, after half a second: the client's end, the server's, and the listener.
+/// Connects the hosts, and waits until 500 ms. Returns the client's stream, the server's stream, and the listener.
 pub(super) async fn pair(bed: &Bed) -> (TcpStream, TcpStream, TcpListener) {
     let listener = bed.host("b").listen("0.0.0.0:80").unwrap();
     let client = bed.host("a").connect("b:80").await.unwrap();

@@ -1,4 +1,4 @@
-//! Hosts that crash, come back, are killed and move, with connections.
+//! Connections of hosts that crash, come back, are killed and move.
 
 use std::io::ErrorKind;
 use std::time::Duration;
@@ -65,7 +65,7 @@ fn a_host_that_is_back_resets_old_connections() {
     }
 }
 
-/// Sends back what it gets.
+/// Echo server, which sends back all octets.
 async fn echo() {
     let listener = TcpListener::bind("0.0.0.0:7").await.unwrap();
     loop {

@@ -1,4 +1,4 @@
-//! How connections come to be, and how not.
+//! Handshakes of connections, successful and failed.
 
 use std::io::ErrorKind;
 use std::time::Duration;
@@ -30,7 +30,7 @@ fn connect_takes_a_round_trip_and_accept_half_of_one_more() {
     }
 }
 
-/// What became of connecting, and when.
+/// Connects from host `a`. Returns the outcome and its instant.
 async fn connecting(bed: &Bed, to: &str) -> (Result<(), ErrorKind>, Instant) {
     let outcome = bed.host("a").connect(to).await;
     (outcome.map(drop).map_err(|error| error.kind()), bed.now())
@@ -61,7 +61,7 @@ fn a_box_that_drops_syns_with_ecn_costs_a_second_and_the_marks() {
     }
 }
 
-/// When SYNs left, by the trace.
+/// Returns the instants at which SYNs left, from the trace \[s\].
 fn syns(bed: &Bed) -> Vec<u64> {
     let trace = bed.trace();
     let is_syn = |event: &&cohaptic_testkit::TraceEvent| trace.words(event).to_string().contains(" is SYN 49152 > 80");

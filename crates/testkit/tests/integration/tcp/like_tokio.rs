@@ -1,4 +1,4 @@
-//! The same program on tokio's streams, on the loopback interface of this machine, and on virtual ones: it sees the same.
+//! One program on tokio's streams, over the loopback interface of this machine, and on virtual streams: all its results are equal.
 
 use cohaptic_testkit::Testbed;
 

@@ -1,4 +1,4 @@
-//! What cannot be is refused, in the words of UDP's.
+//! Refused calls of TCP, whose errors are those of UDP for the same fault.
 
 use std::io::{self, ErrorKind};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -9,7 +9,7 @@ use cohaptic_testkit::{Bed, TcpListener, TcpSocket, TcpStream, Testbed, time};
 
 use crate::tcp::beds;
 
-/// An error, in words.
+/// Returns the kind and the message of the error of `outcome`.
 fn said<T>(outcome: io::Result<T>) -> String {
     let error = outcome.map(drop).unwrap_err();
     format!("{:?}: {error}", error.kind())

@@ -14,13 +14,13 @@ use std::time::Duration;
 use cohaptic_testkit::{Instant, Testbed};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 
-/// The same hosts on both runtimes. A round trip takes 100 ms.
+/// Returns test beds with the same hosts on both runtimes. A round trip takes 100 ms.
 fn beds() -> [Testbed; 2] {
     let bed = Testbed::new(["a", "b"]).links("delay 50ms").seed(1);
     [bed.clone(), bed.on_tokio()]
 }
 
-/// For programs that wait for longer than a test bed lets them, such as for keep-alive.
+/// Time limit for programs that wait for longer than the default limit of a test bed, such as for keep-alive.
 const DAY: Duration = Duration::from_secs(86_400);
 
 const R: Duration = Duration::from_millis(100);
@@ -29,7 +29,7 @@ const fn millis(milliseconds: u64) -> Instant {
     Instant::from_nanos(milliseconds * 1_000_000)
 }
 
-/// The octet at a place of any stream, so that what was lost, doubled or invented is seen.
+/// Returns the octet at a place of every stream. Neighbouring places differ, so that a lost, doubled or invented octet is noticed.
 fn octet(at: usize) -> u8 {
     ((at * 31 + at / 251) % 251) as u8
 }

@@ -1,4 +1,4 @@
-//! What is recorded of TCP, and what is told of programs that wait for ever.
+//! Records of TCP, and messages about programs that wait for ever.
 
 use std::io::ErrorKind;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -55,7 +55,7 @@ fn refusals_count_from_the_syns_of_what_they_refuse() {
     );
 }
 
-/// The frames of a capture: enhanced packet blocks (type 6), whose data begins after 28 octets.
+/// Returns the frames of a capture: enhanced packet blocks (type 6), whose data begins after 28 octets.
 #[cfg(feature = "pcapng")]
 fn frames(mut capture: &[u8]) -> Vec<&[u8]> {
     let mut frames = Vec::new();

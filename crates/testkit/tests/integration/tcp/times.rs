@@ -1,4 +1,4 @@
-//! How long transfers take.
+//! Durations of transfers.
 
 use cohaptic_testkit::{Testbed, time};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};

@@ -1,4 +1,4 @@
-//! What other implementations have fallen into, as far as it is seen from programs.
+//! Situations in which other implementations have failed, as far as a program notices.
 
 use std::time::Duration;
 
@@ -11,7 +11,7 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use crate::tcp::ends::pair;
 use crate::tcp::{R, beds, millis, octet, octets, read_all, send_all};
 
-/// Both ways at once; gives when all was read.
+/// Sends `count` octets in both directions at once. Returns the instant at which both hosts have read all octets.
 async fn both_ways(bed: Bed, count: usize) -> cohaptic_testkit::Instant {
     let (client, server, _listener) = pair(&bed).await;
     let ends = [("a", client), ("b", server)].map(|(host, stream)| {
