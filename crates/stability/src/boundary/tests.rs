@@ -1,4 +1,4 @@
-//! Lines whose crossings are known in closed form.
+//! Boundaries of radii whose crossings of 1 are known in closed form.
 
 use super::*;
 use crate::Radius;
@@ -7,7 +7,7 @@ fn range() -> KeyRange {
     KeyRange { key: "key".to_owned(), low: 0.0, high: 10.0, unit: String::new() }
 }
 
-/// Returns the boundary of a line with that logarithm of the radius, whose error is that of rounding.
+/// Returns the boundary along a key whose value gives the radius exp(`level(value)`), known up to rounding.
 #[track_caller]
 fn along(level: impl Fn(f64) -> f64 + Sync) -> Boundary {
     let radius = |value: f64| Ok::<_, ()>(Cell::certain(Radius { value: libm::exp(level(value)), error: 1e-14 }));
@@ -53,7 +53,7 @@ fn islands_between_the_samples_are_found() {
     }
 }
 
-/// Where two branches cross the larger has a corner: valleys are sharp.
+/// The larger of two branches has a corner where they cross, so that a valley is sharp.
 #[test]
 fn islands_in_sharp_valleys_are_found() {
     for half in [5e-3, 5e-6] {
@@ -93,7 +93,8 @@ fn a_tangency_is_marginal_and_no_crossing() {
     assert!(boundary.marginal.len() == 1 && (boundary.marginal[0].low - CENTRE).abs() < 1e-6, "{:?}", boundary.marginal);
 }
 
-/// An island so narrow that the radius hardly leaves 1 on it: where it cannot be told from 1 is said, and no more crossings than there are.
+/// On a very narrow island the radius is hardly below 1. The stretches on which the radius cannot be told from 1 are reported, and no crossings beyond the real
+/// ones.
 #[test]
 fn an_island_within_the_bound_of_the_error_has_marginal_shores() {
     let half = 5e-7;
@@ -181,7 +182,7 @@ fn blocks_leave_a_search_little_to_do() {
     assert_eq!(Boundary::find(&family, options, &known, |_| (), || false).unwrap(), whole);
 }
 
-/// Where nothing is known of the radius it has no bend, and a look from nearer tells no more.
+/// A stretch of unknown radii shows no bend, and further values would tell nothing.
 #[test]
 fn a_stretch_in_which_nothing_is_known_is_not_halved_to_the_tolerance() {
     let known = |value: f64| Radius { value: libm::exp(value - 9.0), error: 1e-14 };

@@ -9,7 +9,7 @@ fn scalar(now: f64, terms: &[(Kernel, f64)]) -> DelayedLoop {
     DelayedLoop::new(one(now), terms.iter().map(|(kernel, entry)| (*kernel, one(*entry))).collect()).unwrap()
 }
 
-/// Returns the explicit matrix of a loop, whose states are the newest x and the older ones that the kernels reach.
+/// Returns the explicit matrix of a loop. Its states are the newest x and all older x that the kernels use.
 fn companion(looped: &DelayedLoop) -> Matrix {
     let size = looped.now.rows();
     let depth = looped.terms.iter().map(|term| term.kernel.steps()).max().unwrap_or(0) as usize;

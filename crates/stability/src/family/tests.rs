@@ -1,4 +1,4 @@
-//! Families against scenes that are read anew and analysed as they stand.
+//! Families of scenes, against the analysis of each scene read anew.
 
 use proptest::prelude::*;
 
@@ -20,7 +20,7 @@ fn family(overrides: &[&str], keys: &[&str]) -> Family {
     try_family(overrides, keys).unwrap()
 }
 
-/// Both radii of a family against the analysis of the scene read anew.
+/// Checks both radii of a family against the analysis of the scene read anew.
 #[track_caller]
 fn agrees(family: &Family, values: &[f64], scratch: &mut FamilyScratch) {
     let expected = analyse(&family.scene(values).unwrap(), Method::Reduced).unwrap().radius;
@@ -44,7 +44,7 @@ fn agrees_everywhere(family: &Family, learned: &[bool]) {
     }
 }
 
-/// What only the general path follows is pushed through it for each of the values.
+/// Strategies that only the general path follows are analysed by that path for each value.
 #[test]
 fn waves_and_servers_are_families_too() {
     let mut scratch = FamilyScratch::default();
@@ -191,7 +191,7 @@ fn what_makes_no_family_is_refused_and_says_why() {
     assert!(matches!(family.radius(&[], &mut scratch), Err(FamilyError::Values { given: 0, keys: 1 })));
 }
 
-/// What a scene of the family has by the second moment itself.
+/// Checks the radius of a family against the second moment of the scene read anew.
 #[track_caller]
 fn agrees_in_the_mean_square(family: &Family, values: &[f64], scratch: &mut FamilyScratch) {
     let scene = family.scene(values).unwrap();

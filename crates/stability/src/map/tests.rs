@@ -64,7 +64,7 @@ fn known_rows_are_not_computed_again() {
     assert!(matches!(odd, Err(MapError::Known { row: 9, .. })));
 }
 
-/// Returns a map with that logarithm of the radius.
+/// Returns a map of the radius exp(`level(x, y)`).
 fn made_up(columns: usize, rows: usize, level: impl Fn(f64, f64) -> f64) -> Map {
     let range = |text| KeyRange::parse(text).unwrap();
     let (x, y) = (nodes(&range("x=-2..2"), columns), nodes(&range("y=-1..1"), rows));

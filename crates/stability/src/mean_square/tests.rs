@@ -139,7 +139,7 @@ impl Explicit {
         4 * self.peers + 2 * self.frames * self.peers + 2 * place
     }
 
-    /// Returns the state after a frame in which exactly those links (by receiver and sender) lose.
+    /// Returns the state after a frame in which exactly the links lose for which `lost(receiver, sender)` is true.
     fn lead(&self, mut z: Vec<f64>, lost: &dyn Fn(usize, usize) -> bool) -> Vec<f64> {
         let step = Duration::from_millis(1);
         let mass = 0.45 / real(self.peers);
@@ -239,7 +239,7 @@ fn loss_power(base: f64, exponent: u32) -> f64 {
     base.powi(i32::try_from(exponent).unwrap())
 }
 
-/// Where states of four do the same, they are one: the radius is that of the chain of two with p = p13 and r = p31 + p32.
+/// States of a four-state chain that act alike count as one state: the radius equals the radius of the two-state chain with p = p13 and r = p31 + p32.
 #[test]
 fn four_states_that_do_the_work_of_two_have_their_radius() {
     let two = found(&["scene.count=2", "link.loss={ gilbert-elliott = { p = 0.05, r = 0.4 } }"]);
@@ -381,7 +381,7 @@ fn loss_may_stabilise_and_may_destabilise() {
     assert!(stabilised && destabilised, "{stabilised} {destabilised}");
 }
 
-/// Both the common motion and the differences tend to limits as N grows, with distances of order 1/N, at one cost and with the same bounds.
+/// The radii of the common motion and of the differences tend to limits as N grows, with distances of order 1/N. Cost and bounds do not depend on N.
 #[test]
 #[ignore = ".ci/nightly runs it: it takes long"]
 fn a_hundred_thousand_peers_cost_what_ten_do() {

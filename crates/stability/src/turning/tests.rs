@@ -141,8 +141,8 @@ fn the_equations_are_the_linear_part_of_real_peers() {
     }
 }
 
-/// Forces and torques that wait are those that peers have computed where they were: there they are moved by every way at once, and what a frame makes of it at
-/// rest is compared.
+/// Peers with a delayed force hold forces and torques from the tick before. Such a state is displaced along every coordinate at once, and the state after a
+/// frame at rest is compared with the equations.
 #[test]
 fn forces_that_wait_are_those_of_real_peers() {
     let scene = scene(&["peers.a.compute-delay=1", "peers.b.compute-delay=1", "peers.c.compute-delay=1"]);
@@ -188,7 +188,8 @@ fn nothing_resists_what_leaves_the_arms_at_rest() {
     }
 }
 
-/// Hands that pull against each other, by 6 and 8 N at three grasp points, and twist devices that turn; an arm holds against all of them.
+/// Loads at rest: hands that pull against each other with 6 and 8 N at three grasp points and twist devices with an attitude, and an arm that holds against all
+/// hands.
 const LOADS: [&[&str]; 3] = [
     &["peers.a.hand={ force = [3, 1, -4] }", "peers.b.hand={ force = [-5, 2, 1] }", "peers.c.hand={ force = [2, -3, 3] }"],
     &[
@@ -257,8 +258,8 @@ fn without_rest_there_is_no_verdict() {
     }
 }
 
-/// A free body that turns about the axis of its middle moment departs as e^(λt), λ = ω·√((J₂ − J₁)(J₃ − J₂)/(J₁J₃)) (Euler 1758), and about the others it does
-/// not. Samples are of the same instant here, so that copies that are together stay so.
+/// A free body that spins about the axis of its middle moment of inertia departs from the spin as e^(λt), λ = ω·√((J₂ − J₁)(J₃ − J₂)/(J₁J₃)) (Euler 1758). A
+/// spin about another principal axis does not depart. Links have no delay here, so that copies with equal states stay equal.
 #[test]
 fn about_the_middle_axis_a_spin_departs_as_that_of_a_free_body() {
     let [j1, j2, j3] = [1.2e-4, 2.0e-4, 2.6e-4_f64];
@@ -282,8 +283,7 @@ const SPINNING: [&str; 4] = [
     "object.rotational-damping=[1e-3, 2e-3, 1.5e-3]",
 ];
 
-/// Real peers that begin with the steady spin keep it over a hundred frames, and at the state of a frame all directions that are taken out are left as they
-/// are.
+/// Simulated peers that begin with the steady spin keep it over a hundred frames. The directions that the analysis removes are unchanged by a frame.
 #[test]
 fn a_steady_spin_is_that_of_real_peers() {
     let scene = scene(&SPINNING);

@@ -97,7 +97,8 @@ fn a_peer_who_touches_nothing_moves_its_bare_device() {
     }
 }
 
-/// An arm ties the device to ground: at low frequency it is a spring, that of the arm for a device alone, those of both arms for two who hold the object.
+/// An arm ties the device to ground. At low frequency a device alone feels like the spring of its arm, and the object held by two peers like the springs of
+/// both arms.
 #[test]
 fn arms_are_felt_as_springs() {
     let arm = "peer.hand={ arm = { mass = 0.3, damping = 10.0, stiffness = 100.0 } }";
@@ -111,7 +112,7 @@ fn arms_are_felt_as_springs() {
     assert!((both / expected - 1.0).abs() < 1e-3, "{both}, {expected}");
 }
 
-/// Equal peers in one class, against the same peers so little apart that each is a class of its own.
+/// Equal peers in one class, against peers whose masses differ by a rounding, so that each peer is a class of its own.
 #[test]
 fn classes_of_equal_peers_are_exact() {
     for (set, touching) in [("link.delay=8ms", "none"), ("link.delay=27.3ms", "grasp"), ("peer.compute-delay=1", "grasp"), ("peer.phase=3", "none")] {

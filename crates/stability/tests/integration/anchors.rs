@@ -1,4 +1,4 @@
-//! Numbers that are known from elsewhere.
+//! Radii that are known from the paper, from closed forms or from other programs.
 
 use cohaptic_scene::Scene;
 use cohaptic_stability::{Method, analyse};

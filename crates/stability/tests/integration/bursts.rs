@@ -4,7 +4,7 @@ use cohaptic_scene::Scene;
 use cohaptic_stability::{MeanSquareMethod, mean_square};
 use serde_json::Value;
 
-/// The reference knows neither hazards nor places, and what it computes for losses without memory needs no chain here.
+/// The reference uses neither the hazards nor the places of this crate. For its entries without memory, this crate needs no chain.
 #[test]
 fn radii_are_those_of_samples_whose_fates_are_drawn_one_by_one() {
     let entries: Vec<Value> = serde_json::from_str(include_str!("../reference/bursts.json")).unwrap();

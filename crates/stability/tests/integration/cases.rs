@@ -3,18 +3,18 @@
 use cohaptic_scene::Scene;
 use serde_json::Value;
 
-/// A scene and its truth.
+/// Scene with its reference values.
 pub(crate) struct Case {
     pub(crate) name: String,
     pub(crate) text: String,
     pub(crate) scene: Scene,
     pub(crate) radius: f64,
     pub(crate) rigid_modes: u64,
-    /// The place of a peer, and what its hand feels: a spring, a damper and a mass.
+    /// Index of a peer, and the spring, damper and mass that its hand feels.
     pub(crate) felt: Option<(usize, [f64; 3])>,
 }
 
-/// Returns all of them.
+/// Returns all cases of the reference file.
 pub(crate) fn cases() -> Vec<Case> {
     let text = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../stability/tests/reference/random.json")).unwrap();
     let entries: Vec<Value> = serde_json::from_str(&text).unwrap();

@@ -11,7 +11,7 @@ fn read(name: &str, changes: &[&str]) -> Scene {
     Scene::read(&file, &changes).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// The radii computed apart from this program, to the digits that they were given with.
+/// The radii equal those of an independent computation, to all digits given.
 #[test]
 fn a_server_and_its_clients_have_the_radii_computed_elsewhere() {
     let object = "coordination.client-server.returns=object";
@@ -27,7 +27,7 @@ fn a_server_and_its_clients_have_the_radii_computed_elsewhere() {
     }
 }
 
-/// A client that lets go has a device that nothing depends on, and leaves the rest the eigenvalues that it has without it.
+/// Nothing depends on the device of a client that lets go. The rest of the scene has the eigenvalues of a scene without this client.
 #[test]
 fn a_client_that_lets_go_changes_nothing() {
     for returns in ["force", "object"] {
@@ -43,7 +43,7 @@ fn a_client_that_lets_go_changes_nothing() {
     }
 }
 
-/// What the server does not bear, average-position does.
+/// Average-position is stable with a coupling with which client-server is not.
 #[test]
 fn average_position_bears_the_coupling_that_a_server_does_not() {
     let scene = read("counterexamples/client-server-coupling.toml", &["coordination.strategy=average-position"]);

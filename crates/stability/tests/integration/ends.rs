@@ -1,15 +1,15 @@
-//! A watch that ends the work. The tests of `cohaptic-proofs` use it too.
+//! Watch that ends the work. The tests of `cohaptic-proofs` use this file too.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use cohaptic_stability::Watch;
 
-/// Counts how often it is asked, and ends the work at the n-th time.
+/// Watch that counts its questions, and ends the work at question number `at`, counted from 1.
 pub(crate) struct Ends {
     at: usize,
     asked: AtomicUsize,
-    /// The operations that are expected, and those that are done.
+    /// Number of expected operations, and number of operations done.
     pub(crate) operations: Mutex<(f64, f64)>,
 }
 
@@ -37,8 +37,8 @@ impl Watch for Ends {
     }
 }
 
-/// Each analysis is gone through once to count how often it asks; ended at the first question, in the middle and at the last, it says so and asks no more
-/// than a few times after that (each of its threads may be at a question of its own).
+/// Checks that an analysis ends wherever its watch ends the work. A first run counts the questions. Further runs end at the first, the middle and the last
+/// question: each must report the end, and ask at most a few times afterwards, because each of its threads may be at a question.
 #[track_caller]
 pub(crate) fn ends_wherever_it_is_asked(least: usize, run: impl Fn(&Ends) -> bool) {
     let whole = Ends::at(usize::MAX);

@@ -10,7 +10,7 @@ use crate::anchors::scene;
 
 /// Average position over neighbours: a strategy of a user's own.
 pub(crate) struct Neighbours {
-    /// Weights of the others, the peer itself left out; they add up to 1.
+    /// Weights of the other peers, without the peer itself. Their sum is 1.
     weights: Vec<f64>,
     gains: Gains,
 }
@@ -85,7 +85,7 @@ fn a_weighted_graph_is_what_the_general_path_says() {
     agree(&["scene.count=5"], &Graph::Weighted(weights.clone()), weights);
 }
 
-/// The same weights in any unit, whose products are no numbers, are the same graph: as exactly as powers of two are.
+/// A graph depends only on the ratios of its weights. Weights multiplied by a power of two give the same radius to the bit, even where products overflow.
 #[test]
 fn weights_of_any_size_are_those_of_size_one() {
     let weights = |unit: f64| Matrix::from_fn(4, 4, |row, column| if row == column { 0.0 } else { unit * (1 + row * column) as f64 });
@@ -95,7 +95,7 @@ fn weights_of_any_size_are_those_of_size_one() {
     }
 }
 
-/// Two pairs that do not hear each other can each be displaced as a whole.
+/// Each of two pairs without links between the pairs can be displaced as a whole, which gives two rigid-body modes.
 #[test]
 fn parts_that_are_not_connected_are_displaced_one_by_one() {
     let pairs = Matrix::from_fn(4, 4, |row, column| if row != column && row / 2 == column / 2 { 1.0 } else { 0.0 });
@@ -127,7 +127,7 @@ fn what_cannot_be_on_a_graph_is_refused() {
     assert!(matches!(refused(&[], Graph::Weighted(lopsided)), GraphError::Weight { row: 0, column: 1, .. }));
 }
 
-/// A family of scenes with a topology has the radius of each on its graph, and analyses that do not follow one say so by name.
+/// A family of scenes with a topology has the radius of each scene on its graph. Analyses that do not follow a topology are refused with their names.
 #[test]
 fn a_topology_of_a_scene_is_its_graph() {
     const TEXT: &str = r#"

@@ -23,7 +23,7 @@ pub(crate) fn compare(entry: &Value, sharp: f64) -> (String, MeanSquare) {
     (name.to_owned(), found)
 }
 
-/// None is refused.
+/// Every scene of the reference is analysed, and none is refused.
 #[test]
 fn every_reference_radius_comes_out() {
     let entries: Vec<Value> = serde_json::from_str(include_str!("../reference/mean_square.json")).unwrap();

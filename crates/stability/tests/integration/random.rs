@@ -84,7 +84,7 @@ fn no_limit_is_farther_off_than_it_says() {
     assert!(compared > 300 && 10 * sharp > 9 * compared, "{sharp} of {compared}");
 }
 
-/// At a crossing the radius is 1: half the tolerance below it and above it the verdicts of [`analyse`] are those that the boundary says, whatever the scene.
+/// The verdicts of [`analyse`] half a tolerance below and above each crossing equal the verdicts of the boundary.
 #[test]
 fn a_boundary_is_where_the_radius_is_one() {
     let mut found = 0;

@@ -1,4 +1,4 @@
-//! Objects that turn.
+//! Analyses of objects that turn.
 
 use cohaptic_peer::DeviceConfig;
 use cohaptic_scene::Scene;
@@ -6,7 +6,7 @@ use cohaptic_stability::{
     Admittance, AdmittanceError, Family, FamilyScratch, KeyRange, Method, PartKind, PushedAxis, Unwatched, analyse, mean_square, monodromy,
 };
 
-/// The paper's peers, who hold an object that turns.
+/// Scene of two peers with the paper's parameters, who hold an object that turns.
 const TURNS: &str = r#"
     scene        = { duration = "1s", count = 2, axes = 3 }
     object       = { mass = 0.45, inertia = 2.7e-4 }
@@ -125,7 +125,7 @@ fn a_scene_that_splits_has_the_radius_of_all_components_together() {
     }
 }
 
-/// A law that remembers is followed in parts, which have that law, and refused by name where there are none.
+/// A law with memory is analysed in one-axis parts with the same law, and refused by name if the motion does not split into such parts.
 #[test]
 fn laws_that_remember_are_followed_in_parts() {
     for law in ["smoothed-average-position", "local-lag"] {

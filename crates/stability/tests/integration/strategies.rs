@@ -1,4 +1,4 @@
-//! Strategies of a user's own on the general path: analysed if they are linear and show what they remember, refused otherwise.
+//! Strategies of a user on the general path: analysed if they are linear and show all that they remember, refused otherwise.
 
 use cohaptic_peer::{Command, Context, Gains, State, Strategy};
 use cohaptic_scene::{Scene, Strategies};
@@ -6,7 +6,7 @@ use cohaptic_stability::{AnalysisError, Method, analyse, analyse_with};
 
 use crate::anchors::scene;
 
-/// Average position with something added.
+/// Average position, altered as [`Kind`] says.
 #[derive(Clone)]
 struct Altered {
     gains: Gains,
@@ -17,23 +17,23 @@ struct Altered {
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Kind {
-    /// As it is.
+    /// Average position without a change.
     Plain,
-    /// A constant force on top: not part of how the scene moves on its own.
+    /// With a constant force added, which does not change the free motion of the scene.
     Offset,
     /// No force below a distance of 0.1 mm.
     DeadBand,
     /// At most 100 N.
     Limited,
-    /// Filtered, and shows the filter's state.
+    /// Low-pass filtered, with the state of the filter shown by `memory`.
     Filtered,
-    /// Filtered, and hides it.
+    /// Low-pass filtered, with the state of the filter hidden.
     Hidden,
-    /// Stronger as time goes on.
+    /// With a force that grows with the time.
     Timed,
-    /// A spring to the origin.
+    /// With a spring to the origin added.
     Anchored,
-    /// Damping of the own motion in place of that of the difference.
+    /// With damping of the peer's own velocity in place of the velocity difference.
     OwnDamping,
 }
 
@@ -122,7 +122,7 @@ fn what_is_shown_is_analysed() {
     assert!((filtered.radius.value - plain.radius.value).abs() > 1e-4);
 }
 
-/// Where a strategy ties the object to the origin there is no rigid-body mode to remove.
+/// A strategy that ties the object to the origin leaves no rigid-body mode to remove.
 #[test]
 fn a_strategy_that_knows_the_origin_leaves_no_rigid_mode() {
     let (anchored, plain) = (analyse_with(&scene(&[]), &Kind::Anchored).unwrap(), analyse_with(&scene(&[]), &Kind::Plain).unwrap());

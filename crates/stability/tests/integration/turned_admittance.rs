@@ -1,4 +1,4 @@
-//! The admittance of an object that turns and is held off its centre.
+//! Admittance of an object that turns and that is held away from its centre.
 
 use std::f64::consts::{PI, TAU};
 use std::time::Duration;
@@ -37,7 +37,7 @@ fn three(overrides: &[&str]) -> Scene {
     Scene::parse(THREE, "three.toml".as_ref(), &overrides).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Two of them, with devices that turn.
+/// Returns a scene of two peers whose devices have an attitude.
 fn six(overrides: &[&str]) -> Scene {
     let turns = [
         "peers=[{ name = 'a', grasp = [0.03, 0.01, -0.02] }, { name = 'b', grasp = [-0.015, 0.025, 0] }]",
@@ -153,7 +153,8 @@ fn light_devices_on_an_ideal_network_feel_the_free_object() {
     }
 }
 
-/// From the definition: real peers under a sampled sine so small that the angles it makes do not matter, correlated over whole periods once all else has died out.
+/// The admittance by its definition: simulated peers are pushed by a sampled sine so small that its angles do not matter, and their motion is correlated with
+/// the sine over whole periods after the transient has died out.
 #[test]
 fn the_definition_carried_out_gives_the_same() {
     let soft = ["coordination.stiffness=200", "coordination.rotational-stiffness=[0.15, 0.12, 0.14]"];
@@ -226,7 +227,7 @@ fn under(scene: &Scene, push: usize, seen: usize, hz: f64, phase: f64) -> Comple
     sum / (4000.0 * size)
 }
 
-/// That of the links, a constant.
+/// Returns the constant delay of the links of [`three`] and [`six`].
 fn scene_delay(scene: &Scene) -> Duration {
     Duration::from_millis(if scene.peers.len() == 2 { 16 } else { 8 })
 }

@@ -73,7 +73,7 @@ fn a_second_moment_that_takes_too_long_is_refused_before_it_is_begun() {
     assert!(matches!(refused, AnalysisError::TooManyMoments { unknowns: Some(numbers), .. } if numbers > 900_000_000), "{refused:?}");
 }
 
-/// Is told what parts cost, and ends an analysis that begins one of more than 10¹⁰ operations.
+/// Watch that records the costs of parts, and ends an analysis that begins a part of more than 10¹⁰ operations.
 struct Told {
     most_memory: u64,
     costs: Mutex<Vec<PartCost>>,
@@ -103,7 +103,7 @@ impl Watch for Told {
     }
 }
 
-/// 450 million samples of each peer are on the way: no analysis makes anything of that size before it tells the cost, and those that would need it refuse.
+/// 450 million samples of each peer are in flight. An analysis tells the cost before it allocates anything of that size, or is refused.
 #[test]
 fn a_delay_of_a_thousand_hours_is_told_or_refused_before_anything_is_made() {
     let text = THREE.replace("24ms", "1000h");
@@ -180,7 +180,7 @@ fn a_determinant_ends() {
     });
 }
 
-/// The parts of a graph, and those behind an admittance, are asked about before their eigenvalues are begun.
+/// The watch is asked before the eigenvalues of each part of a graph, and of each part that the verdict of an admittance needs.
 #[test]
 fn a_graph_and_the_verdict_of_an_admittance_end() {
     let scene = three(&["link.loss=0%", "scene.count=8"]);

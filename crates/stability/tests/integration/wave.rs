@@ -17,7 +17,7 @@ fn waves(overrides: &[&str]) -> Scene {
     Scene::parse(text, "waves.toml".as_ref(), &overrides).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// The radius computed apart from this program, to the digits that it was given with.
+/// The radius equals that of an independent computation, to all digits given.
 #[test]
 fn waves_have_the_radius_computed_elsewhere() {
     for method in [Method::Reduced, Method::Full] {
@@ -37,7 +37,7 @@ fn each_copy_has_a_rigid_mode_of_its_own() {
     assert_eq!(rigid(&[arm, "scene.count=2"]), 1);
 }
 
-/// Of links that lose nothing, one that holds the last wave and one that does not are the same; where samples are lost they are not.
+/// Holding the last wave changes nothing on links without losses, and changes the radius on links with losses.
 #[test]
 fn a_wave_that_is_held_matters_where_samples_are_lost() {
     let radius = |overrides: &[&str]| analyse(&waves(overrides), Method::Full).unwrap().radius.value;
@@ -64,7 +64,7 @@ fn peer() -> impl Strategy<Value = String> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
 
-    /// Waves that end with the ticks that they were sent for give no energy, so that a damped object comes to rest over any links.
+    /// Waves that end with the ticks for which they were sent add no energy, so that a damped object comes to rest over any links.
     #[test]
     fn waves_are_stable_over_any_constant_links(
         peers in proptest::collection::vec(peer(), 2..=4),
