@@ -126,7 +126,7 @@ fn links_side_by_side_lose_together() {
     check(&automaton, known, 1e-6);
 }
 
-/// The same system in units that make its matrices unequal in every direction: the bounds hardly change.
+/// A change of units, which scales each state differently, hardly changes the bounds.
 #[test]
 fn units_do_not_matter() {
     let a = of(&[&[0.5, 0.4, 0.1], &[-0.3, 0.6, 0.2], &[0.1, -0.2, 0.4]]);

@@ -15,7 +15,7 @@ const THREE: &str = r#"
     link         = { delay = "24ms" }
 "#;
 
-/// There is a question for each product of matrices.
+/// The watch is asked at least once per product of matrices.
 #[test]
 fn a_worst_case_ends() {
     let scene = Scene::parse(THREE, "three.toml".as_ref(), &[]).unwrap();

@@ -34,12 +34,12 @@ fn patterns(losses_in_a_row: u32, delay: Option<(u64, u64)>, links: Links) -> Pa
     Patterns { losses_in_a_row, delay, links }
 }
 
-/// The contacts of a scene that has one combination of them.
+/// Returns the contacts of a scene that has a single combination of contacts.
 fn linear(scene: &Scene) -> Combination {
     pairs(&pieces(scene, "the worst case").unwrap(), &mut false).unwrap().swap_remove(0).1
 }
 
-/// The switched systems of a linear scene; of each peer by itself, if not `reduced`.
+/// Returns the switched systems of a linear scene: of classes of equal peers, or of each peer if `reduced` is `false`.
 fn prepared(scene: &Scene, patterns: &Patterns, reduced: bool) -> Prepared {
     let network = patterns.network(scene).unwrap();
     let contacts = linear(scene).contacts;
@@ -107,7 +107,7 @@ fn a_pattern_of_a_scene_has_the_radius_of_that_sequence() {
     assert!((found - nominal.radius.value).abs() < 1e-8, "{found} {}", nominal.radius.value);
 }
 
-/// Every closed walk of up to so many steps, as symbols, that begins with its smallest symbol.
+/// Returns the symbols of every closed walk of at most `longest` steps that begins with its smallest symbol.
 fn cycles(automaton: &Automaton, longest: usize) -> Vec<Vec<usize>> {
     fn follow(automaton: &Automaton, (root, node): (usize, usize), path: &mut Vec<usize>, longest: usize, found: &mut Vec<Vec<usize>>) {
         if node == root && !path.is_empty() {
@@ -281,7 +281,7 @@ fn a_loss_can_destabilise_a_scene_that_is_stable_in_the_mean_square() {
     assert_eq!(found.worst().sequence, "3 times received, 4 times lost, and again");
 }
 
-/// Peers and links that differ make parts of two dozen states, whose bounds meet soon too.
+/// Different peers and links make parts of two dozen states. The bounds of such parts meet within few products, too.
 #[test]
 fn bounds_of_shipped_scenes_of_many_states_meet() {
     for (text, most) in [
