@@ -14,7 +14,7 @@ struct Family {
     samples: BTreeMap<(String, BTreeMap<String, String>), f64>,
 }
 
-/// Reads the text as <https://prometheus.io/docs/instrumenting/exposition_formats/#text-based-format> says, and fails where it says so.
+/// Parses metrics by the rules of <https://prometheus.io/docs/instrumenting/exposition_formats/#text-based-format>, and panics at a violation.
 fn parse(text: &str) -> BTreeMap<String, Family> {
     assert!(text.ends_with('\n'), "the last line must end with a line feed");
     let mut families: BTreeMap<String, Family> = BTreeMap::new();
@@ -82,7 +82,7 @@ fn sample(line: &str) -> (String, BTreeMap<String, String>, f64) {
     (name.to_owned(), labels, value)
 }
 
-/// The value of a label, whose quote was opened, and what follows its end.
+/// Returns the value of a label and the rest of the text. `text` begins after the opening quote.
 fn quoted(text: &str) -> (String, &str) {
     let mut value = String::new();
     let mut chars = text.char_indices();

@@ -15,7 +15,7 @@ use crate::run::{NoLinks, TOKEN, empty_board};
 /// Longer than an answer takes on a busy machine, and shorter than the 10 s after which the server ends a slow connection.
 const SOON: Duration = Duration::from_secs(8);
 
-/// A run whose people only watch.
+/// Stage on which hands move nothing, for guests who only watch.
 struct Onlookers;
 
 impl Stage for Onlookers {
