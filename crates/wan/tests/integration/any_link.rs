@@ -20,7 +20,7 @@ use proptest::sample::select;
 
 use crate::random_links::{BYTE_A_MICROSECOND, Payload, SEED, gap, nanos, outages, probability, rate, size, some_probability};
 
-/// What is done to a link; each gap is the time since the step before.
+/// Operation on a link. `gap` is the time since the operation before.
 #[derive(Clone, Debug)]
 pub(crate) enum Step {
     Offer { gap: Duration, info: PacketInfo },
@@ -38,7 +38,7 @@ pub(crate) fn any_link(model: impl Into<LinkModel>) -> Link<Payload> {
     Link::new(SEED, &LinkName::between("left", "right"), model)
 }
 
-/// All that becomes of packets offered with those gaps, in the order in which it is polled at the end.
+/// Returns the events of packets offered with the given gaps before them, in the order in which the link gives them when it is polled at the end.
 pub(crate) fn all_events(model: impl Into<LinkModel>, offered: &[(Duration, PacketInfo)]) -> Vec<PacketEvent<Payload>> {
     let mut subject = any_link(model);
     let mut now = Instant::ZERO;
@@ -292,7 +292,7 @@ pub(crate) fn any_delay() -> BoxedStrategy<Delay> {
     .boxed()
 }
 
-/// Any of the impairments that describe themselves, with any values of their forms.
+/// Returns a strategy for the impairments that list their own parameters, with random values of each parameter's form.
 #[expect(clippy::panic, reason = "a test may fail")]
 fn listed() -> impl Strategy<Value = Impairments> {
     let value = |form: &Form| match form {
@@ -316,7 +316,7 @@ fn listed() -> impl Strategy<Value = Impairments> {
     })
 }
 
-/// Any configuration with that layout.
+/// Returns a strategy for configurations with the given layout.
 pub(crate) fn config_in(layout: Layout) -> BoxedStrategy<LinkConfig> {
     let first = (
         option::weighted(0.2, (0..8u64).prop_map(Bytes::new)),
@@ -367,7 +367,7 @@ pub(crate) fn any_stages() -> BoxedStrategy<LinkConfig> {
     prop_oneof![config_in(Layout::Physical), config_in(Layout::Netem)].boxed()
 }
 
-/// A configuration that is a function from a packet to its arrival.
+/// Returns a strategy for configurations without a queue, on which the arrival of a packet is known when it is offered.
 pub(crate) fn direct_config() -> BoxedStrategy<LinkConfig> {
     let order = select(vec![Order::AllowReordering, Order::InOrder]);
     (any_outages(), any_loss(), any_delay(), order)

@@ -1,4 +1,4 @@
-//! When a network must be called for the sake of some receivers.
+//! Instants at which a network must be called so that packets to awaited receivers come out in time.
 
 use cohaptic_units::Instant;
 use cohaptic_wan::{Bottleneck, Fate, LinkConfig, Network, NetworkConfig, NodeId, PacketEvent, Path};
@@ -8,10 +8,11 @@ use crate::random_links::{Payload, Plan, Sending, cases, drain_network, plan, se
 
 const AWAITED: usize = 1;
 
-/// An event, and the instant of the call that gave it.
+/// An event, preceded by the instant of the call after which the network gave it.
 type Called = (Instant, PacketEvent<Payload, Path>);
 
-/// The events of a network that is called when packets are sent, and in between when a packet may reach the awaited node; and the instants of the latter.
+/// Returns the events of a network that is called at each sending, and in between whenever a packet may reach the awaited node. Also returns the instants of
+/// the calls in between.
 fn driven(plan: &Plan, general: bool, script: &[Sending]) -> (Vec<Called>, Vec<Instant>) {
     let mut network = plan.build(general).awaiting([NodeId::new(AWAITED), NodeId::new(77)]);
     let (mut events, mut wakes) = (Vec::new(), Vec::new());
@@ -37,7 +38,8 @@ fn reaches(event: &PacketEvent<Payload, Path>) -> bool {
 proptest! {
     #![proptest_config(cases(300))]
 
-    /// Through queues, access lines and copies: what reaches the awaited node is reported at its instant, and all the rest is what it is without anybody who waits.
+    /// Arrivals at the awaited node are reported at their instants, through queues, access lines and copies. All other events are those of a network without
+    /// awaited nodes.
     #[test]
     fn packets_to_awaited_receivers_come_out_at_their_instant(
         plan in prop_oneof![plan(3, 0.5), plan(3, 0.01)],
@@ -62,7 +64,7 @@ proptest! {
     }
 }
 
-/// Where nothing but links of a constant delay lies in between, there is no call for anybody else.
+/// On links that only delay by a constant, a network asks for no call for the sake of nodes that are not awaited.
 #[test]
 fn nothing_else_wakes_where_links_decide_at_once() {
     let link = |delay: u64| LinkConfig { delay: cohaptic_wan::Delay::constant(std::time::Duration::from_millis(delay)), ..LinkConfig::default() };

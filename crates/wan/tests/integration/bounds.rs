@@ -1,4 +1,4 @@
-//! What holds for every link whatever is random in it: lower bounds, orders and rates.
+//! Lower bounds, orders and rates that hold for every link, whatever its random numbers.
 
 use std::time::Duration;
 
@@ -14,7 +14,7 @@ use crate::random_links::{
     sendings,
 };
 
-/// All that becomes of packets offered with those gaps, in the order in which it is polled at the end.
+/// Returns the events of packets offered with the given gaps before them, in the order in which the link gives them when it is polled at the end.
 fn run(config: &LinkConfig, offered: &[(Duration, Bytes)]) -> Vec<PacketEvent<Payload>> {
     let mut subject = link(config.clone());
     let mut now = Instant::ZERO;

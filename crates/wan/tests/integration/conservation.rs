@@ -57,7 +57,7 @@ fn balance(stats: &LinkStats) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-/// What the counters of a link say against the fates that a copy of it gives when it is drained, so that the link itself may stay undrained.
+/// Checks the counters of a link against the fates of its packets. The fates come from a drained copy of the link, so that the link itself stays as it is.
 fn audit(link: &Link<Payload>, polled: &Ledger, offered: u64) -> Result<(), TestCaseError> {
     let mut ledger = polled.clone();
     balance(&link.stats())?;

@@ -1,4 +1,4 @@
-//! The laws of delays and of the disorder that they make, through a link.
+//! Laws of delays, and of the reordering that random delays cause, through a link.
 
 use std::time::Duration;
 
@@ -7,7 +7,7 @@ use cohaptic_wan::{Correlation, Delay, Distribution, Fate, Jitter, Link, LinkCon
 
 use crate::any_link::JITTERS;
 
-/// Delays \[ns\] of packets sent a second apart, so that none meets another.
+/// Returns the delays \[ns\] of packets sent a second apart, so far apart that no packet overtakes another.
 fn delays(seed: u64, delay: &Delay, count: u64) -> Vec<f64> {
     let mut link = Link::new(seed, &LinkName::between("a", "b"), LinkConfig { delay: delay.clone(), ..LinkConfig::default() });
     (0..count).for_each(|number| link.handle_packet(Instant::from_nanos(number * 1_000_000_000), Bytes::new(64), ()).unwrap());
@@ -42,7 +42,7 @@ fn the_quantiles_of_every_law_come_out_of_a_link() {
     assert_eq!(laws, 20);
 }
 
-/// Which share of packets arrives after one that was sent later (RFC 4737, section 3.4), and the standard error from 100 batches.
+/// Returns the share of packets that arrive after a packet that was sent later (RFC 4737, section 3.4), and its standard error from 100 batches.
 fn reordered(seed: u64, jitter: Duration, distribution: Distribution, spacing: Duration) -> (f64, f64) {
     const BATCH: usize = 2_000;
     let delay = Delay::with_jitter(Duration::from_millis(200), Jitter::new(jitter, distribution)).unwrap();

@@ -1,4 +1,4 @@
-//! The same seed gives the same fates, whatever else is there and however often anybody looks.
+//! Equal seeds give equal fates, whatever other links exist and however often a driver polls.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -13,14 +13,14 @@ use crate::random_links::{
     probability, sendings,
 };
 
-/// How a driver looks at a link between two packets.
+/// Instants at which a driver calls and polls a link between two packets.
 #[derive(Clone, Copy, Debug)]
 enum Looking {
     /// Only when all is over.
     Never,
     /// At every instant that the link asks for.
     WhenAsked,
-    /// So often, whether anything happens or not.
+    /// At this interval, whether anything happens or not.
     Every(Duration),
 }
 
@@ -54,7 +54,7 @@ fn run(config: &LinkConfig, offered: &[(Duration, Bytes)], looking: Looking) -> 
     events
 }
 
-/// What a network with that plan does with those packets, polled where the packets say so.
+/// Returns the events of a network for the packets of a script. The network is polled after each sending that asks for that.
 fn run_network(plan: &Plan, general: bool, script: &[Sending]) -> Vec<PacketEvent<Payload, Path>> {
     let mut subject = plan.build(general);
     let mut now = Instant::ZERO;
@@ -174,7 +174,7 @@ proptest! {
         prop_assert_eq!(Some(alone.stats()), network.link_stats(NodeId(0), NodeId(1)));
     }
 
-    /// Also when the one node more comes first in the list, so that all the others have other numbers.
+    /// The further node may stand at any place of the list, so that the numbers of the other nodes change.
     #[test]
     fn a_node_more_moves_no_other_paths_fates(small in plan(3, 0.01), extra in vec(any_config(), 16), script in sendings(3), more in sendings(4), place in 0..4usize) {
         let build = |names: &[usize], link: &dyn Fn(usize, usize) -> LinkConfig| {

@@ -10,7 +10,7 @@ use proptest::prelude::*;
 
 use crate::random_links::{at, cases};
 
-/// An instant, what breaks ties, and what makes it unique.
+/// Event with an instant, a rank that breaks ties, and a serial number that makes the event unique.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 struct Note {
     at: Instant,
@@ -32,11 +32,11 @@ impl Event for Note {
 
 #[derive(Clone, Copy, Debug)]
 enum When {
-    /// So long after the latest instant given: below and beyond the 65.5 µs of a bucket and the 268 ms of the ring.
+    /// This time \[ns\] after the latest instant so far. Times lie below and beyond the 65.5 µs of a bucket and the 268 ms of the ring.
     Ahead(u64),
-    /// So long before it.
+    /// This time \[ns\] before the latest instant so far.
     Behind(u64),
-    /// At this instant.
+    /// At this instant \[ns\].
     Exactly(u64),
 }
 

@@ -1,4 +1,4 @@
-//! What every link promises, whatever its stages and its kind: tried on random links and random operations with live changes between all kinds.
+//! Promises of every link, whatever its stages and its kind, tried on random links with random operations and live changes between all kinds.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -42,7 +42,7 @@ impl Ledger {
     }
 }
 
-/// What the counters say against the fates that a drained copy gives, so that the link itself may stay undrained.
+/// Checks the counters of a link against the fates of its packets. The fates come from a drained copy of the link, so that the link itself stays as it is.
 fn audit(link: &Link<Payload>, polled: &Ledger, offered: u64, now: Instant) -> Result<(), TestCaseError> {
     let mut ledger = polled.clone();
     // What has arrived counts as delivered when it is polled.
@@ -62,7 +62,7 @@ fn audit(link: &Link<Payload>, polled: &Ledger, offered: u64, now: Instant) -> R
     Ok(())
 }
 
-/// How a driver looks at a link between two packets.
+/// Instants at which a driver calls and polls a link between two packets.
 #[derive(Clone, Copy, Debug)]
 enum Looking {
     WhenAsked,
@@ -138,7 +138,7 @@ proptest! {
         prop_assert_eq!(subject.poll_timeout(), None);
     }
 
-    /// What a fate log asks of its rows: every packet and copy complete, no time backwards.
+    /// The events of a link fulfil the rules of a fate log: each packet and each copy has one end, and no time goes back.
     #[test]
     fn the_events_of_a_link_are_a_fate_log(model in any_model(), offered in packets()) {
         let events = all_events(model, &offered);
@@ -197,7 +197,8 @@ proptest! {
         prop_assert_eq!(Some(alone.stats()), network.link_stats(left, right));
     }
 
-    /// A limit that is never reached needs the engine that keeps packets; without it the link is a function from a packet to its arrival.
+    /// A limit that is never reached makes the link use the engine that keeps packets. Without the limit, the link decides the arrival of a packet when it is
+    /// offered. Both give the same events.
     #[test]
     fn the_engine_says_what_the_function_says(config in direct_config(), changed in direct_config(), offered in packets(), change in 0..60usize) {
         let run = |limit| {
@@ -217,7 +218,7 @@ proptest! {
         prop_assert_eq!(run(None), run(Some(u64::MAX)));
     }
 
-    /// A packet that jumps takes no delay; any other takes that of the path and of the recording.
+    /// Every packet that does not jump takes at least the least delay of the law plus the least delay of the recorded path.
     #[test]
     fn no_packet_arrives_before_the_least_delay(mut config in any_stages(), offered in packets()) {
         if config.reorder.is_some_and(|reorder| matches!(reorder.how, Displacement::Jump { .. })) {

@@ -20,7 +20,7 @@ const PAYLOAD: usize = 1_000;
 /// Ethernet, IPv4 and UDP: what `tbf` counts besides the payload.
 const HEADERS: i32 = 14 + 20 + 8;
 
-/// Runs this test again where loopback is ours, with a token bucket on it, and gives what it saw, or why it could not.
+/// Runs this test again in a network namespace whose loopback interface has a token bucket. Returns the output of that run, or the reason why it failed.
 fn enter_namespace() -> Result<String, String> {
     let program = std::env::current_exe().map_err(|error| error.to_string())?;
     let script = format!(
@@ -38,7 +38,7 @@ fn enter_namespace() -> Result<String, String> {
     Err(text(&output.stderr))
 }
 
-/// Sends all packets at once; when each is received, from the first one on \[s\].
+/// Sends all packets at once through the token bucket of the kernel. Returns the time from the first reception to the reception of each packet \[s\].
 #[expect(clippy::disallowed_methods, reason = "the kernel has no other clock than the wall's")]
 fn through_the_kernel() -> Vec<f64> {
     let receiver = UdpSocket::bind("127.0.0.1:0").unwrap();
@@ -63,7 +63,7 @@ fn through_the_kernel() -> Vec<f64> {
     received
 }
 
-/// The same by the emulated bucket.
+/// Returns the departures \[s\] of the same packets from the emulated token bucket.
 fn through_the_link() -> Vec<f64> {
     let framing = Framing { overhead: HEADERS, cells: None };
     let bucket = TokenBucket { rate: rate(RATE), burst: Bytes::new(BURST), peak: None, framing, limit: None };

@@ -14,7 +14,7 @@ use crate::random_links::{BYTE_A_MICROSECOND, at, probability, rate};
 
 pub(crate) const NORMAL_9995: f64 = 3.2905;
 
-/// Which of `count` packets are lost.
+/// Returns the losses among `count` packets: `true` for a lost packet, indexed by packet.
 pub(crate) fn losses(seed: u64, loss: Loss, count: usize) -> Vec<bool> {
     let mut link = Link::new(seed, &LinkName::between("a", "b"), LinkConfig { loss, ..LinkConfig::default() });
     (0..count as u64).for_each(|number| link.handle_packet(at(number), Bytes::new(64), ()).unwrap());

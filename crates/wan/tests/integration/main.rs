@@ -1,4 +1,4 @@
-//! What links and networks promise, tried on random configurations and operations and, where a law is known, on long fixed runs.
+//! Promises of links and networks, tried on random configurations and operations and, for known laws, on long fixed runs.
 #![expect(clippy::unwrap_used, reason = "a test may fail")]
 #![expect(clippy::cast_precision_loss, reason = "tests count samples")]
 #![expect(clippy::wildcard_enum_match_arm, reason = "a model says so when it meets a kind that it does not know")]

@@ -1,4 +1,4 @@
-//! Arrivals of which nothing else is told.
+//! Networks whose driver asks for arrivals alone, and not for other events.
 
 use cohaptic_units::Instant;
 use cohaptic_wan::NodeId;
@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use crate::random_links::{Plan, cases, plain_config, plan, sendings};
 
-/// Three nodes whose links decide at once.
+/// Returns a strategy for plans of three nodes whose links decide the arrival of a packet when it is offered.
 fn direct() -> impl Strategy<Value = Plan> {
     let nowhere = || vec![None; 3];
     proptest::collection::vec(plain_config(), 9).prop_map(move |links| Plan { nodes: 3, links, uplinks: nowhere(), downlinks: nowhere() })
@@ -15,8 +15,8 @@ fn direct() -> impl Strategy<Value = Plan> {
 proptest! {
     #![proptest_config(cases(300))]
 
-    /// Polled where the network gives them, and as events where it does not, arrivals come in the same order at the same instants; a network that can have no events
-    /// has none.
+    /// Arrivals come in the same order and at the same instants, whether polled as mere arrivals, as far as the network gives those, or as events. A network
+    /// that says that it has no events has none.
     #[test]
     fn mere_arrivals_are_the_events_of_their_packets(
         plan in prop_oneof![3 => direct(), 1 => plan(3, 0.5)],

@@ -1,4 +1,4 @@
-//! What must not change, or must change in a known way, when a link is asked for in other words: over random chains of stages.
+//! Pairs of configurations, over random chains of stages, whose fates must be equal or must differ in a known way.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -16,7 +16,7 @@ use proptest::prelude::*;
 use crate::any_link::{all_events, all_records, any_link, any_stages, framing, limit, micros, packets};
 use crate::random_links::{at, cases, drain, gap, nanos, probability};
 
-/// A stage that does nothing: which one, and the link with it.
+/// Returns the link with a further stage that changes nothing. `which` chooses the stage.
 fn with_nothing(config: &LinkConfig, which: usize) -> LinkModel {
     let mut config = config.clone();
     let fast = Rate::bits_per_sec(u64::MAX).unwrap();
@@ -69,7 +69,7 @@ fn with_nothing(config: &LinkConfig, which: usize) -> LinkModel {
     config.into()
 }
 
-/// All that a link may be whose laws know no absolute time: what is slower by a factor is the same, slower.
+/// Parameters of a link without absolute times: with all times multiplied by a factor, the fates are the same, later by the factor.
 #[derive(Clone, Debug)]
 struct Scalable {
     /// The logarithm of the nanoseconds that a byte takes.
@@ -154,7 +154,7 @@ fn answers<T>(events: &[PacketEvent<u64>], answer: impl Fn(&PacketEvent<u64>) ->
     events.iter().filter(|event| event.fate.is_end()).filter_map(|event| Some(((event.sequence, event.copy), answer(event)?))).collect()
 }
 
-/// What both say of the packets that both know.
+/// Checks that both maps agree on all packets and copies that are in both.
 fn agree<T: PartialEq + std::fmt::Debug>(one: &BTreeMap<(u64, u8), T>, other: &BTreeMap<(u64, u8), T>) -> Result<(), TestCaseError> {
     for (packet, answer) in one {
         if let Some(same) = other.get(packet) {
@@ -211,7 +211,7 @@ proptest! {
         prop_assert_eq!(moved.collect::<Vec<_>>(), all_records(config, &shifted));
     }
 
-    /// What is behind the loss does not matter, nor what is before it.
+    /// The packets lost with a higher probability include those lost with a lower one, whatever stages lie before and after the loss.
     #[test]
     fn a_higher_probability_loses_a_superset(config in any_stages(), offered in packets(), low in 0.0..1.0f64, more in 0.0..1.0f64) {
         let high = low + (1.0 - low) * more;
@@ -280,7 +280,7 @@ proptest! {
         agree(&delay(&all[0]), &delay(&all[3]))?;
     }
 
-    /// A link that replays its own log writes it again, and once more.
+    /// A link that replays a fate log gives the same fate log, and so does a replay of that log.
     #[test]
     fn a_replay_of_a_replay_is_the_log(config in any_stages(), offered in packets()) {
         let log = FateLog::new(all_events(config, &offered).iter().map(|event| event.record)).unwrap();
@@ -294,7 +294,7 @@ proptest! {
         prop_assert_eq!(FateLog::parse(&log.to_text()).unwrap(), log);
     }
 
-    /// What the log does not know is dropped; the payload and the size are those of the packet offered now.
+    /// Packets beyond the end of the log are dropped. Payload and size of each event are those of the offered packet, and not of the logged one.
     #[test]
     fn what_comes_after_the_log_is_dropped(config in any_stages(), offered in packets(), more in 1..5usize) {
         let log = FateLog::new(all_events(config, &offered).iter().map(|event| event.record)).unwrap();

@@ -19,7 +19,7 @@ pub(crate) struct Offered {
     pub(crate) size: Bytes,
 }
 
-/// When a packet had the line to itself.
+/// Span in which a packet of `size` was sent over the line.
 struct Served {
     begin: Moment,
     end: Moment,
@@ -69,7 +69,7 @@ pub(crate) fn fates(name: &LinkName, configs: &[(Instant, LinkConfig)], offered:
     offered.iter().enumerate().map(|(number, packet)| fate(number, packet)).collect()
 }
 
-/// When a packet that has the line from `begin` on is sent: its bits are taken away span by span, in units of 10⁻⁹ bit.
+/// Returns the moment at which a packet that is sent from `begin` on has been sent. Its bits are subtracted span by span, in units of 10⁻⁹ bit.
 fn transmitted(configs: &[(Instant, LinkConfig)], begin: Moment, size: Bytes) -> Moment {
     let bottleneck = |index: usize| configs[index].1.bottleneck.as_ref().unwrap();
     let rate_of = |index: usize| match &bottleneck(index).service {
@@ -94,7 +94,7 @@ fn transmitted(configs: &[(Instant, LinkConfig)], begin: Moment, size: Bytes) ->
     }
 }
 
-/// Which packets the loss model takes. A packet that an outage took asks it nothing.
+/// Returns the losses by the loss model: `true` for a lost packet, indexed by packet. Packets dropped by an outage do not advance the model.
 fn losses(name: &LinkName, configs: &[(Instant, LinkConfig)], offered: &[Offered]) -> Vec<bool> {
     let stream = Stream::new(SEED, name.as_str().as_bytes());
     let first = stream.packet(0).draws(Purpose::InitialState).next_unit();
@@ -152,7 +152,7 @@ fn delay(name: &LinkName, config: &LinkConfig, number: u64) -> u64 {
 #[derive(Clone, Copy)]
 struct Travelling {
     at: Instant,
-    /// Which call brought it to `at`: a packet that takes no time at all comes after whatever was there before it was sent.
+    /// Number of the call that brought the packet to `at`. Breaks ties: a packet without any delay comes after all packets that were there before it was sent.
     call: usize,
     path: (NodeId, NodeId),
     sequence: u64,
@@ -160,7 +160,7 @@ struct Travelling {
     size: Bytes,
 }
 
-/// What becomes of every packet of a network, by path and sequence: each line in turn, since nothing flows back.
+/// Returns the fate of each packet of a network, by sender, receiver and sequence number. Lines are computed one by one, since no line depends on later lines.
 pub(crate) fn network_fates(plan: &Plan, sendings: &[Sending]) -> BTreeMap<(NodeId, NodeId, u64), (Instant, Fate)> {
     let mut fates = BTreeMap::new();
     let mut sequences: BTreeMap<(NodeId, NodeId), u64> = BTreeMap::new();

@@ -1,4 +1,4 @@
-//! Links that are made when they are first used do what links do that are there from the beginning.
+//! Links made at their first use, against links made at the beginning: all events are equal.
 
 use cohaptic_units::Instant;
 use cohaptic_wan::{Network, PacketEvent, Path};
@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use crate::random_links::{Payload, Plan, any_config, cases, drain_network, plan, sendings};
 
-/// How packets are sent: one by one; to all others; to all others through a relay.
+/// Way of sending: to one node, to all other nodes, or to all other nodes through a relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Way {
     Single,
@@ -61,7 +61,7 @@ proptest! {
     }
 }
 
-/// All pairs, those of a node and itself included: these have no link.
+/// Returns all pairs of nodes, including the pairs of a node and itself, which have no link.
 fn paths(plan: &Plan) -> impl Iterator<Item = Path> {
     plan.node_ids().flat_map(|from| plan.node_ids().map(move |to| Path { from, to }))
 }

@@ -118,7 +118,7 @@ proptest! {
         compare_network(&plan, general, &script)?;
     }
 
-    /// Where nothing is random, not jittered and short, equal instants are the rule.
+    /// The lines have no randomness, and constant delays of at most 2 µs, so that many events fall on equal instants.
     #[test]
     fn lines_that_meet_at_one_instant_do_what_the_naive_model_says(mut plan in plan(3, 0.95), script in sendings(3)) {
         let lines = plan.links.iter_mut().chain(plan.uplinks.iter_mut().flatten()).chain(plan.downlinks.iter_mut().flatten());
@@ -192,7 +192,7 @@ fn a_departure_from_a_link_makes_room_for_what_leaves_the_uplink_at_that_instant
 proptest! {
     #![proptest_config(cases(300))]
 
-    /// What waits when the bottleneck is taken away leaves at once, in order.
+    /// Packets that wait when the bottleneck is removed leave at once, in order.
     #[test]
     fn a_bottleneck_that_is_taken_away_releases_what_it_held(offered in offers(), bottleneck in bottleneck(), change in 0..200_000u64) {
         let narrow = LinkConfig { bottleneck: Some(Bottleneck { limit: None, ..bottleneck }), ..LinkConfig::default() };

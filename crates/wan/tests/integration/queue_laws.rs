@@ -1,4 +1,4 @@
-//! What queueing theory and the papers say of queues, through a link.
+//! Queues of a link, against queueing theory and against the papers on active queue management.
 
 use std::time::Duration;
 

@@ -14,12 +14,12 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::select;
 
-/// One byte in a microsecond.
+/// Rate of one byte per microsecond [bit/s].
 pub(crate) const BYTE_A_MICROSECOND: u64 = 8_000_000;
 
 pub(crate) const SEED: u64 = 2015;
 
-/// A payload that is dear enough to be noticed if it went to the wrong packet: the number of the packet among all that were offered.
+/// Payload of a packet: its number among all offered packets, so that a payload in a wrong packet is noticed.
 pub(crate) type Payload = u64;
 
 /// Proptest without files.
@@ -39,7 +39,7 @@ pub(crate) fn jittery(mean: Duration, sd: Duration, distribution: Distribution) 
     Delay::with_jitter(mean, Jitter::new(sd, distribution)).unwrap()
 }
 
-/// What is done to one link; each `gap` is the time since the operation before.
+/// Operation on a link. `gap` is the time since the operation before.
 #[derive(Clone, Debug)]
 pub(crate) enum Operation {
     Offer { gap: Duration, size: Bytes },
@@ -59,11 +59,11 @@ pub(crate) struct Sending {
     pub(crate) poll: bool,
 }
 
-/// A network as a value: a configuration for every pair, and perhaps for access lines.
+/// Description of a network: a configuration for every pair of nodes, and for the access lines of some nodes.
 #[derive(Clone, Debug)]
 pub(crate) struct Plan {
     pub(crate) nodes: usize,
-    /// By sender, then receiver; those on the diagonal are not used.
+    /// Configuration of each link, at `from * nodes + to`. The entries of a node with itself are not used.
     pub(crate) links: Vec<LinkConfig>,
     pub(crate) uplinks: Vec<Option<LinkConfig>>,
     pub(crate) downlinks: Vec<Option<LinkConfig>>,
@@ -78,7 +78,7 @@ impl Plan {
         self.with_access_lines(Network::new(self.config(general), |from, to| self.link(from, to).clone()))
     }
 
-    /// The same network, whose links are made when they are first used.
+    /// Builds the network of [`build`](Self::build), but with links that are made at their first use.
     pub(crate) fn build_on_demand(&self, general: bool) -> Network<Payload> {
         let plan = self.clone();
         self.with_access_lines(Network::on_demand(self.config(general), move |from, to| plan.link(from, to).clone()))
@@ -209,7 +209,7 @@ pub(crate) fn config_with(bottleneck: impl Strategy<Value = Option<Bottleneck>>)
     })
 }
 
-/// A link that only delays, by a constant: what is compiled to one addition.
+/// Returns a strategy for links that only delay, by a constant. The network computes such links by an addition.
 pub(crate) fn plain_config() -> impl Strategy<Value = LinkConfig> {
     (0..20u64).prop_map(|micros| LinkConfig { delay: Delay::constant(Duration::from_micros(micros)), ..LinkConfig::default() })
 }

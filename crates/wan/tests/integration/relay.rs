@@ -20,7 +20,7 @@ fn network(seed: u64, uplink: &LinkConfig) -> Network<u64> {
     network.with_access_line(AccessLine::Uplink(NodeId::new(0)), uplink.clone()).unwrap().with_relay()
 }
 
-/// What becomes of packets that a node sends after these gaps.
+/// Returns the events of packets that a node broadcasts with the given gaps before them \[ns\].
 fn sent(network: &mut Network<u64>, from: usize, gaps: &[u64]) -> Vec<PacketEvent<u64, Path>> {
     let (mut events, mut now) = (Vec::new(), Instant::ZERO);
     for (packet, gap) in (0..).zip(gaps) {
@@ -88,7 +88,7 @@ fn what_needs_no_relay_is_as_without() {
     assert_eq!(events, [(2, Instant::ZERO + DOWN + Duration::from_millis(7))]);
 }
 
-/// A driver that waits for one receiver is woken for packets that a relay hands on to it.
+/// A driver that waits for one receiver is also woken for packets that a relay forwards to that receiver.
 #[test]
 fn a_receiver_behind_a_relay_is_awaited() {
     for uplink in [Delay::constant(Duration::from_millis(7)), Delay::default()] {

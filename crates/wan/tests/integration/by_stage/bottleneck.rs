@@ -20,7 +20,7 @@ struct Recording {
     bytes: u64,
 }
 
-/// A bottleneck and, if it is recorded, what a test can read of it.
+/// Bottleneck with, for a recorded service, the recording in a form that a test can read.
 #[derive(Clone, Debug)]
 struct Config {
     bottleneck: Bottleneck,
@@ -217,7 +217,7 @@ impl Line {
         t + (codel.interval.as_nanos() as f64 / (count as f64).sqrt()).round_ties_even() as u64
     }
 
-    /// RFC 8289, section 5.6; where it drops a packet that understands ECN, that is marked and sent, as in Linux.
+    /// Pseudo-code of RFC 8289, section 5.6. An ECN-capable packet that would be dropped is marked and sent, as in Linux.
     fn deque(&mut self, codel: &CoDel, now: u64) -> Option<Queued> {
         let mut r = self.dodequeue(codel, now);
         let marks = |p: &Queued| codel.ecn && p.packet.ecn_capable;
@@ -309,7 +309,7 @@ impl Line {
         }
     }
 
-    /// When all that is there now will have been sent.
+    /// Returns the instant at which all present packets will have been sent \[ns\].
     fn turn(&self, now: u64) -> u64 {
         let sending = self.sending.as_ref().unwrap();
         let framing = self.config.bottleneck.framing;
@@ -375,7 +375,7 @@ impl Line {
     }
 }
 
-/// The parameters of RED, which has no accessors for all of them.
+/// Parameters of RED, kept here because [`Red`] has no accessors for some of them.
 #[derive(Clone, Debug)]
 struct Words {
     min: u64,

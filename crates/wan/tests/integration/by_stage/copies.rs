@@ -1,4 +1,4 @@
-//! What makes more or fewer packets of one at once: the largest size, copies, damage, and how many may be inside.
+//! Stages that decide about a packet at once: largest size, copies, damage, and limit of packets.
 
 use cohaptic_units::Bytes;
 use cohaptic_wan::random::Purpose;

@@ -71,13 +71,13 @@ fn link(words: Words) -> LinkConfig {
     LinkConfig { loss, ..LinkConfig::default() }
 }
 
-/// What a model remembers, by kind: a change to another kind forgets it.
+/// State of a loss model, one variant per kind. A change to another kind discards the state.
 enum Memory {
     Nothing,
     Before(Dar),
     IsBad(bool),
     Seen(Option<(bool, u64)>),
-    /// 1 to 4.
+    /// State of a four-state chain, from 1 to 4.
     State(u8),
 }
 

@@ -22,21 +22,21 @@ use proptest::prelude::*;
 use crate::any_link::{any_link, packet};
 use crate::random_links::{SEED, at, drain, gap};
 
-/// What a model says of a packet or a copy: its number, the number of the copy, when and what, and whether it was marked.
+/// Fate of a packet or copy by a model: number of the packet, number of the copy, instant, fate, and `true` if marked.
 type Said = (u64, u8, Instant, Fate, bool);
 
-/// An operation on a link whose configuration is one of type C in it.
+/// Operation on a link. `C` is the configuration of the tested stage.
 #[derive(Clone, Copy, Debug)]
 enum Act<C> {
     Offer(Packet),
     Change(C),
 }
 
-/// A packet that is offered.
+/// Offered packet.
 #[derive(Clone, Copy, Debug)]
 struct Packet {
     number: u64,
-    /// The bytes.
+    /// Size \[bytes\].
     size: u64,
     ecn_capable: bool,
 }
@@ -44,7 +44,7 @@ struct Packet {
 /// Operations with their instants \[ns\].
 type Script<C> = Vec<(u64, Act<C>)>;
 
-/// Offers, and a live change now and then.
+/// Returns a strategy for scripts: a first configuration, then offers with occasional live changes.
 fn script<C: Clone + std::fmt::Debug + 'static>(config: BoxedStrategy<C>) -> BoxedStrategy<Script<C>> {
     let first = config.clone();
     let act = prop_oneof![
@@ -71,7 +71,7 @@ fn script<C: Clone + std::fmt::Debug + 'static>(config: BoxedStrategy<C>) -> Box
         .boxed()
 }
 
-/// What a link does with a script.
+/// Returns the events of a link under a script. `link` puts the configuration of the stage into the configuration of a link.
 fn events<C: Clone>(script: &Script<C>, link: impl Fn(C) -> LinkConfig) -> Vec<PacketEvent<u64>> {
     let Some((_, Act::Change(first))) = script.first() else { unreachable!("a script begins with a configuration") };
     let mut subject = any_link(link(first.clone()));
@@ -88,13 +88,13 @@ fn events<C: Clone>(script: &Script<C>, link: impl Fn(C) -> LinkConfig) -> Vec<P
     drain(&mut subject)
 }
 
-/// The same in the order of a fate log.
+/// Returns the fates of a link under a script, in the order of a fate log.
 fn said<C: Clone>(script: &Script<C>, link: impl Fn(C) -> LinkConfig) -> Vec<Said> {
     let log = FateLog::new(events(script, link).iter().map(|event| event.record)).unwrap();
     log.records().iter().map(|record| (record.sequence, record.copy, record.at, record.fate, record.marked)).collect()
 }
 
-/// What a model says, in the order of a fate log.
+/// Sorts the fates of a model into the order of a fate log.
 fn sorted(mut said: Vec<Said>) -> Vec<Said> {
     said.sort_by_key(|(number, copy, at, fate, _)| (*number, *copy, fate.is_end(), *at));
     said

@@ -10,7 +10,7 @@ use proptest::prelude::*;
 use crate::any_link::{all_events, any_link, modulated, packets};
 use crate::random_links::{SEED, at, cases, drain};
 
-/// The states and the instants \[ns\] at which they begin, up to an instant.
+/// Returns the states of a modulator up to an instant, each as the instant at which it begins \[ns\] and its index.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "milliseconds")]
 fn path(modulator: &Modulator, until: u64) -> Vec<(u64, usize)> {
     let stream = Stream::new(SEED, format!("modulator {}", modulator.name()).as_bytes());

@@ -1,4 +1,4 @@
-//! Outages: a timetable, a list of random spans, and what happens to a link that nobody uses.
+//! Outages: by a timetable, by random spans, and of an idle link.
 
 use cohaptic_wan::random::Purpose;
 use cohaptic_wan::{DropCause, IdleOutages, LinkConfig, Outages, RandomOutages, Sojourn};

@@ -71,7 +71,8 @@ fn recording() -> BoxedStrategy<Recording> {
         .boxed()
 }
 
-/// φ of each of the delays that are correlated by packet: it takes milliseconds to find.
+/// Correlation φ of the underlying normal numbers, indexed as [`JITTERS`]; 0 for a delay without correlation by packet. Computed once, because each takes
+/// milliseconds.
 static PHIS: LazyLock<Vec<f64>> = LazyLock::new(|| {
     let phi = |delay: &Delay| match delay.jitter().map(|jitter| jitter.correlation) {
         Some(Correlation::PerPacket(rho)) => delay.law().unwrap().gaussian_correlation(rho).unwrap(),

@@ -1,4 +1,4 @@
-//! Packets that jump, stay behind or come later, over a constant delay.
+//! Reordering over a constant delay: packets that jump ahead, are held until others have passed, or take longer.
 
 use std::time::Duration;
 

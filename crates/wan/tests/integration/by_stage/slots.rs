@@ -1,4 +1,4 @@
-//! Slots: what has gathered leaves when one opens, as much as it takes.
+//! Slots: waiting packets leave when a slot opens, as many as the slot takes.
 
 use cohaptic_wan::random::Purpose;
 use cohaptic_wan::{LinkConfig, SlotGap, Slots};

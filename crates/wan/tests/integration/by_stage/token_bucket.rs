@@ -1,4 +1,4 @@
-//! The token bucket: tokens counted up span by span, and the queue before it looked through from its head.
+//! Token bucket, against a model that adds tokens span by span and serves the queue from its head.
 
 use cohaptic_wan::{DropCause, LinkConfig, QueueLimit, TokenBucket};
 use proptest::prelude::*;
@@ -7,10 +7,10 @@ use super::{Act, Packet, Said, Script, delivered, dropped, said, script, sorted}
 use crate::any_link::token_bucket;
 use crate::random_links::cases;
 
-/// 10⁻⁹ bit.
+/// One byte in units of 10⁻⁹ bit.
 const BYTE: u128 = 8_000_000_000;
 
-/// Mean and peak: rate, size, and what is in them.
+/// Buckets of the mean rate and of the peak rate, each as rate [bit/s], size and present tokens \[10⁻⁹ bit\].
 #[derive(Clone)]
 struct Buckets {
     all: Vec<(u128, u128, u128)>,
@@ -30,7 +30,7 @@ impl Buckets {
         self.now = until;
     }
 
-    /// When all of them hold so much.
+    /// Returns the instant \[ns\] at which every bucket holds `needed` tokens.
     fn ready(&self, needed: u128) -> u64 {
         let wait = self.all.iter().map(|(rate, _, tokens)| needed.saturating_sub(*tokens).div_ceil(*rate)).max().unwrap();
         self.now + u64::try_from(wait).unwrap()
@@ -129,8 +129,8 @@ proptest! {
         prop_assert_eq!(said(&script, |bucket| LinkConfig { token_bucket: Some(bucket), ..LinkConfig::default() }), model(&script));
     }
 
-    /// What the bucket is for: no window of departures carries more than B + R·t, for both buckets; and none waits for nothing: a packet that had to wait, a
-    /// nanosecond earlier would have broken one of the two, or come before the packet ahead of it.
+    /// No span t of departures carries more than B + R·t, for both buckets. No packet waits in vain: a nanosecond earlier, a packet that waited would exceed one of
+    /// the two bounds, or would leave before the packet ahead of it.
     #[test]
     fn departures_conform_and_could_not_be_earlier(mut bucket in token_bucket(), script in script(Just(()).boxed())) {
         bucket.limit = None;
