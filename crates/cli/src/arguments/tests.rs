@@ -4,7 +4,7 @@ use clap::Command;
 
 use super::Arguments;
 
-/// Every command with its full name, the program itself among them.
+/// Returns every command with its full name, including the program itself.
 fn commands() -> Vec<(String, Command)> {
     fn walk(name: &str, command: &Command, all: &mut Vec<(String, Command)>) {
         all.push((name.to_owned(), command.clone()));
@@ -74,7 +74,7 @@ fn scenes_in_examples_ship_with_the_program() {
     }
 }
 
-/// All `--set KEY=VALUE` that a text shows.
+/// Returns the `KEY=VALUE` of each `--set KEY=VALUE` in a text.
 fn overrides(text: &str) -> Vec<String> {
     let words: Vec<&str> = text.split_whitespace().collect();
     words.windows(2).filter(|pair| pair[0] == "--set" && pair[1].contains('=') && !pair[1].starts_with('<')).map(|pair| pair[1].to_owned()).collect()

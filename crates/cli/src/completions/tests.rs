@@ -66,7 +66,7 @@ fn the_option_is_found_in_each_form() {
     }
 }
 
-/// Bash splits words at `=` and `:`, and replaces what stands after the last of them.
+/// Bash splits words at `=` and `:`, and replaces the part after the last break, so that an answer is this part alone.
 #[test]
 fn bash_gets_what_stands_after_the_last_break() {
     assert_eq!(answers(Shell::Bash, "run --set = scene.se"), ["scene.seed="]);

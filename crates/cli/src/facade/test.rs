@@ -71,13 +71,13 @@ fn code(status: ExitStatus) -> ExitCode {
     code.map_or(ExitCode::FAILURE, ExitCode::from)
 }
 
-/// `Cargo.lock` as it was before the tests.
+/// Content of `Cargo.lock` before the tests.
 #[derive(Clone, Debug)]
 struct Saved {
     path: PathBuf,
     /// A copy on disk, for the case that this program is killed. The next call then puts the file back.
     copy: PathBuf,
-    /// `None` if there was no such file.
+    /// Text of the file; `None` if the file did not exist.
     content: Option<String>,
 }
 
@@ -97,7 +97,7 @@ impl Saved {
         Ok(saved)
     }
 
-    /// Puts the file back, unless it is the same. Removes the file if there was none.
+    /// Restores the file if it has changed. Removes the file if it did not exist before.
     fn put_back(&self) -> Result<(), Failure> {
         match &self.content {
             Some(content) if fs::read(&self.path).is_ok_and(|now| now == content.as_bytes()) => Ok(()),

@@ -15,7 +15,7 @@ fn python() -> Option<PathBuf> {
     imports.is_ok_and(|status| status.success()).then_some(python)
 }
 
-/// A scheduler and its workers.
+/// Running scheduler of Dask, with its workers.
 pub(crate) struct Dask<'a> {
     work: &'a Work,
     python: PathBuf,
@@ -24,7 +24,7 @@ pub(crate) struct Dask<'a> {
 }
 
 impl<'a> Dask<'a> {
-    /// `None` if it is not installed.
+    /// Starts a scheduler and two workers. Returns `None` if Dask is not installed.
     pub(crate) fn start(work: &'a Work) -> Option<Self> {
         let python = python()?;
         let start = |module: &str, options: &[&str]| {

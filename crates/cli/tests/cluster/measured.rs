@@ -1,4 +1,4 @@
-//! Writes `docs/measured-cluster.md`, if it is asked to, with a program that is built for release: see its head. Minutes, on a machine that does nothing else.
+//! Writes `docs/measured-cluster.md` on request, with a release build: see the head of that page. Takes minutes on a machine that does nothing else.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -20,10 +20,10 @@ What do shards cost, and how fast are they merged? How they are done: [cluster.m
 
 ";
 
-/// How often each way is measured, all in turn.
+/// Number of measurements of each way. The ways are measured in turn.
 const ROUNDS: usize = 3;
 
-/// The runs of the work.
+/// Number of runs in the campaign.
 const RUNS: f64 = 4096.0;
 
 fn median(mut times: Vec<f64>) -> f64 {
@@ -46,7 +46,7 @@ fn begin(mut command: Command) -> Child {
     command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
 }
 
-/// The same runs by one process and by shards, in each way that there is on this machine.
+/// Measures the same runs in one process and in shards, in each way that this machine offers.
 fn ways(page: &mut String) {
     let work = Work::new();
     let dask = Dask::start(&work);
@@ -116,7 +116,7 @@ fn ways(page: &mut String) {
     }
 }
 
-/// What a shard of one run costs beside the run.
+/// Measures the cost of a shard of one run, beyond the cost of the run.
 fn one_run(page: &mut String) {
     const SHARDS: usize = 40;
     let work = Work::new();
@@ -142,7 +142,7 @@ fn one_run(page: &mut String) {
     );
 }
 
-/// The most memory that a process has held until it ends \[MB\].
+/// Waits for the end of a process. Returns the most memory that it has held \[MB\].
 fn peak_memory(mut child: Child) -> f64 {
     let mut peak = 0.0;
     while child.try_wait().unwrap().is_none() {

@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 
 use crate::work::{SHARDS, Service, Work, has, kill, wait_for, words};
 
-/// The daemons, in the order in which they end.
+/// Daemons of a Slurm cluster, in the order in which they are ended.
 pub(crate) struct Cluster<'a> {
     work: &'a Work,
     _nodes: Vec<Service>,
@@ -15,7 +15,7 @@ pub(crate) struct Cluster<'a> {
     _munge: Service,
 }
 
-/// A port that nothing listens on now.
+/// Returns three ports at which nothing listens at present.
 fn ports() -> [u16; 3] {
     let listeners = [(); 3].map(|()| TcpListener::bind("127.0.0.1:0").unwrap());
     listeners.map(|listener| listener.local_addr().unwrap().port())
@@ -36,7 +36,7 @@ fn configuration(folder: &str, [controller, one, two]: [u16; 3]) -> String {
 }
 
 impl<'a> Cluster<'a> {
-    /// Starts it in the folder of the work; why not, if it cannot be started here.
+    /// Starts the cluster in the folder of the work. Returns the reason if a cluster cannot be started on this machine.
     pub(crate) fn start(work: &'a Work) -> Result<Self, &'static str> {
         if !["munged", "slurmctld", "slurmd", "sbatch"].into_iter().all(has) {
             return Err("munge and Slurm are not installed");
@@ -83,20 +83,20 @@ impl<'a> Cluster<'a> {
         command
     }
 
-    /// What a command prints; nothing if it fails.
+    /// Returns the output of a command; empty if the command fails.
     fn ask(&self, program: &str, words: &[&str]) -> String {
         let output = self.command(program, words).output().unwrap();
         if output.status.success() { String::from_utf8(output.stdout).unwrap() } else { String::new() }
     }
 
-    /// Submits a job, and gives its number.
+    /// Submits a job, and returns its number.
     pub(crate) fn submit(&self, words: &[&str]) -> String {
         let output = self.command("sbatch", &[&["--parsable"], words].concat()).output().unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         String::from_utf8(output.stdout).unwrap().trim().to_owned()
     }
 
-    /// Waits for a job, and gives the states in which it and its tasks ended.
+    /// Waits for the end of a job, and returns the final states of its tasks.
     pub(crate) fn end_of(&self, job: &str) -> Vec<String> {
         wait_for("the end of a job", || {
             let states: Vec<String> = self.ask("squeue", &["-h", "-t", "all", "-r", "-j", job, "-o", "%T"]).lines().map(str::to_owned).collect();

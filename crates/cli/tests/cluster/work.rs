@@ -1,4 +1,4 @@
-//! A campaign that takes some seconds, and the end of one of its workers.
+//! Campaign of some seconds, during which one worker is killed.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -43,13 +43,13 @@ loss   = "10%"
 /// The work without its folder: 64 parts of 64 runs.
 const WORK: &str = "campaign scene.toml --vary link.loss=0%..30%/4 --runs 1024 --part 64 --threads 1 --no-plot";
 
-/// How many shards it is cut into.
+/// Number of shards of the campaign.
 pub(crate) const SHARDS: usize = 4;
 
-/// Far more than any of this takes on a slow machine.
+/// Time limit of every wait, far longer than any wait takes on a slow machine.
 const PATIENCE: Duration = Duration::from_secs(240);
 
-/// A folder with a scene, in which work is done.
+/// Folder with a scene, in which processes do the campaign.
 pub(crate) struct Work(TempDir);
 
 impl Work {
@@ -91,14 +91,14 @@ impl Work {
         command
     }
 
-    /// The same on two threads.
+    /// Returns the command that does the campaign on two threads.
     pub(crate) fn on_two_threads(&self, options: &str) -> Command {
         let mut command = self.command(program_path());
         command.args(words().into_iter().map(|word| if word == "1" { "2" } else { word })).args(options.split(' '));
         command
     }
 
-    /// Waits until a worker is in the middle of its shard, and kills it. Gives the number of its process.
+    /// Waits until a worker is in the middle of its shard, and kills the worker. Returns the number of the killed process.
     pub(crate) fn kill_a_worker(&self, kill: impl FnOnce(u32)) -> u32 {
         let process = wait_for("a worker in the middle of its shard", || {
             let entries = fs::read_dir(self.path("losses")).ok()?;
@@ -114,7 +114,7 @@ impl Work {
         process
     }
 
-    /// The log of a process says that it was killed on its way.
+    /// Checks by its log that a process was killed during its shard.
     pub(crate) fn assert_killed(&self, process: u32) {
         let logs: Vec<String> =
             fs::read_dir(self.path("losses")).unwrap().map(|entry| fs::read_to_string(entry.unwrap().path()).unwrap_or_default()).collect();
@@ -122,7 +122,7 @@ impl Work {
         assert!(!log.contains("\nend "), "it ended by itself: {log}");
     }
 
-    /// The table is that of one process.
+    /// Checks that the table and the names of files are those of a campaign in one process.
     pub(crate) fn assert_whole(&self) {
         let output = self.cohaptic("--out whole").output().unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -137,7 +137,7 @@ impl Work {
     }
 }
 
-/// That of `COHAPTIC_PROGRAM`, such as one of a release build, or the one built with these tests.
+/// Returns the path of the tested program: the value of `COHAPTIC_PROGRAM`, such as a release build, or the program built with these tests.
 fn program_path() -> PathBuf {
     let named = std::env::var_os("COHAPTIC_PROGRAM").map(|named| {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(named);

@@ -10,7 +10,7 @@ fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
 }
 
-/// The paper's scene with one who touches.
+/// Returns a desk with a scene of the paper's parameters, in which one of two peers touches the object.
 fn desk() -> Desk {
     let scene = TWO.replace("mass = 0.3", "mass = 0.45").replace("damping   = 20.0", "damping   = 5.0").replace("\"24ms\"", "\"8ms\"");
     Desk::with("two.toml", &scene.replace("name = \"right\"", "name = \"right\"\ncontact = \"none\""))

@@ -13,7 +13,7 @@ fn desk() -> Desk {
     Desk::with("random.toml", RANDOM)
 }
 
-/// A table of CSV: its header and rows.
+/// Returns the header and the rows of a CSV table.
 fn table(desk: &Desk, file: &str) -> (Vec<String>, Vec<Vec<String>>) {
     let mut reader = csv::Reader::from_path(desk.path(file)).unwrap();
     let header = reader.headers().unwrap().iter().map(str::to_owned).collect();
@@ -217,7 +217,7 @@ pub(crate) mod interrupted {
     /// About two seconds of work for one thread, in 40 parts.
     const LONG: &str = "campaign two.toml --vary link.delay=8ms..24ms/4 --runs 5000 --part 500 --threads 1 --set link.jitter=1ms";
 
-    /// The number of parts that are kept. A process that is killed between a digest and its part leaves the digest alone, which is no part.
+    /// Returns the number of kept parts. A process that is killed between a digest and its part leaves the digest alone, which does not count.
     fn parts(desk: &Desk) -> usize {
         fs::read_dir(desk.path("out")).map_or(0, |files| {
             let names: BTreeSet<_> = files.map(|file| file.unwrap().file_name().into_string().unwrap()).collect();

@@ -15,7 +15,7 @@ fn desk() -> Desk {
     Desk::with("paper.toml", PAPER)
 }
 
-/// What `point` says of a combination of a campaign: verdict, word, radius and error.
+/// Returns the answer of `stability point` for a combination of a campaign: verdict, word, radius and error.
 fn point(desk: &Desk, set: &str, combination: &Value) -> [Value; 4] {
     let mut command = desk.command(&format!("stability point paper.toml --json {set}"));
     for vary in combination["vary"].as_array().unwrap() {

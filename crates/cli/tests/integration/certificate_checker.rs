@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::integration::desk::Desk;
 
-/// Returns whether there is a Python that can check; says so if there is none.
+/// Returns whether a Python that can run the checker is installed. Prints a note if not.
 pub(crate) fn can_check() -> bool {
     let can = Command::new("python3").args(["-c", "import tomllib"]).output().is_ok_and(|output| output.status.success());
     if !can {
@@ -20,7 +20,7 @@ fn check(desk: &Desk, file: &str) -> Output {
     Command::new("python3").arg(program).arg(desk.path(file)).env("PYTHONDONTWRITEBYTECODE", "1").output().unwrap()
 }
 
-/// What the checker says of a certificate that holds; `about` names it where it does not.
+/// Returns the output of the checker for a certificate that it accepts. Panics with the name `about` if the checker refuses the certificate.
 #[track_caller]
 pub(crate) fn accepts(desk: &Desk, file: &str, about: &str) -> String {
     let output = check(desk, file);
@@ -28,14 +28,14 @@ pub(crate) fn accepts(desk: &Desk, file: &str, about: &str) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// The shares of a region that the program says are those that the checker finds.
+/// Checks that the shares of a region in the program's document are those that the checker prints.
 #[track_caller]
 pub(crate) fn assert_shares(text: &str, region: &Value) {
     let share = |key: &str| format!("{key} {:.3} %", 100.0 * region[key].as_f64().unwrap());
     assert!(["stable", "unstable", "undecided"].iter().all(|key| text.contains(&share(key))), "{text} {region}");
 }
 
-/// With that value in that place the checker refuses the certificate by name, with one of these words.
+/// Checks that the checker refuses a certificate with the value `value` at `place`, by name and with one of the given words.
 #[track_caller]
 pub(crate) fn refuses(desk: &Desk, whole: &Value, place: &str, value: Value, words: &str) {
     let mut changed = whole.clone();

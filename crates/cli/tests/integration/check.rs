@@ -9,7 +9,7 @@ fn scene(expect: &str) -> String {
     format!("{TWO}\n[expect]\n{expect}\n")
 }
 
-/// A folder with scenes that hold, one of them in a folder within.
+/// Returns a desk with a folder of scenes whose expectations hold, one of them in an inner folder.
 fn folder() -> Desk {
     let desk = Desk::new();
     desk.write("scenes/a.toml", scene("discrepancy = { max = 0.01 }"));

@@ -1,4 +1,4 @@
-//! Expectations and what came out: in the document of `cohaptic check` and on its page.
+//! Expectations and results in the document of `cohaptic check` and on its page.
 
 use cohaptic_picture::testing::{page_faults, page_in_browser};
 use serde_json::{Value, json};

@@ -20,7 +20,7 @@ fn folder(desk: &Desk, name: &str) -> Vec<(String, Vec<u8>)> {
     desk.files(name).into_iter().map(|file| (file.clone(), fs::read(desk.path(&format!("{name}/{file}"))).unwrap())).collect()
 }
 
-/// The table of runs, by its header.
+/// Returns the rows of the table of runs, each as a map from the name of a column.
 fn rows(desk: &Desk, file: &str) -> Vec<std::collections::BTreeMap<String, String>> {
     let mut reader = csv::Reader::from_path(desk.path(file)).unwrap();
     let header: Vec<String> = reader.headers().unwrap().iter().map(str::to_owned).collect();

@@ -1,11 +1,11 @@
-//! What shells complete: keys, peers and scenes. Shells that are not installed are left out, with a message.
+//! Completion of keys, peers and scenes in shells. Shells that are not installed are left out, with a message.
 
 use std::process::Command;
 
 use crate::integration::desk::{Desk, Outcome};
 use crate::integration::scenes::TWO;
 
-/// A desk with files whose names are completed, and files whose names are not.
+/// Returns a desk with files whose names are completed, and files whose names are not.
 fn desk() -> Desk {
     let desk = Desk::with("two.toml", TWO);
     desk.write("two.csv", "");
@@ -75,7 +75,7 @@ fn bash_completes_keys_peers_and_scenes() {
     assert_completes("bash", &["--norc", "-c"], SCRIPT);
 }
 
-/// The functions that zsh calls at a key stroke are replaced by ones that print.
+/// The functions that zsh calls at a key stroke are replaced by functions that print.
 #[test]
 fn zsh_completes_keys_peers_and_scenes() {
     const SCRIPT: &str = r#"
@@ -105,7 +105,7 @@ fn fish_completes_keys_peers_and_scenes() {
     assert_completes("fish", &["--no-config", "-c"], SCRIPT);
 }
 
-/// Bash inserts an answer as it is, so that what the shell would split is quoted.
+/// Bash inserts an answer as it is, so that characters at which the shell would split are quoted.
 #[test]
 fn names_with_spaces_are_quoted_for_bash() {
     let desk = desk();

@@ -1,4 +1,4 @@
-//! Where a user sits: a folder with scenes in it, and a shell.
+//! Place of a user: a folder with scenes, and a shell.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ pub(crate) struct Desk(TempDir);
 /// No command of a test takes that long, however busy the machine is: one that does hangs.
 const AT_MOST: Duration = Duration::from_secs(900);
 
-/// What came of a command.
+/// Exit status and outputs of a command.
 #[derive(Debug)]
 pub(crate) struct Outcome {
     pub(crate) status: Option<i32>,
@@ -27,7 +27,7 @@ impl Desk {
         Self(tempfile::tempdir().unwrap())
     }
 
-    /// A desk with one scene on it.
+    /// Creates a desk with one file.
     pub(crate) fn with(name: &str, scene: &str) -> Self {
         let desk = Self::new();
         desk.write(name, scene);
@@ -73,12 +73,14 @@ impl Desk {
         self.cohaptic_within(AT_MOST, line)
     }
 
-    /// The same, but it is ended and has no status if it takes longer: for what would go on for ever if it were not refused.
+    /// Like `cohaptic`, but ends a command that takes longer than `patience`, which then has no status. For commands that would not end if they were not
+    /// refused.
     pub(crate) fn cohaptic_within(&self, patience: Duration, line: &str) -> Outcome {
         Outcome::of(assert_cmd::Command::from_std(self.command(line)).timeout(patience).output().unwrap())
     }
 
-    /// What a command prints that succeeds. On standard error it says which files it wrote, and nothing else but how long it takes, which depends on the machine.
+    /// Returns the output of a command, which must succeed. Standard error may name the files written and the expected duration, which depends on the machine,
+    /// and nothing else.
     pub(crate) fn text(&self, line: &str) -> String {
         let outcome = self.cohaptic(line);
         assert_eq!(outcome.status, Some(0), "{line}: {}", outcome.stderr);
@@ -87,14 +89,14 @@ impl Desk {
         outcome.stdout
     }
 
-    /// The document that a command prints that succeeds.
+    /// Returns the document that a command prints. The command must succeed.
     pub(crate) fn json(&self, line: &str) -> Value {
         parse(&self.text(line))
     }
 }
 
 impl Outcome {
-    /// Standard error is a terminal of nobody here, so it holds messages only, and never the marks of a panic.
+    /// Takes the outputs of a process. Standard error is no terminal, so it holds messages only, and it must not hold the marks of a panic.
     pub(crate) fn of(output: std::process::Output) -> Self {
         let text = |bytes| String::from_utf8(bytes).expect("all output is UTF-8");
         let outcome = Self { status: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) };
@@ -102,7 +104,7 @@ impl Outcome {
         outcome
     }
 
-    /// That the command was refused with this status and a message that has all of these parts, and printed nothing else but, under `--json`, the
+    /// Checks that the command was refused with this status and a message with all of the parts, and that it printed nothing else than, with `--json`, the
     /// document of the error.
     pub(crate) fn assert_refused(&self, status: i32, parts: &[&str]) {
         assert_eq!(self.status, Some(status), "{}{}", self.stdout, self.stderr);
@@ -116,13 +118,13 @@ impl Outcome {
     }
 }
 
-/// One JSON document, and nothing behind it but a line break.
+/// Parses a text of one JSON document that ends with a line break.
 pub(crate) fn parse(text: &str) -> Value {
     assert!(text.ends_with("}\n"), "{text:?}");
     serde_json::from_str(text).unwrap_or_else(|error| panic!("{error} in {text}"))
 }
 
-/// The document as text, but for how long the run took.
+/// Returns a document as text, without the duration of the run.
 pub(crate) fn timeless(mut document: Value) -> String {
     let mut runs = vec![&mut document];
     while let Some(run) = runs.pop() {
@@ -151,7 +153,7 @@ fn words(line: &str) -> Vec<String> {
     words
 }
 
-/// A scene that ships with the program.
+/// Returns the path of a scene that ships with the program.
 pub(crate) fn shipped(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios").join(name)
 }

@@ -1,4 +1,4 @@
-//! Every JSON document says what it is, errors are documents too, and how messages look.
+//! JSON documents, which name their schema, also for errors, and the form of messages.
 
 use std::process::Stdio;
 
@@ -100,7 +100,7 @@ fn a_closed_pipe_ends_a_command_quietly() {
     }
 }
 
-/// One wording on standard error, whichever command it is; a JSON document names its files itself.
+/// All commands name written files on standard error in the same words. A JSON document names its files itself.
 #[test]
 fn what_was_written_is_said_on_standard_error() {
     let desk = Desk::with("two.toml", TWO);

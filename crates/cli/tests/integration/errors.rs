@@ -152,7 +152,7 @@ fn too_many_peers_to_simulate_are_refused_before_anything_is_written() {
     assert!(desk.text("explain many.toml").contains("9999900000 links"));
 }
 
-/// A file in TOML that is too long is refused before it is read: its tree would take fifty times its length of memory.
+/// A TOML file that is too long is refused before it is read, because its tree would take fifty times its length of memory.
 #[test]
 fn a_long_file_in_toml_is_refused_before_it_is_read() {
     let desk = Desk::new();

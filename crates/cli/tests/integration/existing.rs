@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use crate::integration::desk::{Desk, Outcome};
 use crate::integration::running::PATIENCE;
 
-/// Version of tokio that the project is built from, whose sources cargo has.
+/// Returns the version of tokio in the project's lock file, whose sources cargo has.
 fn version() -> String {
     let lock = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../Cargo.lock")).unwrap();
     lock.split_once("name = \"tokio\"\nversion = \"").unwrap().1.split('"').next().unwrap().to_owned()

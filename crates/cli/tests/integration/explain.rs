@@ -1,4 +1,4 @@
-//! `cohaptic explain`: what is modelled, what is left out, and why.
+//! `cohaptic explain`: the modelled parts, the parts left out, and the reasons.
 
 use serde_json::Value;
 

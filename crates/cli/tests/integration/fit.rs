@@ -1,4 +1,4 @@
-//! `cohaptic fit`: what a link did is estimated, and is what it was told.
+//! `cohaptic fit`: estimates from the packets of a link agree with the configuration of the link.
 
 use std::fmt::Write as _;
 
@@ -101,7 +101,8 @@ fn one_capture_says_that_two_are_needed() {
     }
 }
 
-/// What is written is read again: by `link` as its keys, by a scene as its `[link]`. At one spacing it speaks of packets, at several of time.
+/// The written link can be read again: as the keys of `link`, and as the `[link]` of a scene. Packets at one spacing give a law per packet, packets at several
+/// spacings a law in time.
 #[test]
 fn the_link_that_is_found_is_the_link_of_a_scene() {
     let desk = Desk::new();
@@ -139,7 +140,7 @@ fn the_link_that_is_found_is_the_link_of_a_scene() {
     }
 }
 
-/// A scene but for its links.
+/// Scene without links.
 const SCENE: &str = "[scene]\nduration = \"1s\"\ncount = 2\n[object]\nmass = 0.45\n[coordination]\nstrategy = \"average-position\"\nstiffness = 100\n\
                      damping = 5\nupdate = \"8ms\"\n[peer]\ncontact = \"none\"\ndevice = { mass = 0.1, damping = 5 }\n\
                      coupling = { stiffness = 100, damping = 5 }\n";

@@ -32,7 +32,7 @@ fn sent(packet: u16) -> (u32, u16) {
     (1_000_000_000 + 10_000 * u32::from(packet), packet)
 }
 
-/// The same by a receiver whose clock is ahead by that time \[µs\], 20 ms and the jitter later.
+/// Returns the arrival of a packet, 20 ms and the jitter after its sending, on a receiver's clock that is ahead by `ahead` \[µs\].
 fn arrived(packet: u16, ahead: i64) -> (u32, u16) {
     let micros = i64::from(sent(packet).0 + 20_000 + jitter(packet)) + ahead;
     (u32::try_from(micros).unwrap(), packet)

@@ -1,4 +1,4 @@
-//! `cohaptic link`: what was asked for beside what was achieved.
+//! `cohaptic link`: the asked figures of a link beside the achieved ones.
 
 use serde_json::Value;
 
@@ -8,7 +8,7 @@ fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
 }
 
-/// The compared figure of that name.
+/// Returns the compared figure with this name.
 fn compared<'a>(document: &'a Value, name: &str) -> &'a Value {
     let figures = document["compared"].as_array().unwrap();
     figures.iter().find(|figure| figure["name"] == name).unwrap_or_else(|| panic!("no {name} in {document:#}"))
@@ -76,7 +76,7 @@ fn a_long_stream_is_measured_by_its_first_packets() {
     assert!(text.contains("\n  figures describe the first 4000000 packets, counts all packets\n  4000100 packets sent, "), "{text}");
 }
 
-/// The text of a log is not held: its limit is that of files that are read piece by piece.
+/// A log of fates is read piece by piece and not held in memory, so that the larger limit of such files holds.
 #[test]
 #[cfg(target_os = "linux")]
 fn a_log_of_fates_may_be_longer_than_other_files() {

@@ -20,9 +20,9 @@ const COORDINATION: f64 = 300.0;
 const ARM: f64 = 100.0;
 /// The dry friction of a simulated grip \[N\].
 const FRICTION: f64 = 0.2;
-/// What whole counts of encoders and motors leave open \[m\]: 0.104 mm and 0.025 mm (crates/live/tests/integration/falcons.rs).
+/// Uncertainty of a position at rest from the whole counts of encoders and motors \[m\]: 0.104 mm and 0.025 mm (crates/live/tests/integration/falcons.rs).
 const COUNTS: f64 = 0.13e-3;
-/// Where the hand of left wants to be along x \[m\]; the others want to be at 0.
+/// Position along x \[m\] towards which the hand of `left` pulls. The other hands pull towards 0.
 const WANTED: f64 = 0.03;
 
 /// A session of the shipped scene in which `falcons` peers have a Falcon and the others are simulated as masses.

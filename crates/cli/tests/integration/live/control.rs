@@ -1,4 +1,4 @@
-//! Live control of a real session: what it shows is so, and what it changes is changed, in the record and its replay.
+//! Live control of a real session: the shown state is right, and each change stands in the record and in its replay.
 
 use std::collections::BTreeMap;
 
@@ -53,7 +53,7 @@ fn a_link_that_is_changed_is_another_link_from_then_on() {
     assert_replays(&desk, "two.toml", "--set scene.duration=1h");
 }
 
-/// One row in `inputs.csv`, and each packet that was sent from then on has the new delay, each before the old one, to the nanosecond.
+/// Checks that `inputs.csv` has one change, and that each packet sent from then on has the new delay, and each earlier packet the old delay, to the nanosecond.
 fn has_changed_once(desk: &Desk) {
     let inputs = inputs(desk, "out");
     assert_eq!(inputs.iter().map(|row| row.kind.as_str()).collect::<Vec<_>>(), ["link", "end"]);
@@ -96,7 +96,7 @@ fn assert_metrics(control: &Control) {
     assert_eq!(values[r#"cohaptic_peer_status{peer="left",status="here"}"#], 1.0);
 }
 
-/// Keys that name files: refused without a folder; with one, its files are read, no others, and nothing of a file is shown.
+/// Keys that name files are refused without a folder. With a folder, only the files of the folder can be read, and no content of a file is shown.
 #[test]
 fn a_change_names_files_of_the_folder_alone_and_is_shown_none_of_them() {
     let scene = format!("{TWO}\n[[links]]\nfrom = \"right\"\nto = \"left\"\ntrace = \"own.trace\"\n");

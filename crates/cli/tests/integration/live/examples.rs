@@ -13,7 +13,8 @@ use super::session::Session;
 use super::wait_for;
 use crate::integration::desk::Desk;
 
-/// Somebody who holds on to 0, the programs, and perhaps a third user who lets the object go where it will. All but the damping is what the programs take unless told.
+/// Returns a scene of a user who holds the object at 0, the programs, and with one program a third user whose hand is free. All parameters but the damping are
+/// the defaults of the programs.
 fn scene(programs: usize) -> String {
     let kinds = ["", "kind = \"udp\"", if programs > 1 { "kind = \"udp\"" } else { "" }];
     let [_, right, third] = kinds;
@@ -28,18 +29,18 @@ fn scene(programs: usize) -> String {
 }
 
 const STIFFNESS: f64 = 300.0;
-/// So much that no copy swings over: then no peer passes on more than it is told, at any frequency, and they come to rest however long a busy machine lets one of
-/// them wait. None counts as silent meanwhile.
+/// Damping BT [N·s/m], so high that no copy overshoots. Then no peer amplifies a motion at any frequency, and all peers come to rest, however long a busy
+/// machine lets a program wait.
 const DAMPING: f64 = 20.0;
 const COUPLING: f64 = 3500.0;
 const ARM: f64 = 300.0;
-/// What the hand of the program at place 1 pushes with, all the time [N].
+/// Constant force of the hand of the program at place 1 [N].
 const FORCE: f64 = 0.5;
-/// What is left of the motion when the copies are looked at [m]: about a hundredth of how far they have moved.
+/// Largest distance [m] of a copy from its place of rest when the copies are compared: about a hundredth of their motion.
 const SETTLED: f64 = 2e-5;
 
-/// Where the copies come to rest [m]. The arm alone holds against the push, F = ka·xd; so F passes through the coupling there, F = KC·(xo − xd), and
-/// through the coordination of its copy with the mean of the others. The third copy feels nothing when it is midway between the two. So
+/// Returns the positions at which the copies come to rest [m]. The arm alone holds against the push, F = ka·xd; so F passes through the coupling there,
+/// F = KC·(xo − xd), and through the coordination of its copy with the mean of the others. The third copy feels nothing when it is midway between the two. So
 /// F = KT·((xr + xt)/2 − xl) = KT·¾·(xr − xl).
 fn at_rest() -> [f64; 3] {
     let left = FORCE / ARM + FORCE / COUPLING;
@@ -53,7 +54,8 @@ fn is_settled(state: &Value) -> bool {
     at_rest().iter().enumerate().all(|(peer, rest)| position(peer).is_some_and(|x| (x - rest).abs() < SETTLED))
 }
 
-/// The programs in one session for so many seconds; whether they came to rest where they must, all of them and those here, and what they said at the end.
+/// Runs the programs in one session for this many seconds. Returns whether all copies came to rest at their positions, the summaries that the programs printed,
+/// and the document of the session.
 fn taken_part(desk: &Desk, languages: &[Language], with_key: bool, seconds: f64) -> Option<(bool, Vec<Summary>, Value)> {
     let programs: Vec<_> = languages.iter().map(|language| language.program()).collect::<Option<_>>()?;
     let key = if with_key { " --key-file session.key" } else { "" };

@@ -45,7 +45,7 @@ impl Control {
         self.get("/api/state")
     }
 
-    /// Waits until the state is such.
+    /// Waits until `holds` is true for the state, and returns the state. `what` names the state in messages.
     pub(super) fn wait(&self, what: &str, mut holds: impl FnMut(&Value) -> bool) -> Value {
         wait_for(what, || Some(self.state()).filter(|state| holds(state)))
     }
@@ -55,7 +55,7 @@ impl Control {
         self.wait(&format!("peer {peer} is {status}"), |state| state["peers"][peer]["status"] == json!(status))
     }
 
-    /// How many packets a link has delivered.
+    /// Returns the number of packets that a link has delivered.
     pub(super) fn delivered(&self, link: usize) -> u64 {
         self.state()["links"][link]["delivered"].as_u64().unwrap()
     }

@@ -9,10 +9,10 @@ use crate::integration::desk::Desk;
 const STIFFNESS: f64 = 600.0;
 const DAMPING: f64 = 5.0;
 const SHARE: f64 = 1.0 / 250.0;
-/// Every peer has two others.
+/// Number of other peers of each peer.
 const OTHERS: f64 = 2.0;
 
-/// What a peer holds of another that is simulated here, tick by tick: the state of the copy at the tick at which the newest sample was sent.
+/// Returns the state that a peer holds of a simulated peer at each tick: the state of the sender's copy at the tick at which the newest sample was sent.
 fn held(ticks: &[Tick], sender: &[Tick], packets: &[&Packet]) -> Vec<(f64, f64)> {
     let mut arrivals: Vec<(u64, u64, u64)> = packets.iter().filter_map(|packet| Some((packet.arrived?, packet.sequence, packet.sent))).collect();
     arrivals.sort_unstable();
@@ -44,7 +44,7 @@ fn largest_excess(ticks: &[Tick], held: &[(f64, f64)], places: &[f64]) -> f64 {
     excess.fold(f64::MIN, f64::max)
 }
 
-/// That neither of the users here feels a jump.
+/// Checks that the force of neither simulated user jumps.
 pub(super) fn assert_no_jump(desk: &Desk, packets: &[Packet], places: &[f64; 2]) {
     let record = trajectory(desk, "out");
     let places = [0.0, places[0], places[1]];

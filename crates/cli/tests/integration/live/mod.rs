@@ -1,7 +1,7 @@
 //! `cohaptic live`: sessions of the real command, with the programs and the people that take part in one.
 //!
-//! A session says where it listens before its time begins, and is ended when a test has seen what it waited for. Nothing here depends on how fast the machine
-//! is: what is awaited is awaited long, and what is compared are records, which say in logical time what happened.
+//! A session prints its address before its time begins, and a test ends the session after the awaited event. The tests do not depend on the speed of the
+//! machine: they wait long, and compare records, whose times are logical.
 
 mod alone;
 mod browser;

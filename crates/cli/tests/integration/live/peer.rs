@@ -19,7 +19,7 @@ pub(super) struct Sent {
     pub(super) sample: Vec<u8>,
 }
 
-/// A sample that was received.
+/// Received sample.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Received {
     pub(super) at: Wall,
@@ -27,16 +27,16 @@ pub(super) struct Received {
     pub(super) sequence: u64,
 }
 
-/// All that a peer did.
+/// Samples that a peer has sent and received.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Account {
     pub(super) sent: Vec<Sent>,
     pub(super) received: Vec<Received>,
-    /// Everything that it said, hellos included, as it went over the wire.
+    /// Every datagram that the peer has sent, hellos included, as bytes.
     pub(super) wire: Vec<Vec<u8>>,
 }
 
-/// A peer at place 1 that rests somewhere, sends every 8 ms, and listens even when it is silent.
+/// Peer at place 1 with a copy at rest. Sends every 8 ms, and receives even while it is silent.
 pub(super) struct Peer {
     speaks: Arc<AtomicBool>,
     ends: Arc<AtomicBool>,
@@ -45,11 +45,11 @@ pub(super) struct Peer {
     thread: Option<JoinHandle<()>>,
 }
 
-/// The session of the scenes here: their seed.
+/// Number of the session, which is the seed of the scenes of these tests.
 pub(super) const SESSION: u64 = 7;
 
 impl Peer {
-    /// Begins at once, from a port of its own.
+    /// Starts a peer that sends from a port of its own.
     pub(super) fn begin(config: ClientConfig, door: SocketAddr, position: f64) -> Self {
         let (speaks, ends) = (Arc::new(AtomicBool::new(true)), Arc::new(AtomicBool::new(false)));
         let (account, position) = (Arc::new(Mutex::new(Account::default())), Arc::new(AtomicU64::new(position.to_bits())));
@@ -61,12 +61,12 @@ impl Peer {
         Self { speaks, ends, account, position, thread: Some(thread) }
     }
 
-    /// Where it is from now on.
+    /// Moves the copy to a position \[m\] at once.
     pub(super) fn move_to(&self, position: f64) {
         self.position.store(position.to_bits(), Ordering::Relaxed);
     }
 
-    /// Says nothing from now on.
+    /// Sends nothing from now on.
     pub(super) fn fall_silent(&self) {
         self.speaks.store(false, Ordering::Relaxed);
     }
@@ -75,7 +75,7 @@ impl Peer {
         self.account.lock().unwrap().clone()
     }
 
-    /// What it did until now, and no more.
+    /// Ends the peer, and returns what it has sent and received.
     pub(super) fn end(mut self) -> Account {
         self.ends.store(true, Ordering::Relaxed);
         self.thread.take().unwrap().join().unwrap();
@@ -134,7 +134,7 @@ fn say(socket: &UdpSocket, account: &Mutex<Account>, datagram: &[u8]) {
     let _sent = socket.send(datagram);
 }
 
-/// A sample as [`Peer`] would send it.
+/// Returns the bytes of a sample as [`Peer`] sends it.
 pub(super) fn sample(session: u64, sender: u32, sequence: u64, position: f64) -> Vec<u8> {
     let mut bytes = [0; MAX_LEN];
     let state = State { position: [position], velocity: [0.0] };

@@ -19,7 +19,7 @@ use super::session::Session;
 use super::wait_for;
 use crate::integration::desk::Desk;
 
-/// A user who moves, a program, and a user who holds on to a place; each pair sees each other through chance.
+/// Scene of a user who moves, a program, and a user who holds the object at a place. All links have random delays and losses.
 pub(super) const SCENE: &str = r#"
 scene        = { duration = "1h", seed = 7 }
 object       = { mass = 0.45, damping = 1.0 }
@@ -46,7 +46,7 @@ jitter = { sd = "6.5ms", distribution = "uniform" }
 loss = { gilbert-elliott = { p = 0.05, r = 0.3 } }
 "#;
 
-/// Where the program is at first, and after it came back [m].
+/// Positions of the program's copy in its first and in its second visit [m].
 const PLACES: [f64; 2] = [0.01, 0.06];
 const UPDATE: usize = 8_000_000;
 
@@ -55,7 +55,7 @@ pub(super) fn keyless(peers: u32) -> ClientConfig {
     ClientConfig::Keyless { session: SESSION, place: Place(1), info: SessionInfo { axes: 1, peers, tick, update } }
 }
 
-/// The session of this file: what its document says, and what the program did from its two ports.
+/// Runs the session of this file. Returns its document, and the samples of the program in its two visits, each from a port of its own.
 fn visited(desk: &Desk) -> (Value, [Account; 2]) {
     let mut session = Session::begin(desk, "scene.toml --json --out out --listen 127.0.0.1:0 --control");
     let (door, control) = (session.address(), session.control());
@@ -76,7 +76,7 @@ fn visited(desk: &Desk) -> (Value, [Account; 2]) {
     (document, [first.end(), second.end()])
 }
 
-/// Comes, and stays until it has heard something and its pull is whole.
+/// Starts a peer, and waits until samples have passed both ways for so long that its pull is whole.
 fn stays(control: &Control, door: SocketAddr, place: f64) -> Peer {
     let delivered = control.delivered(2);
     let peer = Peer::begin(keyless(3), door, place);
@@ -85,14 +85,14 @@ fn stays(control: &Control, door: SocketAddr, place: f64) -> Peer {
     peer
 }
 
-/// What was offered to the links: by sender, the instants of its samples in their order.
+/// Returns the offers to the links: the instants of the samples in order, by sender.
 fn offers(inputs: &[Input], end: u64) -> BTreeMap<usize, Vec<u64>> {
     let grid: Vec<u64> = (0..=end).step_by(UPDATE).collect();
     let heard = inputs.iter().filter(|row| row.kind == "sample").map(|row| row.at).collect();
     [(0, grid.clone()), (1, heard), (2, grid)].into()
 }
 
-/// The same offers to a network of the same links, without a scene, in virtual time: what becomes of each packet until `end`.
+/// Returns the fates of the same offers until `end`, in a network of the same links in virtual time and without a scene.
 fn in_virtual_time(desk: &Desk, offers: &BTreeMap<usize, Vec<u64>>, end: u64) -> BTreeSet<(String, u64, u64, Option<u64>, String)> {
     let scene = Scene::read_live(&desk.path("scene.toml"), &[]).unwrap();
     let names: Vec<String> = scene.peers.iter().map(|peer| peer.name.clone()).collect();
@@ -140,7 +140,7 @@ fn it_comes_goes_and_comes_back_and_the_record_is_the_whole_truth() {
     assert_no_jump(&desk, &packets, &PLACES);
 }
 
-/// Every sample that counts is one that the program sent, in its order; what is missing was lost before the door.
+/// Checks that every counted sample was sent by the program, in this order. A missing sample was lost before it reached the session.
 fn takes_what_was_sent(document: &Value, inputs: &[Input], accounts: &[Account; 2]) {
     let samples = assert_sent_by(accounts, inputs);
     let seat = &document["peers"][1]["seat"];
@@ -151,7 +151,7 @@ fn takes_what_was_sent(document: &Value, inputs: &[Input], accounts: &[Account; 
     assert!(door["joinings"].as_u64().unwrap() >= 2 && door["admitted"].as_u64().unwrap() >= samples as u64, "{door}");
 }
 
-/// That each sample among the inputs was sent by the program, in that order; gives how many there are.
+/// Checks that each sample among the inputs was sent by the program, in this order. Returns the number of samples.
 pub(super) fn assert_sent_by(accounts: &[Account], inputs: &[Input]) -> usize {
     let mut sent = accounts.iter().flat_map(|account| &account.sent).map(|sent| hexadecimal(&sent.sample));
     let samples = inputs.iter().filter(|row| row.kind == "sample");
@@ -166,7 +166,7 @@ fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// A sample but for its number, which the door raises with every joining.
+/// Returns the parts of a sample around its sequence number, which the session changes with every joining.
 fn untimed(sample: &str) -> (&str, &str) {
     (&sample[..48], &sample[64..])
 }
@@ -184,7 +184,7 @@ fn has_the_fates_of_virtual_time(desk: &Desk, packets: &[Packet], inputs: &[Inpu
     assert!(packets.iter().any(|packet| packet.fate == "loss"));
 }
 
-/// What was handed to the program was due when the network had delivered it, in that order.
+/// Checks that the packets sent to the program were due at the instants at which the network delivered them, in this order.
 fn releases_what_has_arrived(desk: &Desk, document: &Value, packets: &[Packet]) {
     let releases = releases(desk, "out");
     let mut arrivals = packets.iter().filter(|packet| packet.link.ends_with("->right")).filter_map(|packet| packet.arrived);

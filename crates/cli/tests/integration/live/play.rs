@@ -1,4 +1,4 @@
-//! `cohaptic play` without a browser: hands over WebSockets, parts that follow one another, records, and those who may not.
+//! `cohaptic play` without a browser: hands over WebSockets, successive parts, records, and refused connections.
 
 use std::io::Write as _;
 use std::net::TcpStream;
@@ -13,11 +13,11 @@ use super::session::Session;
 use super::{PATIENCE, wait_for};
 use crate::integration::desk::Desk;
 
-/// A page that has a hand.
+/// Connection of a page that has a hand.
 pub(super) struct Page(WebSocket<TcpStream>);
 
 impl Page {
-    /// Connects, with what follows in the query; the error is the status with which that was refused.
+    /// Connects with `query` appended to the address. The error is the HTTP status of a refusal.
     fn try_open(control: &Control, query: &str, header: Option<(&'static str, &str)>) -> Result<Self, u16> {
         let stream = TcpStream::connect(&control.host).unwrap();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();

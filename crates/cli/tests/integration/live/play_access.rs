@@ -1,4 +1,4 @@
-//! The page of `cohaptic play` for those who see little, who use no mouse, whom motion disturbs, and who have a gamepad or a phone.
+//! Accessibility of the page of `cohaptic play`: for people with low vision, without a mouse, disturbed by motion, with a gamepad or on a phone.
 
 use std::thread::sleep;
 use std::time::Duration;
@@ -118,7 +118,7 @@ fn a_finger_on_a_phone_will_do_and_every_control_has_a_name() {
     end(session);
 }
 
-/// What can be operated has a name, as a screen reader tells it.
+/// Checks that every control has a name for screen readers.
 fn every_control_has_a_name(browser: &mut Browser) {
     browser.call("Accessibility.enable", json!({}));
     let tree = browser.call("Accessibility.getFullAXTree", json!({}));
@@ -220,7 +220,7 @@ fn with_reduced_motion_nothing_flies_and_the_hand_still_moves() {
     end(session);
 }
 
-/// A gamepad and the motor of a phone, in place of those of the browser: what the page does with them is written down.
+/// Script that replaces the gamepad and the vibration motor of the browser by ones that record the calls of the page.
 const FAKED: &str = "
     window.pulses = [];
     window.vibrations = [];
@@ -230,7 +230,7 @@ const FAKED: &str = "
     Object.defineProperty(navigator, 'vibrate', { value: (ms) => { window.vibrations.push(ms); return true; } });
 ";
 
-/// No gamepad was at hand, so that the page meets one that is faked: it is read by the rules of the Gamepad API, and its motors are driven by them.
+/// The gamepad is simulated, because the test machines have none. The page reads it and drives its motors by the Gamepad API.
 #[test]
 #[ignore = ".ci/nightly runs it: it needs a browser"]
 fn a_stick_moves_the_hand_and_motors_give_its_force() {

@@ -79,15 +79,15 @@ pub(super) fn trajectory(desk: &Desk, folder: &str) -> BTreeMap<String, Vec<Tick
     peers
 }
 
-/// The rows of `releases.csv`: receiver, when it was due, and how late it left in microseconds.
+/// Returns the rows of `releases.csv`: receiver, due instant \[ns\], and lateness \[µs\].
 pub(super) fn releases(desk: &Desk, folder: &str) -> Vec<(String, u64, f64)> {
     rows(desk, &format!("{folder}/releases.csv")).into_iter().map(|row| (row[0].to_owned(), nanos(&row[1]), row[2].parse().unwrap())).collect()
 }
 
-/// What a session has beside the files of a run.
+/// Files that a session writes in addition to the files of a run.
 const OF_A_SESSION: [&str; 4] = ["inputs.csv", "lateness.csv", "live.html", "releases.csv"];
 
-/// The record in `out`, replayed in virtual time, is the same record.
+/// Checks that a replay of the record in `out` in virtual time writes the same record.
 pub(super) fn assert_replays(desk: &Desk, scene: &str, set: &str) {
     desk.text(&format!("run {scene} {set} --inputs out/inputs.csv --out again"));
     assert_same(desk, "out", "again");

@@ -1,4 +1,4 @@
-//! A session that runs.
+//! Running process of `cohaptic live` or `cohaptic play`.
 
 use std::io::{BufRead as _, BufReader, Read as _};
 use std::net::SocketAddr;
@@ -12,7 +12,7 @@ use super::http::Control;
 use super::{PATIENCE, wait_for};
 use crate::integration::desk::{Desk, Outcome, parse};
 
-/// `cohaptic live`, which ends with the test.
+/// Running session, which ends with the test.
 pub(super) struct Session {
     child: Child,
     said: Receiver<String>,
@@ -26,7 +26,7 @@ impl Session {
         Self::of(desk, &format!("live {words}"))
     }
 
-    /// One with a page to take part: `words` are what follows `play`.
+    /// Starts `cohaptic play`. `words` are the arguments after `play`.
     pub(super) fn play(desk: &Desk, words: &str) -> Self {
         Self::of(desk, &format!("play {words}"))
     }
@@ -54,7 +54,7 @@ impl Session {
         Self { child, said, heard: Vec::new(), readers: Some([out, err]) }
     }
 
-    /// What follows these words in a line of standard error.
+    /// Waits for a line of standard error that begins with `words`, and returns the rest of the line.
     pub(super) fn told(&mut self, words: &str) -> String {
         loop {
             if let Some(line) = self.heard.iter().find_map(|line| line.strip_prefix(words)) {
@@ -65,12 +65,12 @@ impl Session {
         }
     }
 
-    /// Where peers in other programs send to.
+    /// Returns the address to which peers in other programs send.
     pub(super) fn address(&mut self) -> SocketAddr {
         self.told("listening on ").split(' ').next().unwrap().parse().unwrap()
     }
 
-    /// Its live control.
+    /// Returns the live control of the session.
     pub(super) fn control(&mut self) -> Control {
         Control::at(&self.url())
     }
@@ -79,7 +79,7 @@ impl Session {
         self.told("live control: ")
     }
 
-    /// The memory that it has, where the system tells [KiB].
+    /// Returns the memory of the process [KiB]; `None` if the system does not tell.
     pub(super) fn memory(&self) -> Option<u64> {
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).ok()?;
         status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?.trim().strip_suffix(" kB")?.trim().parse().ok()
@@ -90,14 +90,14 @@ impl Session {
         assert!(Command::new("kill").args(["-INT", &self.child.id().to_string()]).status().unwrap().success());
     }
 
-    /// What came of it, once it has ended.
+    /// Waits for the end of the process, and returns its status and outputs.
     pub(super) fn outcome(mut self) -> Outcome {
         let status: ExitStatus = wait_for("the end of the session", || self.child.try_wait().unwrap());
         let [stdout, stderr] = self.readers.take().unwrap().map(|reader| reader.join().unwrap().into_bytes());
         Outcome::of(std::process::Output { status, stdout, stderr })
     }
 
-    /// Ends it, and gives its document.
+    /// Ends the session, and returns its document.
     pub(super) fn end(self) -> Value {
         self.interrupt();
         let outcome = self.outcome();

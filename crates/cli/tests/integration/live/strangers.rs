@@ -15,12 +15,12 @@ use super::session::Session;
 use super::wait_for;
 use crate::integration::desk::Desk;
 
-/// How many of each kind he sends.
+/// Number of datagrams of each kind that the stranger sends.
 const ROUNDS: u64 = 250;
-/// What a program may need more in the end than before, for its files and what it says of itself [KiB]; every datagram kept would be more than that.
+/// Memory by which the process may grow, for its files and messages [KiB]. If every datagram were kept, the process would grow by more.
 const GROWTH: u64 = 16 * 1024;
 
-/// The same noise on every machine (splitmix64).
+/// Random numbers that are equal on every machine (splitmix64).
 struct Noise(u64);
 
 impl Noise {
