@@ -11,7 +11,7 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// The words behind `cohaptic` of each command.
+/// Returns the words after `cohaptic` of each command.
 fn commands() -> Vec<Vec<String>> {
     let page = std::fs::read_to_string(root().join("docs/measured.md")).unwrap();
     let words = |line: &str| line.split(' ').map(str::to_owned).collect();

@@ -3,13 +3,13 @@
 use crate::integration::desk::Desk;
 use crate::integration::scenes::TWO;
 
-/// What stands below every refusal of an argument.
+/// Text that follows every refusal of an argument.
 const HELP: &str = "\n\nFor more information, try '--help'.";
 
 struct Bad {
     line: &'static str,
     status: i32,
-    /// Without the `error: ` before it and the line break behind it.
+    /// Message without `error: ` before it and without the line break after it.
     message: &'static str,
 }
 
@@ -59,7 +59,7 @@ const ARGUMENTS: &[Bad] = &[
     ),
 ];
 
-/// Everything else.
+/// Refusals of all other kinds.
 const OTHERS: &[Bad] = &[
     bad(
         "run two.toml --set link.delay=24parsecs",

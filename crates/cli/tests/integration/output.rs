@@ -1,4 +1,4 @@
-//! When what is printed or recorded cannot be written: exit status 3 and a message, never a panic.
+//! Outputs and files that cannot be written: exit status 3 and a message, never a panic.
 
 use std::process::Stdio;
 
@@ -18,7 +18,7 @@ const COMMANDS: [&str; 10] = [
     "--version",
 ];
 
-/// Standard error is for what goes wrong alone.
+/// With `-q`, standard error has only errors.
 #[test]
 fn a_quiet_command_says_nothing_but_its_answer() {
     let desk = Desk::with("two.toml", TWO);
@@ -58,7 +58,7 @@ fn a_full_disk_is_an_output_error() {
     }
 }
 
-/// The standard library takes such a descriptor for a place that swallows everything.
+/// The standard library ignores errors of a standard output that is not open for writing. The program must report them.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_standard_output_that_cannot_be_written_to_is_an_error() {
@@ -70,7 +70,7 @@ fn a_standard_output_that_cannot_be_written_to_is_an_error() {
     }
 }
 
-/// Nobody has to be told that nobody reads.
+/// A reader that closes the pipe early, such as `head`, causes no message.
 #[cfg(unix)]
 #[test]
 fn a_reader_that_has_gone_is_no_error() {

@@ -1,4 +1,4 @@
-//! The picture of a page that takes longer to draw than the page has time for; those of the others are compared in `crates/cli/tests/pages`.
+//! Picture of a page whose runs take longer than the time limit of a page. Other pictures are compared in `crates/cli/tests/pages`.
 
 use cohaptic_picture::testing::faults;
 

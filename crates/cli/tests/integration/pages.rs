@@ -14,7 +14,8 @@ fn a_scene_to_begin_with_passes_its_own_check() {
     assert_eq!(desk.json("run four.toml --json")["peers"].as_array().unwrap().len(), 4);
 }
 
-/// Each shipped scene, as it is and with another number of peers. Expectations are computed where they are kept, so that few are simulated here.
+/// Each shipped scene is accepted with 2 and with 5 peers. A scene keeps its expectations only with its own number of peers, so that `check` simulates few
+/// scenes.
 #[test]
 fn every_scene_of_the_list_is_written_and_accepted() {
     let desk = Desk::new();

@@ -118,7 +118,7 @@ fn every_number_reads_back_as_the_same_bits() {
     assert_eq!(numbers, 600 * 3 * 8);
 }
 
-/// The digits of a number that carry information.
+/// Returns the significant digits of a number.
 fn digits(number: &str) -> String {
     let mantissa = number.split(['e', 'E']).next().unwrap();
     let digits: String = mantissa.chars().filter(char::is_ascii_digit).collect();
@@ -163,7 +163,7 @@ fn the_target_is_the_mean_of_the_newest_samples_of_the_others() {
     }
 }
 
-/// How many packets of each link there are: offered and duplicated, delivered, dropped by cause, on the way.
+/// Returns each link of a document with its counters, by `SENDER->RECEIVER`.
 fn links_of(document: &Value) -> BTreeMap<String, Value> {
     let links = document["links"].as_array().unwrap().iter();
     links.map(|link| (format!("{}->{}", link["from"].as_str().unwrap(), link["to"].as_str().unwrap()), link.clone())).collect()

@@ -19,7 +19,7 @@ fn socket() -> UdpSocket {
     socket
 }
 
-/// A program that answers every datagram with the same bytes, until one says `stop`. It says how many it answered.
+/// Starts a program that answers every datagram with the same bytes until a datagram says `stop`. The thread returns the number of answered datagrams.
 fn echo() -> (SocketAddr, thread::JoinHandle<usize>) {
     let socket = socket();
     let address = socket.local_addr().unwrap();
@@ -37,7 +37,7 @@ fn echo() -> (SocketAddr, thread::JoinHandle<usize>) {
     (address, answering)
 }
 
-/// How long a datagram takes there and back. Other datagrams, of earlier calls that did not wait for them, are none of its business.
+/// Returns the round-trip time of a datagram with this content.
 fn round_trip(client: &UdpSocket, to: SocketAddr, content: &[u8]) -> Duration {
     let begin = Instant::now();
     client.send_to(content, to).unwrap();
@@ -47,7 +47,7 @@ fn round_trip(client: &UdpSocket, to: SocketAddr, content: &[u8]) -> Duration {
     begin.elapsed()
 }
 
-/// Waits until it is so.
+/// Waits until `is_so` is true.
 fn until(mut is_so: impl FnMut() -> bool) {
     let begin = Instant::now();
     while !is_so() {

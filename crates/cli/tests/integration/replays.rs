@@ -1,16 +1,16 @@
-//! A replay of a live session with a scene that is not that of the session.
+//! Replays of a live session with a scene that differs from the scene of the session.
 
 use serde_json::json;
 
 use crate::integration::desk::{Desk, parse};
 use crate::integration::scenes::TWO;
 
-/// A hand whose force stands in a file.
+/// Returns a scene with a hand whose force is in a file.
 fn with_hand() -> String {
     TWO.replace("{ force = 1.5 }", "{ file = \"hand.csv\" }")
 }
 
-/// A desk with a session of 40 ms on it, recorded into `out`.
+/// Returns a desk with a recorded session of 40 ms in `out`.
 fn session() -> Desk {
     let desk = Desk::with("two.toml", &with_hand());
     desk.write("hand.csv", "t,fx\n0,1.5\n1,1.5\n");
@@ -18,7 +18,7 @@ fn session() -> Desk {
     desk
 }
 
-/// The overrides of that session.
+/// Overrides of the recorded session.
 const SET: &str = "--set link.loss=10% --set scene.duration=40ms";
 
 const WAY_OUT: &str = "expected the scene and every --set of the session, which its summary ends with; --force replays it all the same\n";
@@ -38,7 +38,7 @@ fn a_scene_that_says_the_same_is_the_same() {
     desk.text(&format!("run same.toml {SET} --inputs out/inputs.csv --no-plot"));
 }
 
-/// The records of a session say in logical time what happened, and a replay is the same to the last bit: so are the pictures, which are drawn from them.
+/// The records of a session are in logical time, and a replay writes the same bytes. So the pictures, which are drawn from the records, are equal too.
 #[test]
 fn pictures_of_a_session_are_those_of_its_replay() {
     let desk = session();
@@ -126,7 +126,7 @@ fn force_replays_it_and_says_what_differs() {
     assert!(document.get("replayed_otherwise").is_none());
 }
 
-/// Records of versions that did not say with which scene they were made cannot be checked.
+/// Records of earlier versions do not contain the scene of the session, so they cannot be checked.
 #[test]
 fn a_record_that_does_not_know_its_scene_is_refused_without_force() {
     let desk = session();

@@ -1,5 +1,5 @@
-//! `cohaptic router`, with real packets between hosts in network namespaces. The tests make those themselves; where the system allows none they say so and
-//! are skipped.
+//! `cohaptic router`, with real packets between hosts in network namespaces that the tests create. On a system that allows no namespaces, the tests are skipped
+//! with a message.
 #![expect(clippy::print_stdout, reason = "a test that is skipped says why, and a host says what it was asked")]
 
 use std::env;
@@ -13,12 +13,12 @@ use std::time::{Duration, Instant};
 use crate::integration::desk::{Desk, Outcome, parse};
 use crate::integration::running::{Client, PATIENCE, Running, TOKEN};
 
-/// Set in a process that is in namespaces of its own.
+/// Variable that is set in a process in namespaces of its own.
 const INSIDE: &str = "COHAPTIC_CLI_TEST_INSIDE";
-/// Set in a process that is a host.
+/// Variable that is set in a process that plays a host.
 const HOST: &str = "COHAPTIC_CLI_TEST_HOST";
 
-/// A link of 10 ms between two devices of these namespaces.
+/// Returns a router file with a link of 10 ms between two devices. `left` and `right` are further keys of the sides, such as their namespaces.
 fn file(left: &str, right: &str) -> String {
     format!(
         "[router]\ndefault = \"wan\"\n\
@@ -52,7 +52,7 @@ fn is_inside(name: &str) -> bool {
     false
 }
 
-/// A host: a process with a network of its own, which sends and answers what it is told to.
+/// Host: a process with a network of its own, which sends and answers by orders.
 struct Host {
     child: Child,
     orders: ChildStdin,
@@ -71,7 +71,7 @@ impl Host {
         host
     }
 
-    /// The line of a router file that says where it is.
+    /// Returns the line of a router file that names the namespace of this host.
     fn namespace(&self) -> String {
         format!("namespace = \"/proc/{}/ns/net\"", self.child.id())
     }
@@ -80,7 +80,7 @@ impl Host {
         writeln!(self.orders, "{order}").unwrap();
     }
 
-    /// The test around it prints lines of its own.
+    /// Returns the next answer of the host. Other lines, which the test framework of the process prints, are skipped.
     fn answer(&mut self) -> String {
         loop {
             let mut line = String::new();
@@ -91,7 +91,7 @@ impl Host {
         }
     }
 
-    /// How long a datagram takes there and back.
+    /// Returns the round-trip time of a datagram.
     fn round_trip(&mut self) -> Duration {
         self.order("ask");
         Duration::from_nanos(self.answer().parse().unwrap())
@@ -105,7 +105,7 @@ impl Drop for Host {
     }
 }
 
-/// No test of its own: what a [`Host`] does.
+/// Program of a [`Host`], as a test that does nothing unless its process is a host.
 #[test]
 fn be_a_host() {
     if env::var_os(HOST).is_none() {

@@ -1,4 +1,4 @@
-//! `cohaptic run`: what it says.
+//! `cohaptic run`: its text and its document.
 
 use serde_json::Value;
 

@@ -1,4 +1,4 @@
-//! A command that runs until it is stopped, what it says meanwhile, and its live control.
+//! Commands that run until they are stopped, their messages, and their live control.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
@@ -11,10 +11,10 @@ use serde_json::Value;
 
 use crate::integration::desk::Outcome;
 
-/// What is waited for takes milliseconds; this is how long a machine may be busy with something else.
+/// Time limit of every wait. An awaited event takes milliseconds, but the machine may be busy.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
-/// A command in the background. It is ended when the test is over, whatever comes of it.
+/// Command in the background, which is ended at the end of the test, also of a failing one.
 pub(crate) struct Running {
     child: Option<Child>,
     lines: Receiver<String>,
@@ -39,7 +39,7 @@ impl Running {
         Self { child: Some(child), lines, reading: Some(reading) }
     }
 
-    /// The rest of the next line on standard error that begins like that.
+    /// Waits for the next line on standard error that begins with `beginning`, and returns the rest of the line.
     pub(crate) fn said(&self, beginning: &str) -> String {
         let begin = Instant::now();
         loop {
@@ -51,21 +51,21 @@ impl Running {
         }
     }
 
-    /// The address of the port that was said next, and what it is for.
+    /// Waits for the message about the next port, and returns its address and its purpose.
     pub(crate) fn port(&self) -> (SocketAddr, String) {
         let said = self.said("listening on ");
         let (address, purpose) = said.split_once(" for datagrams to ").unwrap();
         (address.parse().unwrap(), purpose.to_owned())
     }
 
-    /// Sends a signal, waits until it ends, and says what came of it.
+    /// Sends a signal, waits for the end of the command, and returns its outcome.
     pub(crate) fn end_by(self, signal: &str) -> Outcome {
         let id = self.child.as_ref().unwrap().id().to_string();
         assert!(Command::new("kill").args([signal, &id]).status().unwrap().success());
         self.end()
     }
 
-    /// Waits until it ends by itself.
+    /// Waits until the command ends by itself, and returns its outcome.
     pub(crate) fn end(self) -> Outcome {
         self.end_within(PATIENCE)
     }
@@ -97,7 +97,7 @@ pub(crate) struct Client {
     address: SocketAddr,
 }
 
-/// What is in the file `token`.
+/// Content of the file `token`.
 pub(crate) const TOKEN: &str = "0123456789-abcdefghijklm";
 
 impl Client {

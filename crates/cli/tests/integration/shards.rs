@@ -68,7 +68,8 @@ fn shards_of_everything_that_is_shared_give_the_files_of_one_process() {
     }
 }
 
-/// The folder has the scene's text, the way to its file and so to the files that it names, and the options. Another working folder changes nothing.
+/// The folder of a campaign has the text of the scene, the path of its file, from which the files named in the scene are found, and the options. So a worker
+/// can run in any working folder.
 #[test]
 fn a_folder_knows_its_campaign() {
     let desk = desk();
@@ -153,7 +154,7 @@ fn begun(desk: &Desk, line: &str) -> Child {
     child
 }
 
-/// What workers say in the folder.
+/// Returns the text of all logs of workers.
 fn logs(desk: &Desk) -> String {
     if !desk.path("out").exists() {
         return String::new();
@@ -243,7 +244,7 @@ fn more_shards_than_parts_are_done_too() {
     assert_eq!((&document["schema"], &document["units"], &document["units_computed"]), (&"cohaptic/shard".into(), &3.into(), &3.into()));
 }
 
-/// The command with these variables.
+/// Runs a command with these environment variables.
 fn with(desk: &Desk, variables: &[(&str, &str)], line: &str) -> Outcome {
     Outcome::of(desk.command(line).envs(variables.iter().copied()).output().unwrap())
 }

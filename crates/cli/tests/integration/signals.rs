@@ -1,4 +1,4 @@
-//! SIGINT while nobody reads standard output: what was computed is written all the same, however long that takes, and a second signal ends that.
+//! SIGINT while nobody reads standard output: computed results are written however long that takes, and a second signal ends the writing.
 
 use std::io::{BufRead as _, BufReader, ErrorKind, Read as _, Write as _};
 use std::os::fd::OwnedFd;
@@ -18,7 +18,7 @@ use crate::integration::scenes::TWO;
 const WRITES: &str =
     "interrupted: what was computed is written before the program ends, however long that takes; a second signal ends the program at once";
 
-/// A command whose standard output takes nothing until somebody reads it.
+/// Command whose standard output blocks until the test reads.
 struct Blocked {
     child: Child,
     stdout: UnixStream,
@@ -179,7 +179,7 @@ fn a_device_that_was_watched_is_described() {
     assert!(has_content(&desk, "samples.csv"));
 }
 
-/// Commands that keep finished results say so, in a document as in words.
+/// Commands that keep finished results after an interruption report this, in words and in their documents.
 #[test]
 fn a_campaign_and_a_map_say_what_they_keep() {
     let desk = Desk::with("two.toml", TWO);

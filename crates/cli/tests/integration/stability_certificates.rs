@@ -13,7 +13,7 @@ peer = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0
 link = { delay = "8ms" }
 "#;
 
-/// One peer on an arm, one that touches, and two that do not.
+/// Scene of one peer whose hand is an arm, one peer that touches the object, and two peers that do not.
 const UNEQUAL: &str = r#"
 scene = { title = "Four peers", duration = "1s" }
 object = { mass = 0.45, damping = 0.2 }
@@ -28,7 +28,7 @@ peers = [
 link = { delay = "13ms" }
 "#;
 
-/// Two who push along two axes, and a link that is faster.
+/// Scene with one-sided contacts of two peers along two axes, and one faster link.
 const TWO_AXES: &str = r#"
 scene = { title = "Two directions", duration = "1s", axes = 2 }
 object = { mass = 0.45 }
@@ -38,7 +38,7 @@ peers = [{ name = "left", contact = { push = "+x" } }, { name = "right", contact
 link = { delay = "24ms" }
 links = [{ from = "left", to = "right", delay = "16ms" }]
 "#;
-/// Equal peers that hear one of their number later.
+/// Scene of equal peers, and one peer from which samples arrive later.
 const FAR: &str = r#"
 scene = { title = "One far away", duration = "1s" }
 object = { mass = 0.45 }
@@ -179,7 +179,7 @@ fn certificates_of_moments_and_of_contacts_hold_too() {
     );
 }
 
-/// Moments and forms that show something else are refused.
+/// Certificates whose moments or forms do not prove the verdict are refused.
 #[test]
 #[ignore = ".ci/nightly runs it: it takes long"]
 fn certificates_of_moments_and_of_contacts_that_say_more_than_they_show_are_refused() {
@@ -248,7 +248,7 @@ fn certificates_of_delays_and_of_every_number_hold_too() {
     }
 }
 
-/// Spans that leave a number out, or say more than their numbers show.
+/// Certificates whose spans leave a number out, or whose numbers do not prove the verdict of a span, are refused.
 #[test]
 #[ignore = ".ci/nightly runs it: it takes long"]
 fn a_certificate_of_numbers_that_says_more_than_it_shows_is_refused() {
@@ -278,7 +278,7 @@ fn a_certificate_of_numbers_that_says_more_than_it_shows_is_refused() {
     }
 }
 
-/// What a certificate says must be what its numbers show, for the scene that it holds.
+/// The verdicts of a certificate must follow from its numbers, for the scene in the certificate.
 #[test]
 #[ignore = ".ci/nightly runs it: it takes long"]
 fn a_certificate_that_says_more_than_it_shows_is_refused() {

@@ -9,19 +9,19 @@ use crate::integration::desk::Desk;
 
 /// A region of gains in which every scene is stable, or in which some piece is unstable throughout.
 struct Region {
-    /// Its scene, but for what is set.
+    /// Text of the scene, to which the overrides `set` are applied.
     scene: &'static str,
     set: String,
-    /// The two keys, and how finely they are divided at most.
+    /// Arguments for the two keys and for the finest division.
     keys: &'static str,
-    /// For which numbers of peers, where it is not that of the scene.
+    /// Argument for the numbers of peers; empty for the number of the scene.
     numbers: &'static str,
-    /// Whether it is stable throughout; or else unstable in some part.
+    /// `true` if the region is stable throughout, `false` if some part is unstable.
     is_stable: bool,
 }
 
 const GAINS: &str = "--x coordination.stiffness=10..1000 --y peer.coupling.stiffness=500..6000 --prove 10";
-/// Scenes of Figs. 3 and 4 in which all touch: BT = BC = 5 N·s/m.
+/// Scene of Figs. 3 and 4 in which all peers touch, with BT = BC = 5 N·s/m.
 const FIGURE: &str = r#"
 scene = { title = "Figs. 3 and 4", duration = "1s", count = 3 }
 object = { mass = 0.45, split-mass = false }
@@ -33,7 +33,7 @@ link = { delay = "8ms" }
 /// The scene of Section 5.2 without its push.
 const ONE_TOUCHES: &str = include_str!("../../../../scenarios/counterexamples/both-stable.toml");
 
-/// The regions that a claim is proven by.
+/// Returns the regions that prove a claim.
 fn regions(claim: &str) -> Vec<Region> {
     let stable = |set: String, keys, numbers| Region { scene: FIGURE, set, keys, numbers, is_stable: true };
     match claim {
@@ -62,7 +62,7 @@ const DELAYS: &str = "--x link.delay=0ms..8ms --y coordination.stiffness=100..10
 
 const GAINS_COARSE: &str = "--x coordination.stiffness=10..1000 --y peer.coupling.stiffness=500..6000 --prove 5";
 
-/// Proves a region and checks its certificate; answers how many boxes it has.
+/// Proves a region and checks its certificate. Returns the number of boxes.
 fn prove(region: &Region) -> u64 {
     let Region { scene, set, keys, numbers, is_stable } = region;
     let desk = Desk::with("figure.toml", scene);
@@ -84,10 +84,10 @@ fn prove(region: &Region) -> u64 {
     found["boxes"].as_u64().unwrap()
 }
 
-/// Claims that the page derives where it says so in another place than their name.
+/// Claims that the page derives in a place that does not have the name of the claim.
 const ON_PAPER: [&str; 1] = ["ap-unaffected"];
 
-/// Claims of the paper that random scenes are searched for, with the property that does.
+/// Claims of the paper for which random scenes are searched for a counterexample, each with the file and the name of the property test.
 const SEARCHED: [(&str, &str, &str); 10] = [
     ("bounded-stiffness", "stiffness.rs", "copies_swing_with_the_stiffness_of_equations_3_and_6"),
     ("frequency-needs-scaling", "stiffness.rs", "with_scaled_gains_the_swing_of_every_number_of_peers_is_that_of_two"),
@@ -101,7 +101,7 @@ const SEARCHED: [(&str, &str, &str); 10] = [
     ("stability-tests", "experiments.rs", "with_arms_the_four_outcomes_are_those_of_the_paper"),
 ];
 
-/// The cell of a claim, from that of its name and that of its region.
+/// Returns the cell of the verdict of a claim. `name` and `asserted` are the cells of its name and of its region.
 fn verdict(name: &str, asserted: &str, page: &str, root: &Path) -> String {
     if asserted == "nowhere" {
         return "*fails*".to_owned();

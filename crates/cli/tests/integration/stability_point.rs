@@ -265,7 +265,7 @@ fn a_note_says_which_radius_it_is_about() {
     assert!(one["notes"][0].as_str().unwrap().starts_with("the timeline is left out"), "{one:#}");
 }
 
-/// A command whose standard error is a file, as soon as that has a text.
+/// Starts a command whose standard error is a file, and waits until the file contains `said`. Returns the path of the file and the process.
 #[cfg(unix)]
 pub(crate) fn running(desk: &Desk, line: &str, said: &str) -> (std::path::PathBuf, std::process::Child) {
     use std::process::Stdio;

@@ -183,7 +183,7 @@ fn delays_are_proven_tick_by_tick() {
     assert!(text.contains(&words), "{text}");
 }
 
-/// A server with its clients, and peers on a ring: single scenes at the ends of stretches say what their stretches say.
+/// The verdicts of proven stretches, of a server with clients and of peers on a ring, equal the verdicts of single scenes at the ends of the stretches.
 #[test]
 fn servers_and_topologies_are_proven_as_single_scenes_are_judged() {
     let desk = Desk::with("equal.toml", EQUAL);

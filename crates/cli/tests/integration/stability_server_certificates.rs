@@ -54,7 +54,7 @@ fn certificates_of_servers_hold_for_a_checker_that_shares_no_code() {
     }
 }
 
-/// What a certificate says must be what its numbers show, for the scene that it holds.
+/// The verdicts of a certificate must follow from its numbers, for the scene in the certificate.
 #[test]
 #[ignore = ".ci/nightly runs it: it takes long"]
 fn a_certificate_of_a_server_that_says_more_than_it_shows_is_refused() {
@@ -102,7 +102,7 @@ fn a_certificate_of_a_server_that_says_more_than_it_shows_is_refused() {
     }
 }
 
-/// The scene with its coordination as a table that others can be added to.
+/// Returns the text of a scene with `coordination` written key by key, so that further keys can be added.
 fn without_coordination(whole: &Value) -> String {
     let text = whole["scene"].as_str().unwrap();
     let line = text.lines().find(|line| line.starts_with("coordination = ")).unwrap();

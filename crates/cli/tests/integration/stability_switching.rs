@@ -1,4 +1,4 @@
-//! `cohaptic stability point --switching`, compared with motions that a program follows which shares no code: `crates/stability/tests/reference/contact_motions.py`.
+//! `cohaptic stability point --switching`, against motions computed by an independent program: `crates/stability/tests/reference/contact_motions.py`.
 
 use std::process::Command;
 

@@ -13,9 +13,9 @@ peer = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0
 link = { delay = "8ms" }
 "#;
 const PD: &str = "--set coordination.strategy=proportional-derivative";
-/// Weights of five of which none hears as much as another.
+/// Weights of a graph of five peers whose sums of weights all differ.
 const UNEVEN: &str = include_str!("../../../proofs/tests/weights/uneven.csv");
-/// The corners of a cube, three of whose eigenvalues are alike, and three others.
+/// Weights of the graph of a cube, whose matrix has two triple eigenvalues.
 const CUBE: &str = include_str!("../../../proofs/tests/weights/cube.csv");
 
 fn desk(topology: &str) -> Desk {
@@ -59,7 +59,7 @@ fn certificates_of_topologies_hold_for_a_checker_that_shares_no_code() {
     }
 }
 
-/// What a certificate says must be what its numbers show, for the scene and the weights that it holds.
+/// The verdicts of a certificate must follow from its numbers, for the scene and the weights in the certificate.
 #[test]
 #[ignore = ".ci/nightly runs it: it takes long"]
 fn a_certificate_of_a_topology_that_says_more_than_it_shows_is_refused() {

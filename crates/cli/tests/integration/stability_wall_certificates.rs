@@ -12,7 +12,7 @@ coordination = { strategy = "average-position", stiffness = 1000.0, damping = 5.
 peer = { contact = "grasp", device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
 link = { delay = "8ms" }
 "#;
-/// Two who push along two axes, all four ends of which have walls, and a link that is faster.
+/// Scene with one-sided contacts of two peers along two axes, walls at both ends of each axis, and one faster link.
 const TWO_AXES: &str = r#"
 scene = { title = "Two directions", duration = "1s", axes = 2 }
 object = { mass = 0.45, enclosure = { min = -0.1, max = 0.1, stiffness = 500.0, damping = 20.0 } }
@@ -53,7 +53,7 @@ fn certificates_of_walls_hold_for_a_checker_that_shares_no_code() {
     refuses(&desk, &axes, "/motions/1", axes["motions"][0].clone(), "stands there twice");
 }
 
-/// Forms and multipliers that show something else, or of another scene.
+/// Certificates whose forms or multipliers do not prove the verdict, or belong to another scene, are refused.
 #[test]
 #[ignore = ".ci/nightly runs it: it takes long"]
 fn a_certificate_of_walls_that_says_more_than_it_shows_is_refused() {

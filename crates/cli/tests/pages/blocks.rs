@@ -7,24 +7,24 @@ use crate::pages::notes::Notes;
 /// A part of a page.
 #[derive(Debug)]
 pub(crate) struct Block {
-    /// Its content, counted in lines of the page from 0; without fences.
+    /// Lines of the content on the page, counted from 0, without fences.
     pub(crate) lines: Range<usize>,
     pub(crate) kind: Kind,
     pub(crate) notes: Notes,
 }
 
-/// What a part is.
+/// Kind of a part of a page.
 #[derive(Debug)]
 pub(crate) enum Kind {
     /// Lines for `sh`.
     Script(String),
-    /// Commands with what they print.
+    /// Commands with their outputs.
     Session(Vec<Shown>),
     /// A file with this content.
     File(String),
     /// `cohaptic …` within a sentence, or as a line of usage.
     Mention(String),
-    /// `--option …` by itself within a sentence or a table: of some command.
+    /// `--option …` alone within a sentence or a table, an option of any command.
     Option(String),
     /// Sentences, or a table, whose figures the commands before have printed.
     Figures(String),
@@ -34,15 +34,15 @@ pub(crate) enum Kind {
 #[derive(Debug)]
 pub(crate) struct Shown {
     pub(crate) command: String,
-    /// Where the page shows what it prints.
+    /// Lines of the page that show the output.
     pub(crate) output: Range<usize>,
 }
 
-/// With which an indented block begins if it is a script. Others are formulas.
+/// Beginnings of indented blocks that are scripts. Other indented blocks are formulas.
 const PROGRAMS: [&str; 4] = ["cohaptic ", "cargo ", "benches/", "cd "];
 
 impl Block {
-    /// All parts of a page, in its order.
+    /// Returns all parts of a page, in order.
     ///
     /// # Panics
     ///

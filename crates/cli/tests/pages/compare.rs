@@ -1,8 +1,8 @@
-//! What a command printed beside what a page shows.
+//! Comparison of the output of a command with the output on a page.
 
 use crate::pages::notes::Vary;
 
-/// Stands for any lines that the page leaves out.
+/// Mark on a page in place of lines that are left out.
 pub(crate) const LEFT_OUT: &str = "…";
 
 /// Returns whether the lines are what the page shows. Spaces at the end of a line do not count.
@@ -39,7 +39,7 @@ pub(crate) fn same_line(shown: &str, printed: &str, vary: &Vary) -> bool {
         || (vary.figures_of(shown) && words(shown) == words(printed))
 }
 
-/// Returns whether the printed line has all parts of the other one, between which something is left out, in their order.
+/// Returns whether the printed line has all parts of the shown line, in order. The shown line leaves out text between its parts.
 fn has_parts(shown: &str, printed: &str) -> bool {
     let parts: Vec<&str> = shown.split(LEFT_OUT).collect();
     let [first, middle @ .., last] = &parts[..] else { return false };
@@ -91,7 +91,7 @@ pub(crate) fn words(line: &str) -> Vec<String> {
     words
 }
 
-/// An address of the web without its numbers, and without words that have digits in them: a port and a token are others each time.
+/// Returns a web address with each part that has digits replaced by `#`, because ports and tokens differ in every run.
 fn address(word: &str) -> String {
     let parts = word.split_inclusive(|letter: char| !letter.is_ascii_alphanumeric());
     let figure = |part: &str| match part.find(|letter: char| !letter.is_ascii_alphanumeric()) {

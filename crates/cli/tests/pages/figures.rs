@@ -1,6 +1,6 @@
-//! Whether the figures of a sentence or a table are those that commands have printed.
+//! Check of the figures in a sentence or a table: commands must have printed them.
 
-/// The numbers with a decimal point in `text` that no number in `printed` is when it is rounded to as many places. Signs do not count.
+/// Returns the numbers with a decimal point in `text` that equal no number of `printed` rounded to as many decimal places. Signs are ignored.
 pub(crate) fn missing(text: &str, printed: &str) -> Vec<String> {
     let known: Vec<f64> = numbers(printed).iter().filter_map(|number| number.parse().ok()).collect();
     let is_known = |number: &str| {

@@ -1,4 +1,4 @@
-//! Where the commands of a page are typed: a folder with the scenes of the project in it, and a shell.
+//! Place in which the commands of a page run: a folder with the scenes of the project, and a shell.
 
 use std::fs;
 use std::os::unix::fs::{PermissionsExt, symlink};
@@ -13,20 +13,20 @@ use crate::pages::root;
 /// A command of a page that takes longer hangs.
 const AT_MOST: Duration = Duration::from_secs(300);
 
-/// What came of a script.
+/// Outputs and statuses of a script.
 #[derive(Debug)]
 pub(crate) struct Outcome {
-    /// What was printed, standard error too, in the order in which it came.
+    /// Standard output and standard error, in the order of printing.
     pub(crate) printed: String,
-    /// With which status each `cohaptic` ended, in turn.
+    /// Exit status of each `cohaptic`, in order.
     pub(crate) statuses: Vec<i32>,
-    /// Of the script; `None` if it was ended because it took too long.
+    /// Exit status of the script; `None` if the script was ended because it took too long.
     pub(crate) status: Option<i32>,
 }
 
 pub(crate) struct Folder(TempDir);
 
-/// Notes with which status the program ended.
+/// Script that runs the program and notes its exit status.
 const WRAPPER: &str =
     "#!/bin/sh\n\"$COHAPTIC_PAGES_PROGRAM\" \"$@\" $COHAPTIC_PAGES_RUN_WITH\nstatus=$?\necho $status >>\"$COHAPTIC_PAGES_STATUSES\"\nexit $status\n";
 
@@ -55,12 +55,12 @@ impl Folder {
         fs::write(path, content).unwrap();
     }
 
-    /// What is in a file that a command has written; `None` if there is none.
+    /// Returns the content of a file that a command has written; `None` if the file does not exist.
     pub(crate) fn read(&self, name: &str) -> Option<String> {
         fs::read_to_string(self.path("desk").join(name)).ok()
     }
 
-    /// Runs these lines in `sh`, with these words behind those of every `cohaptic`.
+    /// Runs a script in `sh`, with the words `run_with` appended to those of every `cohaptic`.
     pub(crate) fn run(&self, script: &str, run_with: &str) -> Outcome {
         let log = self.path("statuses");
         fs::write(&log, "").unwrap();

@@ -10,7 +10,7 @@ use crate::pages::{markdown, root};
 /// The table of contents of the book.
 const SUMMARY: &str = "docs/SUMMARY.md";
 
-/// Pages by their path from the project's folder.
+/// Texts of the pages, by path from the folder of the project.
 type Pages = BTreeMap<PathBuf, String>;
 
 fn pages() -> Pages {
@@ -20,7 +20,7 @@ fn pages() -> Pages {
     found.into_iter().map(|path| (path.strip_prefix(&root).unwrap().to_owned(), fs::read_to_string(&path).unwrap())).collect()
 }
 
-/// Where a link leads: a path from the project's folder and an anchor. `None` for the web.
+/// Returns the target of a link as a path from the folder of the project, and an anchor; `None` for a web address.
 fn place(page: &Path, target: &str) -> Option<(PathBuf, Option<String>)> {
     if target.contains("://") || target.starts_with("mailto:") {
         return None;
@@ -40,7 +40,7 @@ fn place(page: &Path, target: &str) -> Option<(PathBuf, Option<String>)> {
     Some((whole, anchor))
 }
 
-/// The links that lead nowhere.
+/// Returns the links without a target.
 fn dead(pages: &Pages, is_there: impl Fn(&Path) -> bool) -> Vec<String> {
     let mut found = Vec::new();
     for (page, text) in pages {
@@ -60,7 +60,7 @@ fn dead(pages: &Pages, is_there: impl Fn(&Path) -> bool) -> Vec<String> {
     found
 }
 
-/// Pages of `docs` that no other page links to, apart from the table of contents.
+/// Returns the pages of `docs` to which no page but the table of contents links.
 fn lonely(pages: &Pages) -> Vec<String> {
     let linked: BTreeSet<PathBuf> = pages
         .iter()

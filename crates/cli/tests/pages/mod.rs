@@ -55,7 +55,7 @@ use std::path::{Path, PathBuf};
 use crate::pages::blocks::Block;
 use crate::pages::page::check;
 
-/// One test a page, so that they run at the same time.
+/// Makes one test per page, so that pages are checked at the same time.
 macro_rules! pages {
     ($($(#[$attribute:meta])* $name:ident: $path:literal),* $(,)?) => {
         const PAGES: &[&str] = &[$($path),*];

@@ -1,4 +1,4 @@
-//! What comments before a block say about it.
+//! Instructions for the tests, in comments before a block of a page.
 
 /// See the table of the [test's own page](crate).
 #[derive(Debug, Default, Clone)]
@@ -6,21 +6,21 @@ pub(crate) struct Notes {
     pub(crate) file: Option<String>,
     pub(crate) not_run: Option<String>,
     pub(crate) run_with: Option<String>,
-    /// The command that is run, and the shown one that it replaces.
+    /// Command that is run, and the shown command that it replaces.
     pub(crate) instead: Vec<(String, String)>,
     pub(crate) needs: Option<String>,
     pub(crate) statuses: Option<Vec<i32>>,
     pub(crate) vary: Vary,
-    /// Every figure with a decimal point is one that the commands before have printed.
+    /// `true` if the commands before must have printed every figure with a decimal point.
     pub(crate) printed: bool,
 }
 
-/// The parts that are not compared.
+/// Parts of an output that are not compared.
 #[derive(Debug, Default, Clone)]
 pub(crate) struct Vary {
-    /// The figures of lines that have one of these texts; an empty text is in every line.
+    /// Texts of lines whose figures are not compared. An empty text is in every line.
     pub(crate) figures: Vec<String>,
-    /// All of a line that has one of these texts, but for that text.
+    /// Texts of lines of which only the text is compared.
     pub(crate) lines: Vec<String>,
 }
 
@@ -30,7 +30,7 @@ impl Vary {
         self.figures.iter().any(|text| line.contains(text))
     }
 
-    /// Returns whether both lines have the same text of those that are all that is compared.
+    /// Returns whether both lines have the same text of [`Vary::lines`], so that the rest is not compared.
     pub(crate) fn leaves_alone(&self, one: &str, other: &str) -> bool {
         self.lines.iter().any(|text| one.contains(text) && other.contains(text))
     }

@@ -1,4 +1,4 @@
-//! One page from its first command to its last.
+//! Run of all commands of a page, in order.
 
 use std::fs;
 use std::ops::Range;
@@ -26,7 +26,7 @@ struct Page<'a> {
     updates: bool,
     changes: Vec<(Range<usize>, Vec<String>)>,
     problems: Vec<String>,
-    /// What the last session printed.
+    /// Output of the last session.
     printed: String,
 }
 

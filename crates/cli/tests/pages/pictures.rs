@@ -1,4 +1,4 @@
-//! The pictures of the pages are those that their commands draw.
+//! Comparison of the pictures of pages with the pictures that their commands draw.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use crate::pages::prose::links;
 use crate::pages::{PAGES, markdown, root};
 
-/// Pictures that no page draws, and what does. A name that ends in `/` is that of a folder.
+/// Pictures that no page draws, each with its origin. A name that ends in `/` is a folder.
 const DRAWN_ELSEWHERE: [(&str, &str); 5] = [
     ("docs/images/campaign.svg", "crates/cli/tests/integration/page_pictures.rs, with more runs than its page has time for"),
     ("docs/images/live-control.png", "a browser, by hand"),
@@ -16,10 +16,10 @@ const DRAWN_ELSEWHERE: [(&str, &str); 5] = [
     ("docs/images/measured/", "benches/measure"),
 ];
 
-/// A picture that a page shows.
+/// Picture that a page shows.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct Drawn {
-    /// Of the comment, from 0.
+    /// Line of the comment, counted from 0.
     pub(crate) line: usize,
     /// The file that the commands of the page write.
     pub(crate) by_commands: String,
@@ -27,7 +27,7 @@ pub(crate) struct Drawn {
     pub(crate) shown: PathBuf,
 }
 
-/// What stands below the comments `drawn: FILE` of a page.
+/// Returns the pictures below the comments `drawn: FILE` of a page.
 ///
 /// # Panics
 ///

@@ -1,14 +1,14 @@
-//! What a page says outside of code: its links, pictures and anchors.
+//! Parts of a page outside of code: links, pictures and anchors.
 
-/// A link or a picture of a page.
+/// Link or picture of a page.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct Link {
-    /// As it is written, without a title.
+    /// Target as written, without a title.
     pub(crate) target: String,
     pub(crate) is_picture: bool,
 }
 
-/// The lines of a page without fenced blocks and comments.
+/// Returns the lines of a page without fenced blocks and comments.
 fn lines_of_text(text: &str) -> Vec<&str> {
     let (mut fence, mut in_comment, mut kept) = (None::<&str>, false, Vec::new());
     for line in text.lines() {
@@ -80,7 +80,7 @@ fn first_word(target: &str) -> String {
     target.split_whitespace().next().unwrap_or_default().trim_matches(['<', '>']).to_owned()
 }
 
-/// The anchors of a page: its headings, as forges and mdbook name them, and `<a id="…">`.
+/// Returns the anchors of a page: its headings, as forges and mdbook name them, and `<a id="…">`.
 pub(crate) fn anchors(text: &str) -> Vec<String> {
     let mut found: Vec<String> = Vec::new();
     for line in lines_of_text(text) {

@@ -1,6 +1,6 @@
-//! Which programs a script starts, and with which words.
+//! Programs that a script starts, with their arguments.
 
-/// The words of each command in a script for `sh`, as far as pages need it: quotes, comments, lines that go on, and what separates commands.
+/// Returns the words of each command in a script for `sh`. Understands the syntax that pages use: quotes, comments, continued lines, and separators.
 ///
 /// Redirections (`> FILE`) are left out.
 pub(crate) fn commands(script: &str) -> Vec<Vec<String>> {
@@ -30,14 +30,14 @@ pub(crate) fn commands(script: &str) -> Vec<Vec<String>> {
     all.into_iter().map(started).filter(|words| !words.is_empty()).collect()
 }
 
-/// Without the words of the shell before the program and behind its own.
+/// Returns the words of the program, without keywords of the shell before them and redirections after them.
 fn started(words: Vec<String>) -> Vec<String> {
     const SHELL: [&str; 4] = ["do", "then", "else", "done"];
     let own = words.into_iter().skip_while(|word| SHELL.contains(&word.as_str()));
     own.take_while(|word| !word.starts_with('>') && (!word.starts_with('<') || word.len() > 1 && word.ends_with('>'))).collect()
 }
 
-/// `cargo run --release -- …` is `cohaptic …`, which is the program that it starts.
+/// Replaces `cargo run --release -- …` by `cohaptic …`, the program that it starts.
 pub(crate) fn without_cargo(script: &str) -> String {
     script.replace("cargo run --release -- ", "cohaptic ")
 }

@@ -1,12 +1,12 @@
-//! Writes into a page what its commands print now.
+//! Replacement of the outputs on a page by the present outputs of its commands.
 
 use std::ops::Range;
 
 use crate::pages::compare::{LEFT_OUT, same_line, words};
 use crate::pages::notes::Vary;
 
-/// What the page shows in place of what it shows now: as much of it, if the same places can be found, and all of it otherwise. Lines that only differ in
-/// the parts that are not compared stay as they are.
+/// Returns the lines that the page shows from now on: the same excerpt of the output, if its places can be found, or else the whole output. Lines that differ
+/// only in parts that are not compared stay as they are.
 pub(crate) fn shown_anew(shown: &[&str], printed: &[&str], vary: &Vary) -> Vec<String> {
     let trimmed: Vec<&str> = printed.iter().map(|line| line.trim_end()).collect();
     let mut anew = shortened(shown, &trimmed).unwrap_or_else(|| owned(&trimmed));
@@ -45,7 +45,7 @@ fn owned(lines: &[&str]) -> Vec<String> {
     lines.iter().map(|&line| line.to_owned()).collect()
 }
 
-/// The page with other lines in these places, which are in its order.
+/// Returns the page with new lines at the given places, which must be in the order of the page.
 pub(crate) fn replaced(text: &str, changes: &[(Range<usize>, Vec<String>)]) -> String {
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     for (place, anew) in changes.iter().rev() {

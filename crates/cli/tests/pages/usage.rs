@@ -1,4 +1,4 @@
-//! Whether the options of a command are there, for commands that are not run: those in `--help` are.
+//! Check of commands that are not run: their options must be in `--help`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -7,15 +7,15 @@ use std::sync::Mutex;
 
 use crate::pages::root;
 
-/// What `--help` of a command names.
+/// Options and subcommands that `--help` of a command names.
 #[derive(Clone, Default)]
 struct Help {
     options: BTreeSet<String>,
-    /// Such as `point` of `stability`.
+    /// Subcommands, such as `point` of `stability`.
     parts: Vec<String>,
 }
 
-/// By the words behind `cohaptic`; `None` for any other line.
+/// Help of each command asked so far, by the words after `cohaptic`; `None` for words that are no command.
 static HELP: Mutex<BTreeMap<Vec<String>, Option<Help>>> = Mutex::new(BTreeMap::new());
 
 fn help(command: &[String]) -> Option<Help> {
@@ -59,7 +59,7 @@ pub(crate) fn of_some_command(code: &str) -> Result<(), String> {
     Err(format!("no command has the option `{code}`"))
 }
 
-/// Looks up the words of one command that begins with `cohaptic`: the commands that it names and their options.
+/// Checks the words of a command that begins with `cohaptic`: its subcommands and options must exist.
 pub(crate) fn of_cohaptic(words: &[String]) -> Result<(), String> {
     let line = words.join(" ");
     let own: Vec<&String> = words.iter().skip(1).collect();

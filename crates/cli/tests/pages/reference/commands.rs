@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::help::{Entry, Help};
 use super::{WRITTEN, entry, prose};
 
-/// What as many commands take with one meaning is explained once.
+/// Number of commands from which on an option with one meaning is explained once for all.
 const SHARED: usize = 2;
 
 const INTRODUCTION: &str = "\
@@ -14,7 +14,7 @@ Every command with its arguments and options, as `--help` prints them, which als
 Every command has `-h, --help`, and the program has `--version`. An option without a default is off, or is not applied, unless it is given.
 ";
 
-/// The commands that do something, each with the words behind `cohaptic`, in the order of `--help`.
+/// Returns the commands without subcommands, each with its words after `cohaptic` and its help, in the order of `--help`.
 fn all(command: &[String]) -> Vec<(String, Help)> {
     let help = Help::of(command);
     if help.parts.is_empty() {
@@ -28,18 +28,18 @@ fn row(of: &Entry) -> String {
     entry(&format!("`{}`", of.name), &[&default], &prose(&of.about))
 }
 
-/// Entries with an empty line behind them; nothing where there are none.
+/// Returns a list of entries and an empty line; empty without entries.
 fn list(of: &[&Entry]) -> String {
     if of.is_empty() { String::new() } else { of.iter().map(|entry| row(entry)).collect::<String>() + "\n" }
 }
 
-/// The name of an option without its value.
+/// Returns the name of an option without its value.
 fn option(entry: &Entry) -> String {
     let long = entry.name.split_once(", ").map_or(entry.name.as_str(), |(_, long)| long);
     format!("`{}`", long.split([' ', '[']).next().unwrap_or_default())
 }
 
-/// The whole page.
+/// Returns the whole page.
 pub(super) fn page() -> String {
     let all = all(&[]);
     let entries = || all.iter().flat_map(|(_, help)| &help.entries);

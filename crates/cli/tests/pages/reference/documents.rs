@@ -1,4 +1,4 @@
-//! The reference of JSON documents: what each key means, compared with documents that the commands print.
+//! Reference of JSON documents: the meaning of each key, checked against documents that the commands print.
 
 mod list;
 mod parts;
@@ -90,7 +90,7 @@ fn paths(path: &str, value: &Value, found: &mut BTreeSet<String>) {
     }
 }
 
-/// Returns whether a path is that of a key of the table: `NAME` at its end stands for any name and what is within.
+/// Returns whether a path belongs to a key of the table. `NAME` at the end of the key stands for any name and for all keys within.
 fn is_of(path: &str, key: &str) -> bool {
     match key.strip_suffix("NAME") {
         Some(prefix) => path.starts_with(prefix) || prefix.strip_suffix('.') == Some(path),

@@ -1,8 +1,8 @@
-//! What `--help` of a command says, taken apart.
+//! Parser of the output of `--help`.
 
 use std::process::Command;
 
-/// What `--help` says.
+/// Parts of the output of `--help`.
 #[derive(Default, Debug)]
 pub(super) struct Help {
     pub(super) about: String,
@@ -10,20 +10,20 @@ pub(super) struct Help {
     /// Arguments and options.
     pub(super) entries: Vec<Entry>,
     pub(super) examples: Vec<String>,
-    /// Such as `point` of `stability`.
+    /// Subcommands, such as `point` of `stability`.
     pub(super) parts: Vec<String>,
 }
 
-/// An argument or an option.
+/// Argument or option.
 #[derive(Default, Clone, PartialEq, Eq, Debug)]
 pub(super) struct Entry {
-    /// As it is written, `--set <KEY=VALUE>`.
+    /// Name as written in the help, such as `--set <KEY=VALUE>`.
     pub(super) name: String,
     pub(super) about: String,
     pub(super) default: String,
 }
 
-/// Where a line of help stands.
+/// Section of a line of help.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Place {
     About,

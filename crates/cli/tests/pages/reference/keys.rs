@@ -34,10 +34,10 @@ A link is often laid over another one: `[[links]]` over `[link]`, a change over 
 away, as `\"0s\"` does for `jitter`; `queue` and `overhead` go with `rate`.
 ";
 
-/// A key: how it is written, its form, whether it is needed, and its meaning.
+/// Row of a key: its written name, its form, whether it is required, and its meaning.
 type Row = [String; 4];
 
-/// A list of keys with an empty line behind it.
+/// Returns a list of keys and an empty line.
 fn list(rows: &[Row]) -> String {
     rows.iter().map(|[key, form, need, meaning]| entry(key, &[form, need], meaning)).collect::<String>() + "\n"
 }
@@ -49,7 +49,7 @@ fn shape(table: &Table) -> Vec<Shape> {
     table.keys().map(|key| (key.name, key.about, key.form.unit())).collect()
 }
 
-/// A table that was explained.
+/// Table that the page has already explained.
 struct Explained {
     keys: Vec<Shape>,
     name: String,
@@ -57,7 +57,7 @@ struct Explained {
     anchor: String,
 }
 
-/// What was explained so far, and where the next rows go.
+/// Tables explained so far, and the page and the anchor of the next rows.
 #[derive(Default)]
 struct Reference {
     explained: Vec<Explained>,
@@ -88,7 +88,7 @@ fn head(title: &str, introduction: &str) -> String {
     format!("# {title}\n\n{WRITTEN}\n\n{introduction}\n")
 }
 
-/// How a table at the top of a file is written.
+/// Returns the heading of a table at the top level of a file, as it is written in TOML.
 fn head_of(key: &Key) -> String {
     if matches!(key.form, Form::List(_)) {
         format!("`[[{}]]`", key.name)
@@ -99,7 +99,7 @@ fn head_of(key: &Key) -> String {
     }
 }
 
-/// The anchor that a forge gives a heading.
+/// Returns the anchor that a forge gives to a heading.
 fn anchor(heading: &str) -> String {
     let letter = |letter: char| match letter {
         ' ' => Some('-'),
@@ -147,7 +147,7 @@ impl Reference {
         text
     }
 
-    /// A table of its own, with those of its tables that are put off.
+    /// Returns the section of a table, with the sections of its postponed inner tables.
     fn section(&mut self, marks: &str, heading: &str, table_of: &'static Table) -> String {
         self.anchor = anchor(heading);
         let mut rows = Vec::new();
@@ -168,7 +168,7 @@ impl Reference {
         text
     }
 
-    /// What comes behind the sentence on a table at the top of a file: its keys, or a link to them.
+    /// Returns the text after the sentence about a table at the top level of a file: the keys of the table, or a link to them.
     fn rest_of_section(&mut self, heading: &str, table_of: &'static Table) -> String {
         self.anchor = anchor(heading);
         let mut rows = Vec::new();
@@ -237,7 +237,7 @@ fn need(key: &Key) -> String {
     }
 }
 
-/// What may stand there, in words; `words` gets those of which there are several.
+/// Returns the form of a value in words. Choices of several words are appended to `words`.
 fn form(of: &Form, words: &mut Vec<String>) -> String {
     let number =
         |expected: String, many: &str| expected.replacen("a number", many, 1).replace("of at least zero", "≥ 0").replace("above zero", "> 0");

@@ -13,7 +13,7 @@ use std::fs;
 use crate::pages::page::UPDATE;
 use crate::pages::root;
 
-/// Of a page that is written here.
+/// Comment below the title of each page that these tests write.
 const WRITTEN: &str = "<!-- Written by the tests in crates/cli/tests/pages/reference from what the program says of itself. Do not edit. -->";
 
 /// Compares a page byte by byte, or writes it anew.

@@ -1,6 +1,6 @@
 //! The documents of all commands and their keys.
 
-/// The document of a command.
+/// Document of a command.
 pub(super) struct Document {
     pub(super) command: &'static str,
     /// Lines for `sh` that print documents of this kind, one each, and in which every key occurs.
@@ -8,7 +8,7 @@ pub(super) struct Document {
     pub(super) rows: &'static [(&'static str, &'static str)],
 }
 
-/// What the router needs: two devices in namespaces.
+/// Command that succeeds on machines on which the router can run: it needs namespaces and devices.
 pub(super) const NAMESPACES: &str = "unshare --map-root-user --net --mount true && test -w /dev/net/tun && ip -V && python3 -V";
 
 pub(super) const DOCUMENTS: [Document; 24] = [

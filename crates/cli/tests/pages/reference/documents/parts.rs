@@ -1,12 +1,12 @@
 //! Keys that several documents have.
 
-/// A table of keys: each row has keys that are explained together, separated by commas, and what they are.
+/// Table of keys. Each row has the keys that are explained together, separated by commas, and their meaning.
 pub(super) struct Part {
     pub(super) name: &'static str,
     pub(super) rows: &'static [(&'static str, &'static str)],
 }
 
-/// Parts that several documents have. A row names one by its heading: `links[].@Counters`.
+/// Tables that several documents contain. A row of a document names such a table by its heading: `links[].@Counters`.
 pub(super) const PARTS: [Part; 8] = [
     Part {
         name: "Counters",
