@@ -15,7 +15,7 @@ use crate::{AccuracyError, Row, Subject, Watch};
 /// Amount of work in the rows.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Effort {
-    /// Rounds in which the cost of a verdict is measured.
+    /// Number of timed rounds of a verdict. The median of their times gives the cost.
     pub rounds: usize,
     /// Numbers of frames over which a disturbance is simulated.
     pub growth_frames: &'static [u32],

@@ -28,7 +28,7 @@ pub struct Effort {
     pub look: Look,
     /// Number of draws of a way whose error cannot be computed.
     pub draws: usize,
-    /// Rounds in which costs are measured.
+    /// Number of timed rounds of each way. The median of their times gives the cost.
     pub rounds: usize,
     /// Number of packets for the correlation of jitter.
     pub correlated_packets: usize,

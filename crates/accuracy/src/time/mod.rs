@@ -101,7 +101,7 @@ struct Work {
     traffic: Traffic,
     /// Scenes of the grid, each with its stiffness \[N/m\] and its verdict, as far as the verdict can be told.
     scenes: Vec<(Times, f64, bool)>,
-    /// Rounds in which costs are measured.
+    /// Number of timed rounds of each representation of time. The median of their times gives the cost.
     rounds: usize,
 }
 
