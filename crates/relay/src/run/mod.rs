@@ -173,7 +173,8 @@ impl Driven for Running<'_> {
     type Clock = MonotonicClock;
     type Error = io::Error;
 
-    /// Longer than making a release ready takes. A datagram that arrives during this time is offered late.
+    /// A little longer than it takes to make a release ready. A datagram that arrives in the last 3 µs before a release is read after the release, and so is
+    /// offered late.
     const AHEAD: Option<Duration> = Some(Duration::from_micros(3));
     const RESTS: bool = true;
 
