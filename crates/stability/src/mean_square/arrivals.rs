@@ -53,11 +53,11 @@ pub struct Hazard {
 /// Range of the samples that may arrive, or may be held, around a tick.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Window {
-    /// Oldest sample that may arrive at the tick or later. Place 0 at the beginning of the tick.
+    /// Number of the oldest sample that may arrive at the tick or later. This sample has place 0 at the beginning of the tick.
     pub(crate) before: i64,
-    /// Oldest sample that may arrive after the tick. Place 0 at the end of the tick.
+    /// Number of the oldest sample that may arrive after the tick. This sample has place 0 at the end of the tick.
     pub(crate) after: i64,
-    /// Newest sample that may have arrived by the end of the tick.
+    /// Number of the newest sample that may have arrived by the end of the tick.
     pub(crate) newest: i64,
     /// Number of places at the beginning of the tick.
     pub(crate) places: usize,
