@@ -128,7 +128,7 @@ impl Html {
         Self { text: format!("<div class=\"beside\">\n{parts}</div>\n") }
     }
 
-    /// Makes lines of a file or a command.
+    /// Makes preformatted text, such as the lines of a file or the output of a command.
     #[must_use]
     pub fn preformatted(text: &str) -> Self {
         Self { text: format!("<pre>{}</pre>\n", escape(text)) }
