@@ -188,9 +188,10 @@ impl<'a> IntoIterator for &'a LinkSummaries {
 /// Iterator over the links of [`LinkSummaries`].
 #[derive(Clone, Debug)]
 pub struct EachLink<'a> {
-    // `from`: present sender. `place`: number of links of this sender returned so far.
     links: &'a LinkSummaries,
+    /// Index of the present sender.
     from: usize,
+    /// Number of links of the present sender that were returned so far.
     place: usize,
 }
 
