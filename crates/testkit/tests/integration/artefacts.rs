@@ -87,8 +87,7 @@ fn frames(mut capture: &[u8]) -> usize {
     frames
 }
 
-/// Returns the packets that the hosts have sent and received. Other events are left out, because the order in which a link reports the loss and the copy of a
-/// packet at one instant is not specified.
+/// Returns the packets sent and received. The order in which a link reports losses and copies of one instant is not specified, so these are left out.
 fn met(record: &Record) -> Vec<(Instant, Happening)> {
     let events = record.trace().events().iter().filter(|event| matches!(event.what, Happening::Sent { .. } | Happening::Arrived { .. }));
     events.map(|event| (event.at, event.what.clone())).collect()

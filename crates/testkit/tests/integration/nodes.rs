@@ -15,8 +15,7 @@ const fn ms(count: u64) -> Instant {
     Instant::from_nanos(count * 1_000_000)
 }
 
-/// Sender of Go-Back-N: sends the numbers from 0 to `count`, at most `window` of them unacknowledged. Sends the whole window again after `wait` without an
-/// acknowledgement.
+/// Sender of Go-Back-N: sends numbers from 0, at most `window` unacknowledged ones. Repeats the window after `wait` without an acknowledgement.
 struct GoBackN {
     count: u32,
     window: u32,
