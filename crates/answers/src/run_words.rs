@@ -10,7 +10,8 @@ use cohaptic_wan::{DropCause, LinkStats};
 use crate::parts::MOST_LINKS;
 use crate::{length, text_plot};
 
-/// Returns the text about a run. `wall_s`: wall time of the run \[s\]. `positions`: positions to draw as a text plot, if wanted, best in [`TEXT_PLOT_SPANS`](crate::TEXT_PLOT_SPANS) spans.
+/// Returns the text about a run. `wall_s`: wall time of the run \[s\]. `positions`: positions to draw as a text plot, if wanted, best in
+/// [`TEXT_PLOT_SPANS`](crate::TEXT_PLOT_SPANS) spans.
 #[must_use]
 pub fn run_words(scene: &Scene, summary: &Summary, measured: &[MeasuredValue], wall_s: f64, positions: Option<&Bands>) -> String {
     let mut text = String::new();

@@ -2,12 +2,12 @@
 //!
 //! Use this crate if you write a package that stands in for a runtime or for sockets, and want it to have the sockets of the test kit wherever a test bed runs.
 //!
-//! A package `tokio` made by `cohaptic tokio` stands in for tokio in existing programs. Each of its sockets holds a real socket, or a socket of the test bed that
-//! runs on the thread. That package asks [`bed`] which of the two a program gets. The test kit implements the traits of this crate with its own sockets, and
-//! registers each running test bed with [`enter`].
+//! A package `tokio` made by `cohaptic tokio` stands in for tokio in existing programs. Each of its sockets holds a real socket, or a socket of the test bed
+//! that runs on the thread. That package asks [`bed`] which of the two a program gets. The test kit implements the traits of this crate with its own sockets,
+//! and registers each running test bed with [`enter`].
 //!
-//! The crate depends on nothing, so that the test kit and the package `tokio` can both depend on it without a cycle: the test kit itself is compiled against the
-//! package `tokio`.
+//! The crate depends on nothing, so that the test kit and the package `tokio` can both depend on it without a cycle: the test kit itself is compiled against
+//! the package `tokio`.
 //!
 //! ```
 //! // Outside of a test bed sockets are real, and tasks live on no host.

@@ -26,8 +26,8 @@ pub struct Ready {
 
 /// TCP connection. Dropping the connection closes it, as dropping a stream of tokio does.
 ///
-/// Methods named `poll_…` register the waker of the context if they return [`Poll::Pending`]. Methods named `try_…` return [`io::ErrorKind::WouldBlock`] instead.
-/// All methods fail after the host of the connection has crashed, after the run of the test bed, and on other threads than the one of the run.
+/// Methods named `poll_…` register the waker of the context if they return [`Poll::Pending`]. Methods named `try_…` return [`io::ErrorKind::WouldBlock`]
+/// instead. All methods fail after the host of the connection has crashed, after the run of the test bed, and on other threads than the one of the run.
 #[expect(clippy::missing_errors_doc, reason = "the documentation of the trait names the errors of all methods")]
 pub trait Stream: fmt::Debug + Send + Sync {
     /// Waits until bytes can be read, or the connection is over.

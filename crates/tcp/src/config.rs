@@ -190,8 +190,8 @@ impl fmt::Display for ConfigError {
 impl core::error::Error for ConfigError {}
 
 impl TcpConfig {
-    /// Returns TCP as in textbooks: Reno with NewReno, an initial window of 3 segments, timeouts of at least 1 s, a fixed window, no selective acknowledgements, no
-    /// timestamps and no tail loss probes. If ECN is on, a SYN without ECN follows a reset, as RFC 3168 says and Linux does not.
+    /// Returns TCP as in textbooks: Reno with NewReno, an initial window of 3 segments, timeouts of at least 1 s, a fixed window, no selective
+    /// acknowledgements, no timestamps and no tail loss probes. If ECN is on, a SYN without ECN follows a reset, as RFC 3168 says and Linux does not.
     #[must_use]
     pub fn textbook() -> Self {
         Self {

@@ -175,8 +175,8 @@ impl Tuning {
         self.buffer = self.buffer.max((window * 256 / self.ratio).min(self.greatest));
     }
 
-    /// Returns the window to offer while segments take `held` octets of memory (`__tcp_select_window`), and whether little memory is left. `unit` is the unit of
-    /// the window scale, `full` the length of the peer's full segments, and `offered` the window offered last.
+    /// Returns the window to offer while segments take `held` octets of memory (`__tcp_select_window`), and whether little memory is left. `unit` is the unit
+    /// of the window scale, `full` the length of the peer's full segments, and `offered` the window offered last.
     pub(crate) fn window(&self, held: usize, unit: u64, full: usize, offered: u64) -> (u64, bool) {
         let (most, mut free) = (self.most(), self.window_of(self.buffer.saturating_sub(held as u64)));
         let full = (full as u64).min(most);

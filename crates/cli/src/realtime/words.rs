@@ -25,8 +25,8 @@ pub(crate) fn late(summary: &LatenessSummary) -> String {
     format!("p50 {p50}, p99 {p99}, p99.9 {p999}, worst {max}")
 }
 
-/// Lists the real-time privileges that the system granted, each privilege that the system refused, with advice how to get it, and what to do about a run that is
-/// not valid. One indented line each.
+/// Lists the real-time privileges that the system granted, each privilege that the system refused, with advice how to get it, and what to do about a run that
+/// is not valid. One indented line each.
 pub(crate) fn notes(prepared: &Prepared, validity: Validity) -> String {
     let mut text = String::new();
     let granted: Vec<&str> = prepared.granted.iter().copied().map(Wish::name).collect();

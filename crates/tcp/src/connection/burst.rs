@@ -36,8 +36,8 @@ impl Connection {
         Some(u64::try_from(flight * percent * 10_000_000 / srtt).unwrap_or(u64::MAX))
     }
 
-    /// Returns the number of segments in the burst that begins now: what the windows and the data allow, at most half of the congestion window, and at most what
-    /// the rate brings in about a millisecond (`tcp_tso_autosize`).
+    /// Returns the number of segments in the burst that begins now: what the windows and the data allow, at most half of the congestion window, and at most
+    /// what the rate brings in about a millisecond (`tcp_tso_autosize`).
     fn burst_length(&self) -> u32 {
         let mss = self.segment_size().max(1) as u64;
         // On a short path bursts may be longer. The shift is the least round trip in units of 512 µs.
@@ -54,8 +54,8 @@ impl Connection {
         quota.min(u32::try_from(by_rate.max(2)).unwrap_or(u32::MAX)).min(by_octets).max(1)
     }
 
-    /// Notes that the new segment from `start` to `end` leaves at `now`. Returns whether the segment is the last of a burst of several. Called before the segment
-    /// counts as sent.
+    /// Notes that the new segment from `start` to `end` leaves at `now`. Returns whether the segment is the last of a burst of several. Called before the
+    /// segment counts as sent.
     pub(super) fn ends_burst(&mut self, now: Instant, start: Position, end: Position) -> bool {
         if self.send.burst.left == 0 || self.send.burst.next != start || self.send.burst.at != now {
             let left = self.burst_length();

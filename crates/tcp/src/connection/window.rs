@@ -28,8 +28,8 @@ impl Connection {
         u16::try_from(window >> self.receive.scale).unwrap_or(u16::MAX)
     }
 
-    /// Returns the window for which the receive buffer has room, and whether acknowledgements should wait because little room is left. The window is zero if less
-    /// than half of the buffer is free, and the free part is below a sixteenth of the buffer or below a segment.
+    /// Returns the window for which the receive buffer has room, and whether acknowledgements should wait because little room is left. The window is zero if
+    /// less than half of the buffer is free, and the free part is below a sixteenth of the buffer or below a segment.
     pub(super) fn free_window(&self) -> (u64, bool) {
         let unit = 1 << self.receive.scale;
         match (&self.receive.tuning, self.config.receive_buffer) {

@@ -1,7 +1,7 @@
 //! Stands in for tokio in a test. `cohaptic tokio` generates this package; do not edit it.
 //!
-//! Everything is re-exported from the real tokio, apart from sockets, tasks, runtimes, signals and two functions of `time`. These ask `cohaptic-sockets` whether
-//! a test bed runs on the present thread. Outside of a test bed each of them does what the real one does.
+//! Everything is re-exported from the real tokio, apart from sockets, tasks, runtimes, signals and two functions of `time`. These ask `cohaptic-sockets`
+//! whether a test bed runs on the present thread. Outside of a test bed each of them does what the real one does.
 #![allow(rustdoc::broken_intra_doc_links, reason = "the documentation of a function is that of tokio")]
 
 pub use real::*;

@@ -80,7 +80,8 @@ impl Bottleneck {
         }
     }
 
-    /// Returns the bits that a transmitter of constant rate has sent after a span, in 10⁻⁹ bit; 0 for a transmitter that follows a recording, which sends at its opportunities.
+    /// Returns the bits that a transmitter of constant rate has sent after a span, in 10⁻⁹ bit; 0 for a transmitter that follows a recording, which sends at
+    /// its opportunities.
     pub(super) fn bits_sent(&self, span: Duration) -> u128 {
         match &self.service {
             Service::Rate(rate) => rate.bits_sent(span),
@@ -88,8 +89,8 @@ impl Bottleneck {
         }
     }
 
-    /// Returns the time from `now` after which the transmitter will have sent a packet of which `left` bits remained at `since`, and `waiting` bits after it (all in
-    /// 10⁻⁹ bit): the wait of the newest packet.
+    /// Returns the time from `now` after which the transmitter will have sent a packet of which `left` bits remained at `since`, and `waiting` bits after it
+    /// (all in 10⁻⁹ bit): the wait of the newest packet.
     pub(super) fn time_to_send(&self, (since, left): (Instant, u128), waiting: u128, now: Instant) -> Duration {
         match &self.service {
             Service::Rate(rate) => {

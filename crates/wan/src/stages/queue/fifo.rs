@@ -1,8 +1,8 @@
 //! First-in-first-out queue before a transmitter: which packet waits, which is in transmission, and which is marked or dropped.
 //!
-//! The queue serves packets of any type over any transmitter; [`Rules`] has what differs. A stage of a link keeps packets of any size, each boxed, over transmitters of
-//! constant rate or of recorded opportunities ([`BottleneckStage`](super::BottleneckStage)). A link of a large mesh keeps packets of one size over a transmitter of constant
-//! rate, whose size and transmission time are known beforehand and stored once for all links of a kind.
+//! The queue serves packets of any type over any transmitter; [`Rules`] has what differs. A stage of a link keeps packets of any size, each boxed, over
+//! transmitters of constant rate or of recorded opportunities ([`BottleneckStage`](super::BottleneckStage)). A link of a large mesh keeps packets of one size
+//! over a transmitter of constant rate, whose size and transmission time are known beforehand and stored once for all links of a kind.
 
 use alloc::collections::VecDeque;
 use core::time::Duration;
@@ -149,8 +149,8 @@ impl<P, S: Default> Fifo<P, S> {
         self.waiting.push_back(packet);
     }
 
-    /// Removes the packet that leaves the transmitter by `until`, and returns it with its instant. The next packet is in transmission afterwards. For a transmitter of constant
-    /// rate.
+    /// Removes the packet that leaves the transmitter by `until`, and returns it with its instant. The next packet is in transmission afterwards. For a
+    /// transmitter of constant rate.
     #[inline(always)]
     pub(crate) fn leave<R: Rules<P, Sums = S>>(
         &mut self,
