@@ -120,7 +120,7 @@ fn a_page_names_what_was_left_out_and_what_was_not_settled() {
     let desk = Desk::with("random.toml", RANDOM);
     desk.text("admittance random.toml --peer left --at 1 --out bode --set link.jitter=1ms");
     let page = desk.read("bode/admittance.html");
-    for part in ["<h2>Notes</h2>", "<li>The admittance is that with every delay its mean and nothing lost.</li>", "<code>link.jitter=1ms</code>"] {
+    for part in ["<h2>Notes</h2>", "<li>The admittance is that with every delay at its mean and no losses.</li>", "<code>link.jitter=1ms</code>"] {
         assert!(page.contains(part), "no {part} in {page}");
     }
     desk.write("two.toml", TWO);

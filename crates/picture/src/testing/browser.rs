@@ -33,7 +33,7 @@ const WIDTH: &str = "lines.push('WIDER '+(document.documentElement.scrollWidth-d
 /// Script that writes by how much the widest table or picture is cut off on a sheet of A4 with the margins of a browser \[px\]. The style for paper is made
 /// the style for all media, because a browser that prints does not answer.
 const PAPER: &str = "for(const r of document.styleSheets[0].cssRules)if(r.media&&r.media.mediaText==='print')r.media.mediaText='all';\
-    document.documentElement.style.width='718px';\
+    document.body.style.width='';document.documentElement.style.width='718px';\
     lines.push('CUT '+Math.max(0,...[...document.querySelectorAll('.wide')].map(e=>e.scrollWidth-e.clientWidth)));";
 
 /// Returns the misplaced texts of named pictures, as [`misplaced`] does, with the boxes measured by a browser. Returns `None` without a `chromium` on the path.
