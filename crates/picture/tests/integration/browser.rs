@@ -91,7 +91,8 @@ fn a_browser_shows_pages_without_scrolling_sideways_and_texts_apart() {
     assert_eq!(found, [""; 0]);
     for (width, windows) in [("3000px", &["phone", "laptop"][..]), ("500px", &["phone"])] {
         let wide = page().replace("<main>", &format!("<main style=\"width:{width};max-width:none\">"));
-        let found = page_in_browser(folder.path(), &wide).unwrap();
+        let mut found = page_in_browser(folder.path(), &wide).unwrap();
+        found.retain(|fault| fault.starts_with("the page is wider"));
         assert!(found.iter().zip(windows).all(|(fault, window)| fault.contains(window)) && found.len() == windows.len(), "{width}: {found:?}");
     }
     // On a screen a wide table scrolls in its box. A sheet of paper does not scroll.
