@@ -68,7 +68,7 @@ impl Size {
     /// # Errors
     ///
     /// [`SizeError::OutOfRange`].
-    pub(crate) fn millimetres(width: f64, height: f64) -> Result<Self, SizeError> {
+    pub fn millimetres(width: f64, height: f64) -> Result<Self, SizeError> {
         Self { width: width * MILLIMETRE, height: Some(height * MILLIMETRE), font: PRINTED, print: true }.checked()
     }
 

@@ -51,7 +51,7 @@ impl<const A: usize> Axes<A> {
 
     /// Returns a vector of the peer as a vector of the device, zero along the axes that the peer does not use.
     #[must_use]
-    pub(crate) fn to_device(&self, vector: [f64; A]) -> Triple {
+    pub(crate) fn to_device(self, vector: [f64; A]) -> Triple {
         let mut spread = [0.0; 3];
         for (axis, part) in self.0.iter().zip(vector) {
             spread[axis.index()] = part;
