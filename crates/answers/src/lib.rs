@@ -7,7 +7,7 @@
 //! [`map_picture()`], [`boundary_picture()`] and [`admittance_picture()`] draw analyses. [`document!`] makes a document.
 //!
 //! The other commands have a module each, with a function `document` for the JSON document and a function `words` for the text: [`campaign`], [`compare`],
-//! [`mod@link`], [`fit`], [`point`], [`map`], [`boundary`] and [`admittance`]. Five of these have a function `html` for a [page](page) too. [`shards`] has the
+//! [`mod@link`], [`fit`], [`point`], [`map`], [`boundary`] and [`admittance`]. Five of these have a function `html` for a [`page`] too. [`shards`] has the
 //! answers about work shared by several processes.
 //!
 //! The crate reads no clock and prints nothing: [`measure()`] takes the clock as an argument.

@@ -13,7 +13,7 @@ use alloc::vec::Vec;
 /// let mut ring = Ring::new();
 /// ring.push(|| "first");
 /// ring.push(|| "second");
-/// assert_eq!((ring.len(), ring.front(), ring.back()), (2, Some(&"first"), Some(&"second")));
+/// assert_eq!((ring.len(), ring.front()), (2, Some(&"first")));
 /// assert_eq!((ring.pop(), ring.pop(), ring.pop()), (Some("first"), Some("second"), None));
 /// ```
 #[derive(Clone, Debug)]
