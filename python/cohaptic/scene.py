@@ -274,4 +274,6 @@ def _inner(value: Any) -> str:
         return _inner(value.tolist())
     if isinstance(value, int | float):
         return repr(value)
-    raise TypeError(f"{value!r} is not a value of a scene: expected a number, a truth value, a text, a list or a mapping")
+    raise TypeError(
+        f"{value!r} is not a value of a scene: expected a number, a truth value, a text, a list or a mapping"
+    )

@@ -35,7 +35,6 @@ pub struct Arrival<'a> {
 
 /// Result of the intake of one datagram.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[non_exhaustive]
 pub enum Intake {
     /// The datagram was admitted, and is or will be offered to its link.
     Offered,
