@@ -37,7 +37,7 @@ pub struct AnswerPage {
     pub warnings: Vec<String>,
     /// The answer, one paragraph per sentence.
     pub sentences: Vec<String>,
-    /// What was asked besides the scene and its overrides: names with their values.
+    /// Settings of the question besides the scene and its overrides: names with their values.
     pub asked: Vec<(&'static str, Html)>,
     /// Tables, shown after the pictures, with their headings.
     pub tables: Html,

@@ -1,10 +1,10 @@
-//! How often a run asks whether to go on.
+//! Number of instants between two questions of a run whether to go on.
 
 /// Greatest number of instants, or ticks in arrays, between two calls of [`Observer::keep_going`](crate::Observer::keep_going).
 pub(crate) const MOST_INSTANTS_BETWEEN_QUESTIONS: u32 = 1024;
 
 /// Greatest number of ticks of peers, or packets, between two calls of [`Observer::keep_going`](crate::Observer::keep_going), unless a single instant has more.
-/// This many take a part of a second.
+/// So much work takes a part of a second.
 pub(crate) const MOST_WORK_BETWEEN_QUESTIONS: usize = 1 << 22;
 
 /// Returns the number of instants, or of ticks in arrays, between two calls of [`Observer::keep_going`](crate::Observer::keep_going): a power of two. `work` is

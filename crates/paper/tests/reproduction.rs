@@ -95,7 +95,7 @@ fn the_page_begins_with_the_answer() {
     for claim in &quick().claims {
         let begin = page.find(&format!("<section id=\"{}\">", claim.id)).unwrap();
         assert_eq!(page[..sections].contains(claim.short), !claim.is_own, "{}", claim.id);
-        // Its tables and its figures stand in its section, or a figure is linked that an earlier claim shows.
+        // The tables and figures of a claim stand in its section, or a figure that an earlier claim shows is linked.
         let section = &page[begin..begin + page[begin..].find("</section>").unwrap()];
         assert!(claim.tables.iter().all(|table| section.contains(&table.title)), "{}", claim.id);
         let is_shown = |figure: &&str| section.contains(&format!("<figure id=\"{figure}\">")) || section.contains(&format!("href=\"#{figure}\""));

@@ -1,4 +1,4 @@
-//! What files of both formats are written from and read into: the head of a file, open parts, figures of runs, and errors.
+//! Content of a table file, the same for both formats: the head of the file, open parts, figures of runs, and errors.
 
 use std::fs::File;
 use std::io;

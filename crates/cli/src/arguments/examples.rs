@@ -1,4 +1,4 @@
-//! What stands below the help of every command: lines that can be typed as they stand, and the exit status.
+//! Text below the help of every command: examples that can be typed as they stand, and the exit status.
 
 const EXIT_STATUS: &str = "Exit status: 0 done, 1 an expectation failed, 2 a bad argument or scene, 3 an input or output error, 130 interrupted, \
     141 standard output was closed.";

@@ -18,7 +18,7 @@ pub(crate) struct TokioArguments {
 #[derive(Debug, Args)]
 #[command(after_help = after(examples::TEST))]
 pub(crate) struct TestArguments {
-    /// What cargo test is to get, as it would be without cohaptic
+    /// Arguments of cargo test, as they would be without cohaptic
     #[arg(value_name = "ARGS", trailing_var_arg = true, allow_hyphen_values = true)]
     pub(crate) arguments: Vec<OsString>,
 }

@@ -1,4 +1,4 @@
-//! What can be said on the command line.
+//! The command line: commands, options and their help.
 
 mod compare;
 mod examples;
@@ -95,7 +95,7 @@ pub(crate) enum Command {
     Man(ManArguments),
 }
 
-/// What all commands on one scene take.
+/// Arguments that all commands on one scene take.
 #[derive(Debug, Args)]
 pub(crate) struct SceneArguments {
     /// The scene, a TOML file; - reads it from standard input

@@ -23,7 +23,7 @@ pub(crate) fn some(text: &str) -> Result<NonZeroUsize, String> {
     number.ok_or_else(|| expected(1, u64::MAX))
 }
 
-/// How many threads: tens of thousands, which is what a slip of the finger asks for, keep a machine busy with them alone.
+/// Reads a number of threads, at most 1024. Tens of thousands, which a slip of the finger asks for, would keep a machine busy with the threads alone.
 pub(crate) fn threads(text: &str) -> Result<u16, String> {
     integer(1, 1024)(text)
 }

@@ -13,7 +13,7 @@ use super::Overrides;
 use super::examples::{self, after};
 use super::numbers::integer;
 
-/// How to be on time, and live control.
+/// Options for punctuality, and live control.
 #[derive(Debug, Args)]
 pub(crate) struct RealTimeArguments {
     /// Wake up to 120 µs before each deadline and spin: more punctual, and keeps a core busy

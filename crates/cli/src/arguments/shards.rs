@@ -1,4 +1,4 @@
-//! What all commands take whose work several processes can share.
+//! Arguments of commands whose work several processes can share.
 
 use std::path::PathBuf;
 use std::str::FromStr;

@@ -132,7 +132,7 @@ fn numbers(text: &str) -> Result<(u64, Option<u64>), String> {
     if to.is_some_and(|to| to < from) { Err("the smaller number comes first".to_owned()) } else { Ok((from, to)) }
 }
 
-/// How a verdict is reached.
+/// Method by which a verdict is reached.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 pub(crate) enum MethodName {
     Reduced,
@@ -227,11 +227,11 @@ pub(crate) struct BoundaryArguments {
 }
 
 impl BoundaryArguments {
-    /// How many values are looked at at most, unless it is said.
+    /// Default of the largest number of values to check.
     pub(crate) const VALUES: usize = 100_000;
 }
 
-/// How many cells a map has along each axis.
+/// Number of cells of a map along each axis.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct GridSize {
     pub(crate) width: usize,

@@ -1,4 +1,4 @@
-//! What differs between shells: the scripts, how words reach the program, and how answers reach the shell.
+//! Differences between shells: the scripts, the way of words to the program, and the way of answers to the shell.
 
 use clap::{Arg, Command};
 use clap_complete::Shell;

@@ -152,10 +152,10 @@ mod tests {
 
     #[test]
     fn the_path_of_the_patch_begins_in_the_workspace_with_the_tests() {
-        let workspace = |sim: &str| Workspace { root: "/work".into(), sim: sim.into(), sockets: String::new() };
-        let package = Path::new("/work/target/cohaptic/tokio");
-        assert_eq!(workspace("/work/sim").patch(package), "../target/cohaptic/tokio");
-        assert_eq!(workspace("/work").patch(package), "target/cohaptic/tokio");
-        assert_eq!(workspace("/elsewhere").patch(package), "/work/target/cohaptic/tokio");
+        let workspace = |sim: &str| Workspace { root: "/code".into(), sim: sim.into(), sockets: String::new() };
+        let package = Path::new("/code/target/cohaptic/tokio");
+        assert_eq!(workspace("/code/sim").patch(package), "../target/cohaptic/tokio");
+        assert_eq!(workspace("/code").patch(package), "target/cohaptic/tokio");
+        assert_eq!(workspace("/elsewhere").patch(package), "/code/target/cohaptic/tokio");
     }
 }

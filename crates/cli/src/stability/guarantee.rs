@@ -60,5 +60,5 @@ pub(super) fn left_open(pieces: usize) -> Option<String> {
     (pieces > 0).then(|| format!("the certificate leaves open {} of those that are decided here", Counted(pieces, "piece")))
 }
 
-/// What is said of a proof that was ended before all pieces were looked at.
+/// Message about a proof that was stopped before every piece was judged.
 pub(super) const UNFINISHED: &str = "the proof was stopped; pieces that it had not reached are undecided, all others hold";

@@ -80,7 +80,7 @@ fn the_package_has_the_version_and_the_features_of_tokio() {
     assert!(own["features"].get("parking_lot").is_some() && own["features"].get("slab").is_none());
     assert!(own["dependencies"]["cohaptic-sockets"]["path"].as_str().unwrap().ends_with("crates/sockets"));
 
-    // What is the same is not written again, so that cargo compiles nothing again.
+    // An unchanged file is not written again, so that cargo does not compile it again.
     let written = || fs::metadata(desk.path("target/cohaptic/tokio/src/lib.rs")).unwrap().modified().unwrap();
     let first = written();
     // A file of another version goes.
@@ -160,7 +160,7 @@ fn wait_for_change(desk: &Desk, child: &mut Child) {
 #[test]
 fn after_ctrl_c_cargo_lock_is_put_back() {
     let desk = program("\"facade\"");
-    // It does not heed the signal, which comes to the program alone.
+    // The stand-in for cargo ignores the signal, which comes to the program alone.
     stand_in(&desk, "exec sleep 600");
     for signal in ["-INT", "-TERM"] {
         let mut child = command(&desk, "test").stderr(Stdio::null()).spawn().unwrap();

@@ -150,7 +150,7 @@ fn three_falcons() {
 }
 
 /// 0.5 N hold the hand of left, which pulls with 100 N/m, 5 mm from where it wants to be, and dry friction 2 mm more; without a limit it would be 15 mm along x.
-/// What is computed is larger than what goes out.
+/// The computed force is larger than the force that goes out.
 #[test]
 fn the_limit_of_force_in_the_scene_holds() {
     let session = session(3, &["peer.falcon.force-limit=0.5"]);

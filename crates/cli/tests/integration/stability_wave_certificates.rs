@@ -55,7 +55,7 @@ fn certificates_of_waves_hold_for_a_checker_that_shares_no_code() {
     }
 }
 
-/// What a certificate says must be what its numbers show, for the scene that it holds.
+/// A certificate is accepted only if its numbers show its statement, for the scene that it holds.
 #[test]
 #[ignore = ".ci/nightly runs it: it takes long"]
 fn a_certificate_of_waves_that_says_more_than_it_shows_is_refused() {

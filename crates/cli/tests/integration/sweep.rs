@@ -3,7 +3,7 @@
 use crate::integration::desk::Desk;
 use crate::integration::scenes::TWO;
 
-/// What the standard library says of texts that it does not read.
+/// Errors of the standard library for texts that it does not read.
 const RAW: &str = include_str!("../../../scene/tests/integration/raw_texts.txt");
 
 /// No option takes any of these.

@@ -93,7 +93,7 @@ pub struct Diagnostic {
     pub(crate) key: String,
     /// The fault and the expected text.
     pub(crate) message: String,
-    /// Where the document names the file with the fault. `None` for a fault in the document itself or in an override.
+    /// Place in the document that names the file with the fault. `None` for a fault in the document itself or in an override.
     pub(crate) note: Option<String>,
 }
 

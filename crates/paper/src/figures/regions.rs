@@ -24,7 +24,7 @@ pub(super) fn figures(atlas: &Atlas, size: Size) -> Vec<Figure> {
     vec![of("fig-3", "3", 0.0), of("fig-4", "4", 5.0)]
 }
 
-/// What the shades of a panel mean.
+/// Meaning of the shades of a panel, for the caption.
 const SHADES: &str =
     "Each region is filled on the stable side of its line. The stronger the tint of a place, the more of these numbers of users are stable there.";
 

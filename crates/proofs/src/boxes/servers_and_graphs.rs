@@ -239,7 +239,7 @@ fn repeated_eigenvalues_of_a_graph_are_one_part() {
     assert_eq!(analyse(&nearly, Method::Reduced).unwrap().verdict(), Verdict::Stable, "row sums that differ by a rounding are analysed as if equal");
 }
 
-/// What has no proof, or no certificate of it, is refused before anything is looked for, with what could be asked instead.
+/// A question without a proof, or without a certificate, is refused before the search begins, with a question that could be asked instead.
 #[test]
 fn what_is_not_followed_is_refused_by_name() {
     let ring = "topology={ kind = \"ring\", neighbours = 2 }";

@@ -54,7 +54,7 @@ pub(crate) enum LossChain {
 
 impl LossChain {
     /// Returns the states of positive probability. A link begins in the chain's stationary law, so a state with stationary probability zero is never reached.
-    /// Other functions number the states by their position in this list.
+    /// The position of a state in this list is the number of the state in other functions.
     fn live(&self) -> Vec<usize> {
         let two = |bad: f64| vec![1.0 - bad, bad];
         let stationary = match self {

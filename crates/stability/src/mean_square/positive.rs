@@ -15,7 +15,7 @@
 //! (`roundings`) and S are the sizes of the terms of each entry, added up (`sizes`), then the computed image is within γ_K·S of the exact image (Higham 2002,
 //! Section 3.1). Cholesky's factorisation with Rump's criterion (`definite`) shows that γY − L(Y) is positive definite whatever these errors are. A diagonal
 //! entry of Y below zero shows, without any rounding, that Y is not positive definite. So the bounds hold for the operator with the coefficients as stored.
-//! They hold for the exact operator as far as the errors of the coefficients are counted among the roundings. Numbers that underflow are not counted.
+//! The bounds hold for the exact operator as far as the errors of the coefficients are counted among the roundings. Numbers that underflow are not counted.
 
 use crate::definite::is_positive;
 use crate::rounding::{gamma, outward};

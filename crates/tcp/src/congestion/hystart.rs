@@ -42,7 +42,7 @@ struct Round {
     samples: u8,
 }
 
-/// What an acknowledgement tells about the round trip.
+/// Round trip as an acknowledgement tells it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RoundTrip {
     /// Time since the last acknowledged segment was sent.

@@ -85,7 +85,7 @@ const BEGIN: &str = "// Source: none, this tests the interpreter.
 #[test]
 fn the_interpreter_finds_what_is_wrong() {
     let cases = [
-        // What leaves is not what the script says, or at another time, or nothing expects it.
+        // A segment leaves that the script does not expect, or expects otherwise or at another time.
         ("+0 > P. 1:11(10) ack 1", None),
         ("+0 > P. 1:12(11) ack 1", Some("10: expected")),
         ("+0 > . 1:11(10) ack 1", Some("10: expected")),

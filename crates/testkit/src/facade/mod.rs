@@ -20,7 +20,7 @@ use crate::resolve::ToSocketAddrs;
 use crate::socket::UdpSocket;
 use crate::tcp::{TcpListener, TcpSocket, TcpStream};
 
-/// What a task without a host must do. The `tokio` of the program is the package that stands in, and the task was started outside of all hosts.
+/// Advice for a task without a host. The `tokio` of the program is the package that stands in, and the task was started outside of all hosts.
 const HOW: &str = "wrap the call, or the task that `tokio::spawn` started on no host, in `Host::scope`";
 
 /// A run, as `cohaptic-sockets` sees it.

@@ -1,6 +1,6 @@
 //! Certificate of the servers of a test bed.
 //!
-//! It was made once by
+//! The certificate was made once by
 //!
 //! ```sh
 //! openssl genpkey -algorithm ed25519 -out key.pem

@@ -32,9 +32,9 @@ impl Event for Note {
 
 #[derive(Clone, Copy, Debug)]
 enum When {
-    /// This time \[ns\] after the latest instant so far. Times lie below and beyond the 65.5 µs of a bucket and the 268 ms of the ring.
+    /// Span \[ns\] after the latest instant so far. Spans lie below and beyond the 65.5 µs of a bucket and the 268 ms of the ring.
     Ahead(u64),
-    /// This time \[ns\] before the latest instant so far.
+    /// Span \[ns\] before the latest instant so far.
     Behind(u64),
     /// At this instant \[ns\].
     Exactly(u64),

@@ -200,7 +200,7 @@ fn releases_what_has_arrived(desk: &Desk, document: &Value, packets: &[Packet]) 
 
 /// On the program's clock nothing comes before it is due.
 ///
-/// When the session began is not known there; but each sample counts no earlier than it was sent, so it began no earlier than any `sent − counts`.
+/// The program does not know when the session began. But each sample counts no earlier than it was sent, so the session began no earlier than any `sent − counts`.
 fn is_never_early(packets: &[Packet], inputs: &[Input], accounts: &[Account; 2]) {
     let epoch = accounts[0].sent[0].at;
     let seconds = |at: Wall| at.saturating_duration_since(epoch).as_secs_f64();

@@ -82,7 +82,7 @@ fn flood(door: SocketAddr, peer: &Peer) -> u64 {
     sent
 }
 
-/// What a session in which a stranger was came to.
+/// Results of a session to which a stranger sent datagrams.
 struct Flooded {
     document: Value,
     account: Account,
@@ -123,7 +123,7 @@ fn desk() -> Desk {
     Desk::with("scene.toml", &scene)
 }
 
-/// What must hold whoever was there.
+/// Asserts the results that must not depend on strangers.
 fn assert_untouched(desk: &Desk, flooded: &Flooded, causes: &[&str]) {
     let Flooded { document, account, sent } = flooded;
     let door = &document["door"];

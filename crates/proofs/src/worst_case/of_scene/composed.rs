@@ -12,8 +12,8 @@
 //! in any order: γ for as many operations
 //! (Higham 2002, Section 3.1), and a smallest number for each product that underflows.
 //!
-//! What a receiver hears, H = w·S + e − c/(N − 1), has w·S rounded once and w itself once: 3·u·|w|·‖S‖ is more. Its other entries stand alone, and 1/(N − 1)
-//! rounds once.
+//! The combination that a receiver hears, H = w·S + e − c/(N − 1), has w·S rounded once and w itself once: 3·u·|w|·‖S‖ is more. The other entries of H stand
+//! alone, and 1/(N − 1) rounds once.
 
 use cohaptic_stability::numerics::{UNDERFLOW, UNIT, gamma, outward, real};
 

@@ -78,7 +78,7 @@ struct LinkState {
     memory: Memory,
 }
 
-/// Where the state of a link is kept, and the index of its kind in `kinds`.
+/// Place of the state of a link, and the index of its kind in `kinds`.
 #[derive(Clone, Copy, Debug)]
 enum Memory {
     /// A link of this kind, which has no state.

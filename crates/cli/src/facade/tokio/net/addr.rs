@@ -10,7 +10,7 @@ pub trait ToSocketAddrs: Described {}
 pub(super) mod sealed {
     use std::net::SocketAddr;
 
-    /// What a value describes.
+    /// Address or addresses that a value describes.
     #[derive(Debug)]
     pub enum Target {
         /// One address.

@@ -59,6 +59,12 @@ impl<R: std::fmt::Debug, B: std::fmt::Debug> std::fmt::Debug for Either<R, B> {
     }
 }
 
+/// Returns the error of a socket of a test bed that is to be bound to a device.
+#[cfg(all(feature = "net", any(target_os = "android", target_os = "fuchsia", target_os = "linux")))]
+fn no_devices() -> std::io::Error {
+    std::io::Error::new(std::io::ErrorKind::Unsupported, "a test bed has no network devices; bind to an address of the host")
+}
+
 /// Returns the test bed in which the present thread makes a socket, or `None` if the socket is real.
 ///
 /// # Errors

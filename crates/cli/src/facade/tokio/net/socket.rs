@@ -113,7 +113,7 @@ impl TcpSocket {
     pub fn bind_device(&self, interface: Option<&[u8]>) -> io::Result<()> {
         match &self.0 {
             Either::Real(socket) => socket.bind_device(interface),
-            Either::Bed(_) => Err(io::Error::new(io::ErrorKind::Unsupported, "a test bed has no network devices; bind to an address of the host")),
+            Either::Bed(_) => Err(crate::net::no_devices()),
         }
     }
 

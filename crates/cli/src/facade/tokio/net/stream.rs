@@ -257,7 +257,7 @@ impl TcpStream {
     }
 }
 
-/// What halves need, which share a stream.
+/// Calls of the two halves of a stream, which share the stream.
 impl TcpStream {
     #[inline]
     pub(super) fn poll_read_shared(&self, cx: &mut Context<'_>, buffer: &mut ReadBuf<'_>) -> Poll<io::Result<()>> {

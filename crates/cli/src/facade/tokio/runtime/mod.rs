@@ -2,6 +2,70 @@
 
 pub use real::runtime::*;
 
+/// Defines a runtime that holds the real one, with the methods that tokio's two kinds of runtime have alike.
+macro_rules! runtime {
+    ($name:ident) => {
+        #[doc = concat!("See `tokio::runtime::", stringify!($name), "`.")]
+        #[derive(Debug)]
+        pub struct $name {
+            real: real::runtime::$name,
+            handle: $crate::runtime::Handle,
+        }
+
+        impl $name {
+            pub(super) fn of(real: real::runtime::$name) -> Self {
+                let handle = $crate::runtime::Handle::new(real.handle());
+                Self { real, handle }
+            }
+
+            #[doc = concat!("See `tokio::runtime::", stringify!($name), "::handle`.")]
+            pub fn handle(&self) -> &$crate::runtime::Handle {
+                &self.handle
+            }
+
+            #[doc = concat!("See `tokio::runtime::", stringify!($name), "::spawn_blocking`.")]
+            #[track_caller]
+            pub fn spawn_blocking<F, R>(&self, function: F) -> real::task::JoinHandle<R>
+            where
+                F: FnOnce() -> R + Send + 'static,
+                R: Send + 'static,
+            {
+                self.handle.spawn_blocking(function)
+            }
+
+            #[doc = concat!("See `tokio::runtime::", stringify!($name), "::block_on`.")]
+            #[track_caller]
+            pub fn block_on<F: std::future::Future>(&self, future: F) -> F::Output {
+                self.real.block_on(future)
+            }
+
+            #[doc = concat!("See `tokio::runtime::", stringify!($name), "::enter`.")]
+            pub fn enter(&self) -> real::runtime::EnterGuard<'_> {
+                self.real.enter()
+            }
+
+            #[doc = concat!("See `tokio::runtime::", stringify!($name), "::shutdown_timeout`.")]
+            pub fn shutdown_timeout(self, duration: std::time::Duration) {
+                self.real.shutdown_timeout(duration);
+            }
+
+            #[doc = concat!("See `tokio::runtime::", stringify!($name), "::shutdown_background`.")]
+            pub fn shutdown_background(self) {
+                self.real.shutdown_background();
+            }
+        }
+
+        impl std::ops::Deref for $name {
+            type Target = real::runtime::$name;
+
+            fn deref(&self) -> &Self::Target {
+                &self.real
+            }
+        }
+    };
+}
+use runtime;
+
 mod builder;
 mod handle;
 mod rt;
