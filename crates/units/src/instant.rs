@@ -113,14 +113,6 @@ impl fmt::Debug for Instant {
     }
 }
 
-impl fmt::Display for Instant {
-    /// Writes the time since the beginning exactly, in seconds without trailing zeros: `0.024s`.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        crate::print::Seconds(*self).fmt(f)?;
-        f.write_str("s")
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

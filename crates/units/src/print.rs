@@ -19,6 +19,14 @@ impl fmt::Display for Seconds {
     }
 }
 
+impl fmt::Display for Instant {
+    /// Writes the time since the beginning exactly, in seconds without trailing zeros: `0.024s`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        Seconds(*self).fmt(f)?;
+        f.write_str("s")
+    }
+}
+
 /// Prints a span exactly, in the largest unit not longer than the span: `24ms`, `1.5s`, `250us`. Zero prints as `0s`.
 #[derive(Clone, Copy, Debug)]
 pub struct Span(pub Duration);
