@@ -212,13 +212,3 @@ fn figure_on_page(figure: &Figure) -> Html {
     let caption = Html::strong(&format!("{}.", figure.title)).and(" ").and(figure.caption.as_str());
     Html::figure(&figure.id, Html::picture(&figure.svg).and(Html::caption(caption)))
 }
-
-/// Writes a share as a percentage.
-pub(crate) fn percent(share: f64) -> String {
-    format!("{:.1} %", 100.0 * share)
-}
-
-/// Writes a time \[s\], or words for a missing time.
-pub(crate) fn seconds(time: Option<f64>) -> String {
-    time.map_or_else(|| "not reached".to_owned(), |time| format!("{time:.3} s"))
-}

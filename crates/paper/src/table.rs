@@ -43,3 +43,13 @@ pub(crate) fn cell(text: impl Into<String>, fails: bool) -> String {
     let text = text.into();
     if fails { format!("{text} {FAILS}") } else { text }
 }
+
+/// Writes a share as a percentage.
+pub(crate) fn percent(share: f64) -> String {
+    format!("{:.1} %", 100.0 * share)
+}
+
+/// Writes a time \[s\], or words for a missing time.
+pub(crate) fn seconds(time: Option<f64>) -> String {
+    time.map_or_else(|| "not reached".to_owned(), |time| format!("{time:.3} s"))
+}

@@ -3,8 +3,7 @@
 use super::{Claim, Topic, Verdict};
 use crate::case::Strategy;
 use crate::experiment::{DELAYS_MS, StabilityTest, Travel, stability_text, travel_text};
-use crate::page::seconds;
-use crate::table::{Table, cell};
+use crate::table::{Table, cell, seconds};
 
 pub(super) fn claims(tests: &[StabilityTest], travels: &[Travel]) -> Vec<Claim> {
     vec![outcomes(tests), less_time(travels), times(travels), both_stable(travels)]

@@ -6,8 +6,7 @@ use crate::Watch;
 use crate::case::{Case, Mass, Strategy};
 use crate::counter::smallest;
 use crate::figures::admittance::{Fit, Responses};
-use crate::page::percent;
-use crate::table::{Table, cell};
+use crate::table::{Table, cell, percent};
 use crate::{Options, PaperError};
 
 pub(super) fn claims(responses: &Responses, _options: Options, watch: &dyn Watch) -> Result<Vec<Claim>, PaperError> {

@@ -3,9 +3,8 @@
 use super::{Claim, Topic, Verdict, WITH_PD};
 use crate::case::{Case, Strategy};
 use crate::counter::{is_stable, is_unstable, one_more_peer, smallest};
-use crate::page::percent;
 use crate::region::{Atlas, PEERS, Setting};
-use crate::table::{Table, cell};
+use crate::table::{Table, cell, percent};
 use crate::{PaperError, Watch};
 
 /// Relative change of the area, compared with two peers, up to which the area counts as "largely unaffected".
