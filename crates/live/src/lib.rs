@@ -44,12 +44,14 @@ mod entropy;
 pub mod falcons;
 pub mod handshake;
 mod key;
+mod place;
 pub mod pointers;
 mod seal;
 pub mod session;
 
-pub use admission::{Admission, AdmissionConfig, AdmissionConfigError, AdmissionControl, AdmissionStats, Admitted, Limits, Place, Refusal, Seat};
+pub use admission::{Admission, AdmissionConfig, AdmissionConfigError, AdmissionControl, AdmissionStats, Admitted, Limits, Refusal, Seat};
 pub use entropy::{Entropy, EntropyError, SystemEntropy};
 pub use key::{KeyFileError, SessionKey};
+pub use place::Place;
 pub use seal::{MAX_DATAGRAM, Nonce};
 pub use session::{Conductor, LinkChange, Report, Session, SessionConfig, SessionError, Status};

@@ -1,22 +1,12 @@
 //! Configuration of an [`AdmissionControl`](super::AdmissionControl), and the errors of a configuration.
 
-use core::fmt;
 use core::time::Duration;
 
 use cohaptic_peer::wire::SampleKind;
 use cohaptic_units::print::Counted;
 
+use crate::place::Place;
 use crate::{EntropyError, SessionKey};
-
-/// Index of a peer among all peers of the scene, from 0. Samples carry this index as their sender.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
-pub struct Place(pub u32);
-
-impl fmt::Display for Place {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.fmt(f)
-    }
-}
 
 /// Peer of the scene that is another program.
 #[derive(Clone, PartialEq, Eq, Debug)]

@@ -36,7 +36,8 @@ use crate::handshake::{HANDSHAKE_LEN, Hello, Welcome};
 use crate::seal::{JoiningKeys, MAX_DATAGRAM, SEAL_LEN, Sealed, nonce_of};
 use crate::{Entropy, Nonce, SessionKey};
 
-pub use config::{AdmissionConfig, AdmissionConfigError, Limits, Place, Seat};
+pub use crate::place::Place;
+pub use config::{AdmissionConfig, AdmissionConfigError, Limits, Seat};
 pub use refusal::{AdmissionStats, Refusal};
 pub use seats::SeatStatus;
 
