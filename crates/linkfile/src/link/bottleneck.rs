@@ -7,8 +7,8 @@ use cohaptic_wan::{Bottleneck, Cells, DeliveryTrace, Discipline, Framing, Peak, 
 use super::queue::{Queue, read_limit, read_queue};
 use super::{NONE, UNLIMITED, unless, written_together};
 use crate::document::Node;
+use crate::link::keys::LINK_TABLE;
 use crate::reading::{Context, TableReader, values};
-use crate::schema::link::LINK_TABLE;
 
 /// Reads the bottleneck, whose line sends at a rate or at the instants `recorded`. Returns `Some(None)` for a link without a bottleneck.
 pub(super) fn read_bottleneck(table: &mut TableReader<'_>, recorded: Option<DeliveryTrace>, context: Context<'_>) -> Option<Option<Bottleneck>> {

@@ -5,8 +5,8 @@ use cohaptic_wan::{Chance, Checksum, Corruption, Flips};
 use super::loss_pattern::read_range;
 use super::read_chance_in;
 use crate::document::{Node, quote};
+use crate::link::keys::LINK_TABLE;
 use crate::reading::{Context, TableReader, values};
-use crate::schema::link::LINK_TABLE;
 
 /// Reads `"1%"` (one flipped bit per corrupted packet), `{ probability, correlation, bits }` or `{ bit-error-rate }`; both tables also take `bytes` and
 /// `checksum`. Returns `Some(None)` if no bit is ever flipped.

@@ -6,8 +6,8 @@ use cohaptic_wan::{Correlation, Delay, Distribution, Jitter};
 
 use super::distribution::read_distribution;
 use crate::document::Node;
+use crate::link::keys::LINK_TABLE;
 use crate::reading::{Context, TableReader, only_one, values};
-use crate::schema::link::LINK_TABLE;
 
 /// Reads the delay of a link with its jitter.
 pub(super) fn read_delay(table: &mut TableReader<'_>, keys: &Node, context: Context<'_>) -> Option<Delay> {

@@ -6,9 +6,9 @@ use cohaptic_wan::Distribution;
 use cohaptic_wan::law::{DistTable, DistTableError, Empirical, EmpiricalError};
 
 use crate::document::{Node, quote};
+use crate::link::keys::LINK_TABLE;
 use crate::reading::named_file::{Fault, file_path, line_span, read_file};
 use crate::reading::{Context, TableReader, only_one, values};
-use crate::schema::link::LINK_TABLE;
 
 const EXPECTED: &str = "the name of a law, { table = \"file.dist\" } or { empirical = \"file.csv\" }";
 

@@ -6,8 +6,8 @@ use cohaptic_wan::{Bursts, FourState, GilbertElliott, GilbertElliottInTime, Loss
 use super::loss_pattern::{read_lost_packets, read_lost_times};
 use super::read_chance;
 use crate::document::Node;
+use crate::link::keys::LINK_TABLE;
 use crate::reading::{Context, TableReader, only_one, values};
-use crate::schema::link::LINK_TABLE;
 
 const EXPECTED: &str =
     "a probability such as \"1%\", or { gilbert-elliott = … }, { states = … }, { bursts = … }, { correlated = … }, { packets = … } or { times = … }";

@@ -4,6 +4,7 @@ mod bottleneck;
 mod corrupt;
 mod delay;
 mod distribution;
+pub(crate) mod keys;
 mod listed;
 mod loss;
 mod loss_pattern;
@@ -21,8 +22,8 @@ use cohaptic_wan::parameters::Table;
 use cohaptic_wan::{Chance, LinkConfig, LinkModel, Order};
 
 use crate::document::{Entry, Node, Value};
+use crate::link::keys::LINK_TABLE;
 use crate::reading::{Context, TableReader, values};
-use crate::schema::link::LINK_TABLE;
 
 pub use modulators::read_modulators;
 

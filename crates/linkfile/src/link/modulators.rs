@@ -8,9 +8,9 @@ use cohaptic_wan::{LINK_KIND_PARAMETERS, LinkConfig, MODULATOR, Modulated, Modul
 use super::outage::{SOJOURN, read_sojourn};
 use super::read_config;
 use crate::document::{Node, Value, quote};
+use crate::link::keys::LINK_TABLE;
 use crate::reading::values::{self, ReadNumber as _, WEIGHT};
 use crate::reading::{Context, Modulators, TableReader, one_of};
-use crate::schema::link::LINK_TABLE;
 
 /// Reads the list of modulators. Returns `None` if a modulator was refused. A missing list is an empty list.
 pub fn read_modulators(node: Option<&Node>, context: Context<'_>) -> Option<Arc<Modulators>> {

@@ -3,8 +3,8 @@
 use cohaptic_wan::{IdleOutages, Outage, Outages, RandomOutages, Sojourn};
 
 use crate::document::Node;
+use crate::link::keys::LINK_TABLE;
 use crate::reading::{Context, TableReader, only_one, values};
-use crate::schema::link::LINK_TABLE;
 
 /// Reads outages: a list of spans, or a table `{ scheduled, random, idle }`.
 pub(super) fn read_outages(node: &Node, context: Context<'_>) -> Option<Outages> {

@@ -5,8 +5,8 @@ use cohaptic_wan::{CoDel, Discipline, QueueLimit, Red};
 
 use super::{UNLIMITED, unless};
 use crate::document::{Node, quote};
+use crate::link::keys::LINK_TABLE;
 use crate::reading::{Context, TableReader, only_one, values};
-use crate::schema::link::LINK_TABLE;
 
 /// Queue without the line that serves it.
 #[derive(Clone, Copy, Debug)]

@@ -6,8 +6,8 @@ use cohaptic_wan::{Chance, Displacement, Reorder};
 
 use super::read_chance_in;
 use crate::document::{Entry, Node};
+use crate::link::keys::LINK_TABLE;
 use crate::reading::{Context, TableReader, only_one, values};
-use crate::schema::link::LINK_TABLE;
 
 /// Reads `"25%"` (such packets jump ahead), or `{ probability, correlation }` with `gap`, with `behind` and `at-most`, or with `later`. Returns `Some(None)` if
 /// no packet is ever moved.

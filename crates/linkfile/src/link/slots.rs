@@ -6,8 +6,8 @@ use cohaptic_wan::Slots;
 
 use super::delay::read_delay;
 use crate::document::Node;
+use crate::link::keys::LINK_TABLE;
 use crate::reading::{Context, TableReader, values};
-use crate::schema::link::LINK_TABLE;
 
 /// Reads the law of the gaps between slots, and the packets and bytes that may leave in one slot.
 pub(super) fn read_slots(node: &Node, context: Context<'_>) -> Option<Slots> {

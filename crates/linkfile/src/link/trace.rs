@@ -10,9 +10,9 @@ use cohaptic_wan::{Between, DeliveryTrace, DeliveryTraceError, FateLog, FateLogE
 
 use super::is_none;
 use crate::document::Node;
+use crate::link::keys::LINK_TABLE;
 use crate::reading::named_file::{Fault, file_path, line_span, read_file};
 use crate::reading::{Context, TableReader, values};
-use crate::schema::link::LINK_TABLE;
 
 /// Content of a recording.
 #[derive(Clone, Debug)]

@@ -14,9 +14,9 @@ use super::link_keys::{KeysOfLinks, LinkKeys};
 use super::link_table::{LinkChange, LinkTable, first_left, pairs};
 use super::selector::{LinkSelector, read_ends};
 use crate::document::{BEGINNING, Node};
+use crate::link::keys::LINK_ENTRY;
 use crate::link::{is_empty, read_link, read_link_of};
 use crate::reading::{Context, Modulators, TableReader, values};
-use crate::schema::link::LINK_ENTRY;
 
 /// Classes of links at some instant of the timeline.
 #[derive(Clone, Debug)]

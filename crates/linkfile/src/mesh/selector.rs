@@ -1,8 +1,8 @@
 //! Readers of references from one part of a file to peers and links in another part.
 
 use crate::document::{Node, quote};
+use crate::link::keys::{ENDS_TABLE, LINK_OR_LINE};
 use crate::reading::{Context, Names, TableReader, one_of, only_one, values};
-use crate::schema::link::{ENDS_TABLE, LINK_OR_LINE};
 
 /// Selected links or access lines, by the indices of peers in the file.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

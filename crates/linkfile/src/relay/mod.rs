@@ -10,10 +10,10 @@ use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::parameters::{Form, Table, optional, required, usual};
 
 use crate::document::{FileError, Node, Sources};
+use crate::link::keys::{LINK_CHANGE, LINK_ENTRY, LINK_TABLE, LINKS_BETWEEN, MODULATOR};
 use crate::link::read_modulators;
 use crate::mesh::{KeysOfLinks, LinkChange, LinkClasses, LinkSelector, LinkTable, pairs, read_key_changes, read_links, read_links_between};
 use crate::reading::{Context, TableReader, default_title, defaults, parse, values, with_text};
-use crate::schema::link::{LINK_CHANGE, LINK_ENTRY, LINK_TABLE, LINKS_BETWEEN, MODULATOR};
 
 /// Checked content of a relay file, which `cohaptic relay FILE` runs.
 ///

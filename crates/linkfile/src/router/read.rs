@@ -9,10 +9,10 @@ use super::rules::{RULE, TARGET, TARGET_FORM, read_rules, read_target};
 use super::sides::{SIDE, check_sides, read_side};
 use super::{Memory, NamedLink, RouterFile, Target};
 use crate::document::{FileError, Node, Sources, Value, quote};
+use crate::link::keys::{LINK_TABLE, MODULATOR};
 use crate::link::{read_link, read_modulators};
 use crate::mesh::LinkKeys;
 use crate::reading::{Context, TableReader, defaults, parse, values, with_text};
-use crate::schema::link::{LINK_TABLE, MODULATOR};
 
 /// Table at the top of a router file.
 pub static ROOT: Table = Table::of(&[&[

@@ -7,7 +7,10 @@
 //! two keys that exclude each other, and the choice of the unit are left to the readers.
 
 mod json;
-pub mod link;
+/// Declarations of the keys of a link.
+pub mod link {
+    pub use crate::link::keys::*;
+}
 
 pub use crate::relay::ROOT as RELAY;
 pub use crate::router::read::ROOT as ROUTER;
