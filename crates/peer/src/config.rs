@@ -1,7 +1,7 @@
 //! Parameters of a peer. Every number is finite and not negative, and masses are above zero. The caller that makes a parameter checks this.
 
-use crate::tick::grasp;
-use crate::{Motion, Number, Signal};
+use crate::gains::{Gains, grasp};
+use crate::{Motion, Signal};
 
 /// A haptic device: a mass with viscous damping.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -10,40 +10,6 @@ pub struct DeviceConfig {
     pub mass: f64,
     /// Viscous damping bH [N·s/m].
     pub damping: f64,
-}
-
-/// A spring and a damper side by side: the virtual coupling (KC, BC) or the coordination (KT, BT).
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Gains<C = f64> {
-    /// Stiffness [N/m].
-    pub stiffness: C,
-    /// Damping [N·s/m].
-    pub damping: C,
-}
-
-impl<C: Copy> Gains<C> {
-    /// Returns the gains with `gain` applied to each, the stiffness first.
-    #[must_use]
-    #[inline(always)]
-    pub fn map<D>(&self, mut gain: impl FnMut(&C) -> D) -> Gains<D> {
-        Gains { stiffness: gain(&self.stiffness), damping: gain(&self.damping) }
-    }
-}
-
-impl<N: Number> Gains<N> {
-    /// Returns the force of the spring and the damper \[N\], where `apart` is the motion of one end relative to the other end.
-    #[must_use]
-    pub fn force(&self, apart: Motion<N>) -> N {
-        self.stiffness * apart.position + self.damping * apart.velocity
-    }
-}
-
-impl Gains {
-    /// Returns both gains times `factor`.
-    #[must_use]
-    pub fn scaled(self, factor: f64) -> Self {
-        Self { stiffness: self.stiffness * factor, damping: self.damping * factor }
-    }
 }
 
 /// Mass and damping of a peer's copy of the shared virtual object.

@@ -4,23 +4,9 @@
 //! [`AveragePosition`](crate::coordination::AveragePosition). Other laws have other desired motions or gains.
 
 use crate::coordination::{Law, Observation};
-use crate::{Gains, Motion, Number};
+use crate::{Motion, Number};
 
-/// Returns FC \[N\] of a device that grasps its copy, where `apart` is the motion of the device relative to the copy: xH − xO and vH − vO.
-#[must_use]
-#[inline(always)]
-pub fn grasp<N: Number>(coupling: &Gains<N>, apart: Motion<N>) -> N {
-    //= Rakhsha & Constantinescu 2015, eq. (9): FC = KC·(xH − xO) + BC·(vH − vO)
-    coupling.force(apart)
-}
-
-/// Returns FT \[N\] towards a desired motion, where `apart` is the motion of the copy relative to the desired motion: xO − xd and vO − vd.
-#[must_use]
-#[inline(always)]
-pub fn coordinate<N: Number>(coordination: &Gains<N>, apart: Motion<N>) -> N {
-    //= Rakhsha & Constantinescu 2015, eq. (10): FT = KT·(xO − xd) + BT·(vO − vd)
-    coordination.force(apart)
-}
+pub use crate::gains::{coordinate, grasp};
 
 /// Returns the force on a copy \[N\] without its damping and without walls.
 #[must_use]

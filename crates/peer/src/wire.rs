@@ -26,73 +26,14 @@ use cohaptic_units::Instant;
 
 use crate::State;
 use crate::rotation::Attitude;
+use crate::sample_kind::HEADER_LEN;
+
+pub use crate::sample_kind::SampleKind;
 
 /// First four bytes of a datagram.
 pub const MAGIC: [u8; 4] = *b"CHPT";
 /// Length of the largest datagram, with three axes and an attitude \[byte\].
 pub const MAX_LEN: usize = SampleKind::Attitude.datagram_len(3);
-
-const HEADER_LEN: usize = 48;
-const ATTITUDE_LEN: usize = 56;
-
-/// Data of a sample beyond position and velocity.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub enum SampleKind {
-    /// No more data: version 1.
-    #[default]
-    State,
-    /// Attitude of the body, equal for all receivers: version 1.
-    Attitude,
-    /// An energy per axis \[J\], equal for all receivers, that never falls. A lower energy marks a restart of the sender.
-    Energy,
-    /// A wave per axis [√W] for one receiver.
-    Wave,
-    /// A force per axis \[N\] for one receiver.
-    Force,
-}
-
-impl SampleKind {
-    /// Returns the version of the wire format for samples of this kind.
-    #[must_use]
-    pub const fn version(self) -> u16 {
-        match self {
-            Self::State | Self::Attitude => 1,
-            Self::Energy | Self::Wave | Self::Force => 2,
-        }
-    }
-
-    /// Returns whether each receiver gets a sample of its own.
-    #[must_use]
-    pub const fn is_personal(self) -> bool {
-        matches!(self, Self::Wave | Self::Force)
-    }
-
-    /// Returns the length of a datagram with `axes` axes \[byte\].
-    #[must_use]
-    pub const fn datagram_len(self, axes: usize) -> usize {
-        self.attitude_start(axes) + if matches!(self, Self::Attitude) { ATTITUDE_LEN } else { 0 }
-    }
-
-    /// Returns the offset of the attitude in a datagram \[byte\].
-    const fn attitude_start(self, axes: usize) -> usize {
-        HEADER_LEN + self.axis_len() * axes
-    }
-
-    /// Returns the length of the numbers of one axis \[byte\].
-    const fn axis_len(self) -> usize {
-        if self.version() == 1 { 16 } else { 24 }
-    }
-
-    /// Returns byte 7 of the header.
-    const fn code(self) -> u8 {
-        match self {
-            Self::State => 0,
-            Self::Attitude | Self::Energy => 1,
-            Self::Wave => 2,
-            Self::Force => 3,
-        }
-    }
-}
 
 /// Data of a sample beyond position and velocity.
 #[derive(Clone, Copy, PartialEq, Debug)]

@@ -3,7 +3,7 @@
 //! Over an ideal network the difference modes of N copies have the stiffness N/(N−1)·KT (Rakhsha & Constantinescu 2015, equation 6): bounded in N.
 
 use super::{Coefficients, Law, LawKind, LawParameters, Observation};
-use crate::tick::coordinate;
+use crate::gains::coordinate;
 use crate::{Gains, Number};
 
 /// The law of Rakhsha & Constantinescu (2015).

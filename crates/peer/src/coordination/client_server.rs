@@ -8,7 +8,7 @@ use alloc::vec::Vec;
 
 use super::session::{ControllerKind, SessionParameters};
 use super::{Command, Context, LawForm, LawParameter, LawValue, Role, Strategy, UsedGains};
-use crate::wire::SampleKind;
+use crate::sample_kind::SampleKind;
 use crate::{Contact, Gains, Held, State};
 
 /// Words of the parameter `returns`, each with its meaning.

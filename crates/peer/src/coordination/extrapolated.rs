@@ -4,7 +4,7 @@
 //! mean vⱼ). Copies that move at one velocity then exert no force on each other, at any age of the samples up to the horizon.
 
 use super::{Coefficients, Law, LawForm, LawKind, LawParameter, LawParameters, Observation};
-use crate::tick::coordinate;
+use crate::gains::coordinate;
 use crate::{Gains, Motion, Number};
 
 /// The average-position law with extrapolated samples.

@@ -5,7 +5,7 @@
 //! damper dissipates at least β·d²/Tc, so with β = KT·(m + 1)·Tc the network injects no energy. The user feels the damping in free motion.
 
 use super::{Coefficients, Law, LawForm, LawKind, LawParameter, LawParameters, LawValue, Observation, UsedGains};
-use crate::tick::coordinate;
+use crate::gains::coordinate;
 use crate::{Gains, Number};
 
 /// The law with damping of the own copy towards ground.

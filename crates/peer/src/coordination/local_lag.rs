@@ -5,7 +5,7 @@
 //! late.
 
 use super::{Coefficients, Law, LawForm, LawKind, LawParameter, LawParameters, LawValue, Observation};
-use crate::tick::coordinate;
+use crate::gains::coordinate;
 use crate::{Gains, Number};
 
 /// The average-position law with an own state of the past.

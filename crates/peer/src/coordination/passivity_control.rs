@@ -11,8 +11,8 @@ use alloc::vec::Vec;
 
 use super::session::{ControllerKind, SessionParameters, hear_energy};
 use super::{Command, Context, LawForm, LawParameter, LawValues, Strategy};
-use crate::tick::coordinate;
-use crate::wire::SampleKind;
+use crate::gains::coordinate;
+use crate::sample_kind::SampleKind;
 use crate::{Gains, Held, State};
 
 /// The average-position law, with its force limited to the available energy.

@@ -10,7 +10,7 @@ use super::{
     LawVisitor, LocalDamping, LocalLag, Observation, PassivityControl, ProportionalDerivative, Pull, Role, SessionParameters, SetPosition,
     SmoothedAveragePosition, Strategy, UsedGains, Wave,
 };
-use crate::wire::SampleKind;
+use crate::sample_kind::SampleKind;
 use crate::{Contact, Gains, Held, Motion, Number, State};
 
 macro_rules! registry {

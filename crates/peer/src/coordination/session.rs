@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 
 use super::{LawParameter, LawParameters, Pull, UsedGains};
-use crate::wire::SampleKind;
+use crate::sample_kind::SampleKind;
 use crate::{Contact, Gains, State};
 
 /// Parameters of a strategy for which the parameters of a law are not enough.

@@ -12,7 +12,7 @@ use alloc::vec::Vec;
 
 use super::session::{ControllerKind, SessionParameters, hear_energy};
 use super::{Command, Context, LawForm, LawParameter, LawParameters, LawValues, Strategy, UsedGains};
-use crate::wire::SampleKind;
+use crate::sample_kind::SampleKind;
 use crate::{Gains, Held, State};
 
 /// Spring, set-position and energy tank of a copy. Arrays are indexed by axis.

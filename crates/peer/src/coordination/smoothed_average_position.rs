@@ -4,7 +4,7 @@
 //! FT(k) = a·FT(k − 1) + (1 − a)·F(k) with a = e^(−Tc/lag).
 
 use super::{Coefficients, Law, LawForm, LawKind, LawParameter, LawParameters, Observation};
-use crate::tick::coordinate;
+use crate::gains::coordinate;
 use crate::{Gains, Number};
 
 /// The average-position law with a first-order lag.

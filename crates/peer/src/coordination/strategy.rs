@@ -5,7 +5,7 @@ use alloc::boxed::Box;
 use cohaptic_units::Instant;
 
 use super::LawValues;
-use crate::wire::SampleKind;
+use crate::sample_kind::SampleKind;
 use crate::{Contact, Gains, Held, State};
 
 /// Input of a strategy at a tick.

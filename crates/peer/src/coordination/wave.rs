@@ -11,7 +11,7 @@ use alloc::vec::Vec;
 
 use super::session::{ControllerKind, SessionParameters};
 use super::{Command, Context, LawForm, LawParameter, LawParameters, LawValue, Strategy, UsedGains};
-use crate::wire::SampleKind;
+use crate::sample_kind::SampleKind;
 use crate::{Gains, Held, State};
 
 /// Words of the parameter `on-loss`, each with its meaning.
