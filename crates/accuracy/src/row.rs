@@ -1,6 +1,6 @@
 //! Result of a method at a setting.
 
-use crate::{AccuracyError, Subject, Watch};
+use crate::Subject;
 
 /// Cost and error of a method at a setting.
 #[derive(Clone, PartialEq, Debug)]
@@ -32,26 +32,5 @@ impl Row {
     pub(crate) fn of(subject: Subject, case: &str, method: &str, setting: String, (cost, cost_unit): (f64, &'static str)) -> Self {
         let (case, method) = (case.to_owned(), method.to_owned());
         Self { subject, case, method, setting, cost: Some(cost), cost_unit, error: None, error_unit: "", reference: "", note: String::new() }
-    }
-}
-
-/// Rows of a running measurement, and the watcher.
-pub(crate) struct RowSink<'a> {
-    pub(crate) rows: Vec<Row>,
-    pub(crate) watch: &'a dyn Watch,
-}
-
-impl RowSink<'_> {
-    /// Adds a row and shows it to the watcher. An error ends the measurement if the watcher asks for the end.
-    pub(crate) fn push(&mut self, row: Row) -> Result<(), AccuracyError> {
-        // The watcher sees the row before the measurement can end.
-        self.watch.row(&row);
-        self.rows.push(row);
-        self.check()
-    }
-
-    /// Returns [`AccuracyError::Stopped`] if the watcher asks for the end.
-    pub(crate) fn check(&self) -> Result<(), AccuracyError> {
-        if self.watch.stops() { Err(AccuracyError::Stopped) } else { Ok(()) }
     }
 }

@@ -1,7 +1,5 @@
 //! The subjects of the measurement.
 
-use crate::{AccuracyError, Options, Row, Watch, analysis, motion, network, real_time, rotation, time};
-
 /// Task of a group of methods.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Subject {
@@ -33,18 +31,6 @@ impl Subject {
             Self::Network => "network",
             Self::Analysis => "analysis",
             Self::RealTime => "real-time",
-        }
-    }
-
-    /// Measures the rows of the subject.
-    pub(crate) fn rows(self, options: Options, watch: &dyn Watch) -> Result<Vec<Row>, AccuracyError> {
-        match self {
-            Self::Motion => motion::rows(options, watch),
-            Self::Rotation => rotation::rows(options, watch),
-            Self::Time => time::rows(options, watch),
-            Self::Network => network::rows(options.of(network::Effort::FULL, network::Effort::QUICK), watch),
-            Self::Analysis => analysis::rows(options.of(analysis::Effort::FULL, analysis::Effort::QUICK), watch),
-            Self::RealTime => real_time::rows(options.of(real_time::Effort::FULL, real_time::Effort::QUICK), watch),
         }
     }
 }

@@ -13,7 +13,7 @@ use super::growth::growth_over;
 use super::references::on_the_edge;
 use super::{Effort, row};
 use crate::cost::processor_time;
-use crate::row::RowSink;
+use crate::watch::RowSink;
 use crate::{AccuracyError, Row};
 
 /// Name of the work.

@@ -10,7 +10,7 @@ use cohaptic_stability::mean_square;
 use super::references::{Reference, mean_square_reference};
 use super::{Effort, row};
 use crate::cost::{median_time, processor_time};
-use crate::row::RowSink;
+use crate::watch::RowSink;
 use crate::{AccuracyError, Row};
 
 const UNIT: &str = "mean-square radius [1]";

@@ -9,7 +9,7 @@ mod monte_carlo;
 mod radius;
 pub mod references;
 
-use crate::row::RowSink;
+use crate::watch::RowSink;
 use crate::{AccuracyError, Row, Subject, Watch};
 
 /// Amount of work in the rows.

@@ -3,7 +3,7 @@
 use super::every_pattern::{LIMIT, exact, happens, scene};
 use super::{Effort, row};
 use crate::cost::processor_time;
-use crate::row::RowSink;
+use crate::watch::RowSink;
 use crate::{AccuracyError, Row};
 
 const COST: &str = "s a verdict";

@@ -8,7 +8,7 @@ use super::growth::growth_over;
 use super::references::{Reference, references};
 use super::{Effort, row};
 use crate::cost::{median_time, processor_time};
-use crate::row::RowSink;
+use crate::watch::RowSink;
 use crate::{AccuracyError, Row};
 
 const UNIT: &str = "spectral radius [1]";

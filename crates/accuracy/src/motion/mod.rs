@@ -20,7 +20,7 @@ use cohaptic_stability::{Boundary, BoundaryOptions, KeyRange};
 use qd::Quad;
 
 use crate::cost::median_time;
-use crate::row::RowSink;
+use crate::watch::RowSink;
 use crate::{AccuracyError, Options, Row, Subject, Watch};
 use method::Method;
 use number::{Number as _, absolute};

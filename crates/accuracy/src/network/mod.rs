@@ -18,7 +18,7 @@ use std::time::Duration;
 
 use crate::cost::Rounds;
 use crate::network::errors::Look;
-use crate::row::RowSink;
+use crate::watch::RowSink;
 use crate::{AccuracyError, Row, Subject, Watch};
 
 /// Amount of work in the rows.

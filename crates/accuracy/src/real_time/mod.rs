@@ -8,7 +8,7 @@ mod release;
 use std::time::Duration;
 
 use self::release::{Releases, Way};
-use crate::row::RowSink;
+use crate::watch::RowSink;
 use crate::{AccuracyError, Row, Subject, Watch};
 
 /// Amount of work in the rows.

@@ -15,7 +15,7 @@ use std::time::Duration;
 use cohaptic_peer::rotation::{Attitude, Triple};
 
 use crate::cost::{median_time, nanos};
-use crate::row::RowSink;
+use crate::watch::RowSink;
 use crate::{AccuracyError, Options, Row, Subject, Watch};
 use closed_form::FreeTop;
 use methods::Method;

@@ -16,7 +16,7 @@ use std::time::Duration;
 use cohaptic_stability::Method;
 
 use crate::cost::median_time;
-use crate::row::RowSink;
+use crate::watch::RowSink;
 use crate::{AccuracyError, Options, Row, Subject, Watch};
 use steps::Rounding;
 use traffic::{Errors, Traffic};
