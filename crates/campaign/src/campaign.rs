@@ -9,11 +9,12 @@ use std::sync::Arc;
 use crate::compare::{Comparison, compared};
 use crate::error::CampaignError;
 use crate::folder::{Folder, Manifest, hash};
+use crate::judgement::Judgement;
 use crate::plan::{Accepted, CampaignPlan, Parts, Refused};
 use crate::report::{Report, Tally};
 use crate::shard::Missing;
 use crate::table::{Column, Head, TableError, columns};
-use crate::verdicts::{Journal, Judge, Judgement, Lines, judge, read_whole, write_all};
+use crate::verdicts::{Journal, Judge, Lines, judge, read_whole, write_all};
 use crate::watch::{NoWatch, Watch};
 use crate::work::{Keep, Work};
 

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
+use crate::judgement::Judgement;
 use crate::plan::{Accepted, Refused};
 use crate::table::Gist;
-use crate::verdicts::Judgement;
 
 /// Summary of a campaign, computed from its table.
 #[derive(Clone, PartialEq, Debug)]

@@ -6,10 +6,11 @@ use std::path::Path;
 use crate::campaign::Campaign;
 use crate::error::CampaignError;
 use crate::folder::Folder;
+use crate::judgement::Judgement;
 use crate::plan::CampaignPlan;
 use crate::shard::Shard;
 use crate::table::Row;
-use crate::verdicts::{Judge, Judgement};
+use crate::verdicts::Judge;
 use crate::watch::Watch;
 
 /// A campaign in a folder in which other workers may work at the same time, on this machine and on others.

@@ -8,11 +8,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::compare::{Comparison, compared};
 use crate::error::CampaignError;
+use crate::judgement::Judgement;
 use crate::plan::{Accepted, CHUNK, CampaignPlan, Parts, Refused};
 use crate::report::{Report, Tally};
 use crate::table::{Column, Roster, Row, TableError, columns, gists, run_columns};
 use crate::vary::Variation;
-use crate::verdicts::{Judge, Judgement};
+use crate::verdicts::Judge;
 use crate::watch::Watch;
 use crate::work::{Chunk, Scenes, Work};
 

@@ -12,9 +12,9 @@ use cohaptic_harness::{Model, Summary, run_side_by_side};
 use cohaptic_scene::Scene;
 
 use crate::error::CampaignError;
+use crate::judgement::Judgement;
 use crate::plan::{Accepted, CHUNK, CampaignPlan, Parts};
 use crate::table::{Roster, Row, RunId, row};
-use crate::verdicts::Judgement;
 use crate::watch::Watch;
 
 /// Stores the rows of the part with this number.

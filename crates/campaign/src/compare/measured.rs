@@ -2,7 +2,8 @@
 
 use cohaptic_scene::{Measure, Scope};
 
-use crate::table::{Column, Kind};
+use crate::table::Column;
+use crate::value::Kind;
 
 /// Name of the measure in every table: the largest discrepancy of a run.
 pub(super) const LARGEST: &str = "max_discrepancy_m";

@@ -6,30 +6,16 @@ use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom, Write};
 use cohaptic_files::WholeFile;
 
 use super::content::{COMPLETE, DIVERGED, GIST, Gist, Gists, OpenPart, RunColumns, TableError};
-use super::{Column, Row, Value};
+use super::{Column, Row};
+use crate::value::value_text;
 
 pub(super) fn write(to: &mut impl Write, columns: &[Column], rows: &[Row]) -> io::Result<()> {
     let mut to = csv::Writer::from_writer(to);
     to.write_record(columns.iter().map(|column| &column.name)).map_err(unwritten)?;
     for row in rows {
-        to.write_record(row.iter().map(text)).map_err(unwritten)?;
+        to.write_record(row.iter().map(value_text)).map_err(unwritten)?;
     }
     to.flush()
-}
-
-/// Returns a value as a cell of text; empty for no value.
-pub(crate) fn text(value: &Value) -> String {
-    match value {
-        Value::Absent => String::new(),
-        Value::Integer(integer) => integer.to_string(),
-        Value::Number(number) => number_text(*number),
-        Value::Text(text) => text.to_string(),
-    }
-}
-
-/// Returns a number with the fewest digits that read back as the same `f64`.
-pub(crate) fn number_text(number: f64) -> String {
-    format!("{number:?}")
 }
 
 fn unwritten(error: csv::Error) -> io::Error {

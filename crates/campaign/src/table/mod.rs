@@ -8,38 +8,13 @@ mod memory;
 mod parquet_file;
 mod row;
 
-use std::sync::Arc;
+use crate::value::{Kind, Value};
 
 pub(crate) use columns::{Roster, columns};
-pub(crate) use comma_separated::{number_text, text as value_text};
 pub(crate) use content::{Gist, Head, OpenPart, RunColumns, TableError};
 pub use format::Format;
 pub(crate) use memory::{gists, run_columns};
 pub(crate) use row::{RunId, row};
-
-/// Type of the values of a column.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Kind {
-    /// Integers, `i64`.
-    Integer,
-    /// Numbers, `f64`.
-    Number,
-    /// Text, UTF-8.
-    Text,
-}
-
-/// A value of a row.
-#[derive(Clone, PartialEq, Debug)]
-pub enum Value {
-    /// No value: a peer absent from this run, or a mean of nothing.
-    Absent,
-    /// A value of an integer column.
-    Integer(i64),
-    /// A value of a number column; may be infinite or NaN in a diverged run.
-    Number(f64),
-    /// A value of a text column.
-    Text(Arc<str>),
-}
 
 /// A column of the table.
 #[derive(Clone, PartialEq, Eq, Debug)]

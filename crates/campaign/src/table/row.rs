@@ -10,8 +10,8 @@ use cohaptic_units::Instant;
 use cohaptic_wan::{DropCause, LinkStats};
 
 use super::{Roster, Row, Value};
+use crate::judgement::Judgement;
 use crate::vary::Varied;
-use crate::verdicts::Judgement;
 
 /// Identity of a run.
 #[derive(Clone, Copy, Debug)]

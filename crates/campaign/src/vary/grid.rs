@@ -4,7 +4,7 @@ use cohaptic_linkfile::{number_and_unit, text_of_quantity};
 
 use super::error::{MOST_VALUES, VaryError};
 use super::varied::Varied;
-use crate::table::Value;
+use crate::value::Value;
 
 /// A range of `count` values, including both ends.
 #[derive(Clone, PartialEq, Debug)]

@@ -8,7 +8,7 @@ use super::commas::split_at_commas;
 use super::error::{MOST_VALUES, VaryError};
 use super::group::Group;
 use super::varied::Varied;
-use crate::table::{Kind, Value};
+use crate::value::{Kind, Value};
 
 /// A list of values with their common unit and type.
 #[derive(Clone, PartialEq, Debug)]

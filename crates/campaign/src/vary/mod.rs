@@ -11,7 +11,7 @@ mod varied;
 use grid::Grid;
 use list::List;
 
-use crate::table::{Kind, Value, value_text};
+use crate::value::{Kind, Value, value_text};
 
 pub use commas::split_at_commas;
 pub use error::{MOST_VALUES, VaryError};

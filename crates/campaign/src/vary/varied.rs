@@ -1,6 +1,6 @@
 //! One value of a varied key.
 
-use crate::table::Value;
+use crate::value::Value;
 
 /// A value of a varied key.
 #[derive(Clone, PartialEq, Debug)]

@@ -10,7 +10,8 @@ use super::{Judgement, Verdict, Words};
 use crate::error::CampaignError;
 use crate::folder::hash;
 use crate::plan::CampaignPlan;
-use crate::table::{TableError, number_text, value_text};
+use crate::table::TableError;
+use crate::value::{number_text, value_text};
 
 /// Advice to the user about a damaged table of judgements.
 const WAY_OUT: &str = "remove it and repeat the command, which judges again";
