@@ -24,10 +24,7 @@ pub(crate) struct Running {
 }
 
 /// Guard: a test bed runs on this thread until the guard is dropped.
-pub(crate) struct Entered {
-    #[cfg(feature = "facade")]
-    _registered: cohaptic_sockets::Entered,
-}
+pub(crate) struct Entered;
 
 impl Running {
     /// Makes this test bed the one that runs on this thread.
@@ -37,8 +34,6 @@ impl Running {
     /// If another test bed runs on this thread.
     #[expect(clippy::panic, reason = "a misuse, and the way out")]
     pub(crate) fn enter(self) -> Entered {
-        #[cfg(feature = "facade")]
-        let bed = Arc::new(crate::facade::BedOfThread { shared: Arc::clone(&self.shared), others: Arc::clone(&self.tasks.others) });
         RUNNING.with_borrow_mut(|running| {
             if running.is_some() {
                 panic!("a test bed runs inside another one: the time of both cannot pass. Give both programs hosts of one test bed, or run one after the other");
@@ -47,10 +42,7 @@ impl Running {
             current::begin(shared.run(), Rc::new(move || tasks.current(shared.names())));
             *running = Some(self);
         });
-        Entered {
-            #[cfg(feature = "facade")]
-            _registered: cohaptic_sockets::enter(bed),
-        }
+        Entered
     }
 }
 

@@ -1,9 +1,7 @@
 //! The test bed of the present thread for a package `tokio` that stands in for tokio: implements the traits of `cohaptic-sockets`.
 //!
 //! `cohaptic tokio` generates that package. Programs that use tokio's sockets and tasks then run on a test bed unchanged: the package asks `cohaptic-sockets`
-//! for the test bed of the thread, which [`crate::context`] registers for each run.
-
-mod tasks;
+//! for the test bed of the thread, which `crate::runtime` registers for each run.
 
 use std::io;
 use std::net::SocketAddr;
@@ -11,13 +9,12 @@ use std::sync::Arc;
 
 use cohaptic_sockets::{Bed, Call, Connecting, Datagrams, Hold, Host, Listener, Socket, Stream, Version};
 
-pub(crate) use tasks::{Kept, OtherTasks};
-
 use crate::context;
 use crate::core::Shared;
 use crate::current;
 use crate::resolve::ToSocketAddrs;
 use crate::socket::UdpSocket;
+use crate::task::{Kept, OtherTasks};
 use crate::tcp::{TcpListener, TcpSocket, TcpStream};
 
 /// Advice for a task without a host. The `tokio` of the program is the package that stands in, and the task was started outside of all hosts.

@@ -1,5 +1,6 @@
 //! Executors: they poll tasks and let time pass.
 
+mod entered;
 mod limits;
 #[cfg(feature = "tokio")]
 pub(crate) mod on_tokio;

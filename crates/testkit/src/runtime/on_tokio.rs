@@ -28,10 +28,10 @@ use std::time::Duration;
 use cohaptic_units::Instant;
 use tokio::task::LocalSet;
 
+use super::entered::enter;
 use super::limits::{goes_on, nothing_will_happen};
 use super::own::{Executor, is_any_ready, time_stands_still};
 use super::recorder::Recorder;
-use crate::context::Running;
 use crate::core::{Clock, Core, Shared};
 use crate::failure::__rust_begin_short_backtrace;
 use crate::task::{JoinHandle, Tasks};
@@ -225,7 +225,7 @@ where
     drop(guard);
     watched.is_of(&shared);
     let tasks = Rc::new(Tasks::new(Box::new(executor.clone()), hosts, Arc::clone(&watched.pulse)));
-    let _entered = Running { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks) }.enter();
+    let _entered = enter(&shared, &tasks);
     let _recorder = Recorder { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks), recorded };
     let _ = known.set(Arc::clone(&shared));
     runtime.block_on(async {

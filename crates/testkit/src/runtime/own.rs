@@ -14,9 +14,9 @@ use std::task::{Context, Poll, Wake, Waker};
 use cohaptic_units::Instant;
 use cohaptic_units::print::Seconds;
 
+use super::entered::enter;
 use super::limits::{goes_on, nothing_will_happen};
 use super::recorder::Recorder;
-use crate::context::Running;
 use crate::core::{Clock, Core, Shared};
 use crate::task::{Spawner, Task, Tasks};
 use crate::watch::Watched;
@@ -376,7 +376,7 @@ where
     let shared = Arc::new(Shared::new(core, Clock::Own));
     let tasks = Rc::new(Tasks::new(Box::new(executor.clone()), hosts, Arc::clone(&watched.pulse)));
     watched.is_of(&shared);
-    let _entered = Running { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks) }.enter();
+    let _entered = enter(&shared, &tasks);
     // The drop of the recorder ends the run. By then the guard below has put the state back, where other threads find it.
     let _recorder = Recorder { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks), recorded };
     // After `enter`, which has checked that no other test bed runs on this thread.

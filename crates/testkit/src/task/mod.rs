@@ -1,6 +1,8 @@
 //! Tasks: futures that live on hosts. Any executor can poll them.
 
 mod join;
+#[cfg(feature = "facade")]
+mod others;
 
 use std::cell::{Cell, RefCell};
 use std::future::Future;
@@ -12,6 +14,8 @@ use std::task::{Context, Poll, Waker};
 
 pub(crate) use join::joined;
 pub use join::{JoinHandle, TaskStopped};
+#[cfg(feature = "facade")]
+pub(crate) use others::{Kept, OtherTasks};
 
 use cohaptic_units::Instant;
 use cohaptic_units::print::Seconds;
@@ -133,7 +137,7 @@ pub(crate) struct Tasks {
     factories: RefCell<Vec<Option<(Factory, &'static Location<'static>)>>>,
     /// Tasks that tokio polls.
     #[cfg(feature = "facade")]
-    pub(crate) others: Arc<crate::facade::OtherTasks>,
+    pub(crate) others: Arc<OtherTasks>,
 }
 
 impl Tasks {
