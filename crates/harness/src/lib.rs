@@ -35,6 +35,7 @@ pub mod explain;
 mod in_flight;
 pub mod live;
 pub mod measures;
+mod number_text;
 mod observer;
 mod plan;
 mod questions;

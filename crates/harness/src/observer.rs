@@ -227,7 +227,7 @@ macro_rules! observe_by_field {
             ($map)(self, result)
         }
 
-        fn on_input(&mut self, row: &$crate::live::InputRow<'_>) -> Result<(), Self::Error> {
+        fn on_input(&mut self, row: &$crate::rows::InputRow<'_>) -> Result<(), Self::Error> {
             let result = self.$field.on_input(row);
             ($map)(self, result)
         }

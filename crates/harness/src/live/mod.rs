@@ -6,28 +6,16 @@
 //!
 //! `docs/live.md` describes the effect of a silent peer on other peers.
 
-mod device;
-mod fade;
 mod inputs;
-mod presence;
-mod pulled;
 mod recorded;
 mod replay;
 mod rows;
 mod scene;
-mod seat;
-
-pub(crate) use device::{HandDevice, UnsimulatedDevice};
-pub(crate) use presence::RemotePeers;
-pub(crate) use pulled::PulledDevice;
-pub(crate) use seat::Seat;
 
 pub use crate::rows::{Input, InputRow};
-pub use device::LiveDevice;
+pub use crate::world::live::{Datagram, LiveDevice, Presence, SampleError, SeatStats, Transmit, TurnState};
 pub use inputs::{Inputs, InputsError};
-pub use presence::{Datagram, Transmit};
 pub use recorded::{RecordedScene, SceneDifference};
 pub use replay::replay;
 pub use rows::{ClosingLine, InputLine};
-pub use scene::{LiveScene, PeerState, TurnState};
-pub use seat::{Presence, SampleError, SeatStats};
+pub use scene::{LiveScene, PeerState};

@@ -7,12 +7,12 @@ use cohaptic_peer::State;
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
-use super::device::LiveDevice;
 use super::inputs::{Inputs, Recorded};
 use super::scene::LiveScene;
 use crate::observer::Observer;
 use crate::simulation::questions_of;
 use crate::summary::Summary;
+use crate::world::live::LiveDevice;
 
 /// Runs a scene with the inputs of a recorded session, as fast as possible. Fates and motion are those of the session, to the bit.
 ///

@@ -25,7 +25,7 @@ use cohaptic_units::print::csv_quoted;
 
 use super::inputs::{HEADER, Inputs, InputsError, Recorded, shorten};
 use super::recorded::is_about_the_scene;
-use crate::record::parts;
+use crate::number_text::parts;
 use crate::rows::{Input, InputRow};
 
 /// An input as a line without the newline.

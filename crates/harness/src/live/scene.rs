@@ -5,19 +5,16 @@ use std::time::Duration;
 
 use cohaptic_peer::State;
 use cohaptic_peer::coordination::BuiltInStrategy;
-use cohaptic_peer::rotation::Attitude;
 use cohaptic_scene::{Axes, LinkKeys, Scene};
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{LinkModel, LinkStats};
 
-use super::device::LiveDevice;
-use super::presence::{RemotePeers, Transmit};
-use super::seat::{Presence, SampleError, SeatStats};
 use crate::observer::{AnyObserver, Ended, Erased, Observer};
 use crate::plan::{Model, Plan};
 use crate::rows::{Input, InputRow, SendRow};
 use crate::simulation::Simulation;
 use crate::summary::{Ending, Summary};
+use crate::world::live::{LiveDevice, Presence, RemotePeers, SampleError, SeatStats, Transmit, TurnState};
 use crate::world::{Step, Watch, World};
 
 const NANOSECOND: Duration = Duration::from_nanos(1);
@@ -72,15 +69,6 @@ pub struct PeerState {
     pub object: State<3>,
     /// Attitudes of copy and device; `None` if the object does not turn.
     pub turn: Option<TurnState>,
-}
-
-/// Attitudes of a peer, at the same instants as its [`PeerState`].
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct TurnState {
-    /// Attitude of the device; `None` for a device without attitude and for a peer in another process.
-    pub device: Option<Attitude>,
-    /// Attitude of the copy.
-    pub object: Attitude,
 }
 
 impl LiveScene {

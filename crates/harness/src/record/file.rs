@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 use cohaptic_files::WholeFile;
 use cohaptic_units::Instant;
 
+use crate::number_text::parts;
+
 /// Error of writing a record.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write {}: {source}", path.display())]
@@ -71,16 +73,6 @@ pub(crate) fn push_f64(line: &mut Vec<u8>, value: f64) {
     let (mantissa, exponent) = parts(&mut buffer, value);
     line.extend_from_slice(mantissa.as_bytes());
     line.extend_from_slice(exponent.as_bytes());
-}
-
-/// Returns the text of [`push_f64`] in two parts, between which the sign of a positive exponent is left out.
-pub(crate) fn parts(buffer: &mut zmij::Buffer, value: f64) -> (&str, &str) {
-    let text = buffer.format(value);
-    // Searched only in large numbers, because the search takes as long as formatting.
-    match if value.abs() >= 1e16 { text.find("e+") } else { None } {
-        Some(at) => (&text[..=at], &text[at + 2..]),
-        None => (text, ""),
-    }
 }
 
 /// Appends a whole number.

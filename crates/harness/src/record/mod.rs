@@ -25,7 +25,6 @@ mod trajectory;
 mod views;
 
 pub use band::Bands;
-pub(crate) use file::parts;
 pub use file::{RecordError, RecordFile};
 pub use inputs::InputRecorder;
 pub use links::links_csv;

@@ -4,7 +4,7 @@
 //! file, socket or clock of the machine is known here.
 
 mod changes;
-mod live;
+pub(crate) mod live;
 mod member;
 mod remote;
 mod turning;

@@ -1,5 +1,12 @@
 //! Parts of a running scene that only a session needs: datagrams from other processes, devices in hands, changes of links by the operator.
 
+mod device;
+mod fade;
+mod presence;
+mod pulled;
+mod seat;
+
+use cohaptic_peer::rotation::Attitude;
 use cohaptic_peer::wire::{Extra, MAX_LEN, Sample, SampleKind};
 use cohaptic_peer::{Clock, Device, Peer, ReceiveError, Reception, SimulatedDevice, State, Strategy};
 use cohaptic_scene::{PeerKind, Scene};
@@ -8,13 +15,28 @@ use cohaptic_wan::{LinkModel, LinkStats, NodeId, PacketEvent, Path};
 
 use super::{Arriving, DeviceModel, Remote, Step, Watch, World, row};
 use crate::in_flight::Handle;
-use crate::live::{
-    Datagram, HandDevice, Input, InputRow, LiveDevice, Presence, PulledDevice, RemotePeers, SampleError, Seat, SeatStats, Transmit, TurnState,
-    UnsimulatedDevice,
-};
 use crate::observer::{Ended, Observer};
 use crate::plan::ticking;
+use crate::rows::{Input, InputRow};
 use crate::schedule::Schedule;
+
+use device::{HandDevice, UnsimulatedDevice};
+use pulled::PulledDevice;
+use seat::Seat;
+
+pub use device::LiveDevice;
+pub(crate) use presence::RemotePeers;
+pub use presence::{Datagram, Transmit};
+pub use seat::{Presence, SampleError, SeatStats};
+
+/// Attitudes of a peer, at the same instants as its [`PeerState`](crate::live::PeerState).
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct TurnState {
+    /// Attitude of the device; `None` for a device without attitude and for a peer in another process.
+    pub device: Option<Attitude>,
+    /// Attitude of the copy.
+    pub object: Attitude,
+}
 
 impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
     /// Returns the scene before its first instant with all remote peers absent. `devices` gives the device in the hand at the given index of a peer.
