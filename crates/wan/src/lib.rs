@@ -63,6 +63,7 @@ mod ring;
 mod stages;
 
 pub use event_queue::{Event, EventQueue};
+pub use fates::damage::Damage;
 pub use fates::fate::{DropCause, Fate};
 pub use fates::log::{FateLog, FateLogError, FateLogReader, FateRow};
 pub use fates::record::{PacketEvent, PacketRecord};
@@ -82,7 +83,6 @@ pub use network::id::{LinkId, NodeId, Path};
 pub use network::stepped_links::SteppedLinks;
 pub use network::{AccessLine, MOST_NODES, Network, NetworkConfig, NetworkError};
 pub use packet::PacketInfo;
-pub use packet::damage::Damage;
 pub use ring::Ring;
 pub use stages::config::{LINK_PARAMETERS, Layout, LinkConfig};
 pub use stages::corruption::{Checksum, Corruption, Flips};

@@ -5,7 +5,7 @@ use core::ops::Deref;
 use cohaptic_units::{Bytes, Instant};
 
 use super::fate::Fate;
-use crate::packet::damage::Damage;
+use crate::fates::damage::Damage;
 
 /// Record of the fate of one packet or of one copy: the row of a fate log.
 ///

@@ -8,10 +8,10 @@ use core::time::Duration;
 
 use cohaptic_units::Instant;
 
+use crate::fates::damage::Damage;
 use crate::fates::fate::{DropCause, Fate};
 use crate::fates::log::FateLog;
 use crate::fates::record::PacketRecord;
-use crate::packet::damage::Damage;
 use crate::packet::{Carried, Exit, Output, Outputs};
 
 /// A log, and the drops and copies to come. Arrivals are given to the owner at the offer.

@@ -4,9 +4,9 @@ use alloc::vec;
 
 use cohaptic_units::Instant;
 
+use crate::fates::damage::Damage;
 use crate::fates::fate::DropCause;
 use crate::netem::kernel::{DropReason, Output as QdiscOutput, Qdisc};
-use crate::packet::damage::Damage;
 use crate::packet::{Carried, Exit, Output, Outputs};
 
 /// The kernel's queueing discipline on a device of infinite speed, as a stage of a link.

@@ -6,10 +6,10 @@ use cohaptic_units::{Bytes, Instant};
 
 use super::id::{LinkId, NodeId, Path};
 use crate::event_queue::Event;
+use crate::fates::damage::Damage;
 use crate::fates::fate::Fate;
 use crate::fates::record::{PacketEvent, PacketRecord};
 use crate::packet::PacketInfo;
-use crate::packet::damage::Damage;
 
 /// A packet on its way through the network.
 #[derive(Clone, Debug)]

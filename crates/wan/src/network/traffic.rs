@@ -9,11 +9,11 @@ use super::awaited::Awaited;
 use super::id::{NodeId, Path};
 use super::pending::{InNetwork, LineId, Pending, SizeAndMarks, Turn};
 use crate::event_queue::{Event, EventQueue};
+use crate::fates::damage::Damage;
 use crate::fates::fate::Fate;
 use crate::fates::record::PacketEvent;
 use crate::line::Sink;
 use crate::packet::Marks;
-use crate::packet::damage::Damage;
 
 #[derive(Clone, Debug)]
 pub(super) struct Traffic<P> {

@@ -9,10 +9,10 @@ use core::ops::Range;
 
 use cohaptic_units::Probability;
 
+use crate::fates::damage::Damage;
 use crate::laws::chance::CHANCES;
 use crate::laws::chance::{Chance, ChanceStage};
 use crate::packet::PacketInfo;
-use crate::packet::damage::Damage;
 use crate::parameters::{Choices, Form, Key, MOST_OF_32_BITS, Table, optional, usual, words};
 use crate::random::{PacketDraws, Purpose, unit};
 

@@ -1,14 +1,11 @@
 //! Packets inside a link: the facts that a link needs, the packet between two stages, and the outputs of the stages.
 
-pub(crate) mod damage;
-
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use cohaptic_units::{Bytes, Instant};
 
-use damage::Damage;
-
+use crate::fates::damage::Damage;
 use crate::fates::fate::DropCause;
 
 /// Facts about a packet that a link needs. A [`Bytes`] converts to a packet of that size without ECN.
