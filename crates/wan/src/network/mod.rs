@@ -530,11 +530,6 @@ impl<P: Clone> Network<P> {
         let on_demand = self.lines.on_demand.as_mut().expect("links are missing only where they are made on demand");
         let model = on_demand.model(path);
         on_demand.made(link, place);
-        if !model.is_direct() && !self.has_inner_events {
-            // The new line switches the network to inner events, under which all that is due happens before a packet is offered. The switch itself must hold
-            // to that order as well.
-            self.let_happen(self.now);
-        }
         self.is_random |= model.is_random();
         let line = self.line(&name, model);
         self.lines.links.push(line);

@@ -96,6 +96,11 @@ impl<P: Clone> Network<P> {
     #[inline(always)]
     pub(super) fn send(&mut self, now: Instant, path: Path, size: SizeAndMarks, payload: P, words: Option<Words>) {
         let (link, place) = self.link_and_place(path);
+        // As if the packets of a broadcast were sent one by one: an arrival of an earlier one at `now` comes before the events of this one. After `let_pass`,
+        // because the link may just have been made, and may have switched the network to inner events.
+        if self.has_inner_events && self.traffic.pending.may_be_due(now) {
+            self.let_happen(now);
+        }
         let sequence = self.lines.links[place].offered();
         self.offer(now, LineId::Link(link), words, || InNetwork { sequence, offered: now, entered: now, path, size, payload });
     }

@@ -7,6 +7,7 @@
 mod any_link;
 mod awaited;
 mod bounds;
+mod broadcast;
 mod by_stage;
 mod conservation;
 mod delay_laws;
