@@ -239,10 +239,7 @@ impl<T: Clone> Staged<T> {
         let departure = bottleneck.departure_if_idle(now, info.size).filter(|departure| *departure <= until)?;
         // From here on the packet is taken, and the stages change their state.
         let words = self.direct.words(number);
-        Some(self.direct.offer_through(now, number, words, |_| {
-            bottleneck.is_idle_from(departure);
-            Ok(departure)
-        }))
+        Some(self.direct.offer_through(now, number, words, |_| Ok(departure)))
     }
 
     /// Returns the instant at which [`Staged::pass`] must be called next, or `None` if no packet waits.

@@ -223,12 +223,6 @@ impl<T> BottleneckStage<T> {
         Some(now.saturating_add(service))
     }
 
-    /// Records that a packet left at the instant returned by [`departure_if_idle`](BottleneckStage::departure_if_idle), and that no packet followed. CoDel's
-    /// memory of an empty queue stays unchanged.
-    pub(crate) fn is_idle_from(&mut self, departure: Instant) {
-        self.queue.is_idle_from(departure);
-    }
-
     /// Takes a packet, which is then sent, waits, or is dropped into `outputs`; other packets may be dropped in its place. `word` gives the packet's random
     /// word for queues.
     pub(crate) fn offer(&mut self, now: Instant, packet: Carried<T>, word: impl FnOnce() -> u64, outputs: &mut Outputs<T>) {

@@ -114,16 +114,10 @@ impl CoDelState {
         Verdict::Drop
     }
 
-    /// Records that the queue has run empty, which ends a state of dropping.
-    pub(crate) const fn empty(&mut self) {
-        self.first_above = None;
-        self.dropping = false;
-        self.dropped = Dropped::Not;
-    }
-
     /// Returns whether waits have exceeded the target for an interval, and tracks since when they exceed it.
     fn should_drop(&mut self, codel: &CoDel, now: Instant, sojourn: Duration, left_bytes: u128) -> bool {
-        // A queue of at most one packet of the largest size cannot be shortened without leaving the transmitter idle.
+        // A queue of at most one packet of the largest size cannot be shortened without leaving the transmitter idle. The packet after an
+        // empty queue finds no packet after it, and so ends a state of dropping, for which RFC 8289 looks at the empty queue.
         if sojourn < codel.target || left_bytes <= u128::from(codel.mtu.get()) {
             self.first_above = None;
             return false;

@@ -58,7 +58,7 @@ pub(crate) struct Fifo<P, S> {
     waiting: VecDeque<P>,
     sums: S,
     on_line: Option<OnLine<P>>,
-    /// Instant since which the transmitter is idle, or, with RED, up to which idle time has been counted. Meaningless while a packet is in transmission.
+    /// Instant since which the transmitter is idle, or up to which idle time has been counted. Meaningful only with RED, while no packet is in transmission.
     idle_since: Instant,
     discipline: DisciplineState,
 }
@@ -108,11 +108,6 @@ impl<P, S: Default> Fifo<P, S> {
     /// Returns the packet in transmission, for a transmitter that sends by opportunities.
     pub(crate) fn on_line_mut(&mut self) -> &mut Option<OnLine<P>> {
         &mut self.on_line
-    }
-
-    /// Notes that the transmitter was busy up to `departure`, with a packet that the queue did not see. The memory of the discipline stays unchanged.
-    pub(crate) fn is_idle_from(&mut self, departure: Instant) {
-        self.idle_since = departure;
     }
 
     /// Takes a packet, which is then sent, waits, or is dropped; other packets may be dropped in its place. `word` gives the packet's random word for queues,
@@ -168,7 +163,7 @@ impl<P, S: Default> Fifo<P, S> {
     pub(crate) fn serve_next<R: Rules<P, Sums = S>>(&mut self, now: Instant, rules: &R, dropped: impl FnMut(DropCause, P)) {
         match self.take_head(rules) {
             Some(packet) => self.serve(now, rules, packet, dropped),
-            None => self.run_empty(now),
+            None => self.idle_since = now,
         }
     }
 
@@ -186,8 +181,8 @@ impl<P, S: Default> Fifo<P, S> {
                     }
                     codel::Verdict::Drop => {
                         dropped(DropCause::CoDel, packet);
-                        // Without waiting packets the transmitter becomes idle, as if the dropped packet had left.
-                        let Some(next) = self.take_head(rules) else { return self.run_empty(now) };
+                        // CoDel drops a packet only while others wait.
+                        let Some(next) = self.take_head(rules) else { return };
                         packet = next;
                     }
                 }
@@ -267,13 +262,5 @@ impl<P, S: Default> Fifo<P, S> {
         let packet = self.waiting.pop_front()?;
         rules.remove(&mut self.sums, &packet);
         Some(packet)
-    }
-
-    /// Notes that the transmitter has nothing to send from `now` on.
-    fn run_empty(&mut self, now: Instant) {
-        self.idle_since = now;
-        if let DisciplineState::CoDel(state) = &mut self.discipline {
-            state.empty();
-        }
     }
 }
