@@ -1,4 +1,5 @@
-//! The tick of a peer along one axis: equations (7) to (10) of Rakhsha & Constantinescu (2015), in any [`Number`].
+//! The tick of a peer along one axis: equations (7) to (10) of Rakhsha & Constantinescu (2015), in any [`Number`]. Equations (9) and (10) are forces of
+//! [`Gains`](crate::Gains), and stand beside them.
 //!
 //! If the desired motion (xd, vd) is the mean of the held samples, equation (10) is the law of the paper,
 //! [`AveragePosition`](crate::coordination::AveragePosition). Other laws have other desired motions or gains.
