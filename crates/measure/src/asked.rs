@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use cohaptic_units::Bytes;
-use cohaptic_wan::{Correlation, Flips, Layout, LinkConfig, LinkModel, Order, Service};
+use cohaptic_wan::{Correlation, Flips, Layout, LinkConfig, LinkModel, Modulated, Order, Service};
 use serde::Serialize;
 
 use crate::series::count_u64;
@@ -67,11 +67,39 @@ pub(crate) const QUANTILES: [(&str, f64); 7] =
 const LAGS: u32 = 10;
 
 impl Asked {
-    /// Returns the figures asked of a link for packets of `size`, sent `every` so often. A link with states, a replay, and the kernel's netem have no laws
-    /// here, and the result is empty.
+    /// Returns the figures asked of a link for packets of `size`, sent `every` so often. A link that follows a modulator has the means over time of its
+    /// states, and no other figures. A replay and the kernel's netem have no laws here, and the result is empty.
     #[must_use]
     pub fn of(model: &LinkModel, every: Duration, size: Bytes) -> Self {
-        model.as_fixed().map_or_else(Self::default, |config| Self::of_config(config, every, size))
+        match model {
+            LinkModel::Fixed(config) => Self::of_config(config, every, size),
+            LinkModel::Modulated(modulated) => Self::of_modulated(modulated, every, size),
+            LinkModel::Replay(_) | LinkModel::Kernel(_) => Self::default(),
+        }
+    }
+
+    /// Returns the means over the time in each state. A steady stream meets a state as often as the state has of the time, so that shares of time are shares of
+    /// packets. The least delay is the least of all states.
+    fn of_modulated(modulated: &Modulated, every: Duration, size: Bytes) -> Self {
+        let Some(shares) = modulated.modulator().shares() else { return Self::default() };
+        let states: Vec<Self> = modulated.configs().iter().map(|config| Self::of_config(config, every, size)).collect();
+        let mean = |of: fn(&Self) -> Option<f64>| {
+            let terms = states.iter().zip(&shares).map(|(state, share)| of(state).map(|value| share * value));
+            terms.collect::<Option<Vec<f64>>>().map(|terms| terms.iter().sum::<f64>())
+        };
+        let mean_s = mean(|state| state.mean_s);
+        // The variance of a mixture is the mean of the second moments minus the square of the mean.
+        let second = mean(|state| Some(state.sd_s?.powi(2) + state.mean_s?.powi(2)));
+        Self {
+            mean_s,
+            sd_s: second.zip(mean_s).map(|(second, mean)| libm::sqrt((second - mean * mean).max(0.0))),
+            least_s: states.iter().map(|state| state.least_s).collect::<Option<Vec<f64>>>().and_then(|least| least.into_iter().reduce(f64::min)),
+            loss: mean(|state| state.loss),
+            duplicated: mean(|state| state.duplicated),
+            damaged: mean(|state| state.damaged),
+            rate_bit_s: mean(|state| state.rate_bit_s),
+            ..Self::default()
+        }
     }
 
     /// Returns the figures asked of a single configuration, as [`of`](Self::of) does.
@@ -148,7 +176,7 @@ fn autocorrelation(config: &LinkConfig, every: Duration) -> Vec<f64> {
 mod tests {
     use cohaptic_units::Probability;
     use cohaptic_wan::netem::Netem;
-    use cohaptic_wan::{Checksum, Corruption};
+    use cohaptic_wan::{Checksum, Corruption, Modulator, ModulatorState, Sojourn};
 
     use super::*;
 
@@ -187,6 +215,20 @@ mod tests {
         let asked = Asked::of_config(&config, Duration::from_millis(1), Bytes::new(64));
         assert!((asked.damaged.unwrap() - (1.0 - 0.999_f64.powi(480))).abs() < 1e-12);
         assert_eq!((asked.mean_s, asked.sd_s, asked.loss), (Some(0.0), Some(0.0), Some(0.0)));
+    }
+
+    /// Three seconds of four without loss at 10 ms, one with 10 % loss at 30 ms: the mean is 15 ms, the variance 0.75·5² + 0.25·15² ms².
+    #[test]
+    fn figures_of_a_modulated_link_are_means_over_time() {
+        let state =
+            |seconds: u64, next: [f64; 2]| ModulatorState { sojourn: Some(Sojourn::Fixed(Duration::from_secs(seconds))), next: next.to_vec() };
+        let modulator = Modulator::new("cell", vec![state(3, [0.0, 1.0]), state(1, [1.0, 0.0])]).unwrap();
+        let config = |words: &str| Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap();
+        let modulated = Modulated::new(modulator, vec![config("delay 10ms"), config("delay 30ms loss 10%")]).unwrap();
+        let asked = Asked::of(&modulated.into(), Duration::from_millis(1), Bytes::new(64));
+        let figures = [(asked.mean_s, 0.015), (asked.sd_s, 75e-6_f64.sqrt()), (asked.least_s, 0.01), (asked.loss, 0.025)];
+        assert!(figures.iter().all(|(found, expected)| (found.unwrap() - expected).abs() < 1e-12), "{figures:?}");
+        assert_eq!((asked.rate_bit_s, asked.quantiles_s.len()), (None, 0));
     }
 
     #[test]

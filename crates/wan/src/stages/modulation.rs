@@ -153,6 +153,47 @@ impl Modulator {
     pub fn states(&self) -> &[ModulatorState] {
         &self.states
     }
+
+    /// Returns the same chain under another name, and therefore with other random numbers.
+    #[must_use]
+    pub fn renamed(&self, name: &str) -> Self {
+        Self { name: name.into(), states: Arc::clone(&self.states) }
+    }
+
+    /// Returns the share of time that the chain spends in each state in the long run, indexed by state. `None` if the chain has no such shares that do not
+    /// depend on chance: if a state lasts for ever, or if some state cannot be reached from another state.
+    #[must_use]
+    pub fn shares(&self) -> Option<Vec<f64>> {
+        let size = self.states.len();
+        let mut weights: Vec<Vec<f64>> = self.states.iter().map(|state| state.next.clone()).collect();
+        for row in &mut weights {
+            let total: f64 = row.iter().sum();
+            row.iter_mut().for_each(|weight| *weight /= total);
+        }
+        // Grassmann, Taksar and Heyman (1985): states are taken out of the chain from the last one on, without a subtraction, so that no digits are lost. A sum
+        // of zero, or one that is no number, tells that the remaining states cannot be reached.
+        for last in (1..size).rev() {
+            let leaves: f64 = weights[last][..last].iter().sum();
+            if !(leaves > 0.0) {
+                return None;
+            }
+            for from in 0..last {
+                weights[from][last] /= leaves;
+                for to in 0..last {
+                    weights[from][to] += weights[from][last] * weights[last][to];
+                }
+            }
+        }
+        // The number of visits of each state, for one visit of state 0.
+        let mut visits = alloc::vec![1.0; size];
+        for state in 1..size {
+            visits[state] = (0..state).map(|from| visits[from] * weights[from][state]).sum();
+        }
+        let times = visits.iter().zip(self.states.iter()).map(|(visits, state)| Some(visits * state.sojourn?.mean().as_secs_f64()));
+        let times: Vec<f64> = times.collect::<Option<_>>()?;
+        let total: f64 = times.iter().sum();
+        times.iter().all(|time| *time > 0.0).then(|| times.iter().map(|time| time / total).collect())
+    }
 }
 
 /// Configurations of a link that follows a modulator.
@@ -185,6 +226,12 @@ impl Modulated {
     #[must_use]
     pub const fn modulator(&self) -> &Modulator {
         &self.modulator
+    }
+
+    /// Returns the same link, following another modulator name. Links with the same name and seed change state at the same instants.
+    #[must_use]
+    pub fn with_modulator_name(&self, name: &str) -> Self {
+        Self { modulator: self.modulator.renamed(name), configs: Arc::clone(&self.configs) }
     }
 
     /// Returns the configurations, indexed by state.
@@ -275,6 +322,26 @@ static WEIGHTS: Table = Table::with_others(&[], &number(WEIGHT));
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Shares of time against chains that can be solved by hand: two states by their sojourns, a walk whose ends last twice as long (each state alike), and a
+    /// state visited every other time.
+    #[test]
+    fn shares_of_time_are_those_of_the_chain() {
+        let state = |seconds: u64, next: &[f64]| ModulatorState {
+            sojourn: Some(Sojourn::Exponential(core::time::Duration::from_secs(seconds))),
+            next: next.to_vec(),
+        };
+        let shares = |states: Vec<ModulatorState>| Modulator::new("cell", states).unwrap().shares();
+        assert_eq!(shares(vec![state(3, &[0.0, 1.0]), state(1, &[1.0, 0.0])]), Some(vec![0.75, 0.25]));
+        let walk = vec![state(2, &[0.0, 1.0, 0.0]), state(1, &[5.0, 0.0, 5.0]), state(2, &[0.0, 1.0, 0.0])];
+        assert!(shares(walk).unwrap().iter().all(|share| (share - 1.0 / 3.0).abs() < 1e-15));
+        let edges = vec![state(1, &[0.0, 1.0, 3.0]), state(4, &[1.0, 0.0, 0.0]), state(4, &[1.0, 0.0, 0.0])];
+        assert_eq!(shares(edges), Some(vec![0.2, 0.2, 0.6]));
+        assert_eq!(shares(vec![state(1, &[0.0])].into_iter().map(|one| ModulatorState { sojourn: None, ..one }).collect()), None);
+        // The third state is left and never entered, and the last one is never left.
+        assert_eq!(shares(vec![state(1, &[0.0, 1.0, 0.0]), state(1, &[1.0, 0.0, 0.0]), state(1, &[1.0, 0.0, 0.0])]), None);
+        assert_eq!(shares(vec![state(1, &[0.0, 1.0]), ModulatorState { sojourn: None, next: vec![0.0, 0.0] }]), None);
+    }
 
     fn path(seed: u64, modulator: &Modulator, until: u64) -> Vec<(usize, u64)> {
         let configs = vec![LinkConfig::default(); modulator.states().len()];
