@@ -25,6 +25,7 @@
 mod address;
 pub mod document;
 mod fingerprint;
+pub mod library;
 pub mod link;
 pub mod mesh;
 mod quantity_text;

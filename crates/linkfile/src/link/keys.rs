@@ -1,11 +1,19 @@
 //! Declarations of the keys of a link: in `[link]`, in an entry `[\[links\]]`, and in a change.
 
 pub use cohaptic_wan::MODULATOR;
-use cohaptic_wan::parameters::{Form, Key, Table, Words, joined, optional, required};
+use cohaptic_wan::parameters::{Form, Key, Table, Words, joined, optional, required, usual};
 use cohaptic_wan::{LINK_KIND_PARAMETERS, LINK_PARAMETERS};
 
 /// Keys of a link of any kind, in the order of the reference.
-pub const LINK: [&[Key]; 15] = joined(&[&LINK_PARAMETERS, &[&LINK_KIND_PARAMETERS]]);
+pub const LINK: [&[Key]; 16] = joined(&[&LINK_PARAMETERS, &[&LINK_KIND_PARAMETERS, &PROFILE]]);
+
+/// Key that takes a link of the [library](crate::library).
+const PROFILE: [Key; 1] = [usual(
+    "profile",
+    Form::Like(&["starlink/up", "transatlantic", "none"]),
+    "\"none\"",
+    "A link of the library by its name, over which the other keys are laid. Takes away all keys below; \"none\" takes it away",
+)];
 
 /// Table of the keys of one link, such as `[link]`.
 pub static LINK_TABLE: Table = Table::of(&LINK);
@@ -16,7 +24,7 @@ pub static LINK_CHANGE: Table = Table::over(&LINK);
 pub const ENDS: [Key; 2] =
     [required("from", Form::Text, "The name of the one that sends"), required("to", Form::Text, "The name of the one that receives")];
 /// Table of an entry `[\[links\]]`: both ends, and keys laid over those of `[link]`.
-pub static LINK_ENTRY: Table = Table::over(&joined::<16>(&[&[&ENDS], &LINK]));
+pub static LINK_ENTRY: Table = Table::over(&joined::<17>(&[&[&ENDS], &LINK]));
 
 /// Word that stands for every link.
 pub const ALL_LINKS: Words = &[("all", "every link")];

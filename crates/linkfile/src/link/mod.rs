@@ -11,6 +11,7 @@ mod loss_pattern;
 mod modulators;
 mod netem;
 mod outage;
+mod profile;
 mod queue;
 mod reorder;
 mod slots;
@@ -38,6 +39,11 @@ pub(crate) fn read_link_of(declaration: &'static Table, node: &Node, context: Co
     // A first pass over all declared keys reports the unknown ones. The second pass below reads only the keys of a link.
     table.know_all();
     table.finish();
+    let resolved = profile::resolve(node, context)?;
+    let (node, context) = match &resolved {
+        Some(resolved) => (&resolved.keys, context.with_modulators(Some(&resolved.modulators))),
+        None => (node, context),
+    };
     let keys = in_force(node, context)?;
     let mut table = TableReader::new(&keys, context, &LINK_TABLE, "a table of link keys")?;
     if let Some(replay) = table.get("replay").filter(|replay| !is_none(replay)) {
@@ -180,5 +186,5 @@ fn says_everything(entry: &Entry) -> bool {
 
 /// Returns whether a key of a link kind is `none`. `netem = "none"` beside `replay` contradicts nothing.
 fn is_none_of_whole(entry: &Entry) -> bool {
-    matches!(entry.name.as_str(), "netem" | "replay" | "modulated") && is_none(&entry.node)
+    matches!(entry.name.as_str(), "netem" | "replay" | "modulated" | "profile") && is_none(&entry.node)
 }

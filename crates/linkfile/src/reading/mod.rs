@@ -12,6 +12,7 @@ mod table_reader;
 pub mod values;
 
 pub use context::{Context, FileReader, Modulators};
+pub(crate) use names::nearest;
 pub use names::{Names, one_of};
 pub use parse::{Parsed, default_title, defaults, file_text, parse, parse_with, text_of, with_text};
 pub use table_reader::{TableReader, only_one};

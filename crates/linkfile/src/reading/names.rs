@@ -76,7 +76,7 @@ pub fn one_of<'a>(words: impl IntoIterator<Item = &'a str>, given: &str) -> Stri
 }
 
 /// Returns the word with the fewest typing errors to `given`, or `None` if no word is near or if `given` is longer than 40 characters.
-fn nearest<'a>(words: &[&'a str], given: &str) -> Option<&'a str> {
+pub(crate) fn nearest<'a>(words: &[&'a str], given: &str) -> Option<&'a str> {
     // At most 41 characters are read, because a long text is compared with no word.
     let given: Vec<char> = given.chars().take(41).collect();
     if given.len() > 40 {

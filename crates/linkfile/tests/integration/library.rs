@@ -1,0 +1,223 @@
+//! The library of links: the figures of its sources come out of the profiles and of the engine, and keys are laid over a profile.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use cohaptic_linkfile::library::{Direction, Grade, ProfileName, names, of_owner, profile, profiles};
+use cohaptic_linkfile::{LinkKeys, link_from_keys};
+use cohaptic_units::{Bytes, Instant};
+use cohaptic_wan::{Fate, Link, LinkConfig, LinkModel, LinkName, Modulated};
+
+fn link(keys: &[&str]) -> LinkModel {
+    link_from_keys(&keys.iter().map(|key| (*key).to_owned()).collect::<Vec<_>>()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn refused(keys: &[&str]) -> String {
+    link_from_keys(&keys.iter().map(|key| (*key).to_owned()).collect::<Vec<_>>()).unwrap_err().to_string()
+}
+
+fn modulated(name: &str) -> Modulated {
+    match link(&[&format!("profile={name}")]) {
+        LinkModel::Modulated(modulated) => modulated,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn fixed(name: &str) -> LinkConfig {
+    match link(&[&format!("profile={name}")]) {
+        LinkModel::Fixed(config) => config,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn close(found: f64, expected: f64, tolerance: f64) {
+    assert!((found - expected).abs() <= tolerance, "{found} is not {expected}");
+}
+
+/// Returns the mean over the time in each state.
+fn mean(modulated: &Modulated, of: impl Fn(&LinkConfig) -> f64) -> f64 {
+    let shares = modulated.modulator().shares().unwrap();
+    shares.iter().zip(modulated.configs()).map(|(share, config)| share * of(config)).sum()
+}
+
+/// Losses of 0.40 and 0.45 %, mean delays of 20.516 and 30.481 ms, and the round trips of the five states at 10, 30, 50, 70 and 90 % of a lognormal above 20.5 ms.
+#[test]
+fn starlink_has_the_figures_of_its_sources() {
+    let (down, up) = (modulated("starlink/down"), modulated("starlink/up"));
+    let loss = |config: &LinkConfig| config.loss.mean().unwrap();
+    close(mean(&down, loss), 0.004, 1e-6);
+    close(mean(&up, loss), 0.0045, 1e-6);
+    let delay_ms = |config: &LinkConfig| config.delay.mean().as_secs_f64() * 1e3;
+    close(mean(&down, delay_ms), 20.516, 5e-4);
+    close(mean(&up, delay_ms), 30.481, 5e-4);
+    let round_trips = down.configs()[1..].iter().zip(&up.configs()[1..]).map(|(down, up)| delay_ms(down) + delay_ms(up));
+    for (found, expected) in round_trips.zip([40.65, 45.74, 50.00, 54.98, 63.69]) {
+        close(found, expected, 0.005);
+    }
+    // The standard deviation of the round trip is that of the lognormal, 10.87 ms: 9.38 ms between intervals, of which five values keep less, and √2·3.884 within.
+    let jitter = down.configs()[1].delay.law().unwrap().sd() / 1e6;
+    close(jitter, 4.383 * std::f64::consts::PI.sqrt() / 2.0, 5e-4);
+    close((10.87_f64.powi(2) - 2.0 * jitter * jitter).sqrt(), 9.38, 5e-3);
+}
+
+/// The engine loses 0.40 % in the long run, all of it within 215 ms after a boundary of 15 s. One packet each 8 ms for 1500 s and ten seeds; the periods are
+/// independent, and give the standard error.
+#[test]
+fn the_engine_loses_what_starlink_loses_and_only_at_boundaries() {
+    const PERIODS: usize = 100;
+    let every = Duration::from_millis(8);
+    let mut lost_in = Vec::new();
+    for seed in 1..=10 {
+        let mut link: Link<()> = Link::new(seed, &LinkName::between("sender", "receiver"), modulated("starlink/down"));
+        let mut lost = vec![0.0; PERIODS];
+        let packets = u32::try_from(PERIODS).unwrap() * 1875;
+        for number in 0..packets {
+            link.handle_packet(Instant::ZERO + every * number, Bytes::new(64), ()).unwrap();
+            while let Some(event) = link.poll_event() {
+                if let Fate::Dropped(_) = event.record.fate {
+                    let at = event.record.offered.as_nanos();
+                    assert!(at % 15_000_000_000 < 215_000_000, "lost at {at} ns");
+                    lost[usize::try_from(at / 15_000_000_000).unwrap()] += 1.0;
+                }
+            }
+        }
+        lost_in.extend(lost);
+    }
+    #[expect(clippy::cast_precision_loss, reason = "1000")]
+    let count = lost_in.len() as f64;
+    let mean = lost_in.iter().sum::<f64>() / count;
+    let error = (lost_in.iter().map(|lost| (lost - mean).powi(2)).sum::<f64>() / (count - 1.0) / count).sqrt();
+    // The time in the bad state within one edge is drawn anew each time, from its long-run share on.
+    assert!(error < 0.3 && (mean - 0.004 * 1875.0).abs() < 4.0 * error, "{mean} ± {error}");
+}
+
+/// The walks hold each state for a fifth of the time, and have the autocorrelations after 1 and 10 s of the page that describes them, where λₖ = (1 − cos(πk/5))/s
+/// and cₖ = Σᵢ (rᵢ − r̄)·cos(πk(i − ½)/5).
+#[test]
+fn walks_of_the_rate_have_their_autocorrelation() {
+    for (name, [after_1, after_10]) in [
+        ("lte-driving/down", [0.930, 0.495]),
+        ("lte-driving/up", [0.858, 0.309]),
+        ("3g/down", [0.867, 0.292]),
+        ("3g/up", [0.897, 0.366]),
+        ("5g-walking/down", [0.920, 0.489]),
+    ] {
+        let walk = modulated(name);
+        let shares = walk.modulator().shares().unwrap();
+        shares.iter().for_each(|share| close(*share, 0.2, 1e-12));
+        #[expect(clippy::cast_precision_loss, reason = "a rate")]
+        let rates: Vec<f64> = walk.configs().iter().map(|config| bits_of(config) as f64).collect();
+        let middle = rates.iter().sum::<f64>() / 5.0;
+        let stay = |state: usize| walk.modulator().states()[state].sojourn.unwrap().mean().as_secs_f64();
+        assert!(stay(0) == 2.0 * stay(2) && stay(4) == stay(0) && stay(1) == stay(2) && stay(3) == stay(2), "{name}");
+        let found = |after: f64| {
+            let mode = |k: f64| {
+                let turn = std::f64::consts::PI * k / 5.0;
+                let weight: f64 = (1..=5).zip(&rates).map(|(i, rate)| (rate - middle) * (turn * (f64::from(i) - 0.5)).cos()).sum();
+                (weight * weight, (-(1.0 - turn.cos()) / stay(2) * after).exp())
+            };
+            let modes: Vec<(f64, f64)> = (1..5).map(|k| mode(f64::from(k))).collect();
+            modes.iter().map(|(weight, decay)| weight * decay).sum::<f64>() / modes.iter().map(|(weight, _)| weight).sum::<f64>()
+        };
+        // The page has three digits, of rates with four.
+        close(found(1.0), after_1, 1e-3);
+        close(found(10.0), after_10, 1e-3);
+    }
+}
+
+fn bits_of(config: &LinkConfig) -> u64 {
+    match &config.bottleneck.as_ref().unwrap().service {
+        cohaptic_wan::Service::Rate(rate) => rate.as_bits_per_sec(),
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Half of the round trips over a busy Wi-Fi are above 20 ms and a tenth above 100 ms. The DSL line has round trips of least 19.9, mean 21.3 and deviation 6.3 ms.
+#[test]
+fn laws_of_delay_have_the_quantiles_of_their_sources() {
+    let (down, up) = (fixed("wifi-busy/down"), fixed("wifi-busy/up"));
+    let above = |ms: f64| 1.0 - down.delay.law().unwrap().cdf(ms * 1e6 - as_ns(up.delay.mean()));
+    close(above(20.0), 0.5, 1e-3);
+    close(above(100.0), 0.1, 1e-3);
+    let (down, up) = (fixed("dsl/down"), fixed("dsl/up"));
+    close(as_ns(down.delay.least()) + as_ns(up.delay.mean()), 19.9e6, 1.0);
+    close(as_ns(down.delay.mean()) + as_ns(up.delay.mean()), 21.3e6, 1.0);
+    close(down.delay.law().unwrap().sd(), 6.3e6, 1.0);
+}
+
+#[expect(clippy::cast_precision_loss, reason = "milliseconds")]
+fn as_ns(span: Duration) -> f64 {
+    span.as_nanos() as f64
+}
+
+/// Round trips and rates \[kbit/s\] as the tools' tables have them.
+#[test]
+fn presets_are_the_tables_of_the_tools() {
+    for (name, round_trip_ms, rates) in [
+        ("devtools/3g", 400, [500, 500]),
+        ("devtools/slow-4g", 150, [1600, 750]),
+        ("devtools/fast-4g", 60, [9000, 1500]),
+        ("wpt/cable", 28, [5000, 1000]),
+        ("wpt/dsl", 50, [1500, 384]),
+        ("wpt/3g-slow", 400, [400, 400]),
+        ("wpt/3g", 300, [1600, 768]),
+        ("wpt/3g-fast", 150, [1600, 768]),
+        ("wpt/4g", 170, [9000, 9000]),
+        ("wpt/lte", 70, [12000, 12000]),
+        ("wpt/edge", 840, [240, 200]),
+        ("wpt/2g", 800, [280, 256]),
+        ("apple/3g", 200, [780, 330]),
+        ("apple/edge", 840, [240, 200]),
+    ] {
+        let [down, up] = ["down", "up"].map(|direction| fixed(&format!("{name}/{direction}")));
+        assert_eq!((down.delay.mean() + up.delay.mean()).as_millis(), round_trip_ms, "{name}");
+        assert_eq!([bits_of(&down), bits_of(&up)], rates.map(|rate| rate * 1000), "{name}");
+        assert_eq!(profile(name).unwrap().grade(), Grade::Preset);
+    }
+    assert_eq!(profiles().filter(|profile| profile.grade() == Grade::Preset).count(), 14);
+}
+
+#[test]
+fn names_have_versions_and_directions() {
+    for profile in profiles() {
+        for direction in Direction::BOTH {
+            let name = format!("{}/{}", profile.title(), direction.word());
+            assert_eq!(link(&[&format!("profile={name}")]), link(&[&format!("profile={}/{}", profile.name, direction.word())]), "{name}");
+        }
+    }
+    assert!(names().all(|name| name.parse::<ProfileName>().is_ok()));
+    assert_eq!(link(&["profile=transatlantic"]), link(&["profile=transatlantic/up"]));
+    assert!(refused(&["profile=starlink"]).contains("starlink differs by direction: expected starlink/down, towards the user, or starlink/up"));
+    assert!(refused(&["profile=starlnk/up"]).contains("did you mean \"starlink\"?"));
+    assert!(refused(&["profile=starlink@2/up"]).contains("starlink has no version \"2\": expected starlink@1"));
+    assert!(refused(&["profile=7"]).contains("expected the name of a link of the library"));
+}
+
+/// A key over a profile holds in every state; `none` and a later whole description take a profile away, and a profile takes away what lies below.
+#[test]
+fn keys_are_laid_over_a_profile() {
+    let LinkModel::Modulated(slow) = link(&["profile=lte-driving/up", "rate=50kbit"]) else { panic!("modulated") };
+    assert!(slow.configs().iter().all(|config| bits_of(config) == 50_000 && config.delay.mean() == Duration::from_micros(42_400)));
+    assert_eq!(link(&["profile=lte-driving/up", "modulated=none", "order=allow-reordering"]), link(&["delay=42.4ms"]));
+    assert_eq!(link(&["profile=none", "delay=3ms"]), link(&["delay=3ms"]));
+    let below = LinkKeys::default().with("loss", "0.1").with("delay", "7ms");
+    let over = |key: &str, value: &str| below.with(key, value).model(std::path::Path::new("")).unwrap();
+    // Each text of `LinkKeys` is laid over the ones before.
+    assert_eq!(over("profile", "cable/up"), link(&["profile=cable/up"]));
+    assert_eq!(below.with("profile", "cable/up").with("netem", "delay 5ms").model(std::path::Path::new("")).unwrap(), link(&["netem=delay 5ms"]));
+    let wrong = refused(&["profile=cable/up", "queue={ limit = \"9 packets\" }"]);
+    assert!(wrong.contains("link.queue"), "{wrong}");
+}
+
+/// The access lines of one peer follow one modulator, and those of two peers follow two.
+#[test]
+fn a_modulator_belongs_to_the_owner_of_a_line() {
+    let name = |line: &str, owner: &str| match &*of_owner(Arc::new(link(&[&format!("profile={line}")])), owner) {
+        LinkModel::Modulated(modulated) => modulated.modulator().name().to_owned(),
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(name("starlink/up", "anna"), name("starlink/down", "anna"));
+    assert_ne!(name("starlink/up", "anna"), name("starlink/up", "bob"));
+    let plain = Arc::new(link(&["delay=3ms"]));
+    assert!(Arc::ptr_eq(&plain, &of_owner(Arc::clone(&plain), "anna")));
+}
