@@ -1,5 +1,6 @@
 //! Tests of refused scenes: the place of each fault, its key and its message.
 
+mod access;
 mod form;
 mod strategies;
 mod topologies;

@@ -2,6 +2,7 @@
 //! returns `None`; a reader of a key that may be absent returns `Some(None)` without the key. Readers go on after a fault, because of all reported faults the
 //! first in the order of the text is shown.
 
+mod access;
 mod coordination;
 mod device;
 mod expect;

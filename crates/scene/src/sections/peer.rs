@@ -1,18 +1,15 @@
 //! Reader of the keys of a peer. The keys of an entry are laid over the keys of `[peer]` before the reader is called.
 
 use core::time::Duration;
-use std::sync::Arc;
 
 use cohaptic_linkfile::document::Node;
-use cohaptic_linkfile::link::read_link;
 use cohaptic_linkfile::reading::TableReader;
-use cohaptic_linkfile::schema::link::LINK_TABLE;
 use cohaptic_linkfile::schema::{Form, Key, Table, optional, required, somewhere, usual, vector};
 use cohaptic_peer::{Clock, Contact, DeviceConfig, Gains, Hand};
 use cohaptic_units::print::Span;
-use cohaptic_wan::LinkModel;
 
 use super::MOST;
+use super::access::{ACCESS, Access, read_access};
 use super::device::{A_COUPLING, CLOCK, CONTACT, COUPLING, DEVICE, read_clock, read_contact, read_coupling, read_device};
 use super::hand::{HAND, hand_is_sampled, read_hand, read_hand_torque};
 use super::kind::{FALCON, FALCON_DEVICE, KIND, POINTER, SILENCE, STILL_DEVICE, read_kind};
@@ -22,11 +19,11 @@ use crate::model::{PeerKind, Scaling};
 use crate::quantities::{POSITION, RATE, Spread, VELOCITY, maybe_vector_of};
 
 /// Keys of `[peer]`: the defaults of all peers.
-pub(crate) static PEER: Table = Table::of(&[&KEYS]);
+pub(crate) static PEER: Table = Table::of(&[&KEYS, &ACCESS]);
 /// Keys of an entry `[[peers]]`.
 pub(crate) static PEERS: Table =
-    Table::over(&[&[required("name", Form::Text, "Its name: unique, not all, without space and without . > / , and quotes")], &KEYS]);
-const KEYS: [Key; 21] = [
+    Table::over(&[&[required("name", Form::Text, "Its name: unique, not all, without space and without . > / , and quotes")], &KEYS, &ACCESS]);
+const KEYS: [Key; 19] = [
     somewhere("device", Form::Table(&DEVICE), "The haptic device"),
     somewhere("coupling", Form::Table(&COUPLING), "Spring and damper between device and copy; not needed where contact is none"),
     usual("contact", CONTACT, "\"grasp\"", "How the device touches the object"),
@@ -43,8 +40,6 @@ const KEYS: [Key; 21] = [
     usual("grasp", vector(POSITION), "0", "Where the device grasps an object that turns, from its centre in its own axes"),
     optional("orientation", QUATERNION, "As of the object"),
     optional("angular-velocity", vector(RATE), "As of the object"),
-    optional("uplink", Form::Table(&LINK_TABLE), "A line that all it sends passes before the links"),
-    optional("downlink", Form::Table(&LINK_TABLE), "A line that all it receives passes after the links"),
     usual("kind", KIND, "\"simulated\"", "Where the peer lives in a live session"),
     optional("silence", Form::Table(&SILENCE), "When the pull of a peer that lives elsewhere fades"),
     optional("falcon", Form::Table(&FALCON), "Which device a peer of kind falcon has, and how its numbers are meant"),
@@ -53,7 +48,7 @@ const KEYS: [Key; 21] = [
 
 /// Returns the keys whose tables are laid over each other key by key. Every other key replaces the key below as a whole.
 pub(crate) fn nested() -> Vec<&'static str> {
-    KEYS.iter().filter(|key| matches!(key.form, Form::Table(_))).map(|key| key.name).collect()
+    KEYS.iter().chain(&ACCESS).filter(|key| matches!(key.form, Form::Table(_))).map(|key| key.name).collect()
 }
 
 /// Values of the keys of a peer, without its name.
@@ -72,8 +67,7 @@ pub(crate) struct PeerKeys {
     pub(crate) device_position: Option<[f64; 3]>,
     pub(crate) device_velocity: Option<[f64; 3]>,
     pub(crate) rotation: PeerRotationKeys,
-    pub(crate) uplink: Option<Arc<LinkModel>>,
-    pub(crate) downlink: Option<Arc<LinkModel>>,
+    pub(crate) access: Access,
 }
 
 /// Reads the keys of a peer. `declaration` is [`PEER`], or [`PEERS`] for a node with a name, which the module `peers` reads. `update` is the period of
@@ -125,7 +119,7 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, declaration: &'s
     let [position, velocity, device_position, device_velocity] =
         ["position", "velocity", "device-position", "device-velocity"].map(|key| maybe_vector_of(&mut table, key, context, Spread::EveryAxis));
     let turned = read_peer_rotation(&mut table);
-    let [uplink, downlink] = ["uplink", "downlink"].map(|key| table.maybe(key, |node, context| read_link(node, context).map(Arc::new)));
+    let access = read_access(&mut table, *context);
     table.finish();
 
     // Not for `[peer]` on its own: an entry may replace tick or phase.
@@ -170,8 +164,7 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, declaration: &'s
         device_position: device_position?,
         device_velocity: device_velocity?,
         rotation,
-        uplink: uplink?,
-        downlink: downlink?,
+        access: access?,
     })
 }
 

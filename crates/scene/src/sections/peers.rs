@@ -4,6 +4,7 @@ use core::time::Duration;
 use std::collections::BTreeMap;
 
 use cohaptic_linkfile::document::{BEGINNING, Entry, Node, Place, join, quote};
+use cohaptic_linkfile::library::of_owner;
 use cohaptic_linkfile::reading::{Context, Names, one_of, values};
 use cohaptic_peer::Gains;
 use cohaptic_units::print::Counted;
@@ -156,7 +157,8 @@ fn spec(name: &str, keys: PeerKeys, object: &ObjectSpec) -> PeerSpec {
         velocity: keys.velocity.unwrap_or(object.velocity),
         device_position: keys.device_position,
         device_velocity: keys.device_velocity,
-        uplink: keys.uplink,
-        downlink: keys.downlink,
+        // A modulator of the library is the peer's own, also where several peers share the keys of `[peer]`.
+        uplink: keys.access.uplink.map(|line| of_owner(line, name)),
+        downlink: keys.access.downlink.map(|line| of_owner(line, name)),
     }
 }

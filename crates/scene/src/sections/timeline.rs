@@ -26,7 +26,7 @@ pub(crate) static TIMELINE: Table = Table::of(&[&[
     optional("coordination", Form::Table(&CHANGES), "In place of link or peer, and without set: what changes at every peer"),
 ]]);
 /// Keys under `set`, of a link or of a peer. The key `link` or `peer` beside `set` tells which of the two.
-static SET: Table = Table::over(&joined::<16>(&[LINK.as_slice(), &[&OF_PEER]]));
+static SET: Table = Table::over(&joined::<17>(&[LINK.as_slice(), &[&OF_PEER]]));
 static SET_OF_PEER: Table = Table::over(&[&OF_PEER]);
 const OF_PEER: [Key; 2] =
     [optional("contact", CONTACT, "Of a peer: how the device touches the object"), optional("hand", HAND, "Of a peer: what the user does")];
