@@ -39,6 +39,7 @@ pub mod compare;
 mod document;
 mod explanation;
 pub mod fit;
+pub mod library;
 pub mod link;
 pub mod map;
 mod methods;

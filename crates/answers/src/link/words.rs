@@ -60,8 +60,8 @@ fn others(measured: &Measured) -> [Other; 8] {
     let (delay, loss) = (achieved.delay.as_ref(), &achieved.loss);
     let first = |lags: &[f64]| lags.first().copied();
     [
-        ("mean_s", asked.mean_s, delay.map(|delay| delay.mean_s), None),
-        ("sd_s", asked.sd_s, delay.and_then(|delay| delay.sd_s), None),
+        ("mean_s", asked.mean_s, delay.map(|delay| delay.mean_s), delay.and_then(|delay| delay.mean_se_s)),
+        ("sd_s", asked.sd_s, delay.and_then(|delay| delay.sd_s), delay.and_then(|delay| delay.sd_se_s)),
         ("autocorrelation_1", first(&asked.autocorrelation), delay.and_then(|delay| first(&delay.autocorrelation)), None),
         ("loss", asked.loss, loss.value, None),
         ("loss_run_mean", asked.loss_run_mean, loss.run_mean, loss.run_mean_se),

@@ -122,6 +122,8 @@ pub(super) const FALCON_SIMULATE: &[&str] =
 pub(super) const LINK: &[&str] = &[
     "cohaptic link delay 20ms 5ms 25% loss 1%",
     "cohaptic link delay=24ms loss=1% --packets 1000000 --fates fates.csv",
+    "cohaptic link starlink/down rate=50Mbit --every 8ms",
+    "cohaptic link starlink --show",
     "cohaptic link --from fates.csv --json",
 ];
 

@@ -10,9 +10,16 @@ use super::numbers::{any_integer, integer, signed_duration};
 #[derive(Debug, Args)]
 #[command(after_help = after(examples::LINK))]
 pub(crate) struct LinkArguments {
-    /// What the link does: words of tc-netem (delay 20ms 5ms 25% loss 1%), or keys of the link table of a scene (delay=24ms loss=1%)
-    #[arg(required_unless_present = "from", conflicts_with = "from", value_name = "SPEC", allow_negative_numbers = true)]
+    /// What the link does: words of tc-netem (delay 20ms 5ms 25% loss 1%), keys of the link table of a scene (delay=24ms loss=1%), or a link of the library
+    /// (starlink/down), which keys may follow
+    #[arg(required_unless_present_any = ["from", "list"], conflicts_with = "from", value_name = "SPEC", allow_negative_numbers = true)]
     pub(crate) spec: Vec<String>,
+    /// List the links of the library: name, grade, delay and rate, and what each is
+    #[arg(long, conflicts_with_all = ["spec", "from", "show", "json"])]
+    pub(crate) list: bool,
+    /// Show every key of a link of the library with its source, and send nothing
+    #[arg(long, conflicts_with_all = ["from", "json"])]
+    pub(crate) show: bool,
     /// Replay a file of fates instead, as --fates writes it
     #[arg(long, value_name = "FATES.csv")]
     pub(crate) from: Option<PathBuf>,

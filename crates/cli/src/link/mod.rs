@@ -1,5 +1,6 @@
 //! `cohaptic link`: drives one link with a steady stream of packets and measures what the link does.
 
+mod library;
 mod spec;
 
 use std::io;
@@ -28,6 +29,10 @@ const PACKETS: u64 = 100_000;
 
 /// Drives one link, and prints the configured figures beside the measured figures.
 pub(crate) fn link(arguments: &LinkArguments) -> Result<ExitCode, Failure> {
+    if arguments.list || arguments.show {
+        output::text(&if arguments.list { cohaptic_answers::library::list() } else { library::shown(&arguments.spec)? })?;
+        return Ok(ExitCode::SUCCESS);
+    }
     let (measured, written) = drive(arguments, Spec::read(arguments)?)?;
     let document = cohaptic_answers::link::document(&measured, Some(&written));
     let words = || cohaptic_answers::link::words(&measured);

@@ -1,8 +1,10 @@
 //! Configuration of the link of `cohaptic link`, from words of tc-netem, from keys of a scene, or from a log of fates.
 
+use std::borrow::Cow;
 use std::path::Path;
 use std::sync::Arc;
 
+use cohaptic_linkfile::library::{self, Direction, ProfileName};
 use cohaptic_linkfile::link_from_keys;
 use cohaptic_measure::asked::Asked;
 use cohaptic_scene::LinkKeys;
@@ -25,19 +27,34 @@ pub(super) struct Spec {
     pub(super) packets: Option<u64>,
 }
 
+/// Beginning of a key that names a link of the library.
+const PROFILE: &str = "profile=";
+
 impl Spec {
     pub(super) fn read(arguments: &LinkArguments) -> Result<Self, Failure> {
         if let Some(path) = &arguments.from {
             return replay(path);
         }
-        let is_keys = is_keys(&arguments.spec)?;
-        let said = arguments.spec.join(" ");
+        // A bare name is measured towards the user: the direction in which most of the traffic goes.
+        let spec = with_profile(&arguments.spec, Some(Direction::Down));
+        let is_keys = is_keys(&spec)?;
+        let said = spec.join(" ");
+        let said = said.strip_prefix(PROFILE).map_or_else(|| said.clone(), str::to_owned);
         if is_keys && arguments.profile == Profile::Kernel66 {
             return Err(Failure::Input("--profile kernel-6.6 is for words of tc-netem: expected those, or no profile".to_owned()));
         }
-        let (model, asked) = if is_keys { of_keys(arguments)? } else { of_words(arguments, &said)? };
+        let (model, asked) = if is_keys { of_keys(&spec, arguments)? } else { of_words(arguments, &said)? };
         Ok(Self { said, model, asked, packets: None })
     }
+}
+
+/// Returns the words of a link with a name of the [library] in front as the key `profile`, so that keys may follow the name: `starlink/down rate=5Mbit`. The
+/// name gets the version that it stands for. Other words are returned unchanged. `bare` is the direction of a name that needs a direction and has none.
+fn with_profile(spec: &[String], bare: Option<Direction>) -> Cow<'_, [String]> {
+    let Some((first, rest)) = spec.split_first() else { return Cow::Borrowed(spec) };
+    let Ok(name) = first.parse::<ProfileName>() else { return Cow::Borrowed(spec) };
+    let direction = name.direction.or(bare).map_or_else(String::new, |direction| format!("/{}", direction.word()));
+    Cow::Owned([format!("{PROFILE}{}{direction}", name.profile.title())].into_iter().chain(rest.iter().cloned()).collect())
 }
 
 /// Returns whether a link is written in keys of a scene (`true`) or in words of tc-netem (`false`).
@@ -57,8 +74,8 @@ fn is_keys(spec: &[String]) -> Result<bool, Failure> {
     )))
 }
 
-fn of_keys(arguments: &LinkArguments) -> Result<(LinkModel, Asked), Failure> {
-    let model = link_from_keys(&arguments.spec).map_err(Failure::LinkKeys)?;
+fn of_keys(spec: &[String], arguments: &LinkArguments) -> Result<(LinkModel, Asked), Failure> {
+    let model = link_from_keys(spec).map_err(Failure::LinkKeys)?;
     let asked = Asked::of(&model, arguments.every, arguments.size);
     Ok((model, asked))
 }
@@ -70,6 +87,8 @@ pub(crate) fn link_and_keys(spec: &[String]) -> Result<(LinkModel, LinkKeys), Fa
     if spec.is_empty() {
         return Ok((LinkModel::default(), nothing));
     }
+    let spec = with_profile(spec, None);
+    let spec = spec.as_ref();
     if is_keys(spec)? {
         let model = link_from_keys(spec).map_err(Failure::LinkKeys)?;
         let keys = spec.iter().filter_map(|text| text.split_once('='));
@@ -81,7 +100,13 @@ pub(crate) fn link_and_keys(spec: &[String]) -> Result<(LinkModel, LinkKeys), Fa
 }
 
 fn parsed(said: &str) -> Result<Netem, Failure> {
-    Netem::parse(said).map_err(|error| Failure::Input(format!("these words do not describe a link:\n{}", error.excerpt(said))))
+    Netem::parse(said).map_err(|error| {
+        let first = said.split(' ').next().unwrap_or_default();
+        // Whoever misspells the name of a link of the library is told the name that is near, and not the options of tc.
+        let near =
+            library::nearest(first).map_or_else(String::new, |name| format!("\ndid you mean {name}, a link of the library (cohaptic link --list)?"));
+        Failure::Input(format!("these words do not describe a link:\n{}{near}", error.excerpt(said)))
+    })
 }
 
 fn not_exact(said: &str, error: &ExactError) -> Failure {

@@ -7,6 +7,7 @@ mod commands;
 mod documents;
 mod help;
 mod keys;
+mod links;
 
 use std::fs;
 
@@ -65,6 +66,11 @@ fn the_pages_of_keys_are_the_catalogue() {
     for (name, text) in keys::pages() {
         assert_page(&format!("docs/{name}"), &text);
     }
+}
+
+#[test]
+fn the_page_of_links_is_the_library() {
+    assert_page("docs/reference-links.md", &links::page());
 }
 
 #[test]
