@@ -23,7 +23,7 @@ from cohaptic.compare import Comparison, compare
 from cohaptic.errors import AnalysisError, CohapticError, SceneError, UnreadableError
 from cohaptic.fit import fit
 from cohaptic.law import Held, Law, Peer, State
-from cohaptic.link import CAUSES, Copies, Event, Link, Sent
+from cohaptic.link import CAUSES, Copies, Event, Link, Sent, profile
 from cohaptic.run import Picture, Run
 from cohaptic.scene import Check, Expectation, Scene
 from cohaptic.stability import Admittance, Boundary, ContactMode, Crossing, Map, Part, Radius, Stability
@@ -62,4 +62,5 @@ __all__ = [
     "campaign",
     "compare",
     "fit",
+    "profile",
 ]

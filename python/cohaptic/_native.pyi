@@ -293,6 +293,11 @@ def eigenvalues(rows: "list[list[float]]") -> "numpy.ndarray":
     The eigenvalues of a square matrix, by falling modulus.
     """
 
+def is_profile(word: str) -> bool:
+    """
+    Whether a word names a link of the library, such as `starlink/down`.
+    """
+
 def map(scene: "Scene", x: "str", y: "str", columns: "int", rows: "int", threads: "int") -> "dict[str, typing.Any]":
     """
     The radius over a grid of two keys, each `KEY=LOW..HIGH`, as a mapping.
@@ -301,6 +306,11 @@ def map(scene: "Scene", x: "str", y: "str", columns: "int", rows: "int", threads
 def monodromy(scene: "Scene", law: "typing.Any | None" = None) -> "tuple[numpy.ndarray, list[tuple[str, str]], float, float, int, float]":
     """
     The monodromy matrix.
+    """
+
+def profile(name: str) -> str:
+    """
+    The document of a link of the library: `starlink`, `starlink@1`.
     """
 
 def stability(scene: "Scene", method: "str", law: "typing.Any | None" = None) -> "dict[str, typing.Any]":

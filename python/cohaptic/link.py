@@ -78,7 +78,7 @@ class Link:
     """A directed link: delays, losses, queues, order.
 
     ``spec`` is said in words of ``tc-netem``, or in keys of a scene: ``"delay 20ms 5ms loss 1%"`` or ``"delay=20ms jitter=5ms loss=1%"``; a list has
-    keys whose values have spaces. Seed, sender and receiver are the address of its random numbers: equal addresses give equal links, those of
+    keys whose values have spaces. Or it is a link of the library, which keys may follow: ``"starlink/down rate=50Mbit"``. Seed, sender and receiver are the address of its random numbers: equal addresses give equal links, those of
     ``cohaptic link`` with the same seed.
 
     >>> sent = Link("delay 20ms loss 10%", seed=1).send(np.arange(5) * 0.01, 64)
@@ -153,9 +153,26 @@ class Link:
         self._native.change(now, _keys(spec))
 
 
+def profile(name: str) -> dict[str, Any]:
+    """A link of the library with the source of each number: ``"starlink"``, or with the version, ``"starlink@1"``.
+
+    ``down`` and ``up`` have the ``keys`` of the link as TOML, and the ``reasons`` of each key: its ``grade``, the ``sources`` and ``how`` the number follows
+    from them. ``cohaptic link --list`` lists the names.
+
+    >>> dish = profile("starlink")
+    >>> dish["grade"], dish["down"]["keys"]["rate"], dish["down"]["reasons"]["rate"]["sources"]
+    ('C', '"178Mbit"', ['michel-2022'])
+    """
+    document: dict[str, Any] = json.loads(_native.profile(name))
+    return document
+
+
 def _keys(spec: str | Iterable[str]) -> list[str]:
     if not isinstance(spec, str):
         return list(spec)
+    first, *rest = spec.split() or [""]
+    if _native.is_profile(first):
+        return [f"profile={first}", *rest]
     if "=" in spec:
         return spec.split()
     words = spec.strip()

@@ -34,7 +34,7 @@ mod _native {
     #[pymodule_export]
     use crate::law::{Held, State};
     #[pymodule_export]
-    use crate::link::{Link, causes};
+    use crate::link::{Link, causes, is_profile, profile};
     #[pymodule_export]
     use crate::run::Run;
     #[pymodule_export]

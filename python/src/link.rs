@@ -4,7 +4,9 @@ use std::convert::Infallible;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use cohaptic_answers::library::of_profile;
 use cohaptic_answers::link::{Meter, document, too_long};
+use cohaptic_linkfile::library::{NameError, ProfileName};
 use cohaptic_linkfile::link_from_keys;
 use cohaptic_measure::asked::Asked;
 use cohaptic_measure::steady::SteadyStream;
@@ -32,6 +34,19 @@ pub(crate) struct Link {
 #[pyfunction]
 pub(crate) fn causes() -> Vec<&'static str> {
     std::iter::once("").chain(DropCause::ALL.map(DropCause::name)).collect()
+}
+
+/// The document of a link of the library: `starlink`, `starlink@1`.
+#[pyfunction]
+pub(crate) fn profile(name: &str) -> PyResult<String> {
+    let name: ProfileName = name.parse().map_err(|error: NameError| PyValueError::new_err(error.to_string()))?;
+    Ok(json(&of_profile(&name.profile)))
+}
+
+/// Whether a word names a link of the library, such as `starlink/down`.
+#[pyfunction]
+pub(crate) fn is_profile(word: &str) -> bool {
+    word.parse::<ProfileName>().is_ok()
 }
 
 /// The code of a packet that is not out of the link yet, however long one waits.

@@ -2,19 +2,21 @@
 
 import csv
 import itertools
+import json
 import math
 
 import numpy as np
 import pytest
 from conftest import Command
 
-from cohaptic import CAUSES, Link
+from cohaptic import CAUSES, Link, profile
 
 SPECS = [
     "delay 20ms 5ms loss 1%",
     "delay 20ms 5ms distribution normal duplicate 10% corrupt 5%",
     "delay=20ms jitter=5ms order=in-order loss=20%",
     "rate 256kbit limit 5",
+    "wifi-busy/down loss=2%",
     "",
 ]
 
@@ -140,3 +142,11 @@ def test_times_that_make_no_sense_are_refused() -> None:
     with pytest.raises(ValueError, match="time goes back"):
         link.handle_packet(1.0)
     assert link.send([]).arrived.shape == (0,)
+
+
+def test_a_profile_has_its_sources(cohaptic_program: Command) -> None:
+    done = cohaptic_program("link", "dsl", "--show", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["profiles"] == [profile("dsl@1")]
+    with pytest.raises(ValueError, match='did you mean "dsl"'):
+        profile("dls")

@@ -1,8 +1,48 @@
 //! Links of the library in words: the list of `cohaptic link --list`, and one profile with the source of each number.
 
 use core::fmt::Write as _;
+use std::collections::BTreeMap;
 
-use cohaptic_linkfile::library::{Direction, Grade, Line, Profile, profiles};
+use cohaptic_linkfile::library::{Direction, Grade, Line, Profile, Reason, Source, profiles};
+use serde::Serialize;
+
+use crate::document;
+
+/// Returns the answer of `cohaptic link --list --json` or `--show --json`: profiles with all numbers, reasons and sources.
+pub fn document(profiles: impl IntoIterator<Item = Profile>) -> impl Serialize {
+    document! { profiles: profiles.into_iter().map(|profile| of_profile(&profile)).collect::<Vec<_>>() }
+}
+
+/// Returns the document of one profile. Values of keys are TOML.
+pub fn of_profile(profile: &Profile) -> impl Serialize + use<> {
+    let line = |line: &Line| {
+        let reason = |(key, reason): (&String, &Reason)| {
+            (key.clone(), document! { grade: reason.grade.word(), sources: reason.sources.clone(), how: reason.how.clone() })
+        };
+        document! {
+            keys: line.keys().into_iter().map(|(key, value)| (key.to_owned(), value)).collect::<BTreeMap<String, String>>(),
+            reasons: line.reasons.iter().map(reason).collect::<BTreeMap<_, _>>(),
+            between: line.between.clone(),
+        }
+    };
+    let source = |(name, source): (&String, &Source)| {
+        (name.clone(), document! { cite: source.cite.clone(), read: source.read.clone(), licence: source.licence.clone() })
+    };
+    document! {
+        name: profile.name.clone(),
+        version: profile.version,
+        what: profile.what.clone(),
+        place: profile.place.clone(),
+        when: profile.when.clone(),
+        grade: profile.grade().word(),
+        method: profile.method.clone(),
+        not_modelled: profile.not_modelled.clone(),
+        down: line(&profile.down),
+        up: line(&profile.up),
+        modulators: profile.chains.clone(),
+        sources: profile.sources.iter().map(source).collect::<BTreeMap<_, _>>(),
+    }
+}
 
 /// Returns the list of all profiles: first those with sources, then the tables of tools. Each row has the name with its version, the grade, the delay and the
 /// rate in both directions, and what is modelled.

@@ -35,6 +35,7 @@ impl DocumentSchema {
     pub(crate) const FALCON_WATCH: Self = Self { name: "cohaptic/falcon-watch", version: 1 };
     pub(crate) const FALCON_SIMULATE: Self = Self { name: "cohaptic/falcon-simulate", version: 1 };
     pub(crate) const LINK: Self = Self { name: "cohaptic/link", version: 1 };
+    pub(crate) const PROFILES: Self = Self { name: "cohaptic/profiles", version: 1 };
     pub(crate) const FIT: Self = Self { name: "cohaptic/fit", version: 1 };
     pub(crate) const PAPER: Self = Self { name: "cohaptic/paper", version: 1 };
     pub(crate) const ERROR: Self = Self { name: "cohaptic/error", version: 1 };

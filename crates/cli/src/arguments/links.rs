@@ -15,10 +15,10 @@ pub(crate) struct LinkArguments {
     #[arg(required_unless_present_any = ["from", "list"], conflicts_with = "from", value_name = "SPEC", allow_negative_numbers = true)]
     pub(crate) spec: Vec<String>,
     /// List the links of the library: name, grade, delay and rate, and what each is
-    #[arg(long, conflicts_with_all = ["spec", "from", "show", "json"])]
+    #[arg(long, conflicts_with_all = ["spec", "from", "show"])]
     pub(crate) list: bool,
     /// Show every key of a link of the library with its source, and send nothing
-    #[arg(long, conflicts_with_all = ["from", "json"])]
+    #[arg(long, conflicts_with = "from")]
     pub(crate) show: bool,
     /// Replay a file of fates instead, as --fates writes it
     #[arg(long, value_name = "FATES.csv")]

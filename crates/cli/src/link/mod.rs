@@ -30,8 +30,7 @@ const PACKETS: u64 = 100_000;
 /// Drives one link, and prints the configured figures beside the measured figures.
 pub(crate) fn link(arguments: &LinkArguments) -> Result<ExitCode, Failure> {
     if arguments.list || arguments.show {
-        output::text(&if arguments.list { cohaptic_answers::library::list() } else { library::shown(&arguments.spec)? })?;
-        return Ok(ExitCode::SUCCESS);
+        return library::answer(arguments).map(|()| ExitCode::SUCCESS);
     }
     let (measured, written) = drive(arguments, Spec::read(arguments)?)?;
     let document = cohaptic_answers::link::document(&measured, Some(&written));

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use cohaptic_linkfile::library::{Direction, Grade, ProfileName, names, of_owner, profile, profiles};
-use cohaptic_linkfile::{LinkKeys, link_from_keys};
+use cohaptic_linkfile::{Fingerprint, LinkKeys, link_from_keys};
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{Fate, Link, LinkConfig, LinkModel, LinkName, Modulated};
 
@@ -221,3 +221,43 @@ fn a_modulator_belongs_to_the_owner_of_a_line() {
     let plain = Arc::new(link(&["delay=3ms"]));
     assert!(Arc::ptr_eq(&plain, &of_owner(Arc::clone(&plain), "anna")));
 }
+
+/// A version never changes: these are the fingerprints of all keys and modulators of each profile. A profile whose numbers change gets a new version, and a new row
+/// beside the old one; words about sources may be corrected.
+#[test]
+fn a_version_never_changes() {
+    let found: Vec<String> = profiles()
+        .map(|profile| {
+            let keys = Direction::BOTH.map(|direction| format!("{:?}", profile.line(direction).keys()));
+            let all = format!("{} {} {:?}", keys[0], keys[1], profile.chains);
+            format!("{} {}", profile.title(), Fingerprint::of(all))
+        })
+        .collect();
+    assert_eq!(found, VERSIONS);
+}
+
+const VERSIONS: [&str; 23] = [
+    "3g@1 68e46df45ca02010",
+    "5g-walking@1 4ea79d586add9fff",
+    "cable@1 7d1b24793298bda5",
+    "dsl@1 a7d6dbf46f4ea052",
+    "geo-satellite@1 6bcc091dc0631e54",
+    "lte-driving@1 a253e8550758d28e",
+    "starlink@1 2a8c2d0ee745dae8",
+    "transatlantic@1 d16a9c0ab457f865",
+    "wifi-busy@1 ddf0ff8552c8b46a",
+    "apple/3g@1 b55126817ba573b2",
+    "apple/edge@1 018492183ab5cf15",
+    "devtools/3g@1 f40ac5e2d48a2c8d",
+    "devtools/slow-4g@1 56246ff56776ad52",
+    "devtools/fast-4g@1 7cfb19e577ba2cf6",
+    "wpt/2g@1 c963fa5fb2c3e13a",
+    "wpt/3g@1 aba3cbf5385e7351",
+    "wpt/3g-fast@1 a80980df8735d111",
+    "wpt/3g-slow@1 7989f674a5e389b1",
+    "wpt/4g@1 2e1ec7b8394d674d",
+    "wpt/cable@1 02e002e53215287d",
+    "wpt/dsl@1 6bae0be51d568520",
+    "wpt/edge@1 0f8e3af3603e31f9",
+    "wpt/lte@1 1ffcae1f31ee3651",
+];

@@ -11,7 +11,7 @@ pub(super) struct Document {
 /// Command that succeeds on machines on which the router can run: it needs namespaces and devices.
 pub(super) const NAMESPACES: &str = "unshare --map-root-user --net --mount true && test -w /dev/net/tun && ip -V && python3 -V";
 
-pub(super) const DOCUMENTS: [Document; 24] = [
+pub(super) const DOCUMENTS: [Document; 25] = [
     Document {
         command: "run",
         lines: &[
@@ -477,6 +477,28 @@ pub(super) const DOCUMENTS: [Document; 24] = [
                 "packets_per_s, measured_packets, interrupted, files",
                 "how fast; of how many packets figures are, the first; whether cut short; what was written",
             ),
+        ],
+    },
+    Document {
+        command: "link --list, link --show",
+        lines: &["cohaptic link --list --json"],
+        rows: &[
+            (
+                "profiles[].name, profiles[].version, profiles[].grade",
+                "the name without version, the version, and the worst grade of delay, rate and loss: A, B, C or preset",
+            ),
+            (
+                "profiles[].what, profiles[].place, profiles[].when, profiles[].method, profiles[].not_modelled",
+                "what is modelled, where and when it was measured, how the numbers were made, and what is missing",
+            ),
+            ("profiles[].down.keys.NAME, profiles[].up.keys.NAME", "the keys of the link in either direction, as TOML"),
+            (
+                "profiles[].down.reasons.NAME, profiles[].up.reasons.NAME",
+                "of each key `grade`, the names of its `sources`, and `how` it follows from them",
+            ),
+            ("profiles[].down.between.NAME, profiles[].up.between.NAME", "how links of this kind differ, from the 10th to the 90th percentile"),
+            ("profiles[].modulators", "the modulators of both directions, as TOML"),
+            ("profiles[].sources.NAME", "of each source `cite`, how it was `read`, and the `licence` of its data"),
         ],
     },
     Document {
