@@ -1,6 +1,7 @@
 //! The answers about a steady stream over one link: requested and achieved figures of the link, as a document and in words.
 
 mod document;
+mod picture;
 mod words;
 
 use cohaptic_measure::achieved::{Accumulator, Achieved};
@@ -10,6 +11,7 @@ use cohaptic_measure::steady::SteadyStream;
 use cohaptic_wan::PacketRecord;
 
 pub use document::{Written, document};
+pub use picture::LinkPicture;
 pub use words::words;
 
 /// Greatest number of packets in the figures. Each packet takes 127 bytes during the computation, half a gigabyte in all.

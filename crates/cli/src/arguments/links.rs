@@ -50,6 +50,9 @@ pub(crate) struct LinkArguments {
     /// Write the fate of every packet as a capture, for packet analysers
     #[arg(long, value_name = "FILE")]
     pub(crate) pcapng: Option<PathBuf>,
+    /// Draw the delay of each packet, the distribution of the delays, and the rate of what arrived
+    #[arg(long, value_name = "FILE.svg")]
+    pub(crate) picture: Option<PathBuf>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, clap::ValueEnum)]

@@ -3,12 +3,12 @@
 mod library;
 mod spec;
 
-use std::io;
+use std::io::{self, Write as _};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
-use cohaptic_answers::link::{Measured, Meter, Written, too_long};
+use cohaptic_answers::link::{LinkPicture, Measured, Meter, Written, too_long};
 use cohaptic_files::WholeFile;
 use cohaptic_measure::fates::FateWriter;
 use cohaptic_measure::pcapng::CaptureWriter;
@@ -66,7 +66,7 @@ fn drive(arguments: &LinkArguments, spec: Spec) -> Result<(Measured, Written), F
     )?;
     let wall_s = start.elapsed().as_secs_f64();
     progress.clear();
-    let files = sinks.finish()?;
+    let files = sinks.finish(&spec.said)?;
     #[expect(clippy::cast_precision_loss, reason = "for people")]
     let packets_per_s = sent as f64 / wall_s;
     Ok((meter.finish(spec.said, spec.asked, [sent, wanted]), Written { packets_per_s, files }))
@@ -76,6 +76,7 @@ fn drive(arguments: &LinkArguments, spec: Spec) -> Result<(Measured, Written), F
 struct Sinks {
     fates: Option<Sink<FateWriter<WholeFile>>>,
     capture: Option<Sink<CaptureWriter<WholeFile>>>,
+    picture: Option<(WholeFile, PathBuf, LinkPicture)>,
 }
 
 /// Path of a file, and the writer of the file.
@@ -86,6 +87,7 @@ impl Sinks {
         Ok(Self {
             fates: begin(arguments.fates.as_ref(), FateWriter::new)?,
             capture: begin(arguments.pcapng.as_ref(), |to| CaptureWriter::new(to, "link"))?,
+            picture: begin(arguments.picture.as_ref(), Ok)?.map(|(path, file)| (file, path, LinkPicture::default())),
         })
     }
 
@@ -96,14 +98,19 @@ impl Sinks {
         if let Some((path, writer)) = &mut self.capture {
             writer.write(record, &[]).map_err(unwritten(path))?;
         }
+        if let Some((.., picture)) = &mut self.picture {
+            picture.record(record);
+        }
         Ok(())
     }
 
-    fn finish(self) -> Result<Vec<String>, Failure> {
+    /// Completes the files, and returns their names. `said` is the link in words.
+    fn finish(self, said: &str) -> Result<Vec<String>, Failure> {
         let fates = self.fates.map(|(path, writer)| (path, writer.finish()));
         let capture = self.capture.map(|(path, writer)| (path, writer.finish()));
+        let picture = self.picture.map(|(mut file, path, picture)| (path, file.write_all(picture.svg(said).as_bytes()).map(|()| file)));
         let mut files = Vec::new();
-        for (path, file) in fates.into_iter().chain(capture) {
+        for (path, file) in fates.into_iter().chain(capture).chain(picture) {
             file.and_then(WholeFile::finish).map_err(unwritten(&path))?;
             files.push(output::path(&path));
         }

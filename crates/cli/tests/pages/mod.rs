@@ -98,6 +98,7 @@ pages! {
     measured_cluster: "docs/measured-cluster.md",
     measured_router: "docs/measured-router.md",
     gallery: "docs/gallery.md",
+    gallery_links: "docs/gallery-links.md",
     how_to_dev_dependency: "docs/how-to-dev-dependency.md",
     how_to_existing_program: "docs/how-to-existing-program.md",
     how_to_keep_a_failure: "docs/how-to-keep-a-failure.md",

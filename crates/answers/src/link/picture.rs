@@ -1,0 +1,108 @@
+//! Picture of a link: the delay of each packet, the distribution of the delays, and the rate of what arrived.
+
+use cohaptic_picture::{Axis, Line, Look, Panel, Picture, Rug};
+use cohaptic_wan::{Fate, PacketRecord};
+
+/// Greatest number of packets in the picture, a minute at 333 packets a second. Later packets are left out, and the picture says so.
+const MOST: usize = 20_000;
+/// Number of quantiles that the distribution is drawn from.
+const QUANTILES: u32 = 400;
+/// Number of intervals over which the rate is averaged.
+const BINS: usize = 120;
+
+/// Packets of a link for a picture.
+#[derive(Clone, Debug, Default)]
+pub struct LinkPicture {
+    /// Instant of sending \[s\] and delay \[ms\] of each packet, by number. The delay of a lost packet is NaN.
+    packets: Vec<(f64, f64)>,
+    /// Instant of arrival \[s\] and length \[bit\] of each packet and each copy.
+    arrived: Vec<(f64, f64)>,
+    /// Number of packets that are not in the picture.
+    left_out: u64,
+}
+
+impl LinkPicture {
+    /// Adds a record, in any order.
+    pub fn record(&mut self, record: &PacketRecord) {
+        let place = usize::try_from(record.sequence).unwrap_or(usize::MAX);
+        if place >= MOST {
+            self.left_out += u64::from(record.copy == 0 && record.fate.is_end());
+            return;
+        }
+        if place >= self.packets.len() {
+            self.packets.resize(place + 1, (f64::NAN, f64::NAN));
+        }
+        let sent = record.offered.as_secs_f64();
+        if record.copy == 0 {
+            self.packets[place].0 = sent;
+        }
+        if let Fate::Delivered(at) = record.fate {
+            if record.copy == 0 {
+                self.packets[place].1 = at.saturating_duration_since(record.offered).as_secs_f64() * 1e3;
+            }
+            #[expect(clippy::cast_precision_loss, reason = "below 2^27")]
+            self.arrived.push((at.as_secs_f64(), record.size.get() as f64 * 8.0));
+        }
+    }
+
+    /// Returns the picture as SVG. `title` is the link in words.
+    #[must_use]
+    pub fn svg(&self, title: &str) -> String {
+        let lost: Vec<f64> = self.packets.iter().filter(|(_, delay)| delay.is_nan()).map(|(sent, _)| *sent).collect();
+        let mut delays = Panel::new(Axis::new("sent at").unit("s"), Axis::new("delay").unit("ms").include(0.0))
+            .with(Line::new(self.packets.iter().copied(), Look::of(0)).named("delay"));
+        if !lost.is_empty() {
+            delays = delays.with(Rug::new(lost, Look::of(1)).named("lost"));
+        }
+        let distribution = Panel::new(Axis::new("delay").unit("ms").include(0.0), Axis::new("share at or below").range(0.0, 1.0))
+            .with(Line::new(self.quantiles(), Look::of(0)));
+        let rates =
+            Panel::new(Axis::new("arrived at").unit("s"), Axis::new("rate").unit("kbit/s").include(0.0)).with(Line::steps(self.rates(), Look::of(0)));
+        let mut picture = Picture::new(title).aspect(0.4).panel(delays).panel(distribution).panel(rates);
+        if self.left_out > 0 {
+            picture = picture.note(format!("the first {MOST} packets; {} later ones are left out", self.left_out));
+        }
+        picture.svg()
+    }
+
+    /// Returns delays \[ms\], each with the share of arrived packets whose delay is at most as long. Of many packets only some are returned, because a picture has
+    /// no more points across.
+    fn quantiles(&self) -> Vec<(f64, f64)> {
+        let mut delays: Vec<f64> = self.packets.iter().map(|(_, delay)| *delay).filter(|delay| !delay.is_nan()).collect();
+        delays.sort_by(f64::total_cmp);
+        let Some(last) = delays.len().checked_sub(1) else { return Vec::new() };
+        (0..=QUANTILES)
+            .map(|number| {
+                let share = f64::from(number) / f64::from(QUANTILES);
+                #[expect(
+                    clippy::cast_precision_loss,
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "at most the number of packets"
+                )]
+                let place = (share * last as f64).round() as usize;
+                (delays[place], share)
+            })
+            .collect()
+    }
+
+    /// Returns the rate \[kbit/s\] of what arrived, averaged over intervals of equal length, each at its beginning \[s\].
+    fn rates(&self) -> Vec<(f64, f64)> {
+        let end = self.arrived.iter().map(|(at, _)| *at).fold(0.0, f64::max);
+        if end == 0.0 {
+            return Vec::new();
+        }
+        #[expect(clippy::cast_precision_loss, reason = "120")]
+        let width = end / BINS as f64;
+        let mut bits = [0.0; BINS];
+        for (at, length) in &self.arrived {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative, and no larger than the number of intervals")]
+            let place = (at / width) as usize;
+            // The last arrival lies at the end of the last interval.
+            bits[place.min(BINS - 1)] += length;
+        }
+        #[expect(clippy::cast_precision_loss, reason = "120")]
+        let rate = |(place, bits): (usize, &f64)| (place as f64 * width, bits / width / 1e3);
+        bits.iter().enumerate().map(rate).collect()
+    }
+}
