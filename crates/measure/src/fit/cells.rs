@@ -90,21 +90,22 @@ const fn greatest_common_divisor(mut one: u64, mut other: u64) -> u64 {
 }
 
 impl Cells {
-    /// Divides sorted delays, not all equal, of a clock of the given resolution: a cell for each value shown by the clock.
-    pub(super) fn new(sorted: &[f64], resolution: f64) -> Self {
+    /// Divides sorted delays of a clock: a cell for each value shown by the clock. `tick` returns the tick of the clock \[s\] for the delay with that index.
+    pub(super) fn new(sorted: &[f64], tick: impl Fn(usize) -> f64) -> Self {
         let median = sorted[sorted.len() / 2];
         let deviation = series::mean(&sorted.iter().map(|delay| (delay - median).abs()).collect::<Vec<_>>()).unwrap_or(0.0);
-        let width = resolution.max(NARROWEST * deviation).max(ROUNDING * sorted[sorted.len() - 1].abs());
-        // Least value, greatest value and count of each cell. Values less than half a width apart share a cell, as with a fine clock.
-        let mut shared: Vec<(f64, f64, usize)> = Vec::new();
-        for &delay in sorted {
+        let narrowest = (NARROWEST * deviation).max(ROUNDING * sorted[sorted.len() - 1].abs());
+        // Least value, greatest value, count and width of each cell. Values less than half a width apart share a cell, as with a fine clock.
+        let mut shared: Vec<(f64, f64, usize, f64)> = Vec::new();
+        for (place, &delay) in sorted.iter().enumerate() {
             match shared.last_mut() {
-                Some((first, last, held)) if delay - *first < width / 2.0 => (*last, *held) = (delay, *held + 1),
-                _ => shared.push((delay, delay, 1)),
+                Some((first, last, held, width)) if delay - *first < *width / 2.0 => (*last, *held) = (delay, *held + 1),
+                _ => shared.push((delay, delay, 1, tick(place).max(narrowest))),
             }
         }
-        let cell = |(place, &(first, last, held)): (usize, &(f64, f64, usize))| {
-            // Half a width around the values, but not beyond the middle between two neighbours.
+        let cell = |(place, &(first, last, held, width)): (usize, &(f64, f64, usize, f64))| {
+            // Half a width around the values, but not beyond the middle between two neighbours. Where the tick changes, as in ping from 9.99 ms to 10.0 ms,
+            // that middle is the true border: 9.995 ms.
             let before = place.checked_sub(1).map_or(f64::NEG_INFINITY, |before| f64::midpoint(shared[before].1, first));
             let after = shared.get(place + 1).map_or(f64::INFINITY, |after| f64::midpoint(last, after.0));
             Cell { low: before.max(first - width / 2.0), high: after.min(last + width / 2.0), count: count(held) }
@@ -181,17 +182,28 @@ mod tests {
     }
 
     #[test]
+    fn cells_meet_where_the_tick_changes() {
+        // ping prints 9.98, 9.99 and then 10.0 ms, for all from 9.995 to 10.05 ms.
+        let cells = Cells::new(&[9.98, 9.99, 10.0, 10.1], |place| if place < 2 { 0.01 } else { 0.1 });
+        let ends = [(9.975, 9.985), (9.985, 9.995), (9.995, 10.05), (10.05, 10.15)];
+        assert!(
+            cells.cells.iter().zip(ends).all(|(cell, (low, high))| (cell.low - low).abs() < 1e-12 && (cell.high - high).abs() < 1e-12),
+            "{cells:?}"
+        );
+    }
+
+    #[test]
     fn every_delay_is_in_one_cell() {
-        let cells = Cells::new(&[1.0, 1.0, 2.0, 5.0], 1.0);
+        let cells = Cells::new(&[1.0, 1.0, 2.0, 5.0], |_| 1.0);
         let cell = |low, high, count| Cell { low, high, count };
         assert_eq!(cells.cells, [cell(0.5, 1.5, 2.0), cell(1.5, 2.5, 1.0), cell(4.5, 5.5, 1.0)]);
         // A finer clock: 20 000 values of a uniform law.
         let fine: Vec<f64> = (0..20_000).map(|i| f64::from(i) * 1e-3).collect();
-        for cells in [Cells::new(&fine, 1e-12), Cells::new(&fine, 1e-12).coarse(), Cells::new(&fine, 0.0).judged()] {
+        for cells in [Cells::new(&fine, |_| 1e-12), Cells::new(&fine, |_| 1e-12).coarse(), Cells::new(&fine, |_| 0.0).judged()] {
             assert!((cells.cells.iter().map(|cell| cell.count).sum::<f64>() - 20_000.0).abs() < 0.5);
             assert!(cells.cells.iter().all(|cell| cell.low < cell.high) && cells.cells.windows(2).all(|pair| pair[0].high <= pair[1].low));
         }
-        let coarse = Cells::new(&fine, 1e-12).coarse().cells;
+        let coarse = Cells::new(&fine, |_| 1e-12).coarse().cells;
         assert!((100..400).contains(&coarse.len()) && coarse[0].count < 1.5 && coarse[coarse.len() - 1].count < 1.5, "{}", coarse.len());
         // A wide cell has the same share of the law as of the delays.
         assert!(coarse.iter().filter(|cell| cell.count > 1.5).all(|cell| ((cell.high - cell.low) / 1e-3 / cell.count - 1.0).abs() < 1e-6));

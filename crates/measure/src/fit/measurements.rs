@@ -3,6 +3,7 @@
 use cohaptic_wan::{Fate, FateLog};
 
 use super::skew::{Skew, SkewError};
+use super::ticks::Ticks;
 
 /// A measured packet.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -19,6 +20,7 @@ pub struct Measurements {
     pub(super) packets: Vec<Measurement>,
     /// Removed drift; `None` if no drift was removed.
     pub(super) removed: Option<Skew>,
+    pub(super) ticks: Ticks,
 }
 
 /// Error of making measurements. Packets are counted from 1.
@@ -43,6 +45,18 @@ pub enum MeasurementsError {
         /// Instant of sending of the packet before \[s\].
         before_s: f64,
     },
+    /// A tick of the clock is no finite number above zero.
+    #[error("found a tick of {tick_s} s: expected a finite time above zero")]
+    Tick {
+        /// Tick found \[s\].
+        tick_s: f64,
+    },
+    /// A share of a round trip is out of range.
+    #[error("found the share {share} of a round trip: expected above 0 and at most 1")]
+    Share {
+        /// Share found.
+        share: f64,
+    },
 }
 
 impl Measurements {
@@ -62,7 +76,7 @@ impl Measurements {
             }
             before_s = sent_s;
         }
-        Ok(Self { packets, removed: None })
+        Ok(Self::in_order(packets))
     }
 
     /// Takes the packets of a fate log. A packet is sent when offered, and has the delay of its first arrived copy.
@@ -86,7 +100,7 @@ impl Measurements {
 
     /// Makes measurements of packets known to be finite and in the order of sending.
     pub(super) const fn in_order(packets: Vec<Measurement>) -> Self {
-        Self { packets, removed: None }
+        Self { packets, removed: None, ticks: Ticks::Found }
     }
 
     /// Returns the packets, in the order of sending.
@@ -131,7 +145,7 @@ impl Measurements {
     /// [`MeasurementsError::NotFinite`] if a sum is not finite.
     pub fn shifted(&self, by_s: f64) -> Result<Self, MeasurementsError> {
         let later = |packet: &Measurement| Measurement { delay_s: packet.delay_s.map(|delay| delay + by_s), ..*packet };
-        Ok(Self { removed: self.removed, ..Self::new(self.packets.iter().map(later).collect())? })
+        Ok(Self { removed: self.removed, ticks: self.ticks.clone(), ..Self::new(self.packets.iter().map(later).collect())? })
     }
 
     /// Estimates the linear drift of a clock against the other. Returns the measurements without the drift if the drift is significant
@@ -150,7 +164,7 @@ impl Measurements {
             delay_s: packet.delay_s.map(|delay| delay - skew.seconds_per_second * (packet.sent_s - first.sent_s)),
             ..*packet
         };
-        Ok((Self { packets: self.packets.iter().map(corrected).collect(), removed: Some(skew) }, skew))
+        Ok((Self { packets: self.packets.iter().map(corrected).collect(), removed: Some(skew), ticks: self.ticks.clone() }, skew))
     }
 }
 

@@ -31,6 +31,7 @@ mod search;
 mod skew;
 mod steps;
 mod table;
+mod ticks;
 
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -106,8 +107,8 @@ pub struct Goodness {
     pub sd_se_s: f64,
     /// Least delay \[s\].
     pub least_s: f64,
-    /// Resolution of the clock \[s\]: the greatest step such that all differences of delays are whole multiples, in nanoseconds. A shown delay stands for
-    /// all delays within half a step.
+    /// Tick of the clock \[s\], of the median delay: as given, as the program prints delays, or the greatest step such that all differences of delays are
+    /// whole multiples, in nanoseconds. A shown delay stands for all delays within half a tick.
     pub resolution_s: f64,
     /// Least delay, corrected for its bias without a law and not below zero \[s\]: 2x₁ − x₂ of the two least *different* delays (Robson & Whitlock 1964,
     /// Biometrika 51(1/2)). Right for laws with a density at their floor, and too high for other laws, whose own floors are in `laws`.
@@ -159,6 +160,16 @@ pub enum FitError {
         /// Delay of all packets \[s\].
         delay_s: f64,
     },
+    /// All delays are equal, to half a tick of the clock.
+    #[error("all {received} delays are {delay_s} s, to half a tick of {tick_s} s: there is no jitter to estimate, the link is this constant delay")]
+    OneTick {
+        /// Packets arrived.
+        received: usize,
+        /// Least delay \[s\].
+        delay_s: f64,
+        /// Tick of the clock \[s\].
+        tick_s: f64,
+    },
     /// All packets were sent at the same instant.
     #[error("all packets were sent at one instant, {sent_s} s: expected packets of several instants")]
     OneInstant {
@@ -176,7 +187,7 @@ const LEAST_RECEIVED: usize = 50;
 ///
 /// # Errors
 ///
-/// [`FitError`] if fewer than 50 packets arrived, a delay is negative, all delays are equal in nanoseconds, or all packets were sent at the same instant.
+/// [`FitError`] if fewer than 50 packets arrived, a delay is negative, all delays are equal in nanoseconds or to half a known tick, or all packets were sent at the same instant.
 ///
 /// # Panics
 ///
@@ -185,8 +196,10 @@ pub fn fit(measurements: &Measurements) -> Result<Fitted, FitError> {
     let packets = measurements.packets();
     let arrivals: Vec<(f64, f64)> = measurements.arrivals().collect();
     let received = arrivals.len();
-    let mut sorted: Vec<f64> = arrivals.iter().map(|arrival| arrival.1).collect();
-    sorted.sort_by(f64::total_cmp);
+    let mut shown: Vec<(f64, Option<f64>)> =
+        packets.iter().enumerate().filter_map(|(number, packet)| Some((packet.delay_s?, measurements.ticks.of(number)))).collect();
+    shown.sort_by(|one, other| one.0.total_cmp(&other.0));
+    let sorted: Vec<f64> = shown.iter().map(|delay| delay.0).collect();
     let [&least_s, &greatest] = [sorted.first(), sorted.last()].map(|end| end.unwrap_or(&0.0));
     if received == 0 {
         return Err(FitError::NothingArrived { packets: packets.len() });
@@ -201,6 +214,11 @@ pub fn fit(measurements: &Measurements) -> Result<Fitted, FitError> {
     let Some(resolution_s) = resolution_s else {
         return Err(FitError::ConstantDelay { received, delay_s: least_s });
     };
+    let tick_s = |place: usize| shown[place].1.unwrap_or(resolution_s);
+    let cells = Cells::new(&sorted, tick_s);
+    if cells.cells.len() == 1 {
+        return Err(FitError::OneTick { received, delay_s: least_s, tick_s: tick_s(0) });
+    }
     let (spacing_s, evenly_spaced) = spacing(packets);
     if spacing_s <= 0.0 {
         return Err(FitError::OneInstant { sent_s: packets[0].sent_s });
@@ -208,7 +226,7 @@ pub fn fit(measurements: &Measurements) -> Result<Fitted, FitError> {
 
     let effective = effective(packets);
     let moments = Moments::of(&sorted, effective).expect("delays differ");
-    let laws = distribution::fit_all(&Cells::new(&sorted, resolution_s), &moments, effective);
+    let laws = distribution::fit_all(&cells, &moments, effective);
     let correlation = correlation::fit(&arrivals, spacing_s);
     let losses = loss::fit_all(&packets.iter().map(|packet| (packet.sent_s, packet.delay_s.is_none())).collect::<Vec<_>>(), evenly_spaced);
     let delays: Vec<f64> = arrivals.iter().map(|arrival| arrival.1).collect();
@@ -234,7 +252,7 @@ pub fn fit(measurements: &Measurements) -> Result<Fitted, FitError> {
         sd_s: moments.sd,
         sd_se_s: moments.sd_error,
         least_s,
-        resolution_s,
+        resolution_s: tick_s(received / 2),
         floor_robson_whitlock_s: robson_whitlock(&sorted),
         kolmogorov_limit: distribution::limit(effective),
         laws: laws.iter().map(|law| law.fit).collect(),

@@ -32,6 +32,62 @@ fn gamma_of_shape_2(z: f64) -> f64 {
     low
 }
 
+/// Returns delays with these counts in an order without memory. `prime` must be prime to the number of delays.
+pub(super) fn in_an_order_without_memory(counts: &[(u32, usize)], prime: usize) -> Vec<u32> {
+    let sorted: Vec<u32> = counts.iter().flat_map(|&(delay, count)| std::iter::repeat_n(delay, count)).collect();
+    (0..sorted.len()).map(|i| sorted[i * prime % sorted.len()]).collect()
+}
+
+/// Returns measurements of these delays \[s\], one packet every 10 ms.
+pub(super) fn one_clock(delays: &[f64]) -> Measurements {
+    Measurements::new((0..).zip(delays).map(|(i, &delay)| Measurement { sent_s: f64::from(i) * 0.01, delay_s: Some(delay) }).collect()).unwrap()
+}
+
+/// Tied delays, whose laws were computed by another program for the design: 200 delays of a clock of 1 ms, and ln L, Kolmogorov's distance, mean, deviation
+/// and floor of three laws.
+#[test]
+fn laws_of_tied_delays_are_those_computed_elsewhere() {
+    let delays = in_an_order_without_memory(&[(20, 22), (21, 61), (22, 53), (23, 31), (24, 17), (25, 9), (26, 4), (27, 3)], 77);
+    let fitted = fit(&one_clock(&delays.iter().map(|delay| f64::from(*delay) * 1e-3).collect::<Vec<_>>())).unwrap();
+    let expected = [
+        (DelayLaw::Gamma, -348.9333, 0.0061, 22.0927, 1.5102, 19.6090),
+        (DelayLaw::Lognormal, -349.6109, 0.0100, 22.0946, 1.5474, 18.7146),
+        (DelayLaw::Normal, -368.4657, 0.0724, 22.0904, 1.4998, 0.0),
+    ];
+    for (law, log_likelihood, kolmogorov, mean, sd, floor) in expected {
+        let found = fitted.goodness.laws.iter().find(|fit| fit.distribution == law).unwrap();
+        // One unit of the last digit: the top of a likelihood is flat, and each optimiser ends at its own place.
+        let figures = [found.log_likelihood, found.kolmogorov, found.mean_s * 1e3, found.sd_s * 1e3, found.floor_s.unwrap_or(0.0) * 1e3];
+        for (found, expected) in figures.into_iter().zip([log_likelihood, kolmogorov, mean, sd, floor]) {
+            assert!((found - expected).abs() < 1.5e-4, "{law:?} {found} {expected}");
+        }
+    }
+    assert!(fitted.goodness.laws.iter().all(|law| law.log_likelihood <= 0.0));
+    assert!(matches!(fitted.link.jitter.distribution, FittedLaw::Law(_)));
+}
+
+/// Two heaps, 20 ms apart. By construction the mean is 31 ms and the deviation 10.79 ms; 10 000 independent delays have the limit 0.036.
+#[test]
+fn two_heaps_have_no_law() {
+    // A random order: in a regular one the delays have a memory, and are worth fewer.
+    let mut rng = TestRng::new(7);
+    let counts = [(20, 4000), (21, 900), (22, 100), (40, 100), (41, 900), (42, 4000)];
+    let mut delays: Vec<f64> = counts.iter().flat_map(|&(delay, count)| std::iter::repeat_n(f64::from(delay) * 1e-3, count)).collect();
+    for last in (1..delays.len()).rev() {
+        delays.swap(last, (rng.unit() * (last + 1) as f64) as usize);
+    }
+    let fitted = fit(&one_clock(&delays)).unwrap();
+    assert_eq!(fitted.link.jitter.distribution, FittedLaw::Empirical);
+    assert!((fitted.goodness.kolmogorov_limit - 0.036).abs() < 1e-3, "{}", fitted.goodness.kolmogorov_limit);
+    assert!(
+        !fitted.goodness.laws.is_empty() && fitted.goodness.laws.iter().all(|law| !law.fits && law.kolmogorov > 0.2),
+        "{:#?}",
+        fitted.goodness.laws
+    );
+    assert!((fitted.link.delay_s - 0.031).abs() < 1e-6 && (fitted.link.jitter.sd_s - 10.79e-3).abs() < 1e-5, "{:?}", fitted.link);
+    assert!(fitted.delays_csv().is_some());
+}
+
 #[test]
 fn a_link_is_found_from_its_measurements() {
     let fitted = fit(&measured(1, 40_000, |_| 0.008)).unwrap();

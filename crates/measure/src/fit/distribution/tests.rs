@@ -19,7 +19,7 @@ fn sample(seed: u64, draw: impl Fn(&mut TestRng) -> f64) -> Vec<f64> {
 /// Fits all laws to independent delays of a clock of the given resolution.
 fn all(delays: &[f64], resolution: f64) -> Vec<LawFit> {
     let n = count(delays.len());
-    fit_all(&Cells::new(delays, resolution), &Moments::of(delays, n).unwrap(), n).iter().map(|candidate| candidate.fit).collect()
+    fit_all(&Cells::new(delays, |_| resolution), &Moments::of(delays, n).unwrap(), n).iter().map(|candidate| candidate.fit).collect()
 }
 
 /// Checks that the best law is the law drawn from. Mean and deviation must lie within 5 standard errors, sd/√n and sd·√((κ−1)/4n) for kurtosis κ; maximum

@@ -116,7 +116,7 @@ impl Measurements {
     /// If `range` reaches beyond the packets.
     #[must_use]
     pub fn part(&self, range: Range<usize>) -> Self {
-        Self { packets: self.packets[range].to_vec(), removed: self.removed }
+        Self { packets: self.packets[range.clone()].to_vec(), removed: self.removed, ticks: self.ticks.part(range) }
     }
 
     /// Returns the numbers of the packets of the longest part without a step, or of all packets without steps.
