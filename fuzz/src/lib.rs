@@ -9,6 +9,7 @@ pub mod captures;
 pub mod http;
 mod input;
 mod internet;
+pub mod measurements;
 pub mod netem;
 pub mod offload;
 pub mod relay;
@@ -27,10 +28,11 @@ pub use input::Input;
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
-pub const TARGETS: [Target; 12] = [
+pub const TARGETS: [Target; 13] = [
     ("admission", admission::run),
     ("captures", captures::run),
     ("http", http::run),
+    ("measurements", measurements::run),
     ("netem", netem::run),
     ("offload", offload::run),
     ("relay", relay::run),

@@ -63,9 +63,17 @@ class Delays:
     """
     A source of measurements.
     """
-    def fit(self, /, offset: SupportsFloat | SupportsIndex | None, least: SupportsFloat | SupportsIndex | None, skew: bool) -> str:
+    def fit(
+        self,
+        /,
+        offset: SupportsFloat | SupportsIndex | None,
+        least: SupportsFloat | SupportsIndex | None,
+        skew: bool,
+        tick: SupportsFloat | SupportsIndex | None,
+        cut: bool,
+    ) -> str:
         """
-        Estimates the link, and gives the document of `cohaptic fit --json`. `offset` and `least` are in seconds.
+        Estimates the link, and gives the document of `cohaptic fit --json`. `offset`, `least` and `tick` are in seconds.
         """
     @staticmethod
     def of(sent: "numpy.ndarray", delays: "numpy.ndarray") -> "Delays":
@@ -73,9 +81,16 @@ class Delays:
         Delays \\[s\\] of packets sent at those instants \\[s\\]; NaN of packets that were lost.
         """
     @staticmethod
-    def read(file: str | PathLike[str], receiver: str | PathLike[str] | None = None, port: SupportsIndex | None = None) -> Delays:
+    def read(
+        file: str | PathLike[str],
+        receiver: str | PathLike[str] | None = None,
+        port: SupportsIndex | None = None,
+        direction: str | None = None,
+        split: SupportsFloat | SupportsIndex | None = None,
+    ) -> Delays:
         """
-        Reads a table of delays or a log of fates, or the captures of both ends.
+        Reads a table of delays, a log of fates or a file of another program, or the captures of both ends. `direction` is `up`, `down` or `rtt`; `split` is the
+        share of the round trip that is the delay.
         """
 
 @final

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use cohaptic_answers::fit::{Corrections, FitFailure, Source, SourceError, document};
+use cohaptic_answers::fit::{Corrections, Direction, FitFailure, ReadAs, Source, SourceError, Tick, document};
 use cohaptic_files::{LimitedFile, MOST_BYTES, MOST_CAPTURE_BYTES};
 use cohaptic_measure::fit::{Measurement, Measurements};
 use cohaptic_scene::SceneError;
@@ -15,8 +15,8 @@ use crate::errors::{of_fault, of_scene, of_value};
 use crate::interrupt::{Stop, interruptible};
 use crate::scene::json;
 
-/// The names that `cohaptic fit` has for the file with the link and for that with the delays.
-const FILES: [&str; 2] = ["link.toml", "link.delays.csv"];
+/// The name that `cohaptic fit` has for the file with the link.
+const FILE: &str = "link.toml";
 
 fn unreadable(py: Python<'_>, path: &Path, source: std::io::Error) -> PyErr {
     of_scene(py, &SceneError::Read { path: path.to_path_buf(), source, place: None })
@@ -39,13 +39,29 @@ pub(crate) struct Delays {
 
 #[pymethods]
 impl Delays {
-    /// Reads a table of delays or a log of fates, or the captures of both ends.
+    /// Reads a table of delays, a log of fates or a file of another program, or the captures of both ends. `direction` is `up`, `down` or `rtt`; `split` is the
+    /// share of the round trip that is the delay.
     #[staticmethod]
-    #[pyo3(signature = (file, receiver = None, port = None))]
-    fn read(py: Python<'_>, file: PathBuf, receiver: Option<PathBuf>, port: Option<u16>) -> PyResult<Self> {
+    #[pyo3(signature = (file, receiver = None, port = None, direction = None, split = None))]
+    fn read(
+        py: Python<'_>,
+        file: PathBuf,
+        receiver: Option<PathBuf>,
+        port: Option<u16>,
+        direction: Option<&str>,
+        split: Option<f64>,
+    ) -> PyResult<Self> {
         let from = open(py, &file)?;
+        let direction = match direction {
+            None => None,
+            Some("up") => Some(Direction::Up),
+            Some("down") => Some(Direction::Down),
+            Some("rtt") => Some(Direction::Rtt),
+            Some(other) => return Err(of_value(&format!("direction: found {other:?}, expected \"up\", \"down\" or \"rtt\""))),
+        };
+        let read_as = ReadAs { direction, split };
         let Some(receiver) = receiver else {
-            let source = interruptible(py, |_: &Stop| Source::read(from, |rest| rest.limited_to(MOST_BYTES)))?;
+            let source = interruptible(py, |_: &Stop| Source::read(from, |rest| rest.limited_to(MOST_BYTES), &read_as))?;
             let source = source.map_err(|error| match error {
                 SourceError::Io(error) => unreadable(py, &file, error),
                 SourceError::NotText { .. } | SourceError::OneEnd | SourceError::Content(_) => named(py, &file, &error),
@@ -71,16 +87,19 @@ impl Delays {
         Ok(Self { source: Source::of(measurements) })
     }
 
-    /// Estimates the link, and gives the document of `cohaptic fit --json`. `offset` and `least` are in seconds.
-    #[pyo3(signature = (offset, least, skew))]
-    fn fit(&self, py: Python<'_>, offset: Option<f64>, least: Option<f64>, skew: bool) -> PyResult<String> {
-        let least = least.map(Duration::try_from_secs_f64).transpose().map_err(|error| of_value(&format!("least: {error}")))?;
+    /// Estimates the link, and gives the document of `cohaptic fit --json`. `offset`, `least` and `tick` are in seconds.
+    #[pyo3(signature = (offset, least, skew, tick, cut))]
+    fn fit(&self, py: Python<'_>, offset: Option<f64>, least: Option<f64>, skew: bool, tick: Option<f64>, cut: bool) -> PyResult<String> {
+        let span = |name: &str, seconds: Option<f64>| {
+            seconds.map(Duration::try_from_secs_f64).transpose().map_err(|error| of_value(&format!("{name}: {error}")))
+        };
+        let least = span("least", least)?;
+        let tick = span("tick", tick)?.map(|tick| if cut { Tick::Cut(tick) } else { Tick::Rounded(tick) });
         if offset.is_some_and(|offset| !offset.is_finite()) {
             return Err(PyValueError::new_err("offset: expected a finite number of seconds"));
         }
-        let corrections = Corrections { offset_s: offset, least, skew };
-        let [file, delays] = FILES;
-        let answered = interruptible(py, |_: &Stop| self.source.fit(&corrections, Path::new(file), delays))?;
+        let corrections = Corrections { offset_s: offset, least, skew, tick };
+        let answered = interruptible(py, |_: &Stop| self.source.fit(&corrections, Path::new(FILE)))?;
         match answered {
             Ok(answered) => Ok(json(&document(&answered))),
             Err(FitFailure::Scene(error)) => Err(of_scene(py, &error)),

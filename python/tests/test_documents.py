@@ -153,6 +153,27 @@ def test_a_fit_of_arrays_is_that_of_their_table(answer, tmp_path) -> None:
     assert fit((sent, delays)) == fit(path) == without_program(answer("fit", str(path)))
 
 
+def test_a_fit_of_round_trips_is_that_of_the_program(answer, tmp_path) -> None:
+    path = tmp_path / "line.txt"
+    answers = (
+        f"[{100 + number / 100:.6f}] 64 bytes from h: icmp_seq={number} ttl=57 time={20 + number * 37 % 13}.{number % 10} ms"
+        for number in range(1, 200)
+        if number % 20 != 7
+    )
+    path.write_text("\n".join(["PING h", *answers, ""]), encoding="utf-8")
+    fitted = fit(path, split=0.5, tick=1e-4, cut=True)
+    assert fitted == without_program(answer("fit", str(path), "--split", "even", "--tick", "100us", "--cut"))
+    assert fitted["measured_by"]["program"] == "ping"
+    with pytest.raises(cohaptic.CohapticError, match="split: the file has round trips"):
+        fit(path)
+    with pytest.raises(cohaptic.CohapticError, match="direction: expected a file with both ways"):
+        fit(path, direction="up", split=0.5)
+    with pytest.raises(ValueError, match="sideways"):
+        fit(path, direction="sideways")  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="known tick"):
+        fit(path, split=0.5, cut=True)
+
+
 def test_measurements_without_a_link_are_refused(fates: str, tmp_path) -> None:
     with pytest.raises(cohaptic.UnreadableError, match=r"nowhere\.csv"):
         fit("nowhere.csv")

@@ -3,6 +3,7 @@
 
 mod chapter;
 mod files;
+mod measured_line;
 mod scenes;
 
 /// The message with which something fails.

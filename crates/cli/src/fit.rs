@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use cohaptic_answers::fit::{Corrections, FitFailure, Source, SourceError};
+use cohaptic_answers::fit::{Corrections, FitFailure, ReadAs, Source, SourceError, Tick};
 use cohaptic_files::MOST_BYTES;
 use cohaptic_measure::fit::FitError;
 
@@ -13,22 +13,20 @@ use crate::failure::{EXPECTATION, Failure};
 use crate::file::write_file;
 use crate::{file, output};
 
-/// Estimates a link and prints the estimate. With `--out`, also writes the link into a file, unless `--require-law` is given and no law fits the delays.
+/// Estimates a link, or takes the link that a file records, and prints the link. With `--out`, also writes the link into a file, unless `--require-law` is given and no law fits the delays.
 pub(crate) fn fit(arguments: &FitArguments) -> Result<ExitCode, Failure> {
     let source = read(arguments)?;
     let out = arguments.out.as_deref().unwrap_or_else(|| Path::new("link.toml"));
-    // The delays stand beside the file with the link, so that a scene in that folder finds both files.
-    let delays_file = out.with_extension("delays.csv");
-    let delays_name = delays_file.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    let corrections = Corrections { offset_s: arguments.offset, least: arguments.least, skew: arguments.skew };
-    let answered = source.fit(&corrections, out, &delays_name).map_err(|error| failure(&arguments.file, error))?;
-    let law_is_missing = arguments.require_law && answered.delays.is_some();
+    let tick = arguments.tick.map(|tick| if arguments.cut { Tick::Cut(tick) } else { Tick::Rounded(tick) });
+    let corrections = Corrections { offset_s: arguments.offset, least: arguments.least, skew: arguments.skew, tick };
+    let answered = source.fit(&corrections, out).map_err(|error| failure(&arguments.file, error))?;
+    let law_is_missing = arguments.require_law && !answered.has_law;
     let mut written: Vec<&Path> = Vec::new();
     if arguments.out.is_some() && !law_is_missing {
-        // The delays are written first, so that the file with the link never names a file that does not exist.
-        if let Some(csv) = &answered.delays {
-            write_file(&delays_file, csv)?;
-            written.push(&delays_file);
+        // The file beside the link is written first, so that the link never names a file that does not exist.
+        if let Some(beside) = &answered.beside {
+            write_file(&beside.path, &beside.content)?;
+            written.push(&beside.path);
         }
         write_file(out, &answered.scene)?;
         written.push(out);
@@ -60,7 +58,8 @@ fn read(arguments: &FitArguments) -> Result<Source, Failure> {
             .map_err(|error| Failure::Input(format!("{}, {}: {error}", output::path(path), output::path(receiver))));
     }
     let named = |why: &dyn std::fmt::Display| Failure::Input(format!("{}: {why}", output::path(path)));
-    Source::read(file::open_large(path)?, |rest| rest.limited_to(MOST_BYTES)).map_err(|error| match error {
+    let read_as = ReadAs { direction: arguments.direction.map(Into::into), split: arguments.split };
+    Source::read(file::open_large(path)?, |rest| rest.limited_to(MOST_BYTES), &read_as).map_err(|error| match error {
         SourceError::Io(error) => Failure::File { verb: "read", path: path.clone(), error },
         SourceError::NotText { line } => file::not_text(path, line),
         SourceError::OneEnd => {

@@ -4,6 +4,8 @@ use cohaptic_measure::fit::{Measurements, Skew, Step};
 use serde::Serialize;
 
 use super::milliseconds::milliseconds;
+use super::probed::describe_assumed;
+use super::source::Measured;
 use super::{Corrections, FitFailure};
 
 /// Largest plausible mean delay \[s\]. A longer mean delay is more likely an offset between two clocks.
@@ -15,6 +17,9 @@ pub(super) struct Clocks {
     /// Time added to every delay \[s\]; `None` if nothing was added.
     #[serde(skip_serializing_if = "Option::is_none")]
     added_s: Option<f64>,
+    /// `true` if `added_s` is assumed: half the difference of the least delays of both ways.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    is_assumed: bool,
     /// Instants of a lasting change of the least delay.
     steps: Vec<Step>,
     /// The fitted packets.
@@ -32,19 +37,24 @@ struct Fitted {
 }
 
 /// Corrects the measurements so that both ends could share one clock. Returns the corrected measurements, the applied corrections, and the estimated drift if
-/// requested. With `has_one_clock`, steps and long delays are left as properties of the link.
+/// requested. With one clock, steps and long delays are left as properties of the link.
 ///
 /// # Errors
 ///
 /// [`FitFailure::Measurements`] if a correction is impossible, [`FitFailure::LongDelays`] if the mean delay suggests an uncorrected offset.
-pub(super) fn settled(
-    asked: &Corrections,
-    measurements: &Measurements,
-    has_one_clock: bool,
-) -> Result<(Measurements, Clocks, Option<Skew>), FitFailure> {
+pub(super) fn settled(asked: &Corrections, measured: &Measured) -> Result<(Measurements, Clocks, Option<Skew>), FitFailure> {
     let refused = |error: &dyn std::fmt::Display| FitFailure::Measurements(error.to_string());
-    let mut added_s = asked.offset_s;
-    let shifted = added_s.map(|by| measurements.shifted(by)).transpose().map_err(|error| refused(&error))?;
+    let Measured { measurements, has_one_clock, probed, .. } = measured;
+    let has_one_clock = *has_one_clock;
+    // Half of a round trip has half of the tick that its program printed.
+    let share = probed.as_ref().and_then(|probed| probed.share).unwrap_or(1.0);
+    let ticked = asked.tick.map(|tick| tick.of(measurements.clone(), share)).transpose().map_err(|error| refused(&error))?;
+    let measurements = ticked.as_ref().unwrap_or(measurements);
+    // What a reader assumed gives way to what the user knows.
+    let assumed_s = probed.as_ref().and_then(|probed| probed.added_s);
+    let is_assumed = assumed_s.is_some() && asked.offset_s.is_none() && asked.least.is_none();
+    let mut added_s = asked.offset_s.or(assumed_s.filter(|_| is_assumed));
+    let shifted = asked.offset_s.map(|by| measurements.shifted(by - assumed_s.unwrap_or(0.0))).transpose().map_err(|error| refused(&error))?;
     let measurements = shifted.as_ref().unwrap_or(measurements);
     // With one clock a change of the least delay is a change of the path, and belongs to the link.
     let steps = if has_one_clock { Vec::new() } else { measurements.steps() };
@@ -62,20 +72,21 @@ pub(super) fn settled(
     if let (Some(least), Some(found)) = (asked.least, settled.least_s()) {
         let by = least.as_secs_f64() - found;
         settled = settled.shifted(by).map_err(|error| refused(&error))?;
-        added_s = Some(by);
+        added_s = Some(by + assumed_s.unwrap_or(0.0));
     }
     if let Some(mean_s) = settled.mean_s().filter(|mean| *mean > QUESTIONED_S && added_s.is_none() && !has_one_clock) {
         return Err(FitFailure::LongDelays { mean_s });
     }
-    let clocks = Clocks { added_s, steps, fitted, all: measurements.packets().len() };
+    let clocks = Clocks { added_s, is_assumed, steps, fitted, all: measurements.packets().len() };
     Ok((settled, clocks, skew))
 }
 
 /// Returns the lines of text about the corrections.
 pub(super) fn describe(clocks: &Clocks, skew: Option<&Skew>) -> Vec<String> {
     let mut lines = Vec::new();
-    if let Some(added) = clocks.added_s {
-        lines.push(format!("{} was added to every delay", milliseconds(added)));
+    if let Some(added_s) = clocks.added_s {
+        let known = || format!("{} was added to every delay", milliseconds(added_s));
+        lines.push(if clocks.is_assumed { describe_assumed(added_s) } else { known() });
     }
     for step in &clocks.steps {
         let by = step.by_s * 1e3;

@@ -2,20 +2,29 @@
 
 use serde::Serialize;
 
-use super::Answered;
+use super::{Answered, Kind};
 use crate::document;
 
 /// Returns the answer of `cohaptic fit --json`.
 pub fn document(answered: &Answered) -> impl Serialize {
+    let (estimate, recorded) = match &answered.kind {
+        Kind::Estimated(estimate) => (Some(&**estimate), None),
+        Kind::Recorded(recording) => (None, Some(recording)),
+    };
     document! {
         #[serde(flatten)]
-        fitted: &answered.fitted,
+        fitted: estimate.map(|estimate| &estimate.fitted),
+        #[serde(flatten)]
+        recorded: recorded.map(|recording| document! { recorded: recording }),
         // The keys of a scene.
         scene: answered.scene.as_str(),
         #[serde(flatten)]
-        skew: answered.skew.as_ref().map(|skew| document! { skew: skew }),
+        skew: estimate.and_then(|estimate| estimate.skew.as_ref()).map(|skew| document! { skew: skew }),
         #[serde(flatten)]
-        matched: answered.matched.as_ref().map(|matched| document! { matched: matched }),
-        clocks: &answered.clocks,
+        matched: estimate.and_then(|estimate| estimate.matched.as_ref()).map(|matched| document! { matched: matched }),
+        #[serde(flatten)]
+        measured_by: estimate.and_then(|estimate| estimate.probed.as_ref()).map(|probed| document! { measured_by: probed }),
+        #[serde(flatten)]
+        clocks: estimate.map(|estimate| document! { clocks: &estimate.clocks }),
     }
 }

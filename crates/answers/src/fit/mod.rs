@@ -4,21 +4,27 @@ mod clocks;
 mod document;
 mod ends;
 mod milliseconds;
+mod probed;
+mod recorded;
 mod scene_link;
 mod source;
 mod words;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use cohaptic_measure::fit::{self, FitError, Fitted, Measurements, Skew};
+pub use cohaptic_measure::fit::readers::Direction;
+use cohaptic_measure::fit::readers::Recording;
+use cohaptic_measure::fit::{self, FitError, Fitted, Measurements, MeasurementsError, Skew};
 use cohaptic_scene::SceneError;
 
 use clocks::Clocks;
 pub use document::document;
 use ends::Ends;
+use probed::Probed;
 use scene_link::read_again;
-pub use source::{Source, SourceError};
+use source::Found;
+pub use source::{ReadAs, Source, SourceError};
 pub use words::words;
 
 /// Corrections of the clocks of the two ends.
@@ -30,22 +36,68 @@ pub struct Corrections {
     pub least: Option<Duration>,
     /// `true` if a significant linear drift between the two clocks is removed.
     pub skew: bool,
+    /// Tick of the clock that showed the delays; `None` if the delays themselves tell the tick.
+    pub tick: Option<Tick>,
+}
+
+/// Tick of a clock.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Tick {
+    /// The clock rounds to multiples of this time.
+    Rounded(Duration),
+    /// The clock cuts to multiples of this time.
+    Cut(Duration),
+}
+
+impl Tick {
+    /// Returns the measurements of a clock with this tick, of which the delays are the share `share`.
+    fn of(self, measurements: Measurements, share: f64) -> Result<Measurements, MeasurementsError> {
+        match self {
+            Self::Rounded(tick) => measurements.rounded_to(tick.as_secs_f64() * share),
+            Self::Cut(tick) => measurements.cut_to(tick.as_secs_f64() * share),
+        }
+    }
+}
+
+/// A link with its origin.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Answered {
+    /// The link as keys of a scene.
+    pub scene: String,
+    /// The file that the link names; `None` if the link needs no file.
+    pub beside: Option<Beside>,
+    /// `false` if no law fits the delays.
+    pub has_law: bool,
+    kind: Kind,
+}
+
+/// A file that a link names.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Beside {
+    /// Path of the file, in the folder of the file with the link.
+    pub path: PathBuf,
+    /// Content of the file.
+    pub content: String,
+}
+
+/// Origin of a link.
+#[derive(Clone, PartialEq, Debug)]
+enum Kind {
+    Estimated(Box<Estimate>),
+    Recorded(Box<Recording>),
 }
 
 /// An estimated link.
 #[derive(Clone, PartialEq, Debug)]
-pub struct Answered {
+struct Estimate {
     /// The link and its goodness of fit.
-    pub fitted: Fitted,
-    /// The link as keys of a scene.
-    pub scene: String,
-    /// Content of the file of delays named by the link; `None` if a law fits.
-    pub delays: Option<String>,
+    fitted: Fitted,
     /// The fitted packets.
     measurements: Measurements,
     clocks: Clocks,
     skew: Option<Skew>,
     matched: Option<Ends>,
+    probed: Option<Probed>,
 }
 
 /// Why no link is estimated.
@@ -72,17 +124,35 @@ pub enum FitFailure {
 }
 
 impl Source {
-    /// Estimates the link, and reads it back as a scene does. `file`: name of the file with the link. `delays_file`: name of the file of delays beside the
-    /// link, named by the link if no law fits. Neither file needs to exist.
+    /// Estimates the link, or takes the link that the source records, and reads the link back as a scene does. `file`: path of the file with the link. A file
+    /// that the link names lies beside it. Neither file needs to exist.
     ///
     /// # Errors
     ///
     /// [`FitFailure`] if no link can be fitted, or if a scene cannot hold the link.
-    pub fn fit(&self, corrections: &Corrections, file: &Path, delays_file: &str) -> Result<Answered, FitFailure> {
-        let (measurements, clocks, skew) = clocks::settled(corrections, &self.measurements, self.has_one_clock)?;
+    pub fn fit(&self, corrections: &Corrections, file: &Path) -> Result<Answered, FitFailure> {
+        let measured = match &self.found {
+            Found::Measured(measured) => measured,
+            Found::Recorded(recording) => return recorded::answer(recording, corrections, file),
+        };
+        let (measurements, clocks, skew) = clocks::settled(corrections, measured)?;
         let fitted = fit::fit(&measurements)?;
-        let (scene, delays) = (fitted.link.to_scene_toml(delays_file), fitted.delays_csv());
-        read_again(&scene, &fitted.link, file, delays.as_deref())?;
-        Ok(Answered { fitted, scene, delays, measurements, clocks, skew, matched: self.matched.clone() })
+        let beside = fitted.delays_csv().map(|content| Beside::new(file, "delays.csv", content));
+        let scene = fitted.link.to_scene_toml(&beside.as_ref().map_or_else(String::new, Beside::name));
+        read_again(&scene, Some(&fitted.link), file, beside.as_ref())?;
+        let has_law = beside.is_none();
+        let estimate = Estimate { fitted, measurements, clocks, skew, matched: measured.matched.clone(), probed: measured.probed.clone() };
+        Ok(Answered { scene, beside, has_law, kind: Kind::Estimated(Box::new(estimate)) })
+    }
+}
+
+impl Beside {
+    fn new(file: &Path, extension: &str, content: String) -> Self {
+        Self { path: file.with_extension(extension), content }
+    }
+
+    /// Returns the name by which the link finds the file: both lie in one folder.
+    fn name(&self) -> String {
+        self.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
     }
 }

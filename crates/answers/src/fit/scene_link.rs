@@ -2,32 +2,33 @@
 
 use std::io;
 use std::path::Path;
-use std::sync::Arc;
 use std::time::Duration;
 
 use cohaptic_linkfile::document::Sources;
-use cohaptic_linkfile::link::read_link;
+use cohaptic_linkfile::link::{read_link, read_modulators};
 use cohaptic_linkfile::reading::{FileReader, parse_with};
 use cohaptic_measure::fit::FittedLink;
 use cohaptic_wan::{Delay, LinkModel};
 
-use super::FitFailure;
+use super::{Beside, FitFailure};
 
-/// Reads the link as a scene does before anything is written, and compares the moments of its delay with the fitted moments. `file`: name of the file with the
-/// link. `delays`: content of the file named by the link, if the link names a file.
+/// Reads the link as a scene does before anything is written, and compares the moments of its delay with the fitted moments; `None` if nothing was fitted.
+/// `file`: path of the file with the link. `beside`: the file that the link names, if it names one.
 ///
 /// # Errors
 ///
 /// [`FitFailure::Scene`] if a scene refuses the link, [`FitFailure::Unheld`] if a scene reads another mean or standard deviation.
-pub(super) fn read_again(scene: &str, link: &FittedLink, file: &Path, delays: Option<&str>) -> Result<(), FitFailure> {
+pub(super) fn read_again(scene: &str, link: Option<&FittedLink>, file: &Path, beside: Option<&Beside>) -> Result<(), FitFailure> {
     // The file named by the link does not exist yet, so its content is given here.
-    let named = |_: &Path| delays.map(|csv| csv.as_bytes().to_vec()).ok_or_else(|| io::Error::from(io::ErrorKind::NotFound));
-    let modulators = Arc::default();
+    let named = |_: &Path| beside.map(|beside| beside.content.as_bytes().to_vec()).ok_or_else(|| io::Error::from(io::ErrorKind::NotFound));
     let read = parse_with(Sources { file, text: scene, overrides: &[] }, FileReader(&named), |document, context| {
-        let link = document.as_table().and_then(|table| table.get("link"))?;
-        read_link(&link.node, context.with_modulators(Some(&modulators)))
+        let table = document.as_table()?;
+        let modulators = read_modulators(table.get("modulators").map(|entry| &*entry.node), context)?;
+        read_link(&table.get("link")?.node, context.with_modulators(Some(&modulators)))
     });
-    let delay = match read.map_err(|error| FitFailure::Scene(Box::new(error)))?.whole {
+    let read = read.map_err(|error| FitFailure::Scene(Box::new(error)))?;
+    let Some(link) = link else { return Ok(()) };
+    let delay = match read.whole {
         LinkModel::Fixed(config) => config.delay,
         LinkModel::Modulated(_) | LinkModel::Replay(_) | LinkModel::Kernel(_) => Delay::default(),
     };

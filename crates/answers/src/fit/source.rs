@@ -1,22 +1,49 @@
-//! Reads measurements of a link: a table of delays, a log of fates, or the captures of both ends.
+//! Reads measurements of a link: a table of delays, a log of fates, the captures of both ends, or a file of another program.
 
 use std::io::{self, Read};
 
 use cohaptic_measure::fates::{self, ReadError};
 use cohaptic_measure::fit::Measurements;
 use cohaptic_measure::fit::captures::{self, CaptureError};
+use cohaptic_measure::fit::readers::{self, Content, Direction, Recording};
 use cohaptic_wan::FateRow;
 
 use super::ends::Ends;
+use super::probed::Probed;
+
+/// Measurements with their origin, or a link that a file records.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Source {
+    pub(super) found: Found,
+}
+
+/// What a source holds.
+#[derive(Clone, PartialEq, Debug)]
+pub(super) enum Found {
+    Measured(Box<Measured>),
+    /// A link as it is recorded, which needs no estimate.
+    Recorded(Box<Recording>),
+}
 
 /// Measurements with their origin.
 #[derive(Clone, PartialEq, Debug)]
-pub struct Source {
+pub(super) struct Measured {
     pub(super) measurements: Measurements,
     /// Counts of a pair of captures; `None` for other sources.
     pub(super) matched: Option<Ends>,
-    /// `true` if both ends share one clock, as in a log of fates.
+    /// What the file of another program says; `None` for other sources.
+    pub(super) probed: Option<Probed>,
+    /// `true` if both ends share one clock, as in a log of fates and in a round trip.
     pub(super) has_one_clock: bool,
+}
+
+/// How the file of another program is read.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct ReadAs {
+    /// Way of the packets, of a file that has both ways.
+    pub direction: Option<Direction>,
+    /// Share of the round trip that is the delay of one way, above 0 and at most 1. A round trip without a share is refused.
+    pub split: Option<f64>,
 }
 
 /// Why measurements cannot be read.
@@ -44,13 +71,13 @@ const HEAD: u64 = 256;
 const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 
 impl Source {
-    /// Reads a table of delays or a log of fates. A log is read line by line, a table as a whole. Before a table is read, `as_table` gets the rest of the
-    /// reader, and can limit the length.
+    /// Reads a table of delays, a log of fates or a file of another program. A log is read line by line, other files as a whole. Before such a file is read,
+    /// `as_table` gets the rest of the reader, and can limit the length.
     ///
     /// # Errors
     ///
-    /// [`SourceError`] if the file cannot be read or is neither a table nor a log; [`SourceError::OneEnd`] for a capture.
-    pub fn read<R: Read>(mut from: R, as_table: impl FnOnce(R) -> io::Result<R>) -> Result<Self, SourceError> {
+    /// [`SourceError`] if the file cannot be read, is of no known kind, or cannot be read as `read_as` says; [`SourceError::OneEnd`] for a capture.
+    pub fn read<R: Read>(mut from: R, as_table: impl FnOnce(R) -> io::Result<R>, read_as: &ReadAs) -> Result<Self, SourceError> {
         let mut bytes = Vec::new();
         from.by_ref().take(HEAD).read_to_end(&mut bytes)?;
         // A capture is found by its magic number before it fails as a text.
@@ -59,12 +86,13 @@ impl Source {
         }
         // Some editors begin a text with a byte order mark.
         if bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&bytes).starts_with(FateRow::HEADER.as_bytes()) {
+            read_as.is_not_needed()?;
             let log = fates::read(bytes.chain(from)).map_err(|error| match error {
                 ReadError::Io(error) => SourceError::Io(error),
                 ReadError::NotText { line } => SourceError::NotText { line },
                 other @ ReadError::Log(_) => SourceError::Content(other.to_string()),
             })?;
-            return Ok(Self { measurements: Measurements::from_fates(&log), matched: None, has_one_clock: true });
+            return Ok(Self::measured(Measurements::from_fates(&log), None, true));
         }
         as_table(from)?.read_to_end(&mut bytes)?;
         let text = String::from_utf8(bytes).map_err(|error| {
@@ -72,8 +100,23 @@ impl Source {
             let right = &error.as_bytes()[..error.utf8_error().valid_up_to()];
             SourceError::NotText { line: right.iter().filter(|byte| **byte == b'\n').count() as u64 + 1 }
         })?;
-        let measurements = Measurements::from_csv(&text).map_err(|error| SourceError::Content(error.to_string()))?;
-        Ok(Self { measurements, matched: None, has_one_clock: false })
+        let refused = |error: &dyn std::fmt::Display| SourceError::Content(error.to_string());
+        match readers::read(&text, read_as.direction).map_err(|error| refused(&error))? {
+            Some(Content::Delays(delays)) => {
+                let (measurements, probed) = Probed::of(delays, read_as.split).map_err(|error| refused(&error))?;
+                let has_one_clock = probed.has_one_clock();
+                Ok(Self { found: Found::Measured(Box::new(Measured { measurements, matched: None, probed: Some(probed), has_one_clock })) })
+            }
+            Some(Content::Link(recording)) => {
+                read_as.is_not_needed()?;
+                Ok(Self { found: Found::Recorded(Box::new(recording)) })
+            }
+            None => {
+                read_as.is_not_needed()?;
+                let measurements = Measurements::from_csv(&text).map_err(|error| refused(&error))?;
+                Ok(Self::measured(measurements, None, false))
+            }
+        }
     }
 
     /// Reads the captures of both ends. `port`: only datagrams to this UDP port count.
@@ -83,12 +126,27 @@ impl Source {
     /// The errors of [`captures::between`].
     pub fn between(sender: impl Read, receiver: impl Read, port: Option<u16>) -> Result<Self, CaptureError> {
         let (measurements, ends) = Ends::of(captures::between(sender, receiver, port)?);
-        Ok(Self { measurements, matched: Some(ends), has_one_clock: false })
+        Ok(Self::measured(measurements, Some(ends), false))
     }
 
     /// Takes measurements made with two clocks.
     #[must_use]
-    pub const fn of(measurements: Measurements) -> Self {
-        Self { measurements, matched: None, has_one_clock: false }
+    pub fn of(measurements: Measurements) -> Self {
+        Self::measured(measurements, None, false)
+    }
+
+    fn measured(measurements: Measurements, matched: Option<Ends>, has_one_clock: bool) -> Self {
+        Self { found: Found::Measured(Box::new(Measured { measurements, matched, probed: None, has_one_clock })) }
+    }
+}
+
+impl ReadAs {
+    /// Refuses what has no meaning for a file without round trips.
+    fn is_not_needed(&self) -> Result<(), SourceError> {
+        let asked = [("direction", self.direction.is_some()), ("split", self.split.is_some())];
+        match asked.iter().find(|(_, is_asked)| *is_asked) {
+            Some((name, _)) => Err(SourceError::Content(format!("{name}: the file has no round trips: expected one of IRTT, LENS or ping"))),
+            None => Ok(()),
+        }
     }
 }

@@ -7,15 +7,23 @@ use cohaptic_units::print::{Counted, Span};
 
 use super::ends::Ends;
 use super::milliseconds::milliseconds;
-use super::{Answered, clocks};
+use super::probed::Probed;
+use super::{Answered, Estimate, Kind, clocks, recorded};
 
-/// Returns the text about a fitted link: the link, the read packets, and the goodness of each law.
+/// Returns the text about a link: the link, the read packets and the goodness of each law, or what a file records.
 #[must_use]
 pub fn words(answered: &Answered) -> String {
-    let goodness = &answered.fitted.goodness;
-    let mut text = format!("{}\n", answered.scene);
+    match &answered.kind {
+        Kind::Estimated(estimate) => estimated(&answered.scene, estimate),
+        Kind::Recorded(recording) => recorded::words(&answered.scene, recording),
+    }
+}
+
+fn estimated(scene: &str, estimate: &Estimate) -> String {
+    let goodness = &estimate.fitted.goodness;
+    let mut text = format!("{scene}\n");
     let mut line = |line: String| text.push_str(&format!("{line}\n"));
-    let instants = answered.measurements.instants();
+    let instants = estimate.measurements.instants();
     // If most gaps are zero, the packets come in bursts, and the spacing is the spacing of the bursts.
     let are_bursts = 2 * instants <= goodness.packets;
     let (bursts, burst) = if are_bursts { (format!(" in {}", Counted(instants, "burst")), " burst") } else { (String::new(), "") };
@@ -27,8 +35,9 @@ pub fn words(answered: &Answered) -> String {
         milliseconds(goodness.spacing_s),
         goodness.effective
     ));
-    answered.matched.as_ref().map_or_else(Vec::new, Ends::describe).into_iter().for_each(&mut line);
-    clocks::describe(&answered.clocks, answered.skew.as_ref()).into_iter().for_each(&mut line);
+    estimate.matched.as_ref().map_or_else(Vec::new, Ends::describe).into_iter().for_each(&mut line);
+    estimate.probed.as_ref().map_or_else(Vec::new, Probed::describe).into_iter().for_each(&mut line);
+    clocks::describe(&estimate.clocks, estimate.skew.as_ref()).into_iter().for_each(&mut line);
     let error = goodness.mean_se_s.map_or_else(String::new, |error| format!(" +- {}", milliseconds(error)));
     line(format!(
         "mean {}{error}, standard deviation {} +- {}, least {}, in steps of {}",

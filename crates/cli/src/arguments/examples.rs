@@ -16,6 +16,21 @@ pub(super) fn after(examples: &[&str]) -> String {
     text
 }
 
+/// How other programs make a file that `fit` reads, after the examples.
+const MEASUREMENTS: &str = "\
+Programs whose files are read, and the command that makes a good measurement:
+  irtt client -i 10ms -d 10m --stats=both -o line.json HOST    each way by itself: --direction up, down
+  ping -D -i 0.01 -c 60000 HOST > line.txt                     round trips: --split even, or a share
+  iperf3 -c HOST -t 60 -J > rate.json                          the rate up; with -R down; a lower bound
+  iperf3 -c HOST -u -b 5M -R -t 60 -J > rate.json              loss and rate of datagrams down
+CSV files of LENS, traces of CellReplay (light and heavy) and JSON of netem-trace are read too.
+";
+
+/// The examples of `fit`, the programs whose files it reads, and the exit status.
+pub(super) fn after_measurements(examples: &[&str]) -> String {
+    after(examples).replace(EXIT_STATUS, &format!("{MEASUREMENTS}\n{EXIT_STATUS}"))
+}
+
 /// The examples of the program, the exit status, and on systems other than Linux the commands that need Linux.
 pub(super) fn of_program() -> String {
     let needs = if cfg!(target_os = "linux") { "" } else { "\n\nThese commands need Linux: falcon, live, play, relay, router." };
@@ -127,7 +142,12 @@ pub(super) const LINK: &[&str] = &[
     "cohaptic link --from fates.csv --json",
 ];
 
-pub(super) const FIT: &[&str] = &["cohaptic fit fates.csv --out link.toml", "cohaptic fit sender.pcapng receiver.pcapng --port 5000 --skew"];
+pub(super) const FIT: &[&str] = &[
+    "cohaptic fit fates.csv --out link.toml",
+    "cohaptic fit line.json --direction up --out uplink.toml",
+    "cohaptic fit line.txt --split even",
+    "cohaptic fit sender.pcapng receiver.pcapng --port 5000 --skew",
+];
 
 pub(super) const PAPER: &[&str] = &["cohaptic paper --quick", "cohaptic paper --out paper"];
 

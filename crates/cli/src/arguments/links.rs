@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::examples::{self, after};
-use super::numbers::{any_integer, integer, signed_duration};
+use super::examples::{self, after, after_measurements};
+use super::numbers::{any_integer, integer, share, signed_duration};
 
 #[derive(Debug, Args)]
 #[command(after_help = after(examples::LINK))]
@@ -63,15 +63,27 @@ pub(crate) enum Profile {
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = after(examples::FIT))]
+#[command(after_help = after_measurements(examples::FIT))]
 pub(crate) struct FitArguments {
-    /// A CSV of one-way measurements (t,delay or sent,arrived), a file of fates, or the capture of the sender (with that of the receiver)
+    /// A CSV of one-way measurements (t,delay or sent,arrived), a file of fates, a file of another program such as irtt, ping or iperf3, or the capture of the sender (with that of the receiver)
     pub(crate) file: PathBuf,
     /// The capture of the receiver
     pub(crate) receiver: Option<PathBuf>,
     /// Read only datagrams to this UDP port from captures
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer::<u16>(0, 65_535), requires = "receiver")]
     pub(crate) port: Option<u16>,
+    /// Way of the packets, of files that have both ways (IRTT, LENS): up is from client to server
+    #[arg(long, value_enum, conflicts_with = "receiver")]
+    pub(crate) direction: Option<Direction>,
+    /// Take this share of each round trip as the delay of one way: even for half, or a share such as 60%; nothing measures it
+    #[arg(long, value_name = "SHARE", value_parser = share, conflicts_with = "receiver")]
+    pub(crate) split: Option<f64>,
+    /// Tick of the clock that showed the delays [default: as the program prints them, else the greatest step of which all are multiples]
+    #[arg(long, value_name = "TIME", value_parser = cohaptic_units::parse::duration)]
+    pub(crate) tick: Option<std::time::Duration>,
+    /// The clock cuts delays to its tick and does not round them: half a tick is added
+    #[arg(long, requires = "tick")]
+    pub(crate) cut: bool,
     /// Add this time to the clock of the receiver, and so to every delay, if the clocks are known to be apart; may be negative, such as -20ms
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = signed_duration, conflicts_with = "least")]
     pub(crate) offset: Option<f64>,
@@ -90,4 +102,22 @@ pub(crate) struct FitArguments {
     /// Write the link table of a scene into this file, and the delays into a file next to it if no law fits them
     #[arg(long, value_name = "SCENE_LINK.toml")]
     pub(crate) out: Option<PathBuf>,
+}
+
+/// Way of the packets.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, clap::ValueEnum)]
+pub(crate) enum Direction {
+    Up,
+    Down,
+    Rtt,
+}
+
+impl From<Direction> for cohaptic_answers::fit::Direction {
+    fn from(direction: Direction) -> Self {
+        match direction {
+            Direction::Up => Self::Up,
+            Direction::Down => Self::Down,
+            Direction::Rtt => Self::Rtt,
+        }
+    }
 }

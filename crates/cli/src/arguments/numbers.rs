@@ -60,6 +60,12 @@ pub(crate) fn probability(text: &str) -> Result<Probability, String> {
     parse::probability(text).ok().or_else(number).ok_or_else(|| "expected a probability such as 0.015 or 1.5%".to_owned())
 }
 
+/// A share of a round trip: `even`, a number above 0 and at most 1, or a percentage.
+pub(crate) fn share(text: &str) -> Result<f64, String> {
+    let read = if text.trim() == "even" { Some(0.5) } else { probability(text).ok().map(Probability::get) };
+    read.filter(|share| *share > 0.0).ok_or_else(|| "expected even, or a share above 0 such as 0.4 or 60%".to_owned())
+}
+
 fn expected(least: u64, most: u64) -> String {
     if most == u64::MAX {
         format!("expected an integer of at least {least}, below 2^64")
@@ -96,6 +102,14 @@ mod tests {
         assert_eq!(["1.5s", "-20ms", "+2h", "-0s"].map(signed_duration), [1.5, -0.02, 7_200.0, 0.0].map(Ok));
         for text in ["", "-", "--1s", "++1s", "5", "-5", "soon"] {
             assert_eq!(signed_duration(text), Err("expected a duration such as 1.5s, -20ms or 2h".to_owned()), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_share_is_even_or_a_number() {
+        assert_eq!(["even", "50%", "0.25", "1"].map(share), [0.5, 0.5, 0.25, 1.0].map(Ok));
+        for text in ["", "0", "0%", "-1", "1.5", "odd"] {
+            assert_eq!(share(text), Err("expected even, or a share above 0 such as 0.4 or 60%".to_owned()), "{text}");
         }
     }
 

@@ -102,6 +102,7 @@ pages! {
     how_to_dev_dependency: "docs/how-to-dev-dependency.md",
     how_to_existing_program: "docs/how-to-existing-program.md",
     how_to_keep_a_failure: "docs/how-to-keep-a-failure.md",
+    how_to_measure_your_line: "docs/how-to-measure-your-line.md",
     how_to_ci: "docs/how-to-ci.md",
     how_to_named_link: "docs/how-to-named-link.md",
     how_to_map_in_a_paper: "docs/how-to-map-in-a-paper.md",

@@ -104,7 +104,7 @@ fn duration(seconds: f64) -> Span {
 }
 
 /// Returns a TOML string. Names of files may contain quotes, backslashes and control characters.
-fn text_of(text: &str) -> String {
+pub(super) fn text_of(text: &str) -> String {
     let escaped = |character: char| match character {
         '"' | '\\' => format!("\\{character}"),
         control if control.is_control() => format!("\\u{:04X}", u32::from(control)),

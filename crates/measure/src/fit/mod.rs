@@ -15,7 +15,7 @@
 //! # Files of measurements
 //!
 //! [`Measurements::from_csv`] reads the columns `t,delay[,lost]` or `sent,arrived` ([`cohaptic_wan::delay_table`]). [`captures::between`] reads a pair of
-//! captures, made at the two ends.
+//! captures, made at the two ends. [`readers`] read files of other programs, such as IRTT and ping.
 
 pub mod captures;
 mod cells;
@@ -27,6 +27,7 @@ mod link;
 mod link_delay;
 mod loss;
 mod measurements;
+pub mod readers;
 mod search;
 mod skew;
 mod steps;

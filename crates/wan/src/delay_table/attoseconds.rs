@@ -11,7 +11,7 @@ impl Attoseconds {
     /// Parses a decimal number, with or without sign, fraction and exponent, in the unit 10^`unit` s. Digits below 10⁻¹⁸ s are cut. Returns `None` if the text
     /// is no number (NaN and infinities are not numbers) or if the number is out of range.
     #[must_use]
-    pub(crate) fn parse(text: &str, unit: i32) -> Option<Self> {
+    pub fn parse(text: &str, unit: i32) -> Option<Self> {
         let (number, exponent) = match text.split_once(['e', 'E']) {
             Some((number, exponent)) => (number, exponent.parse::<i32>().ok()?),
             None => (text, 0),
@@ -48,6 +48,18 @@ impl Attoseconds {
         }
     }
 
+    /// Returns the whole number of attoseconds.
+    #[must_use]
+    pub const fn get(self) -> i128 {
+        self.0
+    }
+
+    /// Returns the time of this number of attoseconds.
+    #[must_use]
+    pub const fn new(attoseconds: i128) -> Self {
+        Self(attoseconds)
+    }
+
     /// Returns the difference in seconds, rounded once to the precision of a double, or `None` if the difference is out of range.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "rounded once, on purpose")]
@@ -64,7 +76,7 @@ impl Attoseconds {
 
     /// Returns the exact difference, or `None` if the difference is out of range.
     #[must_use]
-    pub(crate) const fn since(self, earlier: Self) -> Option<Self> {
+    pub const fn since(self, earlier: Self) -> Option<Self> {
         match self.0.checked_sub(earlier.0) {
             Some(attos) => Some(Self(attos)),
             None => None,

@@ -95,7 +95,8 @@ impl fmt::Display for DelayTableError {
 impl core::error::Error for DelayTableError {}
 
 const A_TIME: &str = "a decimal number";
-const A_DELAY: &str = "a decimal number, or for a lost packet nothing, NaN, NA or -1";
+/// Text of an error about a cell that [`delay`] refuses.
+pub const A_DELAY: &str = "a decimal number, or for a lost packet nothing, NaN, NA or -1";
 const A_FLAG: &str = "0 or 1";
 
 /// Reads a table of delays. See the [module](self) for the format.
@@ -133,7 +134,8 @@ pub fn read(text: &str) -> Result<Vec<DelayRow>, DelayTableError> {
 }
 
 /// Splits a line into cells, without quotes and without the space around each cell.
-fn cells(line: &str) -> Vec<String> {
+#[must_use]
+pub fn cells(line: &str) -> Vec<String> {
     let (mut cells, mut cell, mut quoted) = (Vec::new(), String::new(), false);
     let mut rest = line.chars().peekable();
     while let Some(next) = rest.next() {
@@ -147,6 +149,17 @@ fn cells(line: &str) -> Vec<String> {
     }
     cells.push(cell);
     cells.into_iter().map(|cell| cell.trim().to_owned()).collect()
+}
+
+/// Reads the text of a cell as a delay in the unit 10^`unit` s. The inner value is `None` for a lost packet: an empty cell, `NaN`, `NA` or −1, in any unit.
+/// Other negative delays come from clocks with an offset. Returns `None` for any other text.
+#[must_use]
+pub fn delay(text: &str, unit: i32) -> Option<Option<Attoseconds>> {
+    if ["", "nan", "na"].iter().any(|word| text.eq_ignore_ascii_case(word)) {
+        return Some(None);
+    }
+    let time = Attoseconds::parse(text, unit)?;
+    Some(Some(time).filter(|time| Some(*time) != Attoseconds::parse("-1", unit)))
 }
 
 /// Column of the table.
@@ -214,13 +227,7 @@ impl Row {
 
     /// Reads the delay or the time of arrival, or `None` if the packet was lost.
     fn end(&self, column: &Column) -> Result<Option<Attoseconds>, DelayTableError> {
-        let text = self.text(column);
-        if ["", "nan", "na"].iter().any(|word| text.eq_ignore_ascii_case(word)) {
-            return Ok(None);
-        }
-        let time = self.time(column, A_DELAY)?;
-        // Programs write -1 for a lost packet in any unit of the column. Other negative delays come from clocks with an offset.
-        Ok(Some(time).filter(|time| Some(*time) != Attoseconds::parse("-1", column.unit)))
+        delay(self.text(column), column.unit).ok_or_else(|| self.cell(column, A_DELAY))
     }
 
     /// Reads a cell as a flag. An empty cell is false.

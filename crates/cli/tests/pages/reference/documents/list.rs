@@ -503,7 +503,12 @@ pub(super) const DOCUMENTS: [Document; 25] = [
     },
     Document {
         command: "fit",
-        lines: &["python3 programs/captures.py && cohaptic fit sender.pcap receiver.pcap --skew --least 20ms --json"],
+        lines: &[
+            "python3 programs/captures.py && cohaptic fit sender.pcap receiver.pcap --skew --least 20ms --json",
+            "python3 programs/measured.py && cohaptic fit line.json --direction up --json",
+            "python3 programs/measured.py && cohaptic fit line.txt --split even --json",
+            "python3 programs/measured.py && cohaptic fit rate.json --json",
+        ],
         rows: &[
             ("link.NAME", "the link that fits best; `link.jitter.distribution` is `empirical` where no law fits"),
             (
@@ -519,7 +524,23 @@ pub(super) const DOCUMENTS: [Document; 25] = [
             ("matched.unmatched_sent, matched.unmatched_arrived, matched.ambiguous", "of two captures: packets in one alone, or indistinguishable"),
             ("matched.left_out", "packets of the sender at its beginning and at its end that the other capture could not show"),
             ("matched.sender.@Contents of a capture, matched.receiver.@Contents of a capture", "what each file holds"),
-            ("clocks.added_s", "with `--offset` or `--least`: what was added to every delay"),
+            (
+                "measured_by.program, measured_by.direction",
+                "of a [file of another program](commands-network.md#files-of-other-programs): which one, and the way of the packets",
+            ),
+            (
+                "measured_by.either_way, measured_by.other_way, measured_by.copies",
+                "packets that are not counted: lost on a way that the file does not name, lost on the other way, answered again",
+            ),
+            ("measured_by.share", "with `--split`: the share of the round trip that is the delay"),
+            ("measured_by.notes", "what was assumed, as sentences"),
+            (
+                "recorded.program, recorded.rate.NAME, recorded.notes",
+                "of a file without delays of packets, in place of `link`, `goodness` and `clocks`: which program wrote it; of a measured rate `intervals`, `seconds`, \
+                 `mean_bps`, `between_bps` (10 % and 90 % of the intervals), `loss`, and whether it `is_lower_bound`; what the link lacks",
+            ),
+            ("clocks.added_s", "with `--offset` or `--least`, or where an offset is assumed: what was added to every delay"),
+            ("clocks.is_assumed", "`true` where the offset is assumed: the least delays of both ways are then equal"),
             (
                 "clocks.steps",
                 "[steps](commands-network.md#clocks-that-are-apart) of the least delay: `at_s`, `by_s`, and the number of the first `packet` after it",
