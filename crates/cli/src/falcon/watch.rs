@@ -346,7 +346,8 @@ mod tests {
             unknown,
             "0.0 s, silent, red light, buttons pressed: none\n  encoders: top 0, right 0, left 0; the position is known once the device is homed"
         );
-        let reading = Reading { at: Instant::ZERO, position: [0.0, -0.02, 0.0305], velocity: [0.0, 0.0, 0.5] };
+        let reading = Reading { at: Instant::ZERO, position: [-0.000_04, -0.02, 0.0305], velocity: [0.0, 0.0, 0.5] };
+        // Less than half of the last decimal to the left of the origin is no negative zero.
         let known = shown(Duration::from_millis(2500), &Status { reading: Some(reading), force: [0.0, 0.0, -0.3], ..*driver.status() });
         assert_eq!(
             known.lines().skip(1).collect::<Vec<_>>(),

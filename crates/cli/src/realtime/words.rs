@@ -175,6 +175,7 @@ fn millis(span: Duration) -> String {
 
 #[cfg(test)]
 mod tests {
+    use cohaptic_realtime::Refused;
     use cohaptic_units::{Bytes, Instant};
     use cohaptic_wan::{Link, LinkName, PacketInfo};
 
@@ -192,6 +193,12 @@ mod tests {
                 && !advice.contains("refused"),
             "{advice}"
         );
+        let granted = Prepared { granted: vec![Wish::Priority], ..Prepared::default() };
+        assert!(notes(&granted, late).contains("End other programs, try --spin"));
+        let refused =
+            Prepared { refused: vec![Refused { wish: Wish::Priority, error: io::ErrorKind::PermissionDenied.into() }], ..Prepared::default() };
+        let advice = notes(&refused, late);
+        assert!(advice.contains("End other programs, allow what the system refused above, try --spin"), "{advice}");
     }
 
     #[test]

@@ -7,7 +7,7 @@ use cohaptic_picture::escape;
 use cohaptic_picture::testing::{page_faults, page_in_browser};
 
 use crate::integration::desk::Desk;
-use crate::integration::scenes::{RANDOM, TWO};
+use crate::integration::scenes::{PAPER, RANDOM, TWO};
 
 /// A command, its page, and what the page must show: a sentence of the answer, and a row of a table.
 struct Case {
@@ -29,7 +29,7 @@ const CASES: [Case; 7] = [
         row: "<th scope=\"row\" class=\"number\">24ms</th><td class=\"number\">1e9</td><td class=\"number\">unstable</td><td class=\"number\">spectral-radius</td><td class=\"number\">1.513863e28</td>",
     },
     Case {
-        line: "stability map it.toml --x coordination.stiffness=100..6000 --y link.delay=8ms..24ms --grid 4x3 --curve object.mass=1,coordination.damping=7",
+        line: "stability map it.toml --x coordination.stiffness=100..6000 --y link.delay=8ms..24ms --grid 4x3 --curve object.mass=1,coordination.damping=7 --against object.damping=1",
         page: "map.html",
         sentence: "<p>As it stands: ",
         row: "<th scope=\"row\">object.mass=1, coordination.damping=7</th><td>spectral radius</td><td class=\"number\">12</td>",
@@ -135,6 +135,28 @@ fn a_page_names_what_was_left_out_and_what_was_not_settled() {
     let page = desk.read("one/campaign.html");
     assert!(page.contains("<th scope=\"row\">all runs</th>") && page.contains("<dd>0 to 2, the same for every combination</dd>"), "{page}");
     assert!(!page.contains("<svg"), "{page}");
+    desk.text("campaign two.toml --vary scene.seed=1,2 --out seeds");
+    assert!(desk.read("seeds/campaign.html").contains("<dt>Seeds</dt><dd>varied</dd>"));
+    // 20 values, and those by which the crossing was found.
+    desk.text("stability boundary two.toml --along coordination.stiffness=100..6000 --samples 20 --out settled");
+    let page = desk.read("settled/boundary.html");
+    assert!(page.contains("<h2>Notes</h2>") && page.contains(" values checked, ") && !page.contains("\"warning\""), "{page}");
+}
+
+/// The second moment of random outages is not followed, so that every verdict is nominal.
+#[test]
+fn every_kind_of_page_says_how_many_verdicts_are_nominal() {
+    let desk = Desk::with("paper.toml", PAPER);
+    let outages = "--set link.outage={random={up=\"5s\",down=\"50ms\"}}";
+    for (line, page, note) in [
+        ("stability map paper.toml --x coordination.stiffness=100..600 --y coordination.damping=1..30 --grid 2x2", "map", "4 cells are"),
+        ("stability boundary paper.toml --along coordination.stiffness=100..6000 --samples 5", "boundary", "5 of the values looked at are"),
+        ("campaign paper.toml --set scene.duration=20ms --verdicts", "campaign", "1 combination is"),
+    ] {
+        desk.cohaptic(&format!("{line} {outages} --out {page}"));
+        let html = desk.read(&format!("{page}/{page}.html"));
+        assert!(html.contains(&format!("<li>{note} nominal: the second moment cannot be followed there")), "{line}: {html}");
+    }
 }
 
 /// 401 combinations are one more than a page shows.

@@ -41,7 +41,8 @@ fn kinds() -> Vec<(String, Vec<&'static str>, Vec<&'static str>)> {
         (
             random(&format!("--vary link.loss=0%,40% --vary coordination.stiffness=500,900 {STRATEGIES}")),
             vec!["Median of the largest discrepancy", "coordination.strategy=average-position"],
-            vec!["coordination.strategy=average-position"],
+            // Of two laws the title of the panel names each, and the legend none.
+            vec!["coordination.strategy=average-position", "nominally stable"],
         ),
         // With the last stiffness all runs diverge: there is no median.
         (
@@ -121,6 +122,16 @@ fn the_line_is_the_median_of_the_rows() {
         assert!((x - along).abs() < 0.02 && (y - up).abs() < 0.03, "{marks:?} {medians:?}");
     }
     assert!((left.1 - right.1).abs() > 20.0, "the medians differ");
+}
+
+/// With the last of three values the run diverges, so that the line of the medians joins the first two.
+#[test]
+fn a_line_ends_before_runs_that_diverge() {
+    let desk = desk();
+    desk.text(&format!("campaign two.toml {DIVERGING} --out out"));
+    let svg = desk.read("out/discrepancy.svg");
+    let line = svg.lines().find(|line| line.contains("class=\"line s0\"")).unwrap();
+    assert_eq!(line.matches('L').count(), 1, "{line}");
 }
 
 #[test]

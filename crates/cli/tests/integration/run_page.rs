@@ -1,6 +1,7 @@
 //! `run.html`: a run on one page.
 
 use cohaptic_picture::testing::{page_faults, page_in_browser};
+use cohaptic_units::print::SixDigits;
 
 use crate::integration::desk::Desk;
 use crate::integration::scenes::{RANDOM, TWO};
@@ -98,9 +99,34 @@ fn the_page_of_a_run_against_another_holds_both() {
     ] {
         assert!(first.contains(part), "no {part} in {first}");
     }
+    // Each measure has a value of each run, to six digits.
+    let value = |document: &serde_json::Value, name: &str| {
+        document["measures"][name].as_f64().map_or_else(|| "–".to_owned(), |value| SixDigits(value).to_string())
+    };
+    let names = document["measures"].as_object().unwrap().keys();
+    let differ = names.filter(|name| {
+        let values = [value(&document, name), value(&document["against"], name)];
+        let row = format!("<code>{name}</code></th><td class=\"number\">{}</td><td class=\"number\">{}</td>", values[0], values[1]);
+        assert!(first.contains(&row), "no {row} in {first}");
+        values[0] != values[1]
+    });
+    assert!(differ.count() > 5);
     // The second run has a page of its own too, which has only that run.
     assert!(second.contains("<h1>Two users, with link.delay=8ms</h1>") && second.contains("8.000</td>") && !second.contains("24.000</td>"));
     assert_eq!(second.matches("<svg ").count(), 3);
+}
+
+/// Within 2 s a stiffness of 1e12 N/m diverges, and 1000 N/m does not.
+#[test]
+fn the_page_of_both_runs_says_which_of_them_diverged_and_what_both_expected() {
+    let desk = Desk::with("two.toml", &format!("{TWO}\n[expect]\ndelay = [{{ max = \"1ms\" }}]\n").replace("200ms", "2s"));
+    desk.cohaptic("run two.toml --against coordination.stiffness=1e12 --out out");
+    let page = desk.read("out/run.html");
+    let second = "<h3>Two users, with coordination.stiffness=1e12</h3>\n";
+    assert_eq!(page.matches("DIVERGED: at ").count(), 1, "{page}");
+    assert!(page.contains(&format!("{second}<p class=\"warning\">DIVERGED: at ")), "{page}");
+    let expected = page.split_once("<h2>Expectations</h2>").unwrap().1.split_once("<h2>").unwrap().0;
+    assert!(expected.contains("<td>at most 1ms</td><td>24ms</td>") && expected.contains(second), "{expected}");
 }
 
 #[test]

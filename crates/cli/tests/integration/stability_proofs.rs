@@ -91,7 +91,9 @@ fn pieces_that_a_certificate_leaves_open_are_counted() {
     let open = certificate["boxes"].as_array().unwrap().iter().filter(is_open).count();
     assert!(open > 1, "{document:#}");
     assert_eq!(document["uncertified"], open, "{document:#}");
-    assert!(desk.text(&command).contains(&format!("note: the certificate leaves open {open} pieces of those that are decided here")), "{command}");
+    let note = format!("certificate leaves open {open} pieces of those that are decided here");
+    assert!(desk.read("out/proof.html").contains(&format!("<li>The {note}.</li>")));
+    assert!(desk.text(&command).contains(&format!("note: the {note}")), "{command}");
 }
 
 #[test]

@@ -113,6 +113,21 @@ fn a_mean_square_ends() {
     assert_interrupted(&stopped(&desk, "stability point two.toml --set peers=[] --set scene.count=3 --set link.jitter=2ms", "-INT"));
 }
 
+/// What was proven by then is written, and the page warns that it is not all.
+#[test]
+fn the_page_of_a_proof_that_was_ended_says_so() {
+    let desk = Desk::with("two.toml", TWO);
+    for line in [
+        "stability map two.toml --x coordination.stiffness=100..6000 --y coordination.damping=0..50 --prove 14 --out out",
+        "stability boundary two.toml --along coordination.stiffness=100..6000 --prove --tolerance 1e-12 --set peers=[] --set scene.count=8 \
+         --set link.delay=200ms --out out",
+    ] {
+        let outcome = stopped_after(20, &desk, line, "-INT");
+        assert_eq!(outcome.status, Some(130), "{line}: {outcome:?}");
+        assert!(desk.read("out/proof.html").contains("<p class=\"warning\">The proof was stopped; "), "{line}");
+    }
+}
+
 #[test]
 fn a_search_for_the_worst_case_ends() {
     let desk = Desk::with("two.toml", TWO);

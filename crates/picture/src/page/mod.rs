@@ -95,6 +95,19 @@ mod tests {
     }
 
     #[test]
+    fn a_table_has_its_caption_its_groups_and_its_columns() {
+        let table = Table::new().column("name").number("one").number("two").group("", 1).group("both", 2).titled("What it is");
+        let html = Html::table(&table.row(["a", "1", "2"].map(Html::text)));
+        assert_eq!(
+            html.as_str().replace('\n', ""),
+            "<div class=\"wide\"><table><caption>What it is</caption><thead><tr><td class=\"group\" colspan=\"1\"></td>\
+             <th scope=\"colgroup\" class=\"group\" colspan=\"2\">both</th></tr>\
+             <tr><th scope=\"col\">name</th><th scope=\"col\" class=\"number\">one</th><th scope=\"col\" class=\"number\">two</th></tr></thead>\
+             <tbody><tr><th scope=\"row\">a</th><td class=\"number\">1</td><td class=\"number\">2</td></tr></tbody></table></div>"
+        );
+    }
+
+    #[test]
     fn a_page_is_one_well_formed_document_without_anything_from_elsewhere() {
         let page = everything().html();
         assert_eq!(crate::testing::page_faults(&page), [""; 0]);

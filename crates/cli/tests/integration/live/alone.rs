@@ -84,10 +84,43 @@ fn it_says_in_words_what_the_document_says() {
     for picture in ["positions.svg", "forces.svg", "network.svg"] {
         assert!(page.contains(&desk.read(&format!("out/{picture}"))), "{picture}");
     }
-    // What it says of the replay is a command that works.
+    // The replay that is said is a command that works.
     let replay = text.lines().find_map(|line| line.trim().strip_prefix("replay: cohaptic ")).unwrap();
     desk.text(&format!("{replay} --out again"));
     assert_same(&desk, "out", "again");
+}
+
+/// A stiffness of 1e12 N/m diverges within 100 ms. No clock wakes a thread within 1 ns, so that nearly every tick is late.
+#[test]
+fn its_page_warns_and_has_the_timeline_the_measures_and_who_was_attached() {
+    let desk = Desk::with("two.toml", TWO);
+    let more = "[measure]\nnames = [\"travel_s\"]\n[[timeline]]\nat = \"10ms\"\nlink = \"all\"\nset = { delay = \"8ms\" }\n";
+    desk.write("more.toml", format!("{TWO}\n{more}"));
+    for (line, parts) in [
+        (
+            "more.toml --for 100ms --tolerance 1ns --set coordination.stiffness=1e12",
+            &[
+                "<p class=\"warning\">DIVERGED: at ",
+                "<p class=\"warning\">The session is not valid: ",
+                "<code>travel_s</code></th><td class=\"number\">0.",
+                "<th scope=\"row\">10ms</th><td>link = &quot;all&quot;, set.delay = &quot;8ms&quot;</td>",
+            ][..],
+        ),
+        (
+            "two.toml --for 20ms --set peers.right.kind=udp --listen 127.0.0.1:0",
+            &[
+                "<h3>Attached from outside</h3>",
+                "<th scope=\"row\">right</th><td>udp</td><td class=\"number\">0</td>",
+                "--no-priority --listen 127.0.0.1:0 --out DIR</pre>",
+            ],
+        ),
+    ] {
+        assert_eq!(desk.cohaptic(&format!("live {line} --no-priority --out out")).status, Some(0), "{line}");
+        let page = desk.read("out/live.html");
+        assert!(parts.iter().all(|part| page.contains(part)), "{line}: {page}");
+        // Linux grants a timer slack of 1 ns to everybody.
+        assert_eq!(page.contains("<h2>Notes</h2>"), cfg!(target_os = "linux"), "{line}: {page}");
+    }
 }
 
 #[test]

@@ -165,6 +165,9 @@ fn a_comparison_runs_the_hand_again_and_its_files_can_be_run_by_anybody() {
     let runs = compared["runs"].as_array().unwrap();
     let names: Vec<&str> = runs.iter().map(|run| run["name"].as_str().unwrap()).collect();
     assert_eq!((names, &compared["hand"]), (vec!["AP", "PD", "without network"], &json!("you")));
+    // The last instant counts in both curves.
+    let values = |run: &Value, curve: &str| run[curve].as_array().unwrap().len();
+    assert!(runs.iter().all(|run| values(run, "discrepancy_m") == values(run, "force_n")), "{compared}");
     let largest = |run: usize| runs[run]["largest_discrepancy_m"].as_f64().unwrap();
     assert!(largest(2) < largest(0) && largest(0) > 1e-3, "{compared}");
     for name in ["scene.toml", "inputs.csv"] {
