@@ -5,6 +5,8 @@ use std::io;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
 use std::task::{Context, Poll};
 
+use crate::Configured;
+
 /// Option of a UDP socket. Flags are 0 or 1.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum DatagramOption {
@@ -63,7 +65,7 @@ pub enum Membership {
 /// [`io::ErrorKind::WouldBlock`] instead. Sending never waits. All methods fail after the host of the socket has crashed, after the run of the test bed, and on
 /// other threads than the one of the run.
 #[expect(clippy::missing_errors_doc, reason = "the documentation of the trait names the errors of all methods")]
-pub trait Datagrams: fmt::Debug + Send + Sync {
+pub trait Datagrams: Configured + fmt::Debug + Send + Sync {
     /// Hands the next datagram and its sender to `take`. The datagram stays in the buffer if `peek` is set.
     fn poll_receive(&self, cx: &mut Context<'_>, peek: bool, take: &mut dyn FnMut(&[u8], SocketAddr)) -> Poll<io::Result<()>>;
     /// Like [`Datagrams::poll_receive`], but does not wait.

@@ -16,6 +16,7 @@
 //! ```
 
 mod datagrams;
+mod settings;
 mod streams;
 mod tasks;
 
@@ -27,6 +28,7 @@ use std::panic::Location;
 use std::sync::Arc;
 
 pub use datagrams::{DatagramOption, Datagrams, Membership};
+pub use settings::{Configured, KeepaliveTimes, Setting};
 pub use streams::{Connecting, Flag, Listener, Number, Ready, Socket, Stream};
 pub use tasks::{Hold, Host, OnHost, Stop, host, on_host};
 

@@ -8,6 +8,8 @@ use std::pin::Pin;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
+use crate::Configured;
+
 /// Future of a connection that is being opened. `Sync`, as that of tokio's `TcpStream::connect` is.
 pub type Connecting = Pin<Box<dyn Future<Output = io::Result<Box<dyn Stream>>> + Send + Sync>>;
 
@@ -29,7 +31,7 @@ pub struct Ready {
 /// Methods named `poll_…` register the waker of the context if they return [`Poll::Pending`]. Methods named `try_…` return [`io::ErrorKind::WouldBlock`]
 /// instead. All methods fail after the host of the connection has crashed, after the run of the test bed, and on other threads than the one of the run.
 #[expect(clippy::missing_errors_doc, reason = "the documentation of the trait names the errors of all methods")]
-pub trait Stream: fmt::Debug + Send + Sync {
+pub trait Stream: Configured + fmt::Debug + Send + Sync {
     /// Waits until bytes can be read, or the connection is over.
     fn poll_readable(&self, cx: &mut Context<'_>) -> Poll<io::Result<()>>;
     /// Waits until bytes can be written, or the connection is over.
@@ -76,7 +78,7 @@ pub trait Stream: fmt::Debug + Send + Sync {
 
 /// TCP listener. All methods fail as those of [`Stream`] do.
 #[expect(clippy::missing_errors_doc, reason = "the documentation of the trait names the errors of all methods")]
-pub trait Listener: fmt::Debug + Send + Sync {
+pub trait Listener: Configured + fmt::Debug + Send + Sync {
     /// Accepts a connection, and returns the address of its other end.
     fn poll_accept(&self, cx: &mut Context<'_>) -> Poll<io::Result<(Box<dyn Stream>, SocketAddr)>>;
     /// Returns the address at which the listener listens.
@@ -113,7 +115,7 @@ pub enum Number {
 
 /// TCP socket that is neither connected nor listening. All methods fail as those of [`Stream`] do.
 #[expect(clippy::missing_errors_doc, reason = "the documentation of the trait names the errors of all methods")]
-pub trait Socket: fmt::Debug + Send + Sync {
+pub trait Socket: Configured + fmt::Debug + Send + Sync {
     /// Binds the socket.
     fn bind(&self, at: SocketAddr) -> io::Result<()>;
     /// Opens a connection.

@@ -1,24 +1,29 @@
 //! Names and addresses of the hosts of a test bed.
 
-use std::fmt::{self, Write as _};
+use std::collections::BTreeMap;
+use std::fmt;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
 use std::sync::Arc;
 
 use cohaptic_wan::NodeId;
 
-use crate::names::{Names, SHOWN};
+use crate::names::Names;
 
 /// Names and present addresses of all hosts.
 ///
-/// Host number n, counted from 1, has the addresses 10.0.0.n and `fd00::n`. Beyond 255 the addresses go on with 10.0.1.0, as numbers of four bytes do.
-/// Addresses given out later, by [`Host::change_addresses`](crate::Host::change_addresses), follow the addresses of all hosts.
+/// Host number n, counted from 1, has the addresses 10.0.0.n and `fd00::n`, unless the test has chosen others by
+/// [`Testbed::address`](crate::Testbed::address). Beyond 255 the addresses go on with 10.0.1.0, as numbers of four bytes do. Addresses given out later, by
+/// [`Host::change_addresses`](crate::Host::change_addresses), follow the addresses of all hosts.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct AddressPlan {
     names: Arc<Names>,
-    /// Number of the present addresses of each host, indexed by host.
-    current: Vec<u32>,
-    /// Host that has the addresses of number `index + 1`; `None` after the host has got new addresses. Numbers beyond the end were never given.
-    owners: Vec<Option<NodeId>>,
+    /// Short form of the present addresses of each host, of IPv4 and of IPv6, indexed by host.
+    current: Vec<[u32; 2]>,
+    /// Host that has the addresses of number `index + 1`, in IPv4 and in IPv6; `None` if the host has other addresses by now. Numbers beyond the end were never
+    /// given in turn.
+    owners: Vec<[Option<NodeId>; 2]>,
+    /// Hosts whose addresses the test has chosen, by version of IP (true for 6) and short form. Few or none, and looked at after `owners`.
+    chosen: BTreeMap<(bool, u32), NodeId>,
 }
 
 /// Addresses of one host.
@@ -34,6 +39,9 @@ pub struct Addresses {
 const FIRST: (u32, u128) = (Ipv4Addr::new(10, 0, 0, 0).to_bits(), 0xfd00 << 112);
 
 impl Addresses {
+    /// Short forms of 127.0.0.1 and of `::1`.
+    pub(crate) const LOOPBACK: [u32; 2] = [Ipv4Addr::LOCALHOST.to_bits().wrapping_sub(FIRST.0), 0];
+
     pub(crate) fn numbered(number: u32) -> Self {
         Self { v4: Ipv4Addr::from_bits(FIRST.0.wrapping_add(number)), v6: Ipv6Addr::from_bits(FIRST.1 + u128::from(number)) }
     }
@@ -75,6 +83,37 @@ impl Addresses {
         if is_six { short == 0 } else { bits >> 24 == 127 }
     }
 
+    /// Returns whether `short` is a broadcast address of IPv4: 255.255.255.255, or 10.255.255.255, which is that of the network of the hosts.
+    #[inline]
+    pub(crate) const fn is_broadcast(short: u32) -> bool {
+        let bits = short.wrapping_add(FIRST.0);
+        bits == u32::MAX || bits == FIRST.0 | 0x00ff_ffff
+    }
+
+    /// Returns whether the address belongs to the network of the hosts: 10.0.0.0/8 or `fd00::/8`. Nobody answers at such an address if no host has it. Other
+    /// networks cannot be reached.
+    pub(crate) const fn is_of_network(address: IpAddr) -> bool {
+        match address {
+            IpAddr::V4(v4) => v4.octets()[0] == 10,
+            IpAddr::V6(v6) => v6.octets()[0] == 0xfd,
+        }
+    }
+
+    /// Returns the short form of an address that a test has chosen for a host, or why no host can have the address.
+    pub(crate) fn choose(address: IpAddr) -> Result<u32, String> {
+        let short = Self::short(address);
+        match address {
+            IpAddr::V4(v4) => {
+                let is_special = v4.is_unspecified() || v4.is_loopback() || v4.is_multicast() || v4.octets()[0] >= 240 || Self::is_broadcast(short);
+                (!is_special).then_some(short).ok_or_else(|| format!("{v4} is no address of a host: expected one such as 192.168.1.10"))
+            }
+            IpAddr::V6(v6) if short == 0 || short == u32::MAX => {
+                Err(format!("{v6} cannot be the address of a host here: expected one from fd00::1 to fd00::ffff:fffe"))
+            }
+            IpAddr::V6(_) => Ok(short),
+        }
+    }
+
     /// Returns the address of the same version as `other`.
     #[must_use]
     pub const fn like(&self, other: IpAddr) -> IpAddr {
@@ -92,25 +131,50 @@ impl Addresses {
 }
 
 impl AddressPlan {
-    pub(crate) fn new(names: Arc<Names>) -> Self {
-        let mut plan = Self { current: Vec::with_capacity(names.len()), names, owners: Vec::new() };
-        for host in 0..plan.names.len() {
-            let number = plan.fresh(NodeId::new(host));
-            plan.current.push(number);
+    /// Creates the plan. `chosen` has the hosts whose addresses the test has chosen, by version of IP (true for 6), with the short form.
+    pub(crate) fn new(names: Arc<Names>, chosen: &BTreeMap<(NodeId, bool), u32>) -> Self {
+        let taken = chosen.iter().map(|((host, is_six), short)| ((*is_six, *short), *host)).collect();
+        let mut plan = Self { current: Vec::with_capacity(names.len()), names, owners: Vec::new(), chosen: taken };
+        for host in (0..plan.names.len()).map(NodeId::new) {
+            let number = plan.fresh(host);
+            plan.current.push([number; 2]);
+        }
+        for ((host, is_six), short) in chosen {
+            let version = usize::from(*is_six);
+            let given = std::mem::replace(&mut plan.current[host.index()][version], *short);
+            plan.let_go(version, given);
         }
         plan
     }
 
+    /// Gives the next number, of which no test has chosen an address.
     fn fresh(&mut self, host: NodeId) -> u32 {
-        self.owners.push(Some(host));
-        u32::try_from(self.owners.len()).unwrap_or(u32::MAX)
+        loop {
+            let number = u32::try_from(self.owners.len() + 1).unwrap_or(u32::MAX);
+            let is_free = ![false, true].into_iter().any(|is_six| self.chosen.contains_key(&(is_six, number)));
+            self.owners.push(if is_free { [Some(host); 2] } else { [None; 2] });
+            if is_free {
+                return number;
+            }
+        }
+    }
+
+    /// Takes an address that was given in turn from its host.
+    fn let_go(&mut self, version: usize, number: u32) {
+        self.owners.iter_mut().skip(Self::place(number)).take(1).for_each(|owner| owner[version] = None);
     }
 
     /// Gives a host addresses that no host has had. Its former addresses belong to no host from now on.
     pub(crate) fn change(&mut self, host: NodeId) -> Addresses {
-        let before = Self::place(self.number(host));
-        self.owners.iter_mut().skip(before).take(1).for_each(|owner| *owner = None);
-        self.current[host.index()] = self.fresh(host);
+        let before = self.current[host.index()];
+        for (version, short) in before.into_iter().enumerate() {
+            // The key stays if the address was chosen, so that the address is not given in turn.
+            if self.chosen.get(&(version == 1, short)) != Some(&host) {
+                self.let_go(version, short);
+            }
+        }
+        let number = self.fresh(host);
+        self.current[host.index()] = [number; 2];
         self.of(host)
     }
 
@@ -124,7 +188,8 @@ impl AddressPlan {
         &self.names
     }
 
-    /// Returns the addresses of the host named `name`, or `None` if there is no such host.
+    /// Returns the addresses of the host named `name`, or `None` if there is no such host. Upper and lower case are the same, and a final dot is ignored, as
+    /// with all names of hosts (RFC 4343).
     #[must_use]
     pub fn addresses(&self, name: &str) -> Option<Addresses> {
         self.names.find(name).map(|host| self.of(host))
@@ -136,38 +201,30 @@ impl AddressPlan {
         self.owner_node(address).map(|host| &*self.names[host.index()])
     }
 
-    /// Returns whether any host has or had the address.
-    pub(crate) fn was_given(&self, address: IpAddr) -> bool {
-        Self::place(Addresses::short(address)) < self.owners.len()
-    }
-
-    /// Returns the message that no host has an address, with the addresses of the hosts.
-    pub(crate) fn unknown(&self, address: IpAddr) -> String {
-        let mut text = format!("no host has the address {address}; the hosts are\n");
-        // Writing to a `String` cannot fail.
-        let _ = self.write_lines(&mut text, SHOWN);
-        if self.names.len() > SHOWN {
-            let _ = writeln!(text, "and {} more", self.names.len() - SHOWN);
-        }
-        text
-    }
-
-    /// Writes a line for each of the first `count` hosts.
-    fn write_lines(&self, to: &mut impl fmt::Write, count: usize) -> fmt::Result {
-        self.names.iter().zip(&self.current).take(count).try_for_each(|(name, number)| {
-            let Addresses { v4, v6 } = Addresses::numbered(*number);
-            writeln!(to, "{name} {v4} {v6}")
-        })
-    }
-
     pub(crate) fn owner_node(&self, address: IpAddr) -> Option<NodeId> {
-        self.owner_of(Addresses::short(address))
+        self.owner_of(Addresses::short(address), address.is_ipv6())
     }
 
-    /// Returns the host that has the addresses of number `number`.
+    /// Returns the host that has the address with the short form `short`.
     #[inline]
-    pub(crate) fn owner_of(&self, number: u32) -> Option<NodeId> {
-        self.owners.get(Self::place(number)).copied().flatten()
+    pub(crate) fn owner_of(&self, short: u32, is_six: bool) -> Option<NodeId> {
+        match self.owners.get(Self::place(short)) {
+            Some(owner) if owner[usize::from(is_six)].is_some() => owner[usize::from(is_six)],
+            _ if self.chosen.is_empty() => None,
+            _ => self.chooser_of(short, is_six),
+        }
+    }
+
+    /// Returns the host that has an address which the test has chosen.
+    #[cold]
+    fn chooser_of(&self, short: u32, is_six: bool) -> Option<NodeId> {
+        self.chosen.get(&(is_six, short)).copied().filter(|host| self.short(*host, is_six) == short)
+    }
+
+    /// Returns whether packets can be sent to the address, even if nobody has it: the address is one of the network of the hosts, or the test has chosen the
+    /// address for a host.
+    pub(crate) fn is_reachable(&self, address: IpAddr) -> bool {
+        Addresses::is_of_network(address) || self.chosen.contains_key(&(address.is_ipv6(), Addresses::short(address)))
     }
 
     /// Returns the index in `owners` of the addresses of number `number`. For number 0, which no host has, the index wraps beyond the end.
@@ -176,21 +233,61 @@ impl AddressPlan {
         number.wrapping_sub(1) as usize
     }
 
-    /// Returns the number of the present addresses of a host.
+    /// Returns the short form of the present address of a host.
     #[inline]
-    pub(crate) fn number(&self, host: NodeId) -> u32 {
-        self.current[host.index()]
+    pub(crate) fn short(&self, host: NodeId, is_six: bool) -> u32 {
+        self.current[host.index()][usize::from(is_six)]
     }
 
     #[inline]
     pub(crate) fn of(&self, host: NodeId) -> Addresses {
-        Addresses::numbered(self.number(host))
+        let [four, six] = self.current[host.index()];
+        Addresses { v4: Addresses::numbered(four).v4, v6: Addresses::numbered(six).v6 }
     }
 }
 
 impl fmt::Display for AddressPlan {
     /// Writes a line per host, such as `server 10.0.0.2 fd00::2`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.write_lines(f, usize::MAX)
+        self.names.iter().enumerate().try_for_each(|(host, name)| {
+            let Addresses { v4, v6 } = self.of(NodeId::new(host));
+            writeln!(f, "{name} {v4} {v6}")
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn chosen_addresses_are_those_of_their_hosts() {
+        let names: Arc<Names> = Arc::new(["a", "b", "c"].map(String::from).into_iter().collect());
+        let short = |text: &str| Addresses::choose(text.parse().unwrap());
+        // Host `a` has the address that would have been given to `b`, and `c` one of another network.
+        let chosen = [((0, false), "10.0.0.2"), ((2, false), "192.168.1.10"), ((1, true), "fd00::5")];
+        let chosen = chosen.map(|((host, is_six), text)| ((NodeId::new(host), is_six), short(text).unwrap())).into_iter().collect();
+        let mut plan = AddressPlan::new(names, &chosen);
+        assert_eq!(plan.to_string(), "a 10.0.0.2 fd00::1\nb 10.0.0.3 fd00::5\nc 192.168.1.10 fd00::4\n");
+        let owner = |plan: &AddressPlan, text: &str| plan.owner(text.parse().unwrap()).map(str::to_owned);
+        for (address, host) in [
+            ("10.0.0.1", None),
+            ("10.0.0.2", Some("a")),
+            ("10.0.0.3", Some("b")),
+            ("192.168.1.10", Some("c")),
+            ("fd00::2", None),
+            ("fd00::3", None),
+            ("fd00::5", Some("b")),
+            ("10.0.0.5", None),
+            ("fd01::1", None),
+        ] {
+            assert_eq!(owner(&plan, address).as_deref(), host, "{address}");
+        }
+        let moved = plan.change(NodeId::new(2));
+        assert_eq!((moved.v4.to_string(), moved.v6.to_string()), ("10.0.0.6".into(), "fd00::6".into()));
+        assert_eq!((owner(&plan, "192.168.1.10"), owner(&plan, "fd00::4"), owner(&plan, "10.0.0.6")), (None, None, Some("c".into())));
+        for text in ["127.0.0.1", "0.0.0.0", "224.0.0.1", "255.255.255.255", "10.255.255.255", "250.0.0.1", "::1", "::", "fe80::1", "fd00::1:0:1"] {
+            assert!(short(text).is_err(), "{text}");
+        }
     }
 }

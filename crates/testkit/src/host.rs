@@ -118,9 +118,7 @@ impl Host {
     #[cfg(feature = "tcp")]
     pub async fn connect(&self, address: impl ToSocketAddrs) -> io::Result<crate::TcpStream> {
         self.shared.check_open(self.node, "a connection")?;
-        let address = address.to_socket_addr()?;
-        let config = self.shared.with(|core| core.tcp_config(self.node).clone());
-        crate::TcpStream::connect_on(Arc::clone(&self.shared), self.node, None, address, config)?.established().await
+        crate::TcpStream::connect_to(&self.shared, self.node, address.to_socket_addrs()?).await
     }
 
     /// Runs a future as a task of this host: sockets that the future makes belong to this host. Needed for tasks started with `tokio::spawn`, which live on no
@@ -224,9 +222,14 @@ impl From<&Host> for IpAddr {
 }
 
 impl ToSocketAddrs for (&Host, u16) {
-    fn to_socket_addr(&self) -> io::Result<std::net::SocketAddr> {
+    fn to_socket_addrs(&self) -> io::Result<Vec<std::net::SocketAddr>> {
         let (host, port) = self;
-        let addresses = host.shared.open(host.node, "the address", |core| core.plan.of(host.node))?;
-        Ok((addresses.v4, *port).into())
+        let (Addresses { v4, v6 }, six_first) =
+            host.shared.open(host.node, "the address", |core| (core.plan.of(host.node), core.settings.six_first))?;
+        let mut both = vec![(v4, *port).into(), (v6, *port).into()];
+        if six_first {
+            both.reverse();
+        }
+        Ok(both)
     }
 }

@@ -93,9 +93,11 @@ mod artefacts;
 #[cfg(feature = "axum")]
 pub mod axum;
 mod bed;
+mod buffers;
 mod context;
 mod core;
 mod current;
+mod errno;
 #[cfg(feature = "facade")]
 mod facade;
 mod failure;

@@ -8,10 +8,11 @@ use cohaptic_wan::{MOST_NODES, NodeId, Path};
 use crate::current;
 
 /// Names of hosts, in the order in which they were given, with an index sorted by name. Looking a host up takes as many steps as the number of hosts has bits.
+/// Names that differ only in the case of letters of ASCII, or in a final dot, are the same name (RFC 4343).
 #[derive(Clone, PartialEq, Eq, Default)]
 pub(crate) struct Names {
     list: Vec<String>,
-    /// Indices into `list`, sorted by name.
+    /// Indices into `list`, sorted by [`key`].
     sorted: Vec<NodeId>,
 }
 
@@ -37,7 +38,7 @@ impl Names {
     }
 
     fn search(&self, name: &str) -> Result<usize, usize> {
-        self.sorted.binary_search_by(|node| (*self.list[node.index()]).cmp(name))
+        self.sorted.binary_search_by(|node| key(&self.list[node.index()]).cmp(key(name)))
     }
 
     /// Returns the host named `name`, if there is one.
@@ -101,6 +102,11 @@ impl<N: Into<String>> FromIterator<N> for Names {
         names.into_iter().for_each(|name| all.add(name.into()));
         all
     }
+}
+
+/// Returns the bytes of a name by which names are compared.
+fn key(name: &str) -> impl Iterator<Item = u8> {
+    name.strip_suffix('.').unwrap_or(name).bytes().map(|byte| byte.to_ascii_lowercase())
 }
 
 /// Returns why a text is not a valid name of a host, or `None` if it is valid.

@@ -16,11 +16,11 @@ pub mod tcp {
     pub use crate::tcp::{OwnedReadHalf, OwnedWriteHalf, ReadHalf, ReuniteError, WriteHalf};
 }
 
-/// Returns the address of a host.
+/// Returns the addresses of a host.
 ///
 /// # Errors
 ///
-/// As [`ToSocketAddrs::to_socket_addr`].
+/// As [`ToSocketAddrs::to_socket_addrs`].
 ///
 /// # Panics
 ///
@@ -28,5 +28,5 @@ pub mod tcp {
 #[track_caller]
 pub fn lookup_host(host: impl ToSocketAddrs) -> impl Future<Output = io::Result<impl Iterator<Item = SocketAddr>>> {
     let _ = Call::here("lookup_host");
-    async move { Ok(std::iter::once(host.to_socket_addr()?)) }
+    async move { Ok(host.to_socket_addrs()?.into_iter()) }
 }

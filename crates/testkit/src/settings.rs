@@ -1,9 +1,11 @@
 //! Settings of a run.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
 use cohaptic_units::Instant;
+use cohaptic_wan::NodeId;
 
 use crate::again::Said;
 use crate::hit::Laws;
@@ -13,6 +15,10 @@ use crate::hit::Laws;
 pub(crate) struct Settings {
     /// Size of the receive buffer of a UDP socket \[bytes\].
     pub(crate) receive_buffer: usize,
+    /// Addresses that the test has chosen, in short form, by host and version of IP (true for 6).
+    pub(crate) addresses: BTreeMap<(NodeId, bool), u32>,
+    /// `true` if the address of IPv6 comes first when a name is looked up.
+    pub(crate) six_first: bool,
     /// `true` if events are recorded.
     pub(crate) traces: bool,
     /// `true` if recorded events contain digests of the packets' bytes.

@@ -53,6 +53,8 @@ impl Setup {
             seed: None,
             settings: Settings {
                 receive_buffer: RECEIVE_BUFFER,
+                addresses: BTreeMap::new(),
+                six_first: false,
                 traces: false,
                 digests: true,
                 keeps_packets: false,

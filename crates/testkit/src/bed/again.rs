@@ -37,7 +37,7 @@ impl Testbed {
             said: Arc::clone(said),
             laws: laws.clone(),
             seed: seed.clone(),
-            others: others.into_iter().flatten().collect(),
+            others: self.address_calls().chain(others.into_iter().flatten()).collect(),
             place,
         }
     }

@@ -1,5 +1,6 @@
 //! Test bed: its parts, and its run.
 
+mod addresses;
 mod again;
 mod hitting;
 #[cfg(feature = "strategies")]

@@ -1,9 +1,23 @@
 //! Addresses and ports of both ends of a packet, packed into 16 bytes because the event queue moves them with the packet.
 
-use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::net::{IpAddr, SocketAddr};
 
 use super::bound::Port;
 use crate::address::Addresses;
+
+/// Returns the address of IPv4 as a socket of IPv6 shows it; an address of IPv6 as it is.
+pub(crate) fn mapped(address: SocketAddr) -> SocketAddr {
+    match address.ip() {
+        IpAddr::V4(v4) => SocketAddr::new(v4.to_ipv6_mapped().into(), address.port()),
+        IpAddr::V6(_) => address,
+    }
+}
+
+/// Returns the address of IPv4 that an address such as `::ffff:10.0.0.1` stands for; any other address as it is.
+#[inline]
+pub(crate) fn unmapped(address: SocketAddr) -> SocketAddr {
+    if address.is_ipv4() { address } else { SocketAddr::new(address.ip().to_canonical(), address.port()) }
+}
 
 /// Both ends of a packet, and the kind of the packet.
 #[derive(Clone, Copy, Default, Debug)]
@@ -15,7 +29,9 @@ pub(crate) struct Ends {
     from_port: u16,
     to_port: u16,
     /// `true` if both addresses are of IPv6.
-    is_six: bool,
+    pub(super) is_six: bool,
+    /// `true` if a socket of IPv6 has received the packet over IPv4, so that its program sees the addresses as `::ffff:10.0.0.1` (RFC 4291, section 2.5.5.2).
+    pub(super) is_mapped: bool,
     pub(super) kind: Kind,
 }
 
@@ -40,7 +56,7 @@ impl Ends {
 
     /// Like [`Ends::new`], but takes short addresses.
     pub(super) const fn of([from, to]: [u32; 2], [from_port, to_port]: [u16; 2], is_six: bool, kind: Kind) -> Self {
-        Self { from, to, from_port, to_port, is_six, kind }
+        Self { from, to, from_port, to_port, is_six, is_mapped: false, kind }
     }
 
     /// Returns the port of the receiver, with the version of IP.
@@ -49,14 +65,22 @@ impl Ends {
         Port::new(self.is_six, self.to_port)
     }
 
+    /// Returns the address of the sender, as the receiving program sees it.
     #[inline]
     pub(super) fn from(&self) -> SocketAddr {
-        SocketAddr::new(Addresses::long(self.from, self.is_six), self.from_port)
+        self.shown(SocketAddr::new(Addresses::long(self.from, self.is_six), self.from_port))
+    }
+
+    /// Returns the address of the receiver, as the receiving program sees it.
+    #[inline]
+    #[cfg(any(test, feature = "quinn"))]
+    pub(super) fn to(&self) -> SocketAddr {
+        self.shown(SocketAddr::new(Addresses::long(self.to, self.is_six), self.to_port))
     }
 
     #[inline]
-    pub(super) fn to(&self) -> SocketAddr {
-        SocketAddr::new(Addresses::long(self.to, self.is_six), self.to_port)
+    fn shown(&self, address: SocketAddr) -> SocketAddr {
+        if self.is_mapped { mapped(address) } else { address }
     }
 
     /// Returns whether the packet goes to an address that every host has: an address of loopback, or broadcast.
@@ -65,15 +89,15 @@ impl Ends {
         self.is_broadcast() || Addresses::is_loopback(self.to, self.is_six)
     }
 
-    /// Returns whether the packet goes to the broadcast address 255.255.255.255.
+    /// Returns whether the packet goes to a broadcast address.
     pub(super) fn is_broadcast(&self) -> bool {
-        self.to().ip() == IpAddr::V4(Ipv4Addr::BROADCAST)
+        !self.is_six && Addresses::is_broadcast(self.to)
     }
 
     /// Returns the ends of an answer of kind `kind`: sender and receiver are swapped.
     pub(super) const fn back(self, kind: Kind) -> Self {
         let Self { from, to, from_port, to_port, is_six, .. } = self;
-        Self { from: to, to: from, from_port: to_port, to_port: from_port, is_six, kind }
+        Self::of([to, from], [to_port, from_port], is_six, kind)
     }
 }
 

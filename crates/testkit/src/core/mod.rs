@@ -33,6 +33,7 @@ use crate::wire::{self, Recorded, Wire};
 use bound::Bound;
 pub(crate) use bound::SocketId;
 use ends::{Ends, Kind};
+pub(crate) use ends::{mapped, unmapped};
 use face::Face;
 use sockets::Sockets;
 use waking::Woken;
@@ -41,7 +42,7 @@ pub(crate) use passing::Outgoing;
 pub(crate) use shared::{Clock, Shared};
 pub(crate) use socket_name::SocketName;
 #[cfg(feature = "tcp")]
-pub(crate) use tcp::{ConnId, HoldId, Inherited, ListenId};
+pub(crate) use tcp::{ConnId, HoldId, Inherited, ListenId, Sharing};
 pub(crate) use timers::{TimerId, Timers};
 pub(crate) use waking::{Registered, registered};
 
@@ -74,7 +75,7 @@ impl Core {
         link: impl Fn(NodeId, NodeId) -> LinkModel + Send + Sync + 'static,
     ) -> Self {
         Self {
-            plan: AddressPlan::new(Arc::clone(names)),
+            plan: AddressPlan::new(Arc::clone(names), &settings.addresses),
             wire: Wire::new(names, seed, &settings, changes, link),
             face: Arc::new(Face::new(settings.patience)),
             settings,

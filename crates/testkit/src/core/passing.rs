@@ -1,12 +1,14 @@
 //! Way of a datagram from the sending socket into its link, and from the link to the receiving socket.
 
 use std::io;
-use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
+use std::net::SocketAddr;
 
 use cohaptic_wan::{NodeId, Path};
 
+use super::sockets::SocketState;
 use super::{Core, Ends, Kind, Parcel, SocketId};
 use crate::address::Addresses;
+use crate::errno::Errno;
 use crate::trace::{Lost, PacketName};
 use crate::wire::Arrival;
 
@@ -28,29 +30,20 @@ pub(crate) struct Outgoing<'a> {
 enum Receivers {
     /// A single host, which may be the sender itself.
     One(NodeId),
-    /// All hosts except the sender.
+    /// All hosts, the sender included.
     All,
-    /// No host. A host may have had the address before.
+    /// No host: the datagram is lost without an error, as in a real network.
     Nobody,
 }
 
-#[cold]
-fn refuse<T>(kind: io::ErrorKind, text: String) -> io::Result<T> {
-    Err(io::Error::new(kind, text))
-}
-
-/// Returns the error of a socket at `local` that cannot send a datagram of `len` bytes to the address `to`.
-#[cold]
-fn refuse_datagram(local: SocketAddr, to: SocketAddr, len: usize) -> io::Result<()> {
-    let longest = LONGEST[usize::from(to.is_ipv6())];
-    let text = if to.is_ipv6() != local.is_ipv6() {
-        format!("a socket at {local} cannot reach {to}, which is of the other version of IP")
-    } else if to.port() == 0 {
-        format!("nothing can be sent to port 0 ({to})")
-    } else {
-        format!("message too long: {len} bytes, where a datagram has {longest} at most")
-    };
-    refuse(io::ErrorKind::InvalidInput, text)
+/// Way of a datagram through the network.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Route {
+    /// Address of the sender, as [`Addresses::short`].
+    from: u32,
+    /// Address on the packet, as [`Addresses::short`]. Differs from the address that the program gave if that is the unspecified one.
+    pub(super) to: u32,
+    receivers: Receivers,
 }
 
 impl Core {
@@ -64,24 +57,21 @@ impl Core {
             return Err(self.error_of(id));
         }
         let host = socket.host;
-        let Some(to) = to.or(socket.peer.as_ref()) else {
-            return refuse(io::ErrorKind::NotConnected, "the socket is not connected; use `send_to`, or `connect` before".into());
+        let to = match to {
+            Some(to) => socket.wire_form(*to)?,
+            None => match socket.peer {
+                Some(peer) => peer,
+                None => return Errno::NoDestination.fail(),
+            },
         };
-        let is_six = to.is_ipv6();
-        if is_six != socket.port.is_six() || to.port() == 0 || bytes.len() > LONGEST[usize::from(is_six)] {
-            return refuse_datagram(socket.local(), *to, bytes.len());
+        if to.port() == 0 {
+            return Errno::InvalidInput.fail();
         }
-        // An address of a host belongs to no other kind of address. Most datagrams go to such an address, so the other kinds are tried only afterwards.
-        let mut number = Addresses::short(to.ip());
-        let receivers = match self.plan.owner_of(number) {
-            Some(owner) => Receivers::One(owner),
-            None => self.other_receivers(host, to, &mut number)?,
-        };
-        let from = self.source(host, socket.at, number, to)?;
-        let addresses = Ends::of([from, number], [socket.port.number(), to.port()], is_six, Kind::Datagram);
-        if matches!(receivers, Receivers::All) && !socket.may_broadcast {
-            return refuse(io::ErrorKind::PermissionDenied, "this socket may not broadcast; `set_broadcast(true)` allows it".into());
+        if bytes.len() > LONGEST[usize::from(to.is_ipv6())] {
+            return Errno::TooLong.fail();
         }
+        let Route { from, to: number, receivers } = self.route(socket, &to)?;
+        let addresses = Ends::of([from, number], [socket.port.number(), to.port()], to.is_ipv6(), Kind::Datagram);
         let parcel = self.spare.copied(addresses, bytes, ecn_capable);
         match receivers {
             Receivers::One(receiver) if receiver == host => self.hand_over(host, parcel),
@@ -90,11 +80,10 @@ impl Core {
                 for other in (0..self.hosts.len()).map(NodeId::new).filter(|other| *other != host) {
                     self.offer(Path { from: host, to: other }, parcel.clone());
                 }
+                // Sockets of the sender hear a broadcast as well, over loopback.
+                self.hand_over(host, parcel);
             }
-            // A datagram to an address that a host has given up is lost without an error, as in a real network. An address that no host ever had is most likely
-            // a mistake of the test.
-            Receivers::Nobody if self.plan.was_given(to.ip()) => {}
-            Receivers::Nobody => return refuse(io::ErrorKind::HostUnreachable, self.plan.unknown(to.ip())),
+            Receivers::Nobody => {}
         }
         // The check comes after the sending: a packet that arrives at once and is read or lost is not held any more.
         if self.wire.held.is_too_much() {
@@ -103,23 +92,45 @@ impl Core {
         Ok(())
     }
 
+    /// Returns the way of a datagram of `socket` to the address `to`, which the socket can send to.
+    ///
+    /// # Errors
+    ///
+    /// If the network cannot be reached from the address of the socket, or the socket may not broadcast.
+    #[inline(always)]
+    pub(super) fn route(&self, socket: &SocketState, to: &SocketAddr) -> io::Result<Route> {
+        // An address of a host belongs to no other kind of address. Most datagrams go to such an address, so the other kinds are tried only afterwards.
+        let mut number = Addresses::short(to.ip());
+        let receivers = match self.plan.owner_of(number, to.is_ipv6()) {
+            Some(owner) => Receivers::One(owner),
+            None => self.other_receivers(socket.host, to, &mut number)?,
+        };
+        let from = self.source(socket.host, socket.at, number, to)?;
+        if matches!(receivers, Receivers::All) && !socket.may_broadcast {
+            return Errno::PermissionDenied.fail();
+        }
+        Ok(Route { from, to: number, receivers })
+    }
+
     /// Returns the receivers of a datagram from `host` to an address that no host has. Sets `number` to the address on the packet, which differs for the
     /// unspecified address.
     #[inline(never)]
     fn other_receivers(&self, host: NodeId, to: &SocketAddr, number: &mut u32) -> io::Result<Receivers> {
         let ip = to.ip();
         if ip.is_multicast() {
-            return refuse(io::ErrorKind::Unsupported, format!("{to} is a multicast address, and a test bed has no groups"));
+            return Err(io::Error::new(io::ErrorKind::Unsupported, format!("{to} is a multicast address, and a test bed has no groups")));
         }
         if ip.is_unspecified() {
-            let loopback = if ip.is_ipv6() { Ipv6Addr::LOCALHOST.into() } else { IpAddr::V4(Ipv4Addr::LOCALHOST) };
-            *number = Addresses::short(loopback);
+            *number = Addresses::LOOPBACK[usize::from(ip.is_ipv6())];
             return Ok(Receivers::One(host));
         }
         if ip.is_loopback() {
             return Ok(Receivers::One(host));
         }
-        Ok(if ip == IpAddr::V4(Ipv4Addr::BROADCAST) { Receivers::All } else { Receivers::Nobody })
+        if ip.is_ipv4() && Addresses::is_broadcast(*number) {
+            return Ok(Receivers::All);
+        }
+        if self.plan.is_reachable(ip) { Ok(Receivers::Nobody) } else { Errno::NetworkUnreachable.fail() }
     }
 
     /// Returns the source address of a socket that sends to the address `number`, given by the program as `to`. `at` is the address at which the socket is
@@ -127,23 +138,30 @@ impl Core {
     #[inline]
     pub(super) fn source(&self, host: NodeId, at: Option<u32>, number: u32, to: &SocketAddr) -> io::Result<u32> {
         match at {
-            None if Addresses::is_loopback(number, to.is_ipv6()) => Ok(number),
-            None => Ok(self.plan.number(host)),
+            None => Ok(self.source_to(host, number, to.is_ipv6())),
             Some(at) => self.check_source(host, at, number, to).map(|()| at),
         }
+    }
+
+    /// Returns the source address of a socket that is bound to no address and sends to the address `number`. As with Linux, 127.0.0.1 is the source also for
+    /// the other addresses of loopback.
+    #[inline]
+    pub(super) fn source_to(&self, host: NodeId, number: u32, is_six: bool) -> u32 {
+        if Addresses::is_loopback(number, is_six) { Addresses::LOOPBACK[usize::from(is_six)] } else { self.plan.short(host, is_six) }
     }
 
     /// Checks that a socket bound to the address `at` can send to the address `number`.
     #[inline(never)]
     fn check_source(&self, host: NodeId, at: u32, number: u32, to: &SocketAddr) -> io::Result<()> {
         let (addresses, bound) = (self.plan.of(host), Addresses::long(at, to.is_ipv6()));
-        if bound.is_loopback() && !Addresses::is_loopback(number, to.is_ipv6()) {
-            return refuse(io::ErrorKind::InvalidInput, format!("a socket at {bound} reaches no other host, and so not {}", to.ip()));
+        let stays = Addresses::is_loopback(number, to.is_ipv6()) || number == self.plan.short(host, to.is_ipv6());
+        if bound.is_loopback() && !stays {
+            return Errno::InvalidInput.fail();
         }
         if !bound.is_loopback() && !addresses.has(bound) {
             let text =
                 format!("host `{}` does not have the address {bound} any more; it has {}", self.plan.names()[host.index()], addresses.like(bound));
-            return refuse(io::ErrorKind::AddrNotAvailable, text);
+            return Err(io::Error::new(io::ErrorKind::AddrNotAvailable, text));
         }
         Ok(())
     }
@@ -201,7 +219,7 @@ impl Core {
             socket.refuse(parcel.addresses.from(), &mut self.woken);
             return Ok(());
         }
-        socket.keep(parcel, (self.settings.receive_buffer, &mut self.wire.held), &mut self.woken)
+        socket.keep(parcel, &mut self.wire.held, &mut self.woken)
     }
 
     /// Returns the socket of `host` that receives the packet. A socket connected to the sender comes before an unconnected socket, then a socket bound to the
@@ -226,7 +244,7 @@ impl Core {
     /// Returns whether `host` has the address to which the packet goes.
     #[inline(always)]
     fn has_address(&self, host: NodeId, ends: &Ends) -> bool {
-        self.plan.number(host) == ends.to || ends.is_to_any_host()
+        self.plan.short(host, ends.is_six) == ends.to || ends.is_to_any_host()
     }
 
     /// Returns why a packet without a receiving socket is lost. A host that is down has no sockets. If the host is up, the sender of a datagram is told.

@@ -10,8 +10,9 @@ use cohaptic_wan::{NodeId, Ring};
 
 use super::bound::{Port, SocketId};
 use super::waking::{Waiters, Woken};
-use super::{Core, Parcel, SocketName};
+use super::{Core, Parcel, SocketName, mapped, unmapped};
 use crate::address::Addresses;
+use crate::errno::Errno;
 use crate::trace::Lost;
 use crate::wire::{Held, Where};
 
@@ -43,7 +44,10 @@ pub(crate) struct SocketState {
     /// Address to which the socket is bound, as [`Addresses::short`]; `None` if the socket is bound to all addresses of its host.
     pub(super) at: Option<u32>,
     pub(super) port: Port,
+    /// Peer to which the socket is connected, as packets have its address: of IPv4 also if the socket is of IPv6.
     pub(super) peer: Option<SocketAddr>,
+    /// Size of the receive buffer \[byte\].
+    pub(super) room: usize,
     pub(super) inbox: Ring<Box<Parcel>>,
     /// Bytes of all datagrams in `inbox`, without overhead.
     pub(super) held: usize,
@@ -58,13 +62,13 @@ pub(crate) struct SocketState {
 }
 
 impl SocketState {
-    /// Puts a datagram into the buffer. `room` is the size of the buffer \[bytes\]; `all` counts the bytes of the whole run. A datagram whose memory does not fit is
-    /// lost, unless the buffer is empty.
+    /// Puts a datagram into the buffer. `all` counts the bytes of the whole run. A datagram whose memory does not fit is lost, unless the buffer is empty.
     #[inline(always)]
-    pub(super) fn keep(&mut self, parcel: Box<Parcel>, (room, all): (usize, &mut Held), woken: &mut Woken) -> Result<(), Lost> {
-        let len = parcel.bytes.len();
-        let memory = self.memory + memory_of(len, self.port.is_six());
-        if memory > room && self.memory > 0 {
+    pub(super) fn keep(&mut self, mut parcel: Box<Parcel>, all: &mut Held, woken: &mut Woken) -> Result<(), Lost> {
+        let (len, is_six) = (parcel.bytes.len(), parcel.addresses.is_six);
+        parcel.addresses.is_mapped = self.port.is_six() && !is_six;
+        let memory = self.memory + memory_of(len, is_six);
+        if memory > self.room && self.memory > 0 {
             return Err(Lost::BufferFull);
         }
         self.memory = memory;
@@ -102,6 +106,45 @@ impl SocketState {
             None => Ipv4Addr::UNSPECIFIED.into(),
         };
         SocketAddr::new(ip, number)
+    }
+
+    /// Returns whether the socket is bound to all addresses of both versions of IP.
+    #[inline]
+    fn is_dual(&self) -> bool {
+        self.at.is_none() && self.port.is_six()
+    }
+
+    /// Returns the port in each version of IP over which the socket receives.
+    fn versions(&self) -> impl Iterator<Item = Port> + use<> {
+        std::iter::once(self.port).chain(self.is_dual().then(|| Port::new(false, self.port.number())))
+    }
+
+    /// Returns an address of a packet as the program sees it.
+    fn shown(&self, address: SocketAddr) -> SocketAddr {
+        if self.port.is_six() { mapped(address) } else { address }
+    }
+
+    /// Returns the address of the other end of a packet of this socket: of IPv4 for `::ffff:10.0.0.1`, which a socket of IPv6 reaches over IPv4.
+    ///
+    /// # Errors
+    ///
+    /// If the socket cannot send packets of that version of IP.
+    #[inline]
+    pub(super) fn wire_form(&self, to: SocketAddr) -> io::Result<SocketAddr> {
+        if to.is_ipv6() == self.port.is_six() && !to.is_ipv6() {
+            return Ok(to);
+        }
+        self.other_form(to)
+    }
+
+    #[inline(never)]
+    fn other_form(&self, to: SocketAddr) -> io::Result<SocketAddr> {
+        let form = if self.port.is_six() { unmapped(to) } else { to };
+        if form.is_ipv6() == self.port.is_six() || self.is_dual() {
+            return Ok(form);
+        }
+        // A socket that is bound to an address of IPv6 has no address of IPv4 to send from.
+        if self.port.is_six() { Errno::NetworkUnreachable.fail() } else { Errno::OtherVersion.fail() }
     }
 
     /// Handles the message of IP that no socket is bound to the port `by`. A socket that is not connected to `by` ignores the message.
@@ -172,33 +215,32 @@ impl Core {
         self.check_owned(host, ip)?;
         let port = match wanted.port() {
             0 => self.free_port(host, ip)?,
-            port if self.is_taken(host, ip, port) => {
-                let text = format!("{wanted} is taken on host `{}`", self.plan.names()[host.index()]);
-                return Err(io::Error::new(io::ErrorKind::AddrInUse, text));
-            }
+            port if self.is_taken(host, ip, port) => return Errno::AddrInUse.fail(),
             port => port,
         };
         let (at, port) = ((!ip.is_unspecified()).then(|| Addresses::short(ip)), Port::new(ip.is_ipv6(), port));
-        let (readers, inbox) = (Waiters::default(), Ring::new());
-        let state = SocketState { host, at, port, peer: None, inbox, held: 0, memory: 0, readers, refused: false, may_broadcast: false, died: None };
+        let (readers, inbox, room) = (Waiters::default(), Ring::new(), self.settings.receive_buffer);
+        let state =
+            SocketState { host, at, port, peer: None, room, inbox, held: 0, memory: 0, readers, refused: false, may_broadcast: false, died: None };
+        let bound = &mut self.hosts[host.index()].bound;
+        let versions = state.versions();
         let id = self.sockets.insert(state);
-        self.hosts[host.index()].bound.add(port, id);
+        versions.for_each(|port| bound.add(port, id));
         Ok(id)
     }
 
     /// Checks that a socket of `host` can be bound to the address `ip`.
     pub(super) fn check_owned(&self, host: NodeId, ip: IpAddr) -> io::Result<()> {
-        if !ip.is_unspecified() && !ip.is_loopback() && !self.plan.of(host).has(ip) {
-            let text = format!("{ip} is not an address of host `{}`, which has {}", self.plan.names()[host.index()], self.plan.of(host).like(ip));
-            return Err(io::Error::new(io::ErrorKind::AddrNotAvailable, text));
-        }
-        Ok(())
+        if ip.is_unspecified() || ip.is_loopback() || self.plan.of(host).has(ip) { Ok(()) } else { Errno::AddrNotAvailable.fail() }
     }
 
     fn is_taken(&self, host: NodeId, ip: IpAddr, port: u16) -> bool {
-        // A socket bound to all addresses conflicts with every socket of the port.
-        let mut bound = self.hosts[host.index()].bound.at(Port::new(ip.is_ipv6(), port));
-        bound.any(|id| ip.is_unspecified() || self.sockets.get(id).at.is_none_or(|other| other == Addresses::short(ip)))
+        let bound = &self.hosts[host.index()].bound;
+        // A socket bound to all addresses conflicts with every socket of the port. At `[::]` these are the sockets of both versions of IP.
+        let is_taken = bound
+            .at(Port::new(ip.is_ipv6(), port))
+            .any(|id| ip.is_unspecified() || self.sockets.get(id).at.is_none_or(|other| other == Addresses::short(ip)));
+        is_taken || ip == IpAddr::V6(Ipv6Addr::UNSPECIFIED) && bound.at(Port::new(false, port)).next().is_some()
     }
 
     fn free_port(&mut self, host: NodeId, ip: IpAddr) -> io::Result<u16> {
@@ -220,7 +262,7 @@ impl Core {
         let Some(mut state) = self.sockets.places[id.0].take() else { return };
         state.clear(&mut self.wire.held);
         self.sockets.free.push(id.0);
-        self.hosts[state.host.index()].bound.remove(state.port, id);
+        state.versions().for_each(|port| self.hosts[state.host.index()].bound.remove(port, id));
     }
 
     /// Checks that the socket lives. A socket dies when its host crashes, or when the program of its host is killed.
@@ -241,26 +283,39 @@ impl Core {
         Err(io::Error::new(io::ErrorKind::ConnectionAborted, text))
     }
 
+    /// Returns the local address of the socket. If the socket is connected and bound to all addresses, this is the address from which it sends.
     pub(crate) fn local_of(&self, id: SocketId) -> SocketAddr {
-        self.sockets.get(id).local()
+        let socket = self.sockets.get(id);
+        let local = socket.local();
+        match socket.peer {
+            Some(peer) if socket.at.is_none() => {
+                let source = Addresses::long(self.source_to(socket.host, Addresses::short(peer.ip()), peer.is_ipv6()), peer.is_ipv6());
+                socket.shown(SocketAddr::new(source, local.port()))
+            }
+            _ => local,
+        }
     }
 
     pub(crate) fn peer_of(&self, id: SocketId) -> Option<SocketAddr> {
-        self.sockets.get(id).peer
+        let socket = self.sockets.get(id);
+        socket.peer.map(|peer| socket.shown(peer))
     }
 
-    /// Connects the socket: from now on it receives datagrams of `peer` only. As with Linux, datagrams already in the buffer stay.
+    /// Connects the socket: from now on it receives datagrams of `peer` only. As with Linux, datagrams already in the buffer stay, and a peer to which no
+    /// datagram could be sent is refused.
     pub(crate) fn connect(&mut self, id: SocketId, peer: SocketAddr) -> io::Result<()> {
         self.check_alive(id)?;
-        let local = self.sockets.get(id).local();
-        if local.is_ipv6() != peer.is_ipv6() {
-            return Err(io::Error::new(
-                io::ErrorKind::InvalidInput,
-                format!("a socket at {local} cannot reach {peer}, which is of the other version of IP"),
-            ));
-        }
-        self.sockets.get_mut(id).peer = Some(peer);
+        let socket = self.sockets.get(id);
+        let to = socket.wire_form(peer)?;
+        let route = self.route(socket, &to)?;
+        let ip = if to.ip().is_unspecified() { Addresses::long(route.to, to.is_ipv6()) } else { to.ip() };
+        self.sockets.get_mut(id).peer = Some(SocketAddr::new(ip, to.port()));
         Ok(())
+    }
+
+    /// Returns the size of the receive buffer of a socket \[byte\].
+    pub(crate) fn room(&mut self, id: SocketId) -> &mut usize {
+        &mut self.sockets.get_mut(id).room
     }
 
     /// Returns a line for each socket that a task waits for.
@@ -309,7 +364,7 @@ impl Core {
         };
         let len = datagram.bytes.len();
         socket.held -= len;
-        socket.memory -= memory_of(len, socket.port.is_six());
+        socket.memory -= memory_of(len, datagram.addresses.is_six);
         self.wire.held.remove(Where::Buffers, Held::cost(len));
         let seen = look(&datagram);
         self.spare.put(datagram);
@@ -332,7 +387,7 @@ impl Core {
             return died;
         }
         self.sockets.get_mut(id).refused = false;
-        io::Error::new(io::ErrorKind::ConnectionRefused, "connection refused: no socket at the port of the peer")
+        Errno::ConnectionRefused.into()
     }
 
     /// Returns whether [`Core::receive`] would return a datagram or an error.
@@ -343,7 +398,7 @@ impl Core {
 
     /// Takes the pending refusal out of the socket.
     pub(crate) fn take_error(&mut self, id: SocketId) -> Option<io::Error> {
-        std::mem::take(&mut self.sockets.get_mut(id).refused).then(|| io::ErrorKind::ConnectionRefused.into())
+        std::mem::take(&mut self.sockets.get_mut(id).refused).then(|| Errno::ConnectionRefused.into())
     }
 
     /// Returns whether [`Core::receive`] would return a datagram or an error. If not, `waker` is woken when it would.

@@ -3,6 +3,8 @@
 //! `cohaptic tokio` generates that package. Programs that use tokio's sockets and tasks then run on a test bed unchanged: the package asks `cohaptic-sockets`
 //! for the test bed of the thread, which `crate::runtime` registers for each run.
 
+mod settings;
+
 use std::io;
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -28,11 +30,11 @@ pub(crate) struct BedOfThread {
 
 impl Bed for BedOfThread {
     fn look_up(&self, name: &str, port: u16) -> io::Result<Vec<SocketAddr>> {
-        Ok(vec![(name, port).to_socket_addr()?])
+        (name, port).to_socket_addrs()
     }
 
     fn look_up_text(&self, text: &str) -> io::Result<Vec<SocketAddr>> {
-        Ok(vec![text.to_socket_addr()?])
+        text.to_socket_addrs()
     }
 
     fn connect(&self, call: Call, to: SocketAddr) -> Connecting {

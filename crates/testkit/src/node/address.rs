@@ -43,7 +43,7 @@ mod tests {
 
     #[test]
     fn places_have_the_addresses_that_the_hosts_of_a_test_bed_have() {
-        let plan = AddressPlan::new(std::sync::Arc::new((0..300).map(|place| format!("host-{place}")).collect()));
+        let plan = AddressPlan::new(std::sync::Arc::new((0..300).map(|place| format!("host-{place}")).collect()), &std::collections::BTreeMap::new());
         for place in [0, 1, 254, 255, 299] {
             assert_eq!(addresses(place), plan.of(NodeId::new(place)));
             assert_eq!(place_of(addresses(place).v4.into()), Some(place));

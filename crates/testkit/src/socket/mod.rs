@@ -15,7 +15,8 @@ use cohaptic_wan::NodeId;
 
 use crate::context::Call;
 use crate::core::{Core, Shared, SocketId};
-use crate::resolve::ToSocketAddrs;
+use crate::errno::Errno;
+use crate::resolve::{ToSocketAddrs, each};
 
 /// Name of this kind of socket in messages.
 const KIND: &str = "a UDP socket";
@@ -32,7 +33,9 @@ const KIND: &str = "a UDP socket";
 ///   datagram is cut off if it is longer than the buffer passed to receive it.
 /// - If no socket is bound to the port of the peer, a connected socket gets [`io::ErrorKind::ConnectionRefused`] after the answer has come back over the link:
 ///   from the next call, or from the call that waits to receive.
-/// - A socket at `[::]` receives over IPv6 only.
+/// - A socket at `[::]` receives over both versions of IP, as with Linux. The sender of a datagram over IPv4 is then shown as `::ffff:10.0.0.1`.
+/// - A datagram to an address of the network of the hosts, 10.0.0.0/8 or `fd00::/8`, that no host has is lost without an error, as in a real network.
+/// - Errors have the numbers of the system ([`io::Error::raw_os_error`]), as far as the system has the error.
 /// - After its host has crashed, every method returns [`io::ErrorKind::ConnectionAborted`], with the way out. The same error comes from every method after the
 ///   run of the test bed has ended, also within the run of another test bed: a task or a destructor may outlive the run. Binding a socket where there is no
 ///   host is a fault of the test, and panics.
@@ -50,7 +53,7 @@ impl UdpSocket {
     ///
     /// # Errors
     ///
-    /// As with tokio: the address is taken, or is no address of the host.
+    /// As with tokio, those of the last address that was tried: the address is taken, or is no address of the host.
     ///
     /// # Panics
     ///
@@ -67,10 +70,11 @@ impl UdpSocket {
     pub(crate) fn bind_on(shared: Arc<Shared>, host: NodeId, address: impl ToSocketAddrs) -> io::Result<Self> {
         // The socket is checked before the address is looked up: on another thread, or after the run, a name means nothing or names another host.
         shared.check_open(host, KIND)?;
-        let address = address.to_socket_addr()?;
-        let id = shared.with(|core| {
-            core.check_up(host)?;
-            core.bind(host, address)
+        let id = each(address, |address| {
+            shared.with(|core| {
+                core.check_up(host)?;
+                core.bind(host, address)
+            })
         })?;
         Ok(Self { shared, host, id, options: options::Options::default() })
     }
@@ -87,7 +91,7 @@ impl UdpSocket {
         })?
     }
 
-    /// Returns the address to which the socket is bound.
+    /// Returns the address to which the socket is bound. A socket that is bound to all addresses and connected has the address from which it sends to its peer.
     ///
     /// # Errors
     ///
@@ -102,18 +106,19 @@ impl UdpSocket {
     ///
     /// [`io::ErrorKind::NotConnected`] if the socket is not connected.
     pub fn peer_addr(&self) -> io::Result<SocketAddr> {
-        self.open(|core| core.peer_of(self.id))?.ok_or_else(|| io::ErrorKind::NotConnected.into())
+        self.open(|core| core.peer_of(self.id))?.ok_or_else(|| Errno::NotConnected.into())
     }
 
     /// Connects the socket: from now on it sends to `peer`, and receives from no other address. Datagrams that have arrived before stay in the buffer.
     ///
     /// # Errors
     ///
-    /// If `peer` is of the other version of IP, or is no address.
+    /// Those of the last address that was tried: the socket cannot send to the address, because it is of the other version of IP, of a network that cannot be
+    /// reached, or a broadcast address without [`UdpSocket::set_broadcast`].
     #[expect(clippy::unused_async, reason = "as tokio's")]
     pub async fn connect(&self, peer: impl ToSocketAddrs) -> io::Result<()> {
         self.shared.check_open(self.host, KIND)?;
-        self.connect_now(peer.to_socket_addr()?)
+        each(peer, |peer| self.connect_now(peer))
     }
 
     fn connect_now(&self, peer: SocketAddr) -> io::Result<()> {
@@ -121,7 +126,8 @@ impl UdpSocket {
         self.shared.with(|core| core.connect(self.id, peer))
     }
 
-    /// Returns whether the socket may send to 255.255.255.255, which reaches all other hosts.
+    /// Returns whether the socket may send to 255.255.255.255 or 10.255.255.255. Sockets bound to `0.0.0.0` or `[::]` hear such a datagram on all hosts, the
+    /// sender's own included. Sockets bound to an address do not.
     ///
     /// # Errors
     ///
@@ -130,7 +136,7 @@ impl UdpSocket {
         self.open(|core| *core.may_broadcast(self.id))
     }
 
-    /// Sets whether the socket may send to 255.255.255.255.
+    /// Sets whether the socket may send to 255.255.255.255 or 10.255.255.255.
     ///
     /// # Errors
     ///

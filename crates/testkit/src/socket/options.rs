@@ -7,6 +7,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 #[cfg(feature = "tokio-net")]
 use super::KIND;
 use super::UdpSocket;
+use crate::buffers::{LEAST_RECEIVE_BUFFER, LEAST_SEND_BUFFER, doubled};
+use crate::errno::Errno;
 
 /// Options that are stored and returned. Only the two lowest bits of the type of service have an effect: see [`UdpSocket::set_tos_v4`].
 #[derive(Debug)]
@@ -15,12 +17,16 @@ pub(super) struct Options {
     type_of_service: AtomicU32,
     multicast_ttl: AtomicU32,
     multicast_loop: AtomicU32,
+    send_buffer: AtomicU32,
 }
+
+/// Default size of a send buffer in Linux (`net.core.wmem_default`) \[byte\].
+const SEND_BUFFER: u32 = 212_992;
 
 impl Default for Options {
     /// Returns the defaults of Linux.
     fn default() -> Self {
-        Self { ttl: 64.into(), type_of_service: 0.into(), multicast_ttl: 1.into(), multicast_loop: 1.into() }
+        Self { ttl: 64.into(), type_of_service: 0.into(), multicast_ttl: 1.into(), multicast_loop: 1.into(), send_buffer: SEND_BUFFER.into() }
     }
 }
 
@@ -33,8 +39,7 @@ impl Options {
 
 fn set(option: &AtomicU32, value: u32, allowed: std::ops::RangeInclusive<u32>) -> io::Result<()> {
     if !allowed.contains(&value) {
-        let text = format!("{value} is none; expected {} to {}", allowed.start(), allowed.end());
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, text));
+        return Errno::InvalidInput.fail();
     }
     option.store(value, Ordering::Relaxed);
     Ok(())
@@ -55,7 +60,7 @@ impl UdpSocket {
         set(option(&self.options), value, allowed)
     }
 
-    /// Returns the time to live. It has no effect, because a test bed has no routers that count it down.
+    /// Returns the time to live. The time to live has no effect, because a test bed has no routers that count it down.
     ///
     /// # Errors
     ///
@@ -64,13 +69,52 @@ impl UdpSocket {
         self.option(|options| &options.ttl)
     }
 
-    /// Sets the time to live, from 1 to 255.
+    /// Sets the time to live, from 1 to 255. The value is stored and has no effect: see [`UdpSocket::ttl`].
     ///
     /// # Errors
     ///
     /// If `ttl` is out of range, or the host of the socket has crashed.
     pub fn set_ttl(&self, ttl: u32) -> io::Result<()> {
         self.set_option(|options| &options.ttl, ttl, 1..=255)
+    }
+
+    /// Returns the size of the receive buffer \[byte\]: see [`Testbed::receive_buffer`](crate::Testbed::receive_buffer).
+    ///
+    /// # Errors
+    ///
+    /// If the host of the socket has crashed.
+    pub fn recv_buffer_size(&self) -> io::Result<u32> {
+        self.open(|core| u32::try_from(*core.room(self.id)).unwrap_or(u32::MAX))
+    }
+
+    /// Sets the size of the receive buffer \[byte\]: as with Linux, to twice `size`, where a size above 212,992 counts as that, and to 2304 at least
+    /// (`SO_RCVBUF`). With tokio this option needs `socket2`.
+    ///
+    /// # Errors
+    ///
+    /// If the host of the socket has crashed.
+    pub fn set_recv_buffer_size(&self, size: u32) -> io::Result<()> {
+        self.open(|core| *core.room(self.id) = doubled(size, LEAST_RECEIVE_BUFFER))
+    }
+
+    /// Returns the size of the send buffer \[byte\]. The size has no effect, because sending never waits.
+    ///
+    /// # Errors
+    ///
+    /// If the host of the socket has crashed.
+    pub fn send_buffer_size(&self) -> io::Result<u32> {
+        self.option(|options| &options.send_buffer)
+    }
+
+    /// Sets the size of the send buffer \[byte\]: as with Linux, to twice `size`, where a size above 212,992 counts as that, and to 4608 at least (`SO_SNDBUF`).
+    /// The size is stored and has no effect: see [`UdpSocket::send_buffer_size`].
+    ///
+    /// # Errors
+    ///
+    /// If the host of the socket has crashed.
+    pub fn set_send_buffer_size(&self, size: u32) -> io::Result<()> {
+        let size = u32::try_from(doubled(size, LEAST_SEND_BUFFER)).unwrap_or(u32::MAX);
+        self.set_option(|options| &options.send_buffer, size, 0..=u32::MAX)
     }
 
     /// Returns the type of service of IPv4.
@@ -110,7 +154,7 @@ impl UdpSocket {
         self.set_tos_v4(class)
     }
 
-    /// Returns the time to live of multicast. It has no effect, because a test bed has no multicast groups.
+    /// Returns the time to live of multicast. The value has no effect, because a test bed has no multicast groups.
     ///
     /// # Errors
     ///
@@ -119,7 +163,7 @@ impl UdpSocket {
         self.option(|options| &options.multicast_ttl)
     }
 
-    /// Sets the time to live of multicast, from 0 to 255.
+    /// Sets the time to live of multicast, from 0 to 255. The value is stored and has no effect, because a test bed has no multicast groups.
     ///
     /// # Errors
     ///
@@ -128,7 +172,7 @@ impl UdpSocket {
         self.set_option(|options| &options.multicast_ttl, ttl, 0..=255)
     }
 
-    /// Returns whether the socket would receive its own multicast over IPv4.
+    /// Returns whether the socket would receive its own multicast over IPv4. The value has no effect, because a test bed has no multicast groups.
     ///
     /// # Errors
     ///
@@ -137,7 +181,7 @@ impl UdpSocket {
         Ok(self.option(|options| &options.multicast_loop)? != 0)
     }
 
-    /// Sets whether the socket would receive its own multicast over IPv4.
+    /// Sets whether the socket would receive its own multicast over IPv4. The value is stored and has no effect.
     ///
     /// # Errors
     ///
@@ -146,7 +190,7 @@ impl UdpSocket {
         self.set_option(|options| &options.multicast_loop, on.into(), 0..=1)
     }
 
-    /// Returns whether the socket would receive its own multicast over IPv6.
+    /// Returns whether the socket would receive its own multicast over IPv6. The value has no effect, because a test bed has no multicast groups.
     ///
     /// # Errors
     ///
@@ -155,7 +199,7 @@ impl UdpSocket {
         self.multicast_loop_v4()
     }
 
-    /// Sets whether the socket would receive its own multicast over IPv6.
+    /// Sets whether the socket would receive its own multicast over IPv6. The value is stored and has no effect.
     ///
     /// # Errors
     ///

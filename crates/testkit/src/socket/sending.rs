@@ -14,8 +14,8 @@ impl UdpSocket {
     ///
     /// # Errors
     ///
-    /// [`io::ErrorKind::NotConnected`] without a peer, `ConnectionRefused` if no socket is bound to the port of the peer, `InvalidInput` if the datagram is too
-    /// long.
+    /// `ConnectionRefused` if no socket is bound to the port of the peer. Those of the system without a peer (`EDESTADDRREQ`), and if the datagram is too long
+    /// (`EMSGSIZE`).
     #[expect(clippy::unused_async, reason = "as tokio's")]
     pub async fn send(&self, bytes: &[u8]) -> io::Result<usize> {
         self.try_send(bytes)
@@ -34,7 +34,8 @@ impl UdpSocket {
     ///
     /// # Errors
     ///
-    /// As [`UdpSocket::send`]; [`io::ErrorKind::HostUnreachable`] if no host ever had the address.
+    /// As [`UdpSocket::send`]; [`io::ErrorKind::NetworkUnreachable`] for an address of a network other than that of the hosts;
+    /// [`io::ErrorKind::PermissionDenied`] for a broadcast without [`UdpSocket::set_broadcast`]; [`io::ErrorKind::InvalidInput`] for port 0.
     #[inline]
     pub fn send_to<'a>(&'a self, bytes: &'a [u8], to: impl ToSocketAddrs + 'a) -> impl Future<Output = io::Result<usize>> + 'a {
         poll_fn(move |_| Poll::Ready(self.send_to_now(&to, bytes)))

@@ -20,9 +20,8 @@ impl Stream for TcpStream {
 
     fn ready(&self) -> io::Result<Ready> {
         self.open(|core| {
-            let [readable, writable] = core.is_ready(self.id);
-            let connection = core.connection(self.id);
-            Ready { readable, writable, read_closed: connection.is_read_closed(), write_closed: connection.is_write_closed() && writable }
+            let [readable, writable, read_closed, write_closed] = core.readiness(self.id);
+            Ready { readable, writable, read_closed, write_closed }
         })
     }
 

@@ -9,10 +9,12 @@ use std::task::{Context, Poll};
 
 use cohaptic_wan::NodeId;
 
+#[cfg(feature = "facade")]
+use super::TcpConfig;
 use super::{KIND, TcpStream};
 use crate::context::Call;
-use crate::core::{Core, HoldId, Inherited, ListenId, Shared};
-use crate::resolve::ToSocketAddrs;
+use crate::core::{Core, HoldId, Inherited, ListenId, Shared, Sharing};
+use crate::resolve::{ToSocketAddrs, each};
 
 /// Default backlog. Linux lets one more connection wait.
 const BACKLOG: usize = 128;
@@ -25,7 +27,8 @@ const BACKLOG: usize = 128;
 /// - At most 129 connections wait to be accepted; [`TcpSocket::listen`](super::TcpSocket::listen) takes another number. As with Linux, a SYN beyond that number
 ///   is dropped without an answer, so that its sender tries again after 1, 3, 7 … s.
 /// - A connection that is reset while it waits is accepted all the same, and reading from it fails.
-/// - A listener at `[::]` accepts connections over IPv6 only.
+/// - A listener at `[::]` accepts connections over both versions of IP, as with Linux. The peer of a connection over IPv4 is then shown as `::ffff:10.0.0.1`.
+///   [`TcpSocket::set_only_v6`](super::TcpSocket::set_only_v6) leaves IPv4 to other sockets.
 /// - After its host has crashed, every method returns [`io::ErrorKind::ConnectionAborted`], with the way out. The same error comes from every method after the
 ///   run of the test bed has ended, also within the run of another test bed.
 /// - The listener belongs to the thread that runs the test bed. On another thread every method returns [`io::ErrorKind::Unsupported`], and the run fails.
@@ -41,7 +44,7 @@ impl TcpListener {
     ///
     /// # Errors
     ///
-    /// As with tokio: the address is taken by another listener, or is no address of the host.
+    /// As with tokio, those of the last address that was tried: the address is taken by another listener, or is no address of the host.
     ///
     /// # Panics
     ///
@@ -57,13 +60,14 @@ impl TcpListener {
 
     pub(crate) fn bind_on(shared: Arc<Shared>, host: NodeId, address: impl ToSocketAddrs) -> io::Result<Self> {
         shared.check_open(host, KIND)?;
-        let address = address.to_socket_addr()?;
-        let (held, config) = shared.with(|core| {
-            core.check_up(host)?;
-            let held = core.hold_port(host, address, true)?;
-            io::Result::Ok((held, core.tcp_config(host).clone()))
-        })?;
-        Self::listen(shared, host, held, BACKLOG, (config, None))
+        each(address, |address| {
+            let (held, config) = shared.with(|core| {
+                core.check_up(host)?;
+                let held = core.hold_port(host, address, Sharing { is_shared: true, is_only_six: false })?;
+                io::Result::Ok((held, core.tcp_config(host).clone()))
+            })?;
+            Self::listen(Arc::clone(&shared), host, held, BACKLOG, (config, None))
+        })
     }
 
     /// Listens at a port that is held. If that fails, the port is released.
@@ -127,7 +131,16 @@ impl TcpListener {
         self.open(|core| core.listener_address(self.id))
     }
 
-    /// Returns the time to live of packets of accepted connections. It has no effect, because a test bed has no routers that count it down.
+    /// Reads or changes what the connections that will be accepted inherit: the constants of TCP, and the time to linger.
+    #[cfg(feature = "facade")]
+    pub(crate) fn inherited<T>(&self, act: impl FnOnce(&mut TcpConfig, &mut Option<std::time::Duration>) -> T) -> io::Result<T> {
+        self.open(|core| {
+            let (config, linger) = core.listener_inherited(self.id);
+            act(config, linger)
+        })
+    }
+
+    /// Returns the time to live of packets of accepted connections. The time to live has no effect, because a test bed has no routers that count it down.
     ///
     /// # Errors
     ///
@@ -136,7 +149,8 @@ impl TcpListener {
         self.open(|core| core.listener_config(self.id).ttl.into())
     }
 
-    /// Sets the time to live of packets of accepted connections, from 1 to 255.
+    /// Sets the time to live of packets of accepted connections, from 1 to 255. The time to live is in the packets and in captures, and has no other effect: see
+    /// [`TcpListener::ttl`].
     ///
     /// # Errors
     ///

@@ -4,13 +4,11 @@ use std::io;
 use std::time::Duration;
 
 use super::{Keepalive, TcpStream};
+use crate::errno::Errno;
 
 /// Converts a time to live, which must be from 1 to 255.
 pub(super) fn ttl(ttl: u32) -> io::Result<u8> {
-    u8::try_from(ttl)
-        .ok()
-        .filter(|ttl| *ttl > 0)
-        .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, format!("{ttl} is none; expected 1 to 255")))
+    u8::try_from(ttl).ok().filter(|ttl| *ttl > 0).ok_or_else(|| Errno::InvalidInput.into())
 }
 
 impl TcpStream {
@@ -79,7 +77,7 @@ impl TcpStream {
         self.set_linger(Some(Duration::ZERO))
     }
 
-    /// Returns the time to live. It has no effect, because a test bed has no routers that count it down.
+    /// Returns the time to live of packets. The time to live has no effect, because a test bed has no routers that count it down.
     ///
     /// # Errors
     ///
@@ -88,7 +86,7 @@ impl TcpStream {
         self.open_alive(|core| core.connection(self.id).config().ttl.into())
     }
 
-    /// Sets the time to live, from 1 to 255.
+    /// Sets the time to live of packets, from 1 to 255. The time to live is in the packets and in captures, and has no other effect: see [`TcpStream::ttl`].
     ///
     /// # Errors
     ///

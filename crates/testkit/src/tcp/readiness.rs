@@ -138,11 +138,10 @@ impl TcpStream {
     fn readiness(&self, interest: tokio::io::Interest) -> io::Result<tokio::io::Ready> {
         use tokio::io::Ready;
         self.open(|core| {
-            let [can_read, can_write] = core.is_ready(self.id);
-            let connection = core.connection(self.id);
+            let [can_read, can_write, read_closed, write_closed] = core.readiness(self.id);
             let flag = |is_set: bool, flag| if is_set { flag } else { Ready::EMPTY };
-            let readable = flag(can_read, Ready::READABLE) | flag(connection.is_read_closed(), Ready::READ_CLOSED);
-            let writable = flag(can_write, Ready::WRITABLE) | flag(connection.is_write_closed() && can_write, Ready::WRITE_CLOSED);
+            let readable = flag(can_read, Ready::READABLE) | flag(read_closed, Ready::READ_CLOSED);
+            let writable = flag(can_write, Ready::WRITABLE) | flag(write_closed, Ready::WRITE_CLOSED);
             flag(interest.is_readable(), readable) | flag(interest.is_writable(), writable)
         })
     }

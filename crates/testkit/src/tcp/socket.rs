@@ -9,8 +9,10 @@ use std::time::Duration;
 use cohaptic_wan::NodeId;
 
 use super::{KIND, TcpConfig, TcpListener, TcpStream};
+use crate::buffers::{LEAST_RECEIVE_BUFFER, LEAST_SEND_BUFFER, doubled};
 use crate::context::Call;
-use crate::core::{HoldId, Shared};
+use crate::core::{HoldId, Shared, Sharing, unmapped};
+use crate::errno::Errno;
 
 /// TCP socket that neither is connected nor listens, with the methods of tokio's `TcpSocket` in the same meaning.
 ///
@@ -28,19 +30,10 @@ struct Settings {
     config: TcpConfig,
     bound: Option<(HoldId, SocketAddr)>,
     is_shared: bool,
+    is_only_six: bool,
     is_port_shared: bool,
     linger: Option<Duration>,
     type_of_service: u32,
-}
-
-/// Twice the least size of a buffer in Linux \[byte\].
-const LEAST_BUFFER: u32 = 4608;
-/// Twice `net.core.rmem_max` and `wmem_max` \[byte\].
-const GREATEST_BUFFER: u32 = 425_984;
-
-fn doubled(size: u32) -> usize {
-    // Linux reserves as much again for its own overhead, and reports the sum.
-    size.saturating_mul(2).clamp(LEAST_BUFFER, GREATEST_BUFFER) as usize
 }
 
 fn told(size: usize) -> u32 {
@@ -87,8 +80,24 @@ impl TcpSocket {
             core.check_up(host)?;
             io::Result::Ok(core.tcp_config(host).clone())
         })?;
-        let settings = Settings { config, bound: None, is_shared: false, is_port_shared: false, linger: None, type_of_service: 0 };
+        let settings =
+            Settings { config, bound: None, is_shared: false, is_only_six: false, is_port_shared: false, linger: None, type_of_service: 0 };
         Ok(Self { shared, host, is_six, settings: Mutex::new(settings) })
+    }
+
+    /// Returns the constants of the connections of the socket, with the options that the program has set.
+    #[cfg(feature = "facade")]
+    pub(crate) fn config(&self) -> io::Result<TcpConfig> {
+        self.shared.check_open(self.host, KIND)?;
+        Ok(self.settings().config.clone())
+    }
+
+    /// Changes the constants of the connections of the socket.
+    #[cfg(feature = "facade")]
+    pub(crate) fn change_config(&self, change: impl FnOnce(&mut TcpConfig)) -> io::Result<()> {
+        self.shared.check_open(self.host, KIND)?;
+        change(&mut self.settings().config);
+        Ok(())
     }
 
     fn settings(&self) -> MutexGuard<'_, Settings> {
@@ -100,23 +109,27 @@ impl TcpSocket {
     /// # Errors
     ///
     /// [`io::ErrorKind::AddrInUse`] if another socket has the port and not both sockets are [shared](TcpSocket::set_reuseaddr), or if another socket listens
-    /// there; [`io::ErrorKind::AddrNotAvailable`] if the host does not have the address; [`io::ErrorKind::InvalidInput`] if the socket is bound already, or the
-    /// address is of the other version of IP.
+    /// there; [`io::ErrorKind::AddrNotAvailable`] if the host does not have the address; [`io::ErrorKind::InvalidInput`] if the socket is bound already. That of
+    /// the system if the address is of the other version of IP (`EAFNOSUPPORT`).
     pub fn bind(&self, address: SocketAddr) -> io::Result<()> {
         let mut settings = self.settings();
         if settings.bound.is_some() || address.is_ipv6() != self.is_six {
-            let text =
-                if settings.bound.is_some() { "the socket is bound already".to_owned() } else { format!("{address} is of the other version of IP") };
-            return Err(io::Error::new(io::ErrorKind::InvalidInput, text));
+            return if settings.bound.is_some() { Errno::InvalidInput } else { Self::of_other_version(self.is_six) }.fail();
         }
-        settings.bound = Some(self.hold_port(address, settings.is_shared)?);
+        settings.bound = Some(self.hold_port(address, &settings)?);
         Ok(())
     }
 
-    fn hold_port(&self, address: SocketAddr, is_shared: bool) -> io::Result<(HoldId, SocketAddr)> {
+    /// Returns the error of an address of the other version of IP. Linux finds an address of IPv4 too short for a socket of IPv6.
+    const fn of_other_version(is_six: bool) -> Errno {
+        if is_six { Errno::InvalidInput } else { Errno::OtherVersion }
+    }
+
+    fn hold_port(&self, address: SocketAddr, settings: &Settings) -> io::Result<(HoldId, SocketAddr)> {
+        let sharing = Sharing { is_shared: settings.is_shared, is_only_six: settings.is_only_six };
         self.shared.open(self.host, KIND, |core| {
             core.check_up(self.host)?;
-            core.hold_port(self.host, address, is_shared)
+            core.hold_port(self.host, address, sharing)
         })?
     }
 
@@ -124,10 +137,13 @@ impl TcpSocket {
     ///
     /// # Errors
     ///
-    /// As [`TcpStream::connect`]; [`io::ErrorKind::InvalidInput`] if the address is of the other version of IP.
+    /// As [`TcpStream::connect`]; that of the system if the address is of the other version of IP (`EAFNOSUPPORT`).
     pub async fn connect(self, address: SocketAddr) -> io::Result<TcpStream> {
         if address.is_ipv6() != self.is_six {
-            return Err(io::Error::new(io::ErrorKind::InvalidInput, format!("{address} is of the other version of IP")));
+            return Self::of_other_version(self.is_six).fail();
+        }
+        if self.settings().is_only_six && unmapped(address).is_ipv4() {
+            return Errno::NetworkUnreachable.fail();
         }
         let stream = {
             let mut settings = self.settings();
@@ -149,7 +165,7 @@ impl TcpSocket {
         let mut settings = self.settings();
         let held = match settings.bound.take() {
             Some(held) => held,
-            None => self.hold_port(self.any(), settings.is_shared)?,
+            None => self.hold_port(self.any(), &settings)?,
         };
         let inherited = (settings.config.clone(), settings.linger);
         TcpListener::listen(Arc::clone(&self.shared), self.host, held, usize::try_from(backlog).unwrap_or(usize::MAX), inherited)
@@ -227,22 +243,40 @@ impl TcpSocket {
         |to, on| to.is_shared = on
     );
     option!(
+        only_v6,
+        set_only_v6,
+        bool,
+        "Whether a socket at `[::]` leaves IPv4 to others (`IPV6_V6ONLY`). With tokio this option needs `socket2`. Set the option before the socket is bound.",
+        |settings| settings.is_only_six,
+        |to, on| to.is_only_six = on
+    );
+    option!(
         reuseport,
         set_reuseport,
         bool,
-        "Whether listeners share its port, which nothing does here.",
+        "Whether listeners share its port (`SO_REUSEPORT`). The option is stored and has no effect: a port has one listener.",
         |settings| settings.is_port_shared,
         |to, on| to.is_port_shared = on
     );
     option!(nodelay, set_nodelay, bool, "Whether small segments leave while others are unanswered.", |settings| settings.config.nodelay, |to, on| {
         to.config.nodelay = on
     });
-    option!(tos_v4, set_tos_v4, u32, "The type of service of IPv4, which is stored.", |settings| settings.type_of_service, |to, tos| to
-        .type_of_service =
-        tos & 0xfc);
-    option!(tclass_v6, set_tclass_v6, u32, "The traffic class of IPv6, which is stored.", |settings| settings.type_of_service, |to, class| to
-        .type_of_service =
-        class & 0xfc);
+    option!(
+        tos_v4,
+        set_tos_v4,
+        u32,
+        "The type of service of IPv4, which is stored and has no effect.",
+        |settings| settings.type_of_service,
+        |to, tos| to.type_of_service = tos & 0xfc
+    );
+    option!(
+        tclass_v6,
+        set_tclass_v6,
+        u32,
+        "The traffic class of IPv6, which is stored and has no effect.",
+        |settings| settings.type_of_service,
+        |to, class| to.type_of_service = class & 0xfc
+    );
     option!(
         send_buffer_size,
         set_send_buffer_size,
@@ -250,8 +284,8 @@ impl TcpSocket {
         "The size of the send buffer \\[byte\\]: as with Linux, twice the size that was set.",
         |settings| told(settings.config.least_send_buffer),
         |to, size| {
-            to.config.send_buffer = doubled(size);
-            to.config.least_send_buffer = doubled(size);
+            to.config.send_buffer = doubled(size, LEAST_SEND_BUFFER);
+            to.config.least_send_buffer = doubled(size, LEAST_SEND_BUFFER);
         }
     );
     option!(
@@ -261,7 +295,7 @@ impl TcpSocket {
         "The size of the receive buffer \\[byte\\]: as with Linux, twice the size that was set. A size that was set stays, and is the window. The default grows \
          as the program reads.",
         |settings| told(settings.config.receive_buffer.unwrap_or(settings.config.least_receive_buffer)),
-        |to, size| to.config.receive_buffer = Some(doubled(size))
+        |to, size| to.config.receive_buffer = Some(doubled(size, LEAST_RECEIVE_BUFFER))
     );
     option!(
         linger,

@@ -14,7 +14,8 @@ use cohaptic_wan::NodeId;
 use super::{Info, KIND, TcpConfig};
 use crate::context::Call;
 use crate::core::{ConnId, Core, HoldId, Shared};
-use crate::resolve::ToSocketAddrs;
+use crate::errno::Errno;
+use crate::resolve::{ToSocketAddrs, each_in_turn};
 
 /// TCP connection of a host of the running test bed, with the methods of tokio's `TcpStream` in the same meaning.
 ///
@@ -79,8 +80,10 @@ impl TcpStream {
     ///
     /// # Errors
     ///
-    /// [`io::ErrorKind::ConnectionRefused`] after a round trip if nobody listens there; [`io::ErrorKind::TimedOut`] after 131 s without an answer;
-    /// [`io::ErrorKind::HostUnreachable`] if no host ever had the address.
+    /// Those of the last address that was tried: [`io::ErrorKind::ConnectionRefused`] after a round trip if nobody listens there;
+    /// [`io::ErrorKind::TimedOut`] after 131 s without an answer; [`io::ErrorKind::HostUnreachable`] after 3 s if no host has the address, which is one of the
+    /// network of the hosts, 10.0.0.0/8 or `fd00::/8`; [`io::ErrorKind::NetworkUnreachable`] at once for other networks. Errors have the numbers of the system
+    /// ([`io::Error::raw_os_error`]).
     ///
     /// # Panics
     ///
@@ -90,10 +93,17 @@ impl TcpStream {
         let call = Call::here("TcpStream::connect");
         async move {
             let (shared, host) = call.host("wrap the call in `Host::scope`; `Host::connect` and, for hyper, `Connector` name the host");
-            let address = address.to_socket_addr()?;
-            let config = shared.with(|core| core.tcp_config(host).clone());
-            Self::connect_on(shared, host, None, address, config)?.established().await
+            Self::connect_to(&shared, host, address.to_socket_addrs()?).await
         }
+    }
+
+    /// Opens a connection to the first of the addresses that answers, one after the other.
+    pub(crate) async fn connect_to(shared: &Arc<Shared>, host: NodeId, addresses: Vec<SocketAddr>) -> io::Result<Self> {
+        each_in_turn(addresses, async |address| {
+            let config = shared.with(|core| core.tcp_config(host).clone());
+            Self::connect_on(Arc::clone(shared), host, None, address, config)?.established().await
+        })
+        .await
     }
 
     /// Sends the SYN. `bound` is the held port with the local address, or `None` for any free port.
@@ -132,7 +142,7 @@ impl TcpStream {
     ///
     /// If the host of the stream has crashed.
     pub fn local_addr(&self) -> io::Result<SocketAddr> {
-        self.open_alive(|core| core.connection(self.id).local_addr())
+        self.open_alive(|core| core.ends_of(self.id)[0])
     }
 
     /// Returns the address of the other end.
@@ -141,12 +151,9 @@ impl TcpStream {
     ///
     /// [`io::ErrorKind::NotConnected`] before the connection is established and after it is over.
     pub fn peer_addr(&self) -> io::Result<SocketAddr> {
-        let (state, peer) = self.open_alive(|core| {
-            let connection = core.connection(self.id);
-            (connection.state(), connection.peer_addr())
-        })?;
+        let (state, peer) = self.open_alive(|core| (core.connection(self.id).state(), core.ends_of(self.id)[1]))?;
         match state {
-            State::SynSent | State::Closed | State::TimeWait => Err(io::ErrorKind::NotConnected.into()),
+            State::SynSent | State::Closed | State::TimeWait => Errno::NotConnected.fail(),
             State::SynReceived | State::Established | State::FinWait1 | State::FinWait2 | State::CloseWait | State::Closing | State::LastAck => {
                 Ok(peer)
             }
@@ -212,6 +219,12 @@ impl TcpStream {
         self.poll_with(cx, |core| core.write(self.id, buffers), Core::wait_to_write_to)
     }
 
+    /// Returns the constants of the connection, with the options that the program has set.
+    #[cfg(feature = "facade")]
+    pub(crate) fn config(&self) -> io::Result<TcpConfig> {
+        self.open_alive(|core| core.connection(self.id).config().clone())
+    }
+
     /// Sends FIN after the bytes written so far. As with tokio, nothing happens to a connection that is over.
     #[cfg_attr(not(feature = "tokio"), allow(dead_code, reason = "tokio's traits ask for it"))]
     pub(super) fn shut_write_half(&self) -> io::Result<()> {
@@ -239,8 +252,8 @@ impl Drop for TcpStream {
 impl fmt::Debug for TcpStream {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let seen = self.shared.try_with(|core| {
-            let connection = core.connection(self.id);
-            (connection.local_addr(), connection.peer_addr(), connection.state())
+            let [local, peer] = core.ends_of(self.id);
+            (local, peer, core.connection(self.id).state())
         });
         let Some((local, peer, state)) = seen else { return f.debug_struct("TcpStream").finish_non_exhaustive() };
         f.debug_struct("TcpStream").field("local", &local).field("peer", &peer).field("state", &state).finish_non_exhaustive()

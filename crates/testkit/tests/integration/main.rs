@@ -4,6 +4,8 @@
 #[cfg(feature = "strategies")]
 mod again;
 mod artefacts;
+#[cfg(all(feature = "tcp", target_os = "linux"))]
+mod as_linux;
 mod byte_limit;
 #[cfg(feature = "strategies")]
 mod chapter;

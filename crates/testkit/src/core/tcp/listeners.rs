@@ -10,16 +10,14 @@ use cohaptic_tcp::{Connection, Segment, TcpConfig};
 use cohaptic_wan::NodeId;
 
 use super::super::waking::Waiters;
-use super::{ConnId, Core, HoldId, LOOPBACK_MTU, ListenId, Listener, SocketName};
+use super::{ConnId, Core, HoldId, LOOPBACK_MTU, ListenId, Listener, SocketName, UNREACHABLE};
 use crate::address::Addresses;
+use crate::core::unmapped;
+use crate::errno::Errno;
 use crate::trace::Lost;
 
 /// Settings that connections inherit from their listener: the constants of TCP, and the time to linger when the stream is dropped.
 pub(crate) type Inherited = (TcpConfig, Option<Duration>);
-
-fn refuse<T>(kind: io::ErrorKind, text: String) -> io::Result<T> {
-    Err(io::Error::new(kind, text))
-}
 
 impl Core {
     /// Listens at a port that is held. Up to `backlog` + 1 connections may wait to be accepted.
@@ -59,15 +57,16 @@ impl Core {
         let any = if remote.is_ipv6() { Ipv6Addr::UNSPECIFIED.into() } else { Ipv4Addr::UNSPECIFIED.into() };
         self.note_call(|_| SocketName { kind: "TCP", host, local: local.unwrap_or_else(|| SocketAddr::new(any, 0)), peer: Some(remote) });
         self.forget_old();
-        if let Some(local) = local.filter(|local| local.is_ipv6() != remote.is_ipv6()) {
-            let text = format!("a socket at {local} cannot reach {remote}, which is of the other version of IP");
-            return refuse(io::ErrorKind::InvalidInput, text);
+        let is_six = remote.is_ipv6();
+        remote = unmapped(remote);
+        let is_mapped = remote.is_ipv6() != is_six;
+        if is_mapped && local.is_some_and(|local| !local.ip().is_unspecified()) {
+            // A socket that is bound to an address of IPv6 has no address of IPv4 to send from.
+            return Errno::NetworkUnreachable.fail();
         }
-        if remote.port() == 0 {
-            return refuse(io::ErrorKind::InvalidInput, format!("nothing can be sent to port 0 ({remote})"));
-        }
-        if remote.ip().is_multicast() || remote.ip() == IpAddr::V4(Ipv4Addr::BROADCAST) {
-            return refuse(io::ErrorKind::Unsupported, format!("{remote} is an address of several hosts, and a connection has two ends"));
+        // A connection has two ends, so that it cannot go to an address of several hosts.
+        if remote.ip().is_multicast() || remote.is_ipv4() && Addresses::is_broadcast(Addresses::short(remote.ip())) {
+            return Errno::NetworkUnreachable.fail();
         }
         let loopback: IpAddr = if remote.is_ipv6() { Ipv6Addr::LOCALHOST.into() } else { Ipv4Addr::LOCALHOST.into() };
         if remote.ip().is_unspecified() {
@@ -75,8 +74,9 @@ impl Core {
         }
         let at = local.map(|local| local.ip()).filter(|ip| !ip.is_unspecified()).map(Addresses::short);
         let from = Addresses::long(self.source(host, at, Addresses::short(remote.ip()), &remote)?, remote.is_ipv6());
-        if !remote.ip().is_loopback() && self.plan.owner_node(remote.ip()).is_none() && !self.plan.was_given(remote.ip()) {
-            return refuse(io::ErrorKind::HostUnreachable, self.plan.unknown(remote.ip()));
+        let is_nobodys = !remote.ip().is_loopback() && self.plan.owner_node(remote.ip()).is_none();
+        if is_nobodys && !self.plan.is_reachable(remote.ip()) {
+            return Errno::NetworkUnreachable.fail();
         }
         let port = match local {
             Some(local) => local.port(),
@@ -84,8 +84,7 @@ impl Core {
         };
         let local = SocketAddr::new(from, port);
         if self.tcp.routes.contains_key(&super::route(host, local, remote)) {
-            let text = format!("host `{}` has a connection from {local} to {remote} already", self.plan.names()[host.index()]);
-            return refuse(io::ErrorKind::AddrNotAvailable, text);
+            return Errno::AddrNotAvailable.fail();
         }
         // A segment on loopback may be as long as the loopback interface permits.
         if self.is_own(host, remote.ip()) {
@@ -96,7 +95,8 @@ impl Core {
             Connection::connect(now, config, local, remote, sequence).map_err(|error| io::Error::new(io::ErrorKind::InvalidInput, error))?;
         let id = self.tcp.insert(host, machine);
         let end = self.tcp.end_mut(id);
-        (end.is_held, end.hold) = (true, bound.map(|(hold, _)| hold));
+        (end.is_held, end.hold, end.is_mapped) = (true, bound.map(|(hold, _)| hold), is_mapped);
+        end.unreachable_at = is_nobodys.then(|| now + UNREACHABLE);
         self.after_call(id);
         Ok(id)
     }
@@ -117,6 +117,7 @@ impl Core {
         self.check_backlog(id)?;
         let listener = self.tcp.listeners.get(id.0);
         let (host, mut config, linger) = (listener.host, listener.config.clone(), listener.linger);
+        let is_mapped = listener.local.is_ipv6() && syn.source.is_ipv4();
         if self.is_own(host, syn.source.ip()) {
             config.mtu = LOOPBACK_MTU;
         }
@@ -124,7 +125,7 @@ impl Core {
         let machine = Connection::accept(now, config, syn, sequence).expect("the constants were checked when they were set");
         let conn = self.tcp.insert(host, machine);
         let end = self.tcp.end_mut(conn);
-        (end.listener, end.linger) = (Some(id), linger);
+        (end.listener, end.linger, end.is_mapped) = (Some(id), linger, is_mapped);
         self.tcp.listeners.get_mut(id.0).half_open.insert(conn);
         self.settle(conn);
         Ok(())
@@ -147,7 +148,7 @@ impl Core {
         self.tcp.calls += 1;
         let end = self.tcp.end_mut(conn);
         (end.is_held, end.listener) = (true, None);
-        Ok(Some((conn, end.machine.peer_addr())))
+        Ok(Some((conn, end.shown(end.machine.peer_addr()))))
     }
 
     /// Registers a task that waits for a connection to accept.
@@ -162,6 +163,13 @@ impl Core {
     /// Returns the constants of the connections that the listener will accept.
     pub(crate) fn listener_config(&mut self, id: ListenId) -> &mut TcpConfig {
         &mut self.tcp.listeners.get_mut(id.0).config
+    }
+
+    /// Returns the constants and the time to linger of the connections that the listener will accept.
+    #[cfg(feature = "facade")]
+    pub(crate) fn listener_inherited(&mut self, id: ListenId) -> (&mut TcpConfig, &mut Option<Duration>) {
+        let listener = self.tcp.listeners.get_mut(id.0);
+        (&mut listener.config, &mut listener.linger)
     }
 
     pub(crate) fn check_listener(&self, id: ListenId) -> io::Result<()> {

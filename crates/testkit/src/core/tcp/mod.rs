@@ -28,10 +28,13 @@ use crate::wire::Where;
 use slots::Slots;
 
 pub(crate) use listeners::Inherited;
-pub(crate) use ports::HoldId;
+pub(crate) use ports::{HoldId, Sharing};
 
 /// Label of the random stream of initial sequence numbers.
 const LABEL: &[u8] = b"initial sequence numbers of a test bed";
+
+/// Time after which Linux gives up to find the owner of an address in its own network: three questions, a second apart (`mcast_solicit`, `retrans_time_ms`).
+const UNREACHABLE: Duration = Duration::from_secs(3);
 
 /// MTU of the loopback interface, the greatest MTU \[byte\].
 const LOOPBACK_MTU: usize = 65_536;
@@ -81,6 +84,10 @@ struct End {
     is_held: bool,
     /// Whether the last write found the send buffer full, or the handshake is not complete.
     is_write_blocked: bool,
+    /// `true` if the socket of the program is of IPv6 and the packets are of IPv4: the program sees `::ffff:10.0.0.1`.
+    is_mapped: bool,
+    /// Instant at which the system gives up to look for the other end, whose address nobody has; `None` if somebody has the address.
+    unreachable_at: Option<Instant>,
     /// Linger time set by the program. Only zero has an effect: the connection is reset when its stream is dropped.
     linger: Option<Duration>,
     /// Listener at which the connection waits to be accepted; `None` for other connections.
@@ -158,6 +165,8 @@ impl Tcp {
             writers: Waiters::default(),
             is_held: false,
             is_write_blocked: true,
+            is_mapped: false,
+            unreachable_at: None,
             linger: None,
             listener: None,
             hold: None,

@@ -122,6 +122,7 @@ impl Core {
         let (state, listener) = (end.machine.state(), end.listener);
         // The end of TIME-WAIT has no visible effect, so TIME-WAIT has no timer.
         let due = if state == State::TimeWait { None } else { end.machine.poll_timeout() };
+        let due = if state == State::SynSent { crate::wire::earlier(due, end.unreachable_at) } else { due };
         if state == State::TimeWait && !end.is_in_time_wait {
             end.is_in_time_wait = true;
             let ends = end.machine.time_wait_ends().unwrap_or(now);

@@ -10,20 +10,31 @@ use cohaptic_units::print::Seconds;
 use cohaptic_wan::NodeId;
 
 use super::{ConnId, Core, End, Gone};
+use crate::core::mapped;
+use crate::errno::Errno;
 
 impl End {
     /// Converts an error of the state machine to an error for programs.
     fn explain(&self, error: Error) -> io::Error {
-        let kind = match error {
-            Error::WouldBlock => return io::ErrorKind::WouldBlock.into(),
-            Error::ConnectionRefused => io::ErrorKind::ConnectionRefused,
-            Error::ConnectionReset => io::ErrorKind::ConnectionReset,
-            Error::TimedOut => io::ErrorKind::TimedOut,
-            Error::BrokenPipe => io::ErrorKind::BrokenPipe,
-            Error::NotConnected => io::ErrorKind::NotConnected,
-            _ => io::ErrorKind::Other,
-        };
-        io::Error::new(kind, format!("{error} ({} to {})", self.machine.local_addr(), self.machine.peer_addr()))
+        match error {
+            Error::WouldBlock => io::ErrorKind::WouldBlock.into(),
+            Error::ConnectionRefused => Errno::ConnectionRefused.into(),
+            Error::ConnectionReset => Errno::ConnectionReset.into(),
+            Error::TimedOut => Errno::TimedOut.into(),
+            Error::BrokenPipe => Errno::BrokenPipe.into(),
+            Error::NotConnected => Errno::NotConnected.into(),
+            _ => io::Error::other(format!("{error} ({} to {})", self.machine.local_addr(), self.machine.peer_addr())),
+        }
+    }
+
+    /// Returns an address of this end as the program sees it.
+    pub(super) fn shown(&self, address: SocketAddr) -> SocketAddr {
+        if self.is_mapped { mapped(address) } else { address }
+    }
+
+    /// Returns whether the system has given up to look for the other end.
+    pub(super) fn is_unreachable(&self, now: Instant) -> bool {
+        self.unreachable_at.is_some_and(|at| at <= now)
     }
 }
 
@@ -40,6 +51,21 @@ impl Core {
     pub(crate) fn check_connection(&self, id: ConnId) -> io::Result<()> {
         let end = self.tcp.end(id);
         self.check_gone(end.gone, end.host, end.machine.local_addr())
+    }
+
+    /// Returns the addresses of both ends of a connection, the own one first, as the program sees the addresses.
+    pub(crate) fn ends_of(&self, id: ConnId) -> [SocketAddr; 2] {
+        let end = self.tcp.end(id);
+        [end.machine.local_addr(), end.machine.peer_addr()].map(|address| end.shown(address))
+    }
+
+    /// Returns what would not block now, as the `poll` of Linux tells: reading, writing, the end of reading, and the end of writing. Writing has ended when both
+    /// directions have: after a shutdown of the own direction alone the system does not tell so.
+    pub(crate) fn readiness(&self, id: ConnId) -> [bool; 4] {
+        let [readable, writable] = self.is_ready(id);
+        let connection = self.connection(id);
+        let read_closed = connection.is_read_closed();
+        [readable, writable, read_closed, read_closed && connection.is_write_closed() && writable]
     }
 
     /// Returns the state machine of a connection.
@@ -71,7 +97,11 @@ impl Core {
         let end = self.tcp.connections.get_mut(id.0);
         match end.machine.state() {
             State::SynSent | State::SynReceived => None,
-            State::Closed => Some(Err(end.machine.take_error().map_or_else(|| io::ErrorKind::NotConnected.into(), |error| end.explain(error)))),
+            State::Closed if end.unreachable_at.is_some() => Some(Errno::HostUnreachable.fail()),
+            State::Closed => {
+                let error = end.machine.take_error().unwrap_or(Error::NotConnected);
+                Some(Err(end.explain(error)))
+            }
             State::Established | State::FinWait1 | State::FinWait2 | State::CloseWait | State::Closing | State::LastAck | State::TimeWait => {
                 Some(Ok(()))
             }
@@ -84,7 +114,8 @@ impl Core {
         self.check_connection(id)?;
         let machine = &mut self.tcp.end_mut(id).machine;
         let mut count = 0;
-        let mut outcome = Ok(0);
+        // As with tokio, which waits for readiness first, a read into no space waits until there is something to read.
+        let mut outcome = if machine.is_readable() { Ok(0) } else { Err(Error::WouldBlock) };
         for buffer in to.iter_mut().filter(|buffer| !buffer.is_empty()) {
             // A further read of an empty receive buffer would turn success into `WouldBlock`.
             if count > 0 && machine.info().unread == 0 {

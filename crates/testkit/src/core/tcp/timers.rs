@@ -69,7 +69,11 @@ impl Core {
         }
         while let Some((_, _, id)) = self.tcp.timers.first().copied().filter(|(at, ..)| *at <= now) {
             self.tcp.set_timer(id, None);
-            self.tcp.end_mut(id).machine.handle_timeout(now);
+            let end = self.tcp.end_mut(id);
+            end.machine.handle_timeout(now);
+            if end.is_unreachable(now) {
+                end.machine.abort();
+            }
             self.settle(id);
             self.take_arrivals();
         }

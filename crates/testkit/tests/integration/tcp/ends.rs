@@ -168,7 +168,7 @@ fn time_wait_keeps_no_port_from_being_bound_and_is_no_event() {
             let state = |bed: &Bed| bed.connections().iter().map(|end| (end.host.clone(), end.info.state)).collect::<Vec<_>>();
             assert_eq!(state(&bed), [("b".into(), State::TimeWait)]);
             let taken = bed.host("b").listen("10.0.0.2:80").unwrap_err();
-            assert_eq!((taken.kind(), taken.to_string()), (ErrorKind::AddrInUse, "10.0.0.2:80 is taken on host `b`".into()));
+            assert_eq!(taken.kind(), ErrorKind::AddrInUse);
             drop(listener);
             let listener = bed.host("b").listen("0.0.0.0:80").unwrap();
             time::sleep(Duration::from_secs(61)).await;

@@ -39,7 +39,7 @@ async fn connecting(bed: &Bed, to: &str) -> (Result<(), ErrorKind>, Instant) {
 #[test]
 fn no_listener_refuses_after_a_round_trip() {
     for bed in beds() {
-        let seen = bed.run_twice(|bed| async move { connecting(&bed, "b:80").await });
+        let seen = bed.run_twice(|bed| async move { connecting(&bed, "10.0.0.2:80").await });
         assert_eq!(seen, (Err(ErrorKind::ConnectionRefused), millis(100)));
     }
 }
@@ -78,7 +78,7 @@ fn a_host_that_is_down_or_a_way_that_is_cut_is_given_up_after_131_seconds() {
                     "cut" => bed.cut("a", "b"),
                     words => bed.set_link("a", "b", words),
                 }
-                (connecting(&bed, "b:80").await, syns(&bed))
+                (connecting(&bed, "10.0.0.2:80").await, syns(&bed))
             });
             assert_eq!(seen, (Err(ErrorKind::TimedOut), millis(131_000)), "{way}");
             assert_eq!(syns, [0, 1, 2, 3, 4, 5, 7, 11, 19, 35, 67], "{way}");
@@ -119,12 +119,12 @@ fn a_syn_that_is_lost_n_times_costs_n_seconds_and_doubles_from_the_sixth_time_on
 }
 
 #[test]
-fn an_address_that_nobody_ever_had_is_refused_at_once_and_one_that_somebody_had_is_not() {
+fn an_address_that_nobody_has_is_given_up_after_three_seconds() {
     for bed in beds() {
         bed.run_twice(|bed| async move {
-            assert_eq!(connecting(&bed, "10.0.0.77:80").await, (Err(ErrorKind::HostUnreachable), Instant::ZERO));
+            assert_eq!(connecting(&bed, "10.0.0.77:80").await, (Err(ErrorKind::HostUnreachable), millis(3000)));
             bed.host("b").change_addresses();
-            assert_eq!(connecting(&bed, "10.0.0.2:80").await, (Err(ErrorKind::TimedOut), millis(131_000)));
+            assert_eq!(connecting(&bed, "10.0.0.2:80").await, (Err(ErrorKind::HostUnreachable), millis(6000)));
         });
     }
 }
@@ -223,7 +223,6 @@ fn version_6_and_loopback() {
             let stream = bed.host("a").connect("[b]:80").await.unwrap();
             assert_eq!((stream.local_addr().unwrap().to_string(), stream.info().segment_size), ("[fd00::1]:49152".into(), 1428));
             assert_eq!(six.accept().await.unwrap().1.to_string(), "[fd00::1]:49152");
-            assert_eq!(connecting(&bed, "b:80").await.0, Err(ErrorKind::ConnectionRefused), "it hears version 6 alone");
             // Within a host no time passes.
             let four = bed.host("a").listen("127.0.0.1:80").unwrap();
             let before = bed.now();
@@ -233,7 +232,7 @@ fn version_6_and_loopback() {
             super::read_all(&mut other, 1_000_000).await;
             write.await.unwrap();
             assert_eq!(bed.now(), before);
-            assert_eq!(connecting(&bed, "a:80").await, (Err(ErrorKind::ConnectionRefused), before), "that address has no listener");
+            assert_eq!(connecting(&bed, "10.0.0.1:80").await, (Err(ErrorKind::ConnectionRefused), before), "that address has no listener");
         });
     }
 }

@@ -76,7 +76,9 @@ macro_rules! program {
                 log.see("by hand", server.async_io(Interest::READABLE, || server.try_read(&mut [0; 8])).await);
                 log.see("ready by hand", poll_fn(|cx| client.poll_write_ready(cx)).await);
                 log.see("flushed", client.flush().await);
+                log.see("nothing to read into no space", client.try_read(&mut []));
                 log.see("shut", client.shutdown().await);
+                log.see("is not said", client.ready(Interest::WRITABLE).await.map(|ready| ready.is_write_closed()));
                 log.see("shut again", client.shutdown().await);
                 log.see("nothing more", client.write(b"x").await);
                 log.see("the end", server.read(&mut short).await);
@@ -84,6 +86,8 @@ macro_rules! program {
                 log.see("ready to read the end", poll_fn(|cx| server.poll_read_ready(cx)).await);
                 log.see("closed", server.ready(Interest::READABLE).await.map(|ready| ready.is_readable()));
                 log.see("the other way", server.write(b"bye").await);
+                client.readable().await.unwrap();
+                log.see("something to read into no space", client.read(&mut []).await);
                 drop(server);
                 let mut text = String::new();
                 log.see("to the end", client.read_to_string(&mut text).await);

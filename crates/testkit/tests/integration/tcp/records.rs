@@ -37,7 +37,7 @@ fn the_trace_shows_flags_relative_numbers_and_windows() {
 #[test]
 fn refusals_count_from_the_syns_of_what_they_refuse() {
     let ((), record) = Testbed::new(["a", "b"]).links("delay 50ms").seed(1).run_recorded(|bed| async move {
-        assert!(bed.host("a").connect("b:81").await.is_err());
+        assert!(bed.host("a").connect("10.0.0.2:81").await.is_err());
         let (mut client, _server, _listener) = pair(&bed).await;
         bed.host("b").crash();
         bed.host("b").restart();

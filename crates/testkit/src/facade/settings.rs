@@ -1,0 +1,144 @@
+//! Options that programs set on placeholders of sockets: see [`cohaptic_sockets::Setting`].
+
+use std::io;
+
+use cohaptic_sockets::{Configured, KeepaliveTimes, Setting, Version};
+
+use crate::socket::UdpSocket;
+use crate::tcp::{Keepalive, TcpListener, TcpSocket, TcpStream};
+
+const fn times(keepalive: Keepalive) -> KeepaliveTimes {
+    KeepaliveTimes { idle: keepalive.idle, interval: keepalive.interval, probes: keepalive.probes }
+}
+
+const fn keepalive(times: KeepaliveTimes) -> Keepalive {
+    Keepalive { idle: times.idle, interval: times.interval, probes: times.probes }
+}
+
+/// Returns the version of IP of a socket, from its own address.
+fn version(local: io::Result<std::net::SocketAddr>) -> Version {
+    if local.is_ok_and(|local| local.is_ipv6()) { Version::Six } else { Version::Four }
+}
+
+impl Configured for TcpStream {
+    fn version(&self) -> Version {
+        version(self.local_addr())
+    }
+
+    fn settings(&self) -> io::Result<Vec<Setting>> {
+        let config = self.config()?;
+        let linger = self.linger()?.map(|linger| Setting::Linger(Some(linger)));
+        Ok([Setting::NoDelay(config.nodelay), Setting::Keepalive(config.keepalive.map(times)), Setting::Ttl(config.ttl.into())]
+            .into_iter()
+            .chain(config.user_timeout.map(|timeout| Setting::UserTimeout(Some(timeout))))
+            .chain(linger)
+            .collect())
+    }
+
+    fn set(&self, setting: Setting) -> io::Result<()> {
+        match setting {
+            Setting::NoDelay(on) => self.set_nodelay(on),
+            Setting::Keepalive(times) => self.set_keepalive_times(times.map(keepalive)),
+            Setting::Linger(time) => self.set_linger(time),
+            Setting::UserTimeout(timeout) => self.set_user_timeout(timeout),
+            Setting::Ttl(ttl) => self.set_ttl(ttl),
+            // The buffers of a connection have their sizes from its beginning. The other options say how a socket is bound, or have no effect.
+            Setting::ReceiveBuffer(_)
+            | Setting::SendBuffer(_)
+            | Setting::TypeOfService(_)
+            | Setting::ReuseAddress(_)
+            | Setting::ReusePort(_)
+            | Setting::OnlyV6(_)
+            | Setting::Broadcast(_) => Ok(()),
+        }
+    }
+}
+
+impl Configured for TcpListener {
+    fn version(&self) -> Version {
+        version(self.local_addr())
+    }
+
+    fn settings(&self) -> io::Result<Vec<Setting>> {
+        let (config, linger) = self.inherited(|config, linger| (config.clone(), *linger))?;
+        Ok([Setting::NoDelay(config.nodelay), Setting::Keepalive(config.keepalive.map(times)), Setting::Ttl(config.ttl.into())]
+            .into_iter()
+            .chain(linger.map(|linger| Setting::Linger(Some(linger))))
+            .collect())
+    }
+
+    /// Sets an option, which the connections that are accepted from now on inherit.
+    fn set(&self, setting: Setting) -> io::Result<()> {
+        self.inherited(|config, linger| match setting {
+            Setting::NoDelay(on) => config.nodelay = on,
+            Setting::Keepalive(times) => config.keepalive = times.map(keepalive),
+            Setting::Linger(time) => *linger = time,
+            Setting::UserTimeout(timeout) => config.user_timeout = timeout,
+            Setting::ReceiveBuffer(bytes) => config.receive_buffer = Some(bytes as usize),
+            Setting::SendBuffer(bytes) => (config.send_buffer, config.least_send_buffer) = (bytes as usize, bytes as usize),
+            Setting::Ttl(ttl) => config.ttl = u8::try_from(ttl).unwrap_or(u8::MAX).max(1),
+            Setting::TypeOfService(_) | Setting::ReuseAddress(_) | Setting::ReusePort(_) | Setting::OnlyV6(_) | Setting::Broadcast(_) => {}
+        })
+    }
+}
+
+impl Configured for UdpSocket {
+    fn version(&self) -> Version {
+        version(self.local_addr())
+    }
+
+    fn settings(&self) -> io::Result<Vec<Setting>> {
+        Ok(vec![Setting::Ttl(self.ttl()?), Setting::TypeOfService(self.tos_v4()?), Setting::Broadcast(self.broadcast()?)])
+    }
+
+    fn set(&self, setting: Setting) -> io::Result<()> {
+        match setting {
+            Setting::ReceiveBuffer(bytes) => self.set_recv_buffer_size(bytes / 2),
+            Setting::SendBuffer(bytes) => self.set_send_buffer_size(bytes / 2),
+            Setting::TypeOfService(value) => self.set_tos_v4(value),
+            Setting::Ttl(ttl) => self.set_ttl(ttl),
+            Setting::Broadcast(on) => self.set_broadcast(on),
+            Setting::NoDelay(_)
+            | Setting::Keepalive(_)
+            | Setting::Linger(_)
+            | Setting::UserTimeout(_)
+            | Setting::ReuseAddress(_)
+            | Setting::ReusePort(_)
+            | Setting::OnlyV6(_) => Ok(()),
+        }
+    }
+}
+
+impl Configured for TcpSocket {
+    fn version(&self) -> Version {
+        version(self.local_addr())
+    }
+
+    fn settings(&self) -> io::Result<Vec<Setting>> {
+        let settings = [
+            Setting::NoDelay(self.nodelay()?),
+            Setting::Keepalive(self.config()?.keepalive.map(times)),
+            Setting::ReuseAddress(self.reuseaddr()?),
+            Setting::ReusePort(self.reuseport()?),
+        ];
+        let six = (self.version() == Version::Six).then_some(Setting::OnlyV6(self.only_v6()?));
+        Ok(settings.into_iter().chain(self.linger()?.map(|linger| Setting::Linger(Some(linger)))).chain(six).collect())
+    }
+
+    fn set(&self, setting: Setting) -> io::Result<()> {
+        match setting {
+            Setting::NoDelay(on) => self.set_nodelay(on),
+            Setting::Keepalive(times) => self.change_config(|config| config.keepalive = times.map(keepalive)),
+            Setting::Linger(time) => self.set_linger(time),
+            Setting::UserTimeout(timeout) => self.change_config(|config| config.user_timeout = timeout),
+            Setting::ReceiveBuffer(bytes) => self.set_recv_buffer_size(bytes / 2),
+            Setting::SendBuffer(bytes) => self.set_send_buffer_size(bytes / 2),
+            Setting::TypeOfService(value) => self.set_tos_v4(value),
+            Setting::Ttl(ttl) => self.change_config(|config| config.ttl = u8::try_from(ttl).unwrap_or(u8::MAX).max(1)),
+            Setting::ReuseAddress(on) => self.set_reuseaddr(on),
+            Setting::ReusePort(on) => self.set_reuseport(on),
+            Setting::OnlyV6(on) => self.set_only_v6(on),
+            Setting::Broadcast(_) => Ok(()),
+        }
+    }
+}
