@@ -109,7 +109,7 @@ impl<'a> State<'a> {
             return None;
         }
         self.command = self.file_command().unwrap_or(self.command);
-        let all: Vec<&Arg> = self.command.get_positionals().filter(|arg| !arg.is_last_set()).collect();
+        let all: Vec<&Arg> = self.command.get_positionals().collect();
         all.get(self.positionals.len()).or_else(|| all.last().filter(|arg| takes_many(arg))).copied()
     }
 

@@ -115,6 +115,89 @@ fn names_with_spaces_are_quoted_for_bash() {
     assert_eq!(desk.text("completions fish -- run 'a folder/four.toml' --set peers."), "peers.peer1.\npeers.peer2.\npeers.peer3.\npeers.peer4.\n");
 }
 
+/// Returns the answers for fish without their meanings, joined by blanks.
+fn fish(desk: &Desk, line: &str) -> String {
+    let text = desk.text(&format!("completions fish -- {line}"));
+    let answers: Vec<&str> = text.lines().map(|line| line.split('\t').next().unwrap()).collect();
+    answers.join(" ")
+}
+
+/// Entries of lists are offered by name, those of tables with free keys by key, and neither if the shell would read the name as two words.
+#[test]
+fn names_in_the_file_are_offered_as_far_as_they_are_words() {
+    let desk = desk();
+    desk.write("relay.toml", "[[programs]]\nname = \"robot\"\n[[programs]]\nname = \"two words\"\n");
+    desk.write("router.toml", "[links.wan]\ndelay = \"8ms\"\n[links.\"two words\"]\n");
+    let states = "[[modulators]]\nname = \"night\"\n[[modulators.states]]\nname = \"on\"\n[[modulators]]\nname = \"two words\"\n\
+                  [[modulators]]\nname = \"day\"\n[[modulators.states]]\nname = \"off\"\n[[timeline]]\nat = \"1s\"\n";
+    desk.write("states.toml", states);
+    for (line, expected) in [
+        ("relay relay.toml --set programs.", "programs.robot."),
+        ("relay relay.toml --set links.", "links.robot."),
+        ("relay relay.toml --set relay.allow-remote=", "relay.allow-remote=true relay.allow-remote=false"),
+        ("router router.toml --set links.", "links.wan."),
+        ("router router.toml --set links.wan.del", "links.wan.delay="),
+        ("run two.toml --set links.", "links.left. links.right."),
+        ("run states.toml --set modulators.", "modulators.night. modulators.day."),
+        ("run states.toml --set modulators.day.states.", "modulators.day.states.off."),
+        ("run states.toml --set timeline.", "timeline.0."),
+    ] {
+        assert_eq!(fish(&desk, line), expected, "{line}");
+    }
+}
+
+/// Values of options are no files, wherever they stand.
+#[test]
+fn files_are_offered_where_a_file_is_meant() {
+    let desk = desk();
+    desk.write("points.toml", "");
+    desk.write("re:lay.toml", "");
+    desk.write("two\nlines.toml", "");
+    for (line, expected) in [
+        ("check r", "re:lay.toml relay.toml router.toml"),
+        ("relay rel", "relay.toml"),
+        ("router rou", "router.toml"),
+        ("run --jobs 3 tw", "two.toml"),
+        ("run ''", "a folder/ half.toml points.toml re:lay.toml relay.toml router.toml two.toml"),
+        // A dash is the file.
+        ("run - tw", ""),
+        // These are values of `--back`.
+        ("relay --back delay 5ms rel", ""),
+        ("relay --back -5 rel", ""),
+        // The beginning of a command.
+        ("stability po", ""),
+        // Behind the two dashes nothing is an option.
+        ("run -- --set scene.se", ""),
+    ] {
+        assert_eq!(fish(&desk, line), expected, "{line}");
+    }
+    // Bash splits the word at the colon as well.
+    assert_eq!(desk.text("completions bash -- run re : la"), "lay.toml\n");
+}
+
+/// A pipe is not read: its writer means the text for the command that is typed.
+#[test]
+fn a_pipe_is_not_read() {
+    use std::io::Write as _;
+    use std::process::Stdio;
+    let desk = desk();
+    let mut command = desk.command("completions fish -- run /dev/stdin --set peers.");
+    let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+    child.stdin.take().unwrap().write_all(TWO.as_bytes()).unwrap();
+    assert_eq!(Outcome::of(child.wait_with_output().unwrap()).stdout, "");
+}
+
+/// Several commands have the same option, for which fish needs one line.
+#[test]
+fn the_script_for_fish_has_each_line_once() {
+    let script = desk().text("completions fish");
+    let mut lines: Vec<&str> = script.lines().filter(|line| line.contains("__cohaptic_answers)")).collect();
+    let count = lines.len();
+    lines.sort_unstable();
+    lines.dedup();
+    assert!(count > 3 && lines.len() == count, "{lines:?}");
+}
+
 /// A command line that nobody can complete has no answer and no error.
 #[test]
 fn what_the_program_does_not_know_has_no_answer() {
