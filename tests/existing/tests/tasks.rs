@@ -127,6 +127,103 @@ fn virtual_time_waits_for_blocking_work() {
     });
 }
 
+/// The time of packets waits for blocking work as well, whichever function starts the work.
+#[test]
+fn packets_wait_for_blocking_work() {
+    fn work() {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    type Way = fn() -> std::pin::Pin<Box<dyn Future<Output = ()>>>;
+    let ways: [Way; 4] = [
+        || Box::pin(async { tokio::task::spawn_blocking(work).await.unwrap() }),
+        || Box::pin(async { Handle::current().spawn_blocking(work).await.unwrap() }),
+        || {
+            Box::pin(async {
+                let mut set = JoinSet::new();
+                set.spawn_blocking(work);
+                set.join_next().await.unwrap().unwrap();
+            })
+        },
+        || {
+            Box::pin(async {
+                let mut set = JoinSet::new();
+                set.spawn_blocking_on(work, &Handle::current());
+                set.join_next().await.unwrap().unwrap();
+            })
+        },
+    ];
+    for way in ways {
+        // Within a millisecond not tokio moves the clock but the test bed.
+        two().links("delay 500us").run(async move |bed: Bed| {
+            let client = bed.host("client").bind("0.0.0.0:9").unwrap();
+            bed.host("server").spawn(async move {
+                own_address().await;
+                way().await;
+            });
+            let begin = Instant::now();
+            tokio::task::yield_now().await;
+            bed.host("client").spawn(async move { way().await }).await.unwrap();
+            assert_eq!(begin.elapsed(), Duration::ZERO);
+            client.recv(&mut [0; 10]).await.unwrap();
+            assert_eq!(begin.elapsed(), Duration::from_micros(500));
+        });
+    }
+}
+
+/// Starts a task, and counts it when it is over, when the value is dropped.
+struct Tells(Arc<AtomicUsize>);
+
+impl Drop for Tells {
+    fn drop(&mut self) {
+        let told = Arc::clone(&self.0);
+        tokio::spawn(async move {
+            own_address().await;
+            told.fetch_add(1, Ordering::Relaxed);
+        });
+    }
+}
+
+/// A future that is over, or that is aborted, is dropped on its host: a task that its destructor starts lives there.
+#[test]
+fn futures_are_dropped_on_their_host() {
+    two().run(async |bed: Bed| {
+        let told = Arc::new(AtomicUsize::new(0));
+        let (one, other) = (Tells(Arc::clone(&told)), Tells(Arc::clone(&told)));
+        bed.host("server")
+            .spawn(async move {
+                let ends = tokio::spawn(async move {
+                    let _kept = one;
+                    tokio::task::yield_now().await;
+                });
+                ends.await.unwrap();
+                let waits = tokio::spawn(async move {
+                    sleep(Duration::from_secs(100)).await;
+                    drop(other);
+                });
+                tokio::task::yield_now().await;
+                waits.abort();
+            })
+            .await
+            .unwrap();
+        all_come_from_the_server(&bed, 2).await;
+        assert_eq!(told.load(Ordering::Relaxed), 2);
+    });
+}
+
+/// A test bed moves its time itself.
+#[test]
+fn pause_and_resume_do_nothing() {
+    two().run(async |_: Bed| {
+        let begin = Instant::now();
+        tokio::time::pause();
+        sleep(Duration::from_secs(1)).await;
+        tokio::time::resume();
+        tokio::time::resume();
+        sleep(Duration::from_secs(1)).await;
+        assert_eq!(begin.elapsed(), Duration::from_secs(2));
+    });
+}
+
 #[test]
 fn a_program_for_many_threads_may_block_in_place() {
     two().run(async |_: Bed| assert_eq!(tokio::task::block_in_place(|| 7), 7));

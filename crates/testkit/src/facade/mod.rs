@@ -39,10 +39,8 @@ impl Bed for BedOfThread {
 
     fn connect(&self, call: Call, to: SocketAddr) -> Connecting {
         let (shared, host) = context::Call::from(call).host(HOW);
-        let begun = shared.check_open(host, "a connection").and_then(|()| {
-            let config = shared.with(|core| core.tcp_config(host).clone());
-            TcpStream::connect_on(shared, host, None, to, config)
-        });
+        let config = shared.with(|core| core.tcp_config(host).clone());
+        let begun = TcpStream::connect_on(shared, host, None, to, config);
         Box::pin(async move { Ok(Box::new(begun?.established().await?) as Box<dyn Stream>) })
     }
 
