@@ -30,7 +30,7 @@ use std::sync::Arc;
 pub use datagrams::{DatagramOption, Datagrams, Membership};
 pub use settings::{Configured, KeepaliveTimes, Setting};
 pub use streams::{Connecting, Flag, Listener, Number, Ready, Socket, Stream};
-pub use tasks::{Hold, Host, OnHost, Stop, host, on_host};
+pub use tasks::{Hold, Host, OnHost, Signals, Stop, host, on_host};
 
 thread_local! {
     static BED: RefCell<Option<Arc<dyn Bed>>> = const { RefCell::new(None) };

@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 use std::fmt;
 use std::sync::Arc;
+use std::task::{Context, Poll};
 
 thread_local! {
     /// Host for which this thread works outside of the run, as a thread of `spawn_blocking` does.
@@ -16,12 +17,21 @@ pub trait Host: Send + Sync {
 
     /// Keeps `stop`, and calls it when the program of the host ends: by a crash, or because the program is killed.
     fn keep(&self, stop: Box<dyn Stop>);
+
+    /// Listens for the signal `number`, such as 15 for `SIGTERM`, which is then handled by the program: it does not end the program any more.
+    fn listen_for(&self, number: i32) -> Box<dyn Signals>;
 }
 
 impl fmt::Debug for dyn Host {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Host").finish_non_exhaustive()
     }
+}
+
+/// Signals of one kind that come to the program of a host.
+pub trait Signals: fmt::Debug + Send + Sync {
+    /// Waits for the next signal. Signals that come before the program asks again are one signal. Registers the waker of the context if no signal has come.
+    fn poll_receive(&mut self, cx: &mut Context<'_>) -> Poll<()>;
 }
 
 /// The way to stop a task.

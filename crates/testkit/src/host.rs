@@ -161,6 +161,28 @@ impl Host {
         }
     }
 
+    /// Sends a signal to the program of the host, such as 15 for `SIGTERM`. A program that listens for the signal, by `tokio::signal` of the package that
+    /// `cohaptic tokio` generates, receives the signal. Otherwise the signal does what Linux does by default: 17, 18, 23 and 28 do nothing, and every other
+    /// signal kills the program, as [`Host::kill`] does. Nothing happens to a host that is down.
+    ///
+    /// # Panics
+    ///
+    /// Outside of the run. If the number is not that of a signal of Linux that a program can receive: from 1 to 31, without 9, for which there is
+    /// [`Host::kill`], and without those that stop a program, 19 to 22.
+    #[cfg(feature = "facade")]
+    pub fn signal(&self, number: i32) {
+        assert!(
+            matches!(number, 1..=8 | 10..=18 | 23..=31),
+            "host `{}` cannot get the signal {number}: expected a number from 1 to 31, without 9, for which there is `Host::kill`, and without 19 to 22, which stop a program",
+            self.name()
+        );
+        let running = self.running("signals are sent");
+        let is_ignored = matches!(number, 17 | 18 | 23 | 28);
+        if self.is_up() && !running.tasks.others.signals.send(self.node, number) && !is_ignored {
+            self.kill();
+        }
+    }
+
     /// Brings the host up again. The program of [`Host::start`] starts anew, if there is one. Nothing happens to a host that is up, unless its program was
     /// killed.
     ///

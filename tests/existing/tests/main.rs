@@ -8,6 +8,7 @@ mod h2;
 mod mini_redis;
 mod ping_pong;
 mod refused;
+mod signals;
 mod sockets;
 mod tasks;
 mod websocket;

@@ -18,6 +18,38 @@ fn a_further_runtime() {
 }
 
 #[test]
+#[should_panic(expected = "tests/refused.rs")]
+fn a_further_runtime_by_its_short_name() {
+    on_one_host(async || drop(tokio::runtime::Runtime::new()));
+}
+
+#[test]
+#[should_panic(expected = "builds a runtime of tokio inside a test bed")]
+fn a_further_runtime_of_one_thread() {
+    on_one_host(async || drop(tokio::runtime::LocalRuntime::new()));
+}
+
+#[test]
+#[should_panic(expected = "starts the process \"true\" in a test bed")]
+fn a_process() {
+    on_one_host(async || drop(tokio::process::Command::new("true").arg("now").spawn()));
+}
+
+#[test]
+#[should_panic(expected = "by `Host::spawn`, or run the processes outside of tests, over `cohaptic relay`")]
+fn a_process_whose_output_is_wanted() {
+    on_one_host(async || drop(tokio::process::Command::new("true").output().await));
+}
+
+#[tokio::test]
+async fn a_process_outside_of_a_test_bed_is_started() {
+    let mut command = tokio::process::Command::new("sh");
+    let output = command.args(["-c", "echo $A"]).env("A", "said").output().await.unwrap();
+    assert_eq!(output.stdout, b"said\n");
+    assert!(command.arg("more").stdout(std::process::Stdio::null()).status().await.unwrap().success());
+}
+
+#[test]
 #[should_panic(expected = "`UdpSocket::bind` at tests/refused.rs:")]
 fn a_socket_on_no_host() {
     Testbed::new(["host"]).on_tokio().run(async |_: Bed| drop(UdpSocket::bind("0.0.0.0:0").await));

@@ -23,7 +23,7 @@ macro_rules! files {
 }
 
 /// Sources of the package that stands in for tokio.
-const SOURCES: [(&str, &str); 28] = files![
+const SOURCES: [(&str, &str); 29] = files![
     "hosted.rs",
     "lib.rs",
     "net/addr.rs",
@@ -40,6 +40,7 @@ const SOURCES: [(&str, &str); 28] = files![
     "net/udp.rs",
     "net/udp_options.rs",
     "net/udp_receiving.rs",
+    "process.rs",
     "runtime/builder.rs",
     "runtime/handle.rs",
     "runtime/local.rs",

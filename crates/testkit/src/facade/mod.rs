@@ -4,6 +4,7 @@
 //! for the test bed of the thread, which `crate::runtime` registers for each run.
 
 mod settings;
+mod signals;
 
 use std::io;
 use std::net::SocketAddr;

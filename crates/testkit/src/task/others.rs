@@ -2,18 +2,22 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use cohaptic_sockets::{Host, Stop};
+use cohaptic_sockets::{Host, Signals, Stop};
 use cohaptic_wan::NodeId;
 
+use super::signals::Handlers;
 use crate::current;
 
-/// The ways to stop the tasks that tokio polls for hosts of a run.
+/// The ways to stop the tasks that tokio polls for hosts of a run, and the signals for which the programs of the hosts listen.
 #[derive(Default)]
-pub(crate) struct OtherTasks(Mutex<Vec<(NodeId, Box<dyn Stop>)>>);
+pub(crate) struct OtherTasks {
+    stops: Mutex<Vec<(NodeId, Box<dyn Stop>)>>,
+    pub(crate) signals: Handlers,
+}
 
 impl OtherTasks {
     fn keep(&self, host: NodeId, stop: Box<dyn Stop>) {
-        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut kept = self.stops.lock().unwrap_or_else(PoisonError::into_inner);
         // Tasks that are over are forgotten whenever the array is full, so that the array stays proportional to the number of live tasks.
         if kept.len() == kept.capacity() {
             kept.retain(|(_, stop)| !stop.is_over());
@@ -21,11 +25,12 @@ impl OtherTasks {
         kept.push((host, stop));
     }
 
-    /// Stops all tasks of a host.
+    /// Stops all tasks of a host, whose program then listens for no signal.
     pub(crate) fn stop_all_of(&self, host: NodeId) {
+        self.signals.forget(host);
         // The lock ends before tasks are stopped: a destructor may start a task, which takes the lock.
         let of_host: Vec<Box<dyn Stop>> = {
-            let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut kept = self.stops.lock().unwrap_or_else(PoisonError::into_inner);
             kept.extract_if(.., |(of, _)| *of == host).map(|(_, stop)| stop).collect()
         };
         of_host.iter().for_each(|stop| stop.stop());
@@ -45,5 +50,9 @@ impl Host for Kept {
 
     fn keep(&self, stop: Box<dyn Stop>) {
         self.others.keep(self.host, stop);
+    }
+
+    fn listen_for(&self, number: i32) -> Box<dyn Signals> {
+        Box::new(self.others.signals.listen(self.host, number))
     }
 }

@@ -285,6 +285,65 @@ fn tasks_that_are_over_are_forgotten_and_no_others() {
     });
 }
 
+/// Listens for a signal, and returns how often it came by the end of the run of 10 ms.
+async fn count_signals(number: i32) -> u32 {
+    let mut signals = cohaptic_sockets::host().unwrap().listen_for(number);
+    let mut count = 0;
+    while time::timeout(Duration::from_millis(10), poll_fn(|cx| signals.poll_receive(cx))).await.is_ok() {
+        count += 1;
+    }
+    count
+}
+
+#[test]
+fn a_signal_comes_to_the_program_that_listens() {
+    two().run(|bed| async move {
+        let (client, server) = (bed.host("client"), bed.host("server"));
+        let counts =
+            [client.spawn(count_signals(15)), client.spawn(count_signals(15)), client.spawn(count_signals(2)), server.spawn(count_signals(15))];
+        time::sleep(Duration::from_millis(1)).await;
+        client.signal(15);
+        time::sleep(Duration::from_millis(1)).await;
+        // Signals that come before the program asks are one.
+        client.signal(15);
+        client.signal(15);
+        let mut found = Vec::new();
+        for count in counts {
+            found.push(count.await.unwrap());
+        }
+        assert_eq!(found, [2, 2, 0, 0]);
+        // The program handles the signal also when nobody waits for it any more.
+        client.signal(15);
+        assert!(client.spawn(async { time::now() }).await.is_ok());
+    });
+}
+
+#[test]
+fn a_signal_that_no_program_handles_kills_it_as_with_linux() {
+    two().run(|bed| async move {
+        let server = bed.host("server");
+        for (number, lives) in [(28, true), (15, false), (17, true), (2, false), (18, true), (23, true), (1, false)] {
+            let task = server.spawn(time::sleep(Duration::from_millis(1)));
+            server.signal(number);
+            assert_eq!(task.await.is_ok(), lives, "{number}");
+            server.restart();
+        }
+        // A program that starts anew handles no signal of the one before.
+        drop(server.spawn(async { cohaptic_sockets::host().unwrap().listen_for(15) }).await.unwrap());
+        server.crash();
+        server.restart();
+        let task = server.spawn(std::future::pending::<()>());
+        server.signal(15);
+        assert!(task.await.is_err());
+    });
+}
+
+#[test]
+#[should_panic(expected = "host `server` cannot get the signal 9: expected a number from 1 to 31")]
+fn a_signal_that_no_program_can_receive_is_refused() {
+    two().run(|bed| async move { bed.host("server").signal(9) });
+}
+
 #[test]
 #[should_panic(expected = "`TcpStream::connect` at")]
 fn a_socket_on_no_host_is_refused_with_the_place_of_the_call() {

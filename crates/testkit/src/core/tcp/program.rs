@@ -65,7 +65,7 @@ impl Core {
         let [readable, writable] = self.is_ready(id);
         let connection = self.connection(id);
         let read_closed = connection.is_read_closed();
-        [readable, writable, read_closed, read_closed && connection.is_write_closed() && writable]
+        [readable, writable, read_closed, read_closed && connection.is_write_closed()]
     }
 
     /// Returns the state machine of a connection.
