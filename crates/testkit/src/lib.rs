@@ -70,6 +70,7 @@
 //! | `pcapng` | yes | captures among what a failed test leaves behind, by `cohaptic-capture` |
 //! | `strategies` | | strategies of proptest for links, networks and hits, and `proptest` itself |
 //! | `facade` | | programs that use tokio's own sockets, on a test bed unchanged, through the package that `cohaptic tokio` generates; brings `tcp` and `tokio` |
+//! | `loopback` | | runtimes whose loopback is a link, for the package that `cohaptic tokio` generates; not for use by hand; brings `facade` |
 //! | `tokio-net` | | the methods `ready`, `try_io` and `async_io` of sockets, whose types tokio has only with its own feature `net`; brings `tokio` |
 //! | `files` | | relay files (TOML) as hosts and links; files of plain words need no feature |
 //! | `scenes` | | scene files as hosts and links and as tests, and strategies for scenes of coordination; brings `files` and `strategies` |
@@ -85,6 +86,7 @@
 //! | [`COHAPTIC_TEST_SEED`](SEED_VARIABLE) | the seed of every test bed of the process |
 //! | [`COHAPTIC_TEST_STALL`](STALL_VARIABLE) | for how long anything may run without returning to the test bed, by the wall clock |
 //! | [`COHAPTIC_TEST_ARTEFACTS`](ARTEFACTS_VARIABLE) | the folder below which every test that fails writes what happened |
+//! | `COHAPTIC_TEST_LOOPBACK` | words of `tc-netem` for the loopback of tests that make no test bed, under `cohaptic test`: `docs/how-to-existing-program.md` |
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "tests"))]
 
 mod address;
@@ -108,6 +110,9 @@ mod host;
 #[cfg(feature = "hyper")]
 pub mod hyper;
 mod link;
+#[cfg(feature = "loopback")]
+#[doc(hidden)]
+pub mod loopback;
 mod names;
 #[cfg(feature = "tcp")]
 pub mod net;

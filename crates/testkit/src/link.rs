@@ -58,15 +58,7 @@ impl ToLink for str {
     /// can also be the name of a link that somebody measured, such as `starlink/up`: see `docs/how-to-named-link.md` in the repository.
     #[expect(clippy::panic, reason = "a test that says nonsense is to fail, with the place")]
     fn to_link(&self) -> LinkModel {
-        if self.trim().is_empty() {
-            return LinkModel::default();
-        }
-        #[cfg(feature = "files")]
-        if let Some(link) = named(self) {
-            return link;
-        }
-        let netem = Netem::parse(self).unwrap_or_else(|error| panic!("this is not a link: {error}\n{}", error.excerpt(self)));
-        netem.to_link_config(&mut |_| None).unwrap_or_else(|error| panic!("`{self}` is not a link: {error}")).into()
+        parse(self).unwrap_or_else(|fault| panic!("{fault}"))
     }
 
     fn words(&self) -> Option<String> {
@@ -74,15 +66,27 @@ impl ToLink for str {
     }
 }
 
+/// Parses the words of `tc-netem`, or the name of a link of the library. The error names the place of the fault.
+pub(crate) fn parse(words: &str) -> Result<LinkModel, String> {
+    if words.trim().is_empty() {
+        return Ok(LinkModel::default());
+    }
+    #[cfg(feature = "files")]
+    if let Some(link) = named(words.trim()) {
+        return link;
+    }
+    let netem = Netem::parse(words).map_err(|error| format!("this is not a link: {error}\n{}", error.excerpt(words)))?;
+    netem.to_link_config(&mut |_| None).map(LinkModel::from).map_err(|error| format!("`{words}` is not a link: {error}"))
+}
+
 /// Returns the link of the library with a name; `None` if the text is no name of the library.
 #[cfg(feature = "files")]
-#[expect(clippy::panic, reason = "a test that says nonsense is to fail, with the way out")]
-fn named(text: &str) -> Option<LinkModel> {
-    let name = text.trim().parse::<cohaptic_linkfile::library::ProfileName>().ok()?;
-    if let Err(error) = name.one_direction() {
-        panic!("`{text}` is no link in one direction: {error}");
-    }
-    Some(cohaptic_linkfile::link_from_keys(&[format!("profile={}", text.trim())]).unwrap_or_else(|error| panic!("`{text}` is not a link: {error}")))
+fn named(text: &str) -> Option<Result<LinkModel, String>> {
+    let name = text.parse::<cohaptic_linkfile::library::ProfileName>().ok()?;
+    let link = name.one_direction().map_err(|error| error.to_string()).and_then(|_| {
+        cohaptic_linkfile::link_from_keys(&[format!("profile={text}")]).map_err(|error| error.to_string())
+    });
+    Some(link.map_err(|error| format!("`{text}` is not a link: {error}")))
 }
 
 impl ToLink for String {

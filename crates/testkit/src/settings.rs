@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use cohaptic_units::Instant;
-use cohaptic_wan::NodeId;
+use cohaptic_wan::{NodeId, Path};
 
 use crate::again::Said;
 use crate::hit::Laws;
@@ -35,6 +35,8 @@ pub(crate) struct Settings {
     pub(crate) said: Arc<Said>,
     /// Laws that hit packets.
     pub(crate) laws: Laws,
+    /// Link that the packets of its sender to itself take; `None` if such packets arrive at once. The receiver of the link is a host without programs.
+    pub(crate) loopback: Option<Path>,
 }
 
 /// Limits of a run, beyond which the run fails.

@@ -63,6 +63,7 @@ impl Setup {
                 limits: Limits::default(),
                 said: Arc::default(),
                 laws: Laws::default(),
+                loopback: None,
             },
             artefacts: None,
             stall_limit: LIMIT,

@@ -4,7 +4,9 @@ use cohaptic_testkit::{Bed, Testbed};
 
 mod axum;
 mod beds;
+mod foreign;
 mod h2;
+mod loopback;
 mod mini_redis;
 mod ping_pong;
 mod refused;

@@ -18,7 +18,8 @@ pub(crate) struct TokioArguments {
 #[derive(Debug, Args)]
 #[command(after_help = after(examples::TEST))]
 pub(crate) struct TestArguments {
-    /// Arguments of cargo test, as they would be without cohaptic
+    /// Arguments of cargo test, as they would be without cohaptic. The variable COHAPTIC_TEST_LOOPBACK='delay 20ms loss 1%' gives the tests a loopback with these
+    /// words of tc-netem
     #[arg(value_name = "ARGS", trailing_var_arg = true, allow_hyphen_values = true)]
     pub(crate) arguments: Vec<OsString>,
 }

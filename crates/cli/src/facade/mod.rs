@@ -1,9 +1,11 @@
 //! `cohaptic tokio` and `cohaptic test`: a package `tokio` that stands in for tokio, for tests of programs that nobody changes.
 //!
-//! `workspace` asks cargo about the workspace of the user, `sources` gets the sources of tokio from cargo, `package` writes both packages, and `test` calls
-//! `cargo test` with the package in the place of tokio. The sources of the package lie in the folder `tokio`.
+//! `workspace` asks cargo about the workspace of the user, `sources` gets the sources of tokio from cargo, `package` writes the packages, of which `loopback`
+//! describes one, and `test` calls `cargo test` with the package in the place of tokio. The sources of the package lie in the folder `tokio`.
 
 mod cargo;
+mod files;
+mod loopback;
 mod package;
 mod sources;
 mod test;

@@ -1,16 +1,17 @@
-//! The generated packages: the real tokio under another name, and the package `tokio` that stands in for it.
+//! The generated packages: the real tokio under another name, the test kit on top of it, and the package `tokio` that stands in for it.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use toml::{Table, Value};
 
+use super::files::{Files, list};
+use super::loopback;
 use super::sources::Sources;
 use super::workspace::Workspace;
 use crate::failure::Failure;
-use crate::file::{read_text, write_file};
+use crate::file::read_text;
 
 /// Name of the package with the sources of the real tokio.
 pub(super) const REAL: &str = "cohaptic-real-tokio";
@@ -115,13 +116,14 @@ impl Builder {
     ),
 ];
 
-/// Writes both packages. Returns the folder of the package `tokio`.
+/// Writes the packages. Returns the folder of the package `tokio`.
 pub(super) fn write(workspace: &Workspace, sources: &Sources) -> Result<PathBuf, Failure> {
-    let Sources { version, folder: sources } = sources;
+    let Sources { version, folder: sources, kit } = sources;
     let manifest = sources.join("Cargo.toml");
     let manifest: Table =
         read_text(&manifest)?.parse().map_err(|error| Failure::System(format!("{} cannot be read: {error}", manifest.display())))?;
     write_real(&workspace.folder().join("real-tokio"), version, sources, &manifest)?;
+    Files::new(&workspace.folder().join("loopback")).write("Cargo.toml", &loopback::manifest(kit, &workspace.sockets))?;
     let package = workspace.folder().join("tokio");
     let mut files = Files::new(&package);
     files.write("Cargo.toml", &standing_in(version, &manifest, &workspace.sockets))?;
@@ -168,23 +170,6 @@ fn write_real(folder: &Path, version: &str, sources: &Path, manifest: &Table) ->
     files.remove_others()
 }
 
-/// Returns the paths of all files below `folder` with `/` between names, relative to `folder`.
-fn list(folder: &Path, below: &Path) -> Result<Vec<String>, Failure> {
-    let here = folder.join(below);
-    let unread = |error| Failure::File { verb: "read", path: here.clone(), error };
-    let mut found = Vec::new();
-    for entry in fs::read_dir(&here).map_err(unread)? {
-        let entry = entry.map_err(unread)?;
-        let path = below.join(entry.file_name());
-        if entry.file_type().map_err(unread)?.is_dir() {
-            found.append(&mut list(folder, &path)?);
-        } else {
-            found.push(path.to_string_lossy().replace('\\', "/"));
-        }
-    }
-    Ok(found)
-}
-
 /// Returns a source of the package for one version of tokio. A line `//@ has FILE|TEXT` stands before an item that exists only if the file of the real tokio
 /// contains the text.
 fn chosen(text: &str, sources: &Path) -> Result<String, Failure> {
@@ -225,6 +210,9 @@ fn standing_in(version: &str, real: &Table, sockets: &str) -> String {
         if name == "io-util" && !implicit.contains("bytes") {
             own.push("dep:bytes".to_owned());
         }
+        if name == "rt" {
+            own.push("dep:loopback".to_owned());
+        }
         let _ = writeln!(text, "{} = {own:?}", Value::String(name.clone()));
     }
     for name in &implicit {
@@ -233,8 +221,10 @@ fn standing_in(version: &str, real: &Table, sockets: &str) -> String {
     }
     let _ = write!(
         text,
-        "\n[dependencies]\nbytes = {{ version = \"1\", optional = true }}\ncohaptic-sockets = {sockets}\n\
-         real = {{ package = \"{REAL}\", path = \"../real-tokio\", default-features = false }}\n\n[workspace]\n\n[lints.rust]\nwarnings = \"allow\"\n"
+        "\n[dependencies]\nbytes = {{ version = \"1\", optional = true }}\ncohaptic-sockets = {{ {sockets} }}\n\
+         loopback = {{ package = \"{}\", path = \"../loopback\", default-features = false, features = [\"loopback\", \"pcapng\"], optional = true }}\n\
+         real = {{ package = \"{REAL}\", path = \"../real-tokio\", default-features = false }}\n\n[workspace]\n\n[lints.rust]\nwarnings = \"allow\"\n",
+        loopback::NAME
     );
     text
 }
@@ -247,43 +237,46 @@ fn optional(package: &Table) -> BTreeSet<String> {
     dependencies.filter(|(_, needed)| needed.get("optional").and_then(Value::as_bool) == Some(true)).map(|(name, _)| name.clone()).collect()
 }
 
-/// Folder whose files are written only if they change, so that cargo compiles nothing again that is the same.
-struct Files {
-    folder: PathBuf,
-    written: BTreeSet<String>,
-}
+#[cfg(test)]
+mod tests {
+    use super::super::files::make_folder;
+    use super::*;
+    use crate::file::write_file;
 
-impl Files {
-    fn new(folder: &Path) -> Self {
-        Self { folder: folder.to_owned(), written: BTreeSet::new() }
+    #[test]
+    fn items_that_a_version_lacks_are_left_out() {
+        let folder = tempfile::tempdir().unwrap();
+        make_folder(&folder.path().join("src")).unwrap();
+        write_file(&folder.path().join("src/a.rs"), "pub fn new_one() {}").unwrap();
+        let text = "//@ has a.rs|fn new_one\nfn one() {}\n    //@ has a.rs|fn newer\n    fn other() {}\n//@ has b.rs|fn any\nfn third() {}\n";
+        let expected = "fn one() {}\n#[cfg(any())]\n    fn other() {}\n#[cfg(any())]\nfn third() {}\n";
+        assert_eq!(chosen(text, folder.path()).unwrap(), expected);
     }
 
-    fn write(&mut self, name: &str, text: &str) -> Result<(), Failure> {
-        let path = self.folder.join(name);
-        if fs::read(&path).is_ok_and(|old| old == text.as_bytes()) {
-            self.written.insert(name.to_owned());
-            return Ok(());
+    /// A version may name its optional dependencies as features, or with `dep:`. The package needs `bytes` of its own where tokio does.
+    #[test]
+    fn features_bring_what_the_package_itself_needs() {
+        for (form, expected) in [("bytes", "[\"real/io-util\", \"bytes\"]"), ("dep:bytes", "[\"real/io-util\", \"dep:bytes\"]")] {
+            let real = format!("[features]\nio-util = [{form:?}]\nrt = []\n[dependencies.bytes]\nversion = \"1\"\noptional = true\n");
+            let own = standing_in("1.99.0", &real.parse().unwrap(), "path = \"sockets\"");
+            assert!(own.contains(&format!("\"io-util\" = {expected}\n\"rt\" = [\"real/rt\", \"dep:loopback\"]\n")), "{own}");
+            assert_eq!(own.contains("bytes = [\"real/bytes\", \"dep:bytes\"]\n"), form == "bytes", "{own}");
         }
-        make_folder(path.parent().unwrap_or(&self.folder))?;
-        write_file(&path, text)?;
-        self.written.insert(name.to_owned());
-        Ok(())
     }
 
-    /// Removes files of another version.
-    fn remove_others(&self) -> Result<(), Failure> {
-        for name in list(&self.folder, Path::new(""))? {
-            // Cargo writes the lock file and the folder `target` if somebody builds the package by itself.
-            if !self.written.contains(&name) && name.starts_with("src/") {
-                let path = self.folder.join(name);
-                fs::remove_file(&path).map_err(|error| Failure::File { verb: "remove", path, error })?;
-            }
+    /// Sources in which the places that the appended code needs are named otherwise.
+    #[test]
+    fn a_tokio_that_is_built_in_another_way_is_refused() {
+        let (sources, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        for (file, needed, _) in APPENDED {
+            let path = sources.path().join("src").join(file);
+            make_folder(path.parent().unwrap()).unwrap();
+            write_file(&path, needed).unwrap();
         }
-        Ok(())
+        let write = || write_real(folder.path(), "1.99.0", sources.path(), &Table::new());
+        write().unwrap();
+        assert!(read_text(&folder.path().join("src/util/rand.rs")).unwrap().contains("fn cohaptic(seed: u64)"));
+        write_file(&sources.path().join("src/util/rand.rs"), "fn other()").unwrap();
+        assert!(matches!(write(), Err(Failure::System(text)) if text.contains("tokio 1.99.0 is built in another way")));
     }
-}
-
-/// Makes a folder with the folders above it.
-pub(super) fn make_folder(path: &Path) -> Result<(), Failure> {
-    fs::create_dir_all(path).map_err(|error| Failure::File { verb: "make", path: path.to_owned(), error })
 }

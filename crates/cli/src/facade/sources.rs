@@ -2,28 +2,35 @@
 
 use std::path::{Path, PathBuf};
 
+use serde_json::Value;
+
 use super::cargo::metadata;
 use super::workspace::Workspace;
 use crate::failure::Failure;
 use crate::file::write_file;
 
-/// Sources of a version of tokio.
+/// Sources of a version of tokio, and of the test kit.
 #[derive(Debug)]
 pub(super) struct Sources {
+    /// Version of tokio.
     pub(super) version: String,
-    /// Folder with `Cargo.toml` and `src`.
+    /// Folder with the `Cargo.toml` and `src` of tokio.
     pub(super) folder: PathBuf,
+    /// The test kit, as cargo describes a package.
+    pub(super) kit: Value,
 }
 
 /// Returns cargo's sources of a version of tokio, which cargo downloads if it does not have them. Without a version, those of the newest version 1.
 ///
-/// Asks about a package of its own, which depends on tokio alone: the workspace of the user may name the generated package, which need not exist yet.
+/// Asks about a package of its own, which depends on tokio and on the test kit alone: the workspace of the user may name the generated package, which need not exist yet.
 pub(super) fn find(workspace: &Workspace, version: Option<&str>) -> Result<Sources, Failure> {
     let wanted = version.map_or_else(|| "1".to_owned(), |version| format!("={version}"));
     let folder = workspace.folder().join("sources");
-    super::package::make_folder(&folder.join("src"))?;
+    super::files::make_folder(&folder.join("src"))?;
     let manifest = format!(
-        "[package]\nname = \"cohaptic-sources\"\nversion = \"0.0.0\"\nedition = \"2024\"\npublish = false\n\n[dependencies]\ntokio = \"{wanted}\"\n\n[workspace]\n"
+        "[package]\nname = \"cohaptic-sources\"\nversion = \"0.0.0\"\nedition = \"2024\"\npublish = false\n\n[dependencies]\ntokio = \"{wanted}\"\n\
+         cohaptic-testkit = {{ {}, default-features = false }}\n\n[workspace]\n",
+        workspace.kit
     );
     write_file(&folder.join("Cargo.toml"), manifest)?;
     write_file(&folder.join("src/lib.rs"), "//! Cargo is asked for the sources of tokio with this package.\n")?;
@@ -38,11 +45,14 @@ pub(super) fn find(workspace: &Workspace, version: Option<&str>) -> Result<Sourc
         Some(Ok(known)) => known,
         Some(Err(_)) | None => metadata(&workspace.root, &["--manifest-path", &path], &purpose)?,
     };
-    let found = known["packages"].as_array().and_then(|packages| packages.iter().find(|package| package["name"] == "tokio"));
-    let text = |key: &str| found.and_then(|tokio| tokio[key].as_str());
+    let package = |name: &str| known["packages"].as_array().and_then(|packages| packages.iter().find(|package| package["name"] == name));
+    let (tokio, kit) = (package("tokio"), package("cohaptic-testkit"));
+    let text = |key: &str| tokio.and_then(|tokio| tokio[key].as_str());
     let sources = text("manifest_path").and_then(|manifest| Path::new(manifest).parent()).filter(|folder| folder.join("src/lib.rs").exists());
     match (text("version"), sources) {
-        (Some(version), Some(folder)) => Ok(Sources { version: version.to_owned(), folder: folder.to_owned() }),
+        (Some(version), Some(folder)) => {
+            Ok(Sources { version: version.to_owned(), folder: folder.to_owned(), kit: kit.cloned().unwrap_or_default() })
+        }
         _ => Err(Failure::System(format!("{purpose}: expected a folder with its src/lib.rs"))),
     }
 }

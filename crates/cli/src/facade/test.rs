@@ -30,7 +30,7 @@ pub(super) fn run(arguments: &[OsString]) -> Result<ExitCode, Failure> {
     // The tests are those of this workspace, also if there is another one for tests.
     let workspace = Workspace::here(Some(Path::new(".")))?;
     let folder = workspace.folder();
-    super::package::make_folder(&folder)?;
+    super::files::make_folder(&folder)?;
     let saved = Saved::new(&workspace.lock_file(), folder.join("Cargo.lock.saved"))?;
     let (_, package) = super::generate(&workspace)?;
     // From here on the program ends by itself after a signal, when cargo has ended and the file is put back.

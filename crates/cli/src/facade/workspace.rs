@@ -24,7 +24,9 @@ pub(super) struct Workspace {
     pub(super) root: PathBuf,
     /// Folder of the workspace with the tests, which may be the same.
     sim: PathBuf,
-    /// Dependency on `cohaptic-sockets` as a value of TOML, from the same source as the test kit.
+    /// Source of the test kit, as keys of an inline table of TOML.
+    pub(super) kit: String,
+    /// Source of `cohaptic-sockets`, which is that of the test kit, as keys of an inline table of TOML.
     pub(super) sockets: String,
 }
 
@@ -54,8 +56,8 @@ impl Workspace {
                 sim.display()
             )));
         }
-        let sockets = sockets(kit)?;
-        Ok(Self { root, sim, sockets })
+        let (kit, sockets) = (source(kit, ".")?, source(kit, "../sockets")?);
+        Ok(Self { root, sim, kit, sockets })
     }
 
     /// Returns the folder below which everything is written.
@@ -114,23 +116,24 @@ fn dependency<'a>(workspace: &'a Value, name: &str) -> Option<&'a Value> {
     packages.iter().filter_map(|package| package["dependencies"].as_array()).flatten().find(|dependency| dependency["name"] == name)
 }
 
-/// Returns the dependency on `cohaptic-sockets` that comes from the same source as the test kit. Two copies of that package would not know of each other.
-fn sockets(kit: &Value) -> Result<String, Failure> {
+/// Returns the source of a package that comes from where the test kit comes from, as keys of an inline table of TOML. `folder` is the folder of the package as
+/// the folder of the test kit must name it. Two copies of `cohaptic-sockets` would not know of each other.
+fn source(kit: &Value, folder: &str) -> Result<String, Failure> {
     let quoted = |text: &str| toml::Value::String(text.to_owned()).to_string();
     if let Some(path) = kit["path"].as_str() {
-        let sockets = Path::new(path).join("../sockets");
-        let sockets = sockets
+        let package = Path::new(path).join(folder);
+        let package = package
             .canonicalize()
-            .map_err(|error| Failure::Input(format!("cohaptic-testkit lies in {path}, but {} cannot be found: {error}", sockets.display())))?;
-        return Ok(format!("{{ path = {} }}", quoted(&sockets.display().to_string())));
+            .map_err(|error| Failure::Input(format!("cohaptic-testkit lies in {path}, but {} cannot be found: {error}", package.display())))?;
+        return Ok(format!("path = {}", quoted(&package.display().to_string())));
     }
     match kit["source"].as_str().and_then(|source| source.strip_prefix("git+")) {
         Some(git) => {
             let (url, which) = git.split_once('?').unwrap_or((git, ""));
             let which = which.split_once('=').map_or_else(String::new, |(key, value)| format!(", {key} = {}", quoted(value)));
-            Ok(format!("{{ git = {}{which} }}", quoted(url)))
+            Ok(format!("git = {}{which}", quoted(url)))
         }
-        None => Ok(quoted(kit["req"].as_str().unwrap_or("*"))),
+        None => Ok(format!("version = {}", quoted(kit["req"].as_str().unwrap_or("*")))),
     }
 }
 
@@ -142,17 +145,22 @@ mod tests {
 
     #[test]
     fn sockets_come_from_where_the_test_kit_comes_from() {
-        assert_eq!(sockets(&json!({ "source": "git+https://example.org/c?rev=abc" })).unwrap(), r#"{ git = "https://example.org/c", rev = "abc" }"#);
-        assert_eq!(sockets(&json!({ "source": "git+https://example.org/c" })).unwrap(), r#"{ git = "https://example.org/c" }"#);
-        assert_eq!(sockets(&json!({ "source": "registry+https://github.com/rust-lang/crates.io-index", "req": "^0.1" })).unwrap(), r#""^0.1""#);
+        let sockets = |kit: Value| source(&kit, "../sockets");
+        assert_eq!(sockets(json!({ "source": "git+https://example.org/c?rev=abc" })).unwrap(), r#"git = "https://example.org/c", rev = "abc""#);
+        assert_eq!(sockets(json!({ "source": "git+https://example.org/c" })).unwrap(), r#"git = "https://example.org/c""#);
+        assert_eq!(
+            sockets(json!({ "source": "registry+https://github.com/rust-lang/crates.io-index", "req": "^0.1" })).unwrap(),
+            r#"version = "^0.1""#
+        );
         let kit = Path::new(env!("CARGO_MANIFEST_DIR")).join("../testkit");
-        assert!(sockets(&json!({ "path": kit })).unwrap().ends_with("sockets\" }"));
-        assert!(sockets(&json!({ "path": "/nowhere/testkit" })).is_err());
+        assert!(sockets(json!({ "path": kit })).unwrap().ends_with("sockets\""));
+        assert!(source(&json!({ "path": kit }), ".").unwrap().ends_with("testkit\""));
+        assert!(sockets(json!({ "path": "/nowhere/testkit" })).is_err());
     }
 
     #[test]
     fn the_path_of_the_patch_begins_in_the_workspace_with_the_tests() {
-        let workspace = |sim: &str| Workspace { root: "/code".into(), sim: sim.into(), sockets: String::new() };
+        let workspace = |sim: &str| Workspace { root: "/code".into(), sim: sim.into(), kit: String::new(), sockets: String::new() };
         let package = Path::new("/code/target/cohaptic/tokio");
         assert_eq!(workspace("/code/sim").patch(package), "../target/cohaptic/tokio");
         assert_eq!(workspace("/code").patch(package), "target/cohaptic/tokio");

@@ -36,13 +36,13 @@ fn program(features: &str) -> Desk {
     desk
 }
 
-/// Puts a cargo in the place of the real one, which passes questions on, and for tests changes `Cargo.lock` and then does `then`.
+/// Puts a cargo in the place of the real one, which notes and passes on questions, and for tests changes `Cargo.lock` and then does `then`.
 fn stand_in(desk: &Desk, then: &str) {
     let real = env!("CARGO");
     desk.write(
         "cargo",
         format!(
-            "#!/bin/sh\n[ \"$1\" = metadata ] && exec '{real}' \"$@\"\nprintf '%s\\n' \"$CARGO_TARGET_DIR\" \"$@\" >said\n\
+            "#!/bin/sh\necho \"$@\" >>asked\n[ \"$1\" = metadata ] && exec '{real}' \"$@\"\nprintf '%s\\n' \"$CARGO_TARGET_DIR\" \"$@\" >said\n\
              echo $$ >number\necho 'name = \"cohaptic-real-tokio\"' >>Cargo.lock\n{then}\n"
         ),
     );
@@ -76,6 +76,17 @@ fn the_package_has_the_version_and_the_features_of_tokio() {
             assert!(own.contains(part), "{feature} lacks {part}");
         }
     }
+    // The copy of the real tokio names nothing that is not copied: tests, what tests need, and the page about the package.
+    let text = real.to_string();
+    for part in ["dev-dependencies", "[[test]]", "readme"] {
+        assert!(!text.contains(part), "{part}");
+    }
+    // The package builds runtimes by a copy of the test kit that stands on the real tokio, and shares the sockets.
+    let loopback = manifest("loopback");
+    assert_eq!(loopback["dependencies"]["tokio"]["package"].as_str(), Some("cohaptic-real-tokio"));
+    assert_eq!(loopback["dependencies"]["cohaptic-sockets"]["path"], own["dependencies"]["cohaptic-sockets"]["path"]);
+    assert!(Path::new(loopback["lib"]["path"].as_str().unwrap()).ends_with("crates/testkit/src/lib.rs"));
+    assert!(own["features"]["rt"].as_array().unwrap().contains(&"dep:loopback".into()));
     // Optional dependencies are features as well, as those of the real tokio are.
     assert!(own["features"].get("parking_lot").is_some() && own["features"].get("slab").is_none());
     assert!(own["dependencies"]["cohaptic-sockets"]["path"].as_str().unwrap().ends_with("crates/sockets"));
@@ -85,9 +96,12 @@ fn the_package_has_the_version_and_the_features_of_tokio() {
     let first = written();
     // A file of another version goes.
     desk.write("target/cohaptic/tokio/src/old.rs", "");
+    // A file of somebody who builds the package by itself stays.
+    desk.write("target/cohaptic/tokio/Cargo.lock", "");
     desk.text("tokio");
     assert_eq!(written(), first);
     assert!(!desk.path("target/cohaptic/tokio/src/old.rs").exists());
+    assert!(desk.path("target/cohaptic/tokio/Cargo.lock").exists());
 }
 
 #[test]
@@ -107,6 +121,20 @@ fn tests_in_a_workspace_of_their_own_name_the_test_kit() {
     assert!(said.contains("\ntokio = { path = \"../target/cohaptic/tokio\" }\n"), "{said}");
     assert!(desk.path("target/cohaptic/tokio/src/net/stream.rs").exists());
     assert_eq!(desk.text("tokio --sim sim"), said);
+}
+
+/// Cargo is asked without a network for a version that it has, and the version is that of tokio 1, wherever the registry is.
+#[test]
+fn the_version_is_that_of_cargo_lock() {
+    let desk = program("\"facade\"");
+    stand_in(&desk, "");
+    let old = "[[package]]\nname = \"tokio\"\nversion = \"0.2.25\"\nsource = \"registry+https://github.com/rust-lang/crates.io-index\"\n\n";
+    desk.write("Cargo.lock", lock().replace("registry+", "sparse+").replace("[[package]]", &format!("{old}[[package]]")));
+    let outcome = run(&desk, "tokio");
+    assert!(outcome.stdout.starts_with(&format!("tokio {} for tests: ", version())), "{outcome:?}");
+    let asked = desk.read("asked");
+    let asked: Vec<&str> = asked.lines().filter(|line| line.contains("cohaptic/sources")).collect();
+    assert!(asked.len() == 1 && asked[0].contains("--offline"), "{asked:?}");
 }
 
 #[test]
@@ -145,7 +173,25 @@ fn cargo_gets_the_arguments_and_cargo_lock_is_put_back() {
     assert_eq!(said[3..], ["test", "-p", "program", "--test", "network", "--", "--nocapture", "--locked"]);
     assert!(!desk.path("target/cohaptic/Cargo.lock.saved").exists());
 
-    run(&desk, "test --locked").assert_refused(2, &["--locked cannot be"]);
+    for option in ["--locked", "--frozen"] {
+        run(&desk, &format!("test {option}")).assert_refused(2, &[&format!("{option} cannot be")]);
+    }
+
+    // The tests are those of the folder, also if another workspace has tests of its own.
+    desk.write("sim/Cargo.toml", "[package]\nname = \"without\"\n");
+    desk.write("sim/src/lib.rs", "");
+    desk.write("Cargo.toml", desk.read("Cargo.toml").replace("[workspace]", "[workspace]\nexclude = [\"sim\"]"));
+    assert_eq!(run(&desk, "test").status, Some(7));
+}
+
+#[test]
+fn a_cargo_lock_that_was_not_there_is_removed() {
+    let desk = program("\"facade\"");
+    fs::remove_file(desk.path("Cargo.lock")).unwrap();
+    stand_in(&desk, "");
+    let outcome = Outcome::of(command(&desk, "test").env("CARGO_NET_OFFLINE", "true").output().unwrap());
+    assert_eq!(outcome.status, Some(0), "{outcome:?}");
+    assert!(desk.path("said").exists() && !desk.path("Cargo.lock").exists());
 }
 
 /// Waits until cargo has changed the file.
@@ -168,7 +214,24 @@ fn after_ctrl_c_cargo_lock_is_put_back() {
         assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
         assert_eq!(child.wait().unwrap().code(), Some(130));
         assert_eq!(desk.read("Cargo.lock"), lock());
+        // Cargo has ended as well.
+        assert!(!kill(&desk, "-0"));
     }
+    // A second signal ends the program at once.
+    let begin = Instant::now();
+    let mut child = command(&desk, "test").stderr(Stdio::null()).spawn().unwrap();
+    wait_for_change(&desk, &mut child);
+    for signal in ["-INT", "-TERM"] {
+        assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+    }
+    assert!(!child.wait().unwrap().success() && begin.elapsed() < PATIENCE);
+    assert_eq!(desk.read("Cargo.lock"), lock());
+    kill(&desk, "-KILL");
+}
+
+/// Sends a signal to the stand-in for cargo. Returns whether there is such a process.
+fn kill(desk: &Desk, signal: &str) -> bool {
+    Command::new("kill").args([signal, desk.read("number").trim()]).stderr(Stdio::null()).status().unwrap().success()
 }
 
 #[test]

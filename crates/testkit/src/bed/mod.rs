@@ -3,6 +3,8 @@
 mod addresses;
 mod again;
 mod hitting;
+#[cfg(feature = "loopback")]
+mod loopback;
 #[cfg(feature = "strategies")]
 mod network;
 mod running;
@@ -288,12 +290,34 @@ impl Testbed {
         F: Future<Output = T> + 'static,
         T: 'static,
     {
+        #[cfg(feature = "tokio")]
+        if self.is_tokio {
+            return self.run_with(seed, origin, |core, hosts, watched, recorded| {
+                #[cfg(feature = "facade")]
+                cohaptic_sockets::seed_next_runtime(seed.value);
+                crate::runtime::on_tokio::run(core, hosts, |shared| program(Bed::new(shared)), origin, watched, recorded)
+            });
+        }
+        self.run_with(seed, origin, |core, hosts, watched, recorded| {
+            crate::runtime::own::run(core, hosts, |shared| program(Bed::new(shared)), origin, watched, recorded)
+        })
+    }
+
+    /// Makes the state of a run, calls `execute` with the state and the number of hosts, and reports a failure.
+    fn run_with<T>(
+        self,
+        seed: &Seed,
+        origin: &'static Location<'static>,
+        execute: impl FnOnce(Core, usize, &Watched, &mut Option<Recorded>) -> T,
+    ) -> (T, Record) {
         let again = self.again(seed, origin);
         let mut setup = self.setup;
         let artefacts = Artefacts::new(setup.artefacts.take(), seed);
         if artefacts.is_wanted() {
             setup.record();
         }
+        // The program of a run on a loopback is a runtime of a program that knows no test bed, which no printed test could repeat.
+        let has_test = setup.settings.loopback.is_none();
         let (link, names) = (setup.links(), setup.names);
         #[cfg_attr(not(feature = "tcp"), expect(unused_mut, reason = "only TCP has constants"))]
         let mut core = Core::new(&names, seed.value, setup.settings, setup.changes, link);
@@ -305,15 +329,7 @@ impl Testbed {
         #[cfg(not(feature = "tokio"))]
         let kind = Kind::Own;
         let watched = Watched::begin(kind, &names, setup.stall_limit, seed, &artefacts);
-        let run = || {
-            #[cfg(feature = "tokio")]
-            if self.is_tokio {
-                #[cfg(feature = "facade")]
-                cohaptic_sockets::seed_next_runtime(seed.value);
-                return crate::runtime::on_tokio::run(core, names.len(), |shared| program(Bed::new(shared)), origin, &watched, &mut recorded);
-            }
-            crate::runtime::own::run(core, names.len(), |shared| program(Bed::new(shared)), origin, &watched, &mut recorded)
-        };
+        let run = || execute(core, names.len(), &watched, &mut recorded);
         let outcome = catch_unwind(AssertUnwindSafe(|| failure::__rust_begin_short_backtrace(run)));
         // The watchdog ends here: the report of a panic may take long.
         let panicked = watched.pulse.running().map(|runner| runner.words(&names));
@@ -332,7 +348,7 @@ impl Testbed {
             Err(panic) => {
                 // A test with its own links fails again as it stands if its seed is that of its place, or if it has no chance. Otherwise, or if a strategy drew
                 // the links, the report prints a test.
-                let differs = failure::is_searching() || !seed.is_of_place && again.has_chance();
+                let differs = has_test && (failure::is_searching() || !seed.is_of_place && again.has_chance());
                 failure::report(Box::new(move || {
                     let test = if differs { again.test(&drawn, true) } else { String::new() };
                     artefacts.report(panicked, test, record)

@@ -183,9 +183,9 @@ impl Core {
             while let Some(parcel) = self.wire.poll() {
                 // The parts are copied one by one. A processor that loads a value whole shortly after the value was stored in parts has to wait for the stores.
                 let Arrival { packet: PacketName { path: Path { from, to }, sequence, copy }, at, is_cut, .. } = parcel.arrival;
-                let path = Path { from, to };
+                let path = Path { from, to: self.receiver(Path { from, to }) };
                 let end = if is_cut { Err(Lost::Cut) } else { self.arrive(path, parcel) };
-                self.wire.ends(PacketName { path, sequence, copy }, at, end);
+                self.wire.ends(PacketName { path: Path { from, to }, sequence, copy }, at, end);
             }
             #[cfg(feature = "tcp")]
             if self.take_from_loopback() {
@@ -195,8 +195,22 @@ impl Core {
         }
     }
 
-    /// Delivers a packet that does not leave its host, at the present instant.
+    /// Returns the host at which the packets of a link arrive.
+    #[inline]
+    pub(super) fn receiver(&self, path: Path) -> NodeId {
+        if self.settings.loopback == Some(path) { path.from } else { path.to }
+    }
+
+    /// Returns the link that packets of `host` to itself take, or `None` if such packets arrive at once.
+    pub(super) fn loopback_of(&self, host: NodeId) -> Option<Path> {
+        self.settings.loopback.filter(|path| path.from == host)
+    }
+
+    /// Delivers a packet that does not leave its host: at the present instant, unless the loopback of the host is a link.
     pub(super) fn hand_over(&mut self, host: NodeId, mut parcel: Box<Parcel>) {
+        if let Some(path) = self.loopback_of(host) {
+            return self.offer(path, parcel);
+        }
         (parcel.arrival.at, parcel.arrival.marked) = (self.now(), false);
         // Fates of packets are recorded for links only. Loopback is not part of the network.
         let _ = self.arrive(Path { from: host, to: host }, parcel);

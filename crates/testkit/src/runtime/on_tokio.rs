@@ -20,22 +20,25 @@ use std::future::{Future, poll_fn};
 use std::panic::Location;
 use std::pin::{Pin, pin};
 use std::rc::Rc;
+#[cfg(feature = "loopback")]
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::task::{Context, Poll, Wake, Waker};
 use std::time::Duration;
 
 use cohaptic_units::Instant;
+use tokio::runtime::Builder;
 use tokio::task::LocalSet;
 
-use super::entered::enter;
+use super::entered::{Entered, enter};
 use super::limits::{goes_on, nothing_will_happen};
 use super::own::{Executor, is_any_ready, time_stands_still};
 use super::recorder::Recorder;
 use crate::core::{Clock, Core, Shared};
 use crate::failure::__rust_begin_short_backtrace;
 use crate::task::{JoinHandle, Tasks};
-use crate::watch::Watched;
+use crate::watch::{Pulse, Watched};
 use crate::wire::Recorded;
 
 /// Unit of tokio's timers: a millisecond \[ns\].
@@ -177,6 +180,67 @@ fn step(now: Instant, next: Option<Instant>) -> Option<Instant> {
     }
 }
 
+/// What tokio calls before it parks its thread. Does something while a run goes on.
+#[derive(Default)]
+pub(crate) struct Hook(Mutex<Option<Arc<Parking>>>);
+
+/// What a run does before tokio parks its thread.
+struct Parking {
+    idle: Arc<Idle>,
+    shared: Arc<Shared>,
+    pulse: Arc<Pulse>,
+}
+
+impl Hook {
+    fn set(&self, parking: Option<Parking>) {
+        let before = std::mem::replace(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner), parking.map(Arc::new));
+        // Dropped after the lock has ended: the state of the run has destructors of programs.
+        drop(before);
+    }
+
+    fn park(&self) {
+        let parking = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        if let Some(Parking { idle, shared, pulse }) = parking.as_deref() {
+            pulse.turns();
+            idle.notice(shared);
+        }
+    }
+}
+
+/// Prepares a builder of runtimes with one thread for runs that begin with `hook`.
+pub(crate) fn prepare<'a>(builder: &'a mut Builder, hook: &Arc<Hook>) -> &'a mut Builder {
+    let hook = Arc::clone(hook);
+    builder.enable_time().start_paused(true).on_thread_park(move || hook.park())
+}
+
+/// Run that has begun. Its parts are dropped in this order.
+struct Begun<'a> {
+    _recorder: Recorder<'a>,
+    _entered: Entered,
+    tasks: Rc<Tasks>,
+    shared: Arc<Shared>,
+    executor: Executor,
+    idle: Arc<Idle>,
+    /// Reading of tokio's clock at [`Instant::ZERO`].
+    origin: tokio::time::Instant,
+}
+
+impl<'a> Begun<'a> {
+    /// Begins a run on this thread.
+    fn new(mut core: Core, hosts: usize, origin: tokio::time::Instant, hook: &Hook, watched: &Watched, recorded: &'a mut Option<Recorded>) -> Self {
+        let idle = Arc::new(Idle::new(core.settings.limits.until()));
+        let executor = Executor::new();
+        core.woken.trust(&executor.waker());
+        let shared = Arc::new(Shared::new(core, Clock::Tokio { origin }));
+        watched.is_of(&shared);
+        let tasks = Rc::new(Tasks::new(Box::new(executor.clone()), hosts, Arc::clone(&watched.pulse)));
+        let entered = enter(&shared, &tasks);
+        let recorder = Recorder { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks), recorded };
+        hook.set(Some(Parking { idle: Arc::clone(&idle), shared: Arc::clone(&shared), pulse: Arc::clone(&watched.pulse) }));
+        Self { _recorder: recorder, _entered: entered, tasks, shared, executor, idle, origin }
+    }
+}
+
 /// Runs a program on tokio.
 ///
 /// # Panics
@@ -201,70 +265,78 @@ where
              outside of `block_on`"
         );
     }
-    let idle = Arc::new(Idle::new(core.settings.limits.until()));
-    let known: Arc<OnceLock<Arc<Shared>>> = Arc::default();
-    let (hook_idle, hook_known, pulse) = (Arc::clone(&idle), Arc::clone(&known), Arc::clone(&watched.pulse));
-    let runtime = tokio::runtime::Builder::new_current_thread()
-        .enable_time()
-        .start_paused(true)
-        .on_thread_park(move || {
-            pulse.turns();
-            if let Some(shared) = hook_known.get() {
-                hook_idle.notice(shared);
-            }
-        })
-        .build()
-        .unwrap_or_else(|error| panic!("tokio cannot be started: {error}"));
+    let hook = Arc::default();
+    let runtime = prepare(&mut Builder::new_current_thread(), &hook).build().unwrap_or_else(|error| panic!("tokio cannot be started: {error}"));
     let guard = runtime.enter();
     // The clock stands still, so this is the instant from which tokio counts its milliseconds.
-    let origin_of_time = tokio::time::Instant::now();
-    let executor = Executor::new();
-    let mut core = core;
-    core.woken.trust(&executor.waker());
-    let shared = Arc::new(Shared::new(core, Clock::Tokio { origin: origin_of_time }));
+    let begun = Begun::new(core, hosts, tokio::time::Instant::now(), &hook, watched, recorded);
     drop(guard);
-    watched.is_of(&shared);
-    let tasks = Rc::new(Tasks::new(Box::new(executor.clone()), hosts, Arc::clone(&watched.pulse)));
-    let _entered = enter(&shared, &tasks);
-    let _recorder = Recorder { shared: Arc::clone(&shared), tasks: Rc::clone(&tasks), recorded };
-    let _ = known.set(Arc::clone(&shared));
     runtime.block_on(async {
-        // Tasks that the program starts with tokio's `spawn_local` live in this set. `drive` polls the set whenever the set was woken, as `LocalSet::run_until`
-        // does.
+        // Tasks that the program starts with tokio's `spawn_local` live in this set. The set is polled whenever it was woken, as `LocalSet::run_until` does.
         let mut set = LocalSet::new();
         let _local = set.enter();
-        let _here = shared.stay();
+        let _here = begun.shared.stay();
         let outcome = Rc::new(RefCell::new(None));
-        let (future, slot) = (Box::pin(program(Arc::clone(&shared))), Rc::clone(&outcome));
-        let main = tasks.spawn(None, origin, async move {
+        let (future, slot) = (Box::pin(program(Arc::clone(&begun.shared))), Rc::clone(&outcome));
+        let main = begun.tasks.spawn(None, origin, async move {
             let came_out = future.await;
             *slot.borrow_mut() = Some(came_out);
         });
-        drive(&executor, &shared, &tasks, &idle, origin_of_time, main, &mut set).await;
+        let mut beside = pin!(poll_fn(|cx| {
+            // A set without tasks is ready; it is polled again once it has a task.
+            let _: Poll<()> = Pin::new(&mut set).poll(cx);
+            Poll::Pending
+        }));
+        drive(&begun, Some(main), beside.as_mut()).await;
         outcome.take().unwrap_or_else(|| panic!("the program was stopped before it was over: do not abort it, or the runtime"))
     })
 }
 
-/// Polls tasks until the program is over. Unlike [`run`], this function is not generic, so that it is compiled only once, with the test kit.
-async fn drive(
-    executor: &Executor,
-    shared: &Shared,
-    tasks: &Tasks,
-    idle: &Idle,
-    origin: tokio::time::Instant,
-    main: JoinHandle<()>,
-    set: &mut LocalSet,
-) {
+/// Runs a future of another program as a task of `host` until the future is over. `block_on` runs the future that is given to it on a runtime from a builder
+/// that [`prepare`] has prepared with `hook`. `origin` is the reading of the clock when that runtime was built, which the first run finds out.
+///
+/// # Panics
+///
+/// As [`Testbed::run`](crate::Testbed::run); and if `block_on` returns before its future is over.
+#[cfg(feature = "loopback")]
+#[expect(clippy::panic, reason = "a misuse, and the way out")]
+pub(crate) fn run_beside<F: Future>(
+    (core, hosts, host): (Core, usize, cohaptic_wan::NodeId),
+    future: F,
+    block_on: impl FnOnce(Pin<&mut dyn Future<Output = ()>>),
+    (hook, origin): (&Hook, &OnceLock<tokio::time::Instant>),
+    watched: &Watched,
+    recorded: &mut Option<Recorded>,
+) -> F::Output {
+    let mut outcome = None;
+    let run = async {
+        // The clock stands still until something runs on the runtime.
+        let origin = *origin.get_or_init(tokio::time::Instant::now);
+        let begun = Begun::new(core, hosts, origin, hook, watched, recorded);
+        let _here = begun.shared.stay();
+        let mut beside = pin!(async { outcome = Some(future.await) });
+        drive(&begun, None, beside.as_mut()).await;
+    };
+    // Whatever the runtime polls lives on the host, wherever it was started.
+    crate::current::on_host(Some(host), || block_on(pin!(run)));
+    hook.set(None);
+    outcome.unwrap_or_else(|| panic!("the runtime was stopped before the program was over"))
+}
+
+/// Polls tasks until `main` or `beside` is over. `beside` is polled whenever it was woken. Unlike [`run`], this function is not generic, so that it is compiled
+/// only once, with the test kit.
+async fn drive(begun: &Begun<'_>, main: Option<JoinHandle<()>>, mut beside: Pin<&mut dyn Future<Output = ()>>) {
+    let Begun { executor, shared, tasks, idle, origin, .. } = begun;
     let mut main = pin!(main);
-    let mut pump = pin!(pump(shared, tasks, idle, origin));
-    let mut woken: Option<Arc<SetWaker>> = None;
+    let mut pump = pin!(pump(shared, tasks, idle, *origin));
+    let mut woken: Option<Arc<BesideWaker>> = None;
     let limits = shared.with(|core| core.settings.limits);
     let mut steps = 0;
     let mut turn = |cx: &mut Context<'_>| {
         let woken = woken.get_or_insert_with(|| {
             executor.begin(Some(cx.waker()));
             *idle.main.lock().unwrap_or_else(PoisonError::into_inner) = Some(cx.waker().clone());
-            Arc::new(SetWaker { is_woken: AtomicBool::new(true), main: cx.waker().clone() })
+            Arc::new(BesideWaker { is_woken: AtomicBool::new(true), main: cx.waker().clone() })
         });
         let moved = idle.moved.swap(NO_INSTANT, Ordering::Relaxed);
         idle.is_idle.store(false, Ordering::Relaxed);
@@ -281,7 +353,10 @@ async fn drive(
             steps += 1;
             left > 0 && tokio::task::coop::has_budget_remaining()
         });
-        if main.is_finished() && main.as_mut().poll(cx).is_ready() {
+        if let Some(main) = main.as_mut().as_pin_mut()
+            && main.is_finished()
+            && main.poll(cx).is_ready()
+        {
             return Poll::Ready(());
         }
         if all_wait {
@@ -299,21 +374,20 @@ async fn drive(
         }
         drop(synced);
         if woken.is_woken.swap(false, Ordering::Relaxed) {
-            // A set without tasks is ready; it is polled again once it has a task.
-            let _: Poll<()> = Pin::new(&mut *set).poll(&mut Context::from_waker(&Arc::clone(woken).into()));
+            return beside.as_mut().poll(&mut Context::from_waker(&Arc::clone(woken).into()));
         }
         Poll::Pending
     };
     poll_fn(|cx| __rust_begin_short_backtrace(|| turn(cx))).await;
 }
 
-/// Waker of the set of local tasks: marks the set and wakes the executor, which then polls the set.
-struct SetWaker {
+/// Waker of the future beside the tasks: marks the future and wakes the executor, which then polls the future.
+struct BesideWaker {
     is_woken: AtomicBool,
     main: Waker,
 }
 
-impl Wake for SetWaker {
+impl Wake for BesideWaker {
     fn wake(self: Arc<Self>) {
         Self::wake_by_ref(&self);
     }

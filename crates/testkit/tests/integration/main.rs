@@ -19,6 +19,7 @@ mod like_tokio;
 #[cfg(feature = "strategies")]
 mod limits;
 mod link_files;
+mod loopback;
 mod many_hosts;
 mod misuse;
 mod nodes;

@@ -53,13 +53,17 @@ impl Core {
     /// way takes no time.
     fn emit(&mut self, host: NodeId, connection: Option<ConnId>, segment: &Segment<'_>) {
         let (from, to) = (segment.source.ip(), segment.destination.ip());
-        if self.is_own(host, to) {
-            self.tcp.loopback.push_back((host, segment.to_packet().into()));
-            return;
-        }
-        // The segment is lost if its source is an address that the host has given up, or if no host has its destination any more.
-        let Some(receiver) = self.plan.owner_node(to).filter(|_| self.plan.of(host).has(from)) else { return };
-        let path = Path { from: host, to: receiver };
+        let path = if self.is_own(host, to) {
+            let Some(path) = self.loopback_of(host) else {
+                self.tcp.loopback.push_back((host, segment.to_packet().into()));
+                return;
+            };
+            path
+        } else {
+            // The segment is lost if its source is an address that the host has given up, or if no host has its destination any more.
+            let Some(receiver) = self.plan.owner_node(to).filter(|_| self.plan.of(host).has(from)) else { return };
+            Path { from: host, to: receiver }
+        };
         let packet = self.wire.next_packet(path);
         let addresses = Ends::new(segment.source, segment.destination, Kind::Segment);
         let parcel = self.spare.wrapped(addresses, segment.to_packet().into(), segment.ecn != Ecn::NotCapable);
@@ -78,7 +82,7 @@ impl Core {
             let (own, peers) = machine.initial_sequences();
             (own, peers.unwrap_or(0), machine.window_shift())
         } else {
-            let peer = self.tcp.routes.get(&super::route(packet.path.to, segment.destination, segment.source));
+            let peer = self.tcp.routes.get(&super::route(self.receiver(packet.path), segment.destination, segment.source));
             let (peers, own) = peer.map_or((0, None), |id| self.tcp.end(*id).machine.initial_sequences());
             (own.unwrap_or(0), peers, 0)
         };

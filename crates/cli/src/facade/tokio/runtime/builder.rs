@@ -5,6 +5,8 @@ use std::io;
 use std::ops::{Deref, DerefMut};
 use std::time::Duration;
 
+use loopback::loopback::Loopback;
+
 use super::Runtime;
 
 /// See `tokio::runtime::Builder`.
@@ -81,25 +83,36 @@ impl Builder {
     /// See `tokio::runtime::Builder::build`.
     #[track_caller]
     pub fn build(&mut self) -> io::Result<Runtime> {
-        self.prepare();
-        self.0.build().map(Runtime::of)
+        match self.prepare() {
+            None => self.0.build().map(|real| Runtime::of(real, None)),
+            Some((mut builder, loopback)) => builder.build().map(|real| Runtime::of(real, Some(loopback))),
+        }
     }
 
     /// See `tokio::runtime::Builder::build_local`.
     //@ has runtime/builder.rs|build_local(&mut self, _options: LocalOptions)
     #[track_caller]
     pub fn build_local(&mut self, options: real::runtime::LocalOptions) -> io::Result<super::LocalRuntime> {
-        self.prepare();
-        self.0.build_local(options).map(super::LocalRuntime::of)
+        match self.prepare() {
+            None => self.0.build_local(options).map(|real| super::LocalRuntime::of(real, None)),
+            Some((mut builder, loopback)) => builder.build_local(options).map(|real| super::LocalRuntime::of(real, Some(loopback))),
+        }
     }
 
-    /// Refuses a runtime inside a test bed, and gives the runtime that is built for a test bed the seed of the test bed, which decides where `select!` begins.
+    /// Refuses a runtime inside a test bed, and gives the runtime that is built for a test bed the seed of the test bed, which decides where `select!` begins. If
+    /// the environment asks for a loopback, returns the loopback, and the builder of a runtime for it: with one thread, and virtual time.
     #[track_caller]
-    fn prepare(&mut self) {
+    fn prepare(&mut self) -> Option<(real::runtime::Builder, Loopback)> {
         super::refuse_in_bed();
         if let Some(seed) = cohaptic_sockets::take_runtime_seed() {
             self.0.cohaptic_seed(seed);
+            return None;
         }
+        let loopback = Loopback::of_environment()?;
+        let mut builder = real::runtime::Builder::new_current_thread();
+        loopback.prepare(&mut builder);
+        builder.cohaptic_seed(loopback.seed());
+        Some((builder, loopback))
     }
 }
 

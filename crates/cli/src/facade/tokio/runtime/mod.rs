@@ -10,12 +10,14 @@ macro_rules! runtime {
         pub struct $name {
             real: real::runtime::$name,
             handle: $crate::runtime::Handle,
+            /// Loopback of the programs that the runtime runs; `None` if their sockets are real.
+            loopback: Option<loopback::loopback::Loopback>,
         }
 
         impl $name {
-            pub(super) fn of(real: real::runtime::$name) -> Self {
+            pub(super) fn of(real: real::runtime::$name, loopback: Option<loopback::loopback::Loopback>) -> Self {
                 let handle = $crate::runtime::Handle::new(real.handle());
-                Self { real, handle }
+                Self { real, handle, loopback }
             }
 
             #[doc = concat!("See `tokio::runtime::", stringify!($name), "::handle`.")]
@@ -36,7 +38,10 @@ macro_rules! runtime {
             #[doc = concat!("See `tokio::runtime::", stringify!($name), "::block_on`.")]
             #[track_caller]
             pub fn block_on<F: std::future::Future>(&self, future: F) -> F::Output {
-                self.real.block_on(future)
+                match &self.loopback {
+                    None => self.real.block_on(future),
+                    Some(loopback) => loopback.block_on(future, |run| self.real.block_on(run)),
+                }
             }
 
             #[doc = concat!("See `tokio::runtime::", stringify!($name), "::enter`.")]

@@ -49,7 +49,7 @@ impl LocalSet {
     /// See `tokio::task::LocalSet::block_on`.
     #[track_caller]
     pub fn block_on<F: Future>(&self, runtime: &Runtime, future: F) -> F::Output {
-        self.0.block_on(runtime, future)
+        runtime.block_on(self.0.run_until(future))
     }
 
     /// See `tokio::task::LocalSet::run_until`.

@@ -1,0 +1,97 @@
+//! Runtimes of tokio whose loopback is a link, for test suites that nobody changes.
+//!
+//! The package `tokio` that `cohaptic tokio` generates depends on a copy of this crate that is compiled against the real tokio, and builds its runtimes with a
+//! [`Loopback`] if the environment asks for one.
+
+use std::env::VarError;
+use std::fmt;
+use std::future::Future;
+use std::panic::Location;
+use std::pin::Pin;
+use std::sync::{Arc, OnceLock};
+
+use crate::bed::Testbed;
+use crate::link;
+use crate::runtime::on_tokio::{self, Hook};
+use crate::seed::{Place, Seed};
+
+/// Name of the environment variable with the words of the loopback. A runtime of tokio that is built outside of a test bed then runs its programs on a test bed
+/// of one host, and packets of the host to itself take a link of these words.
+pub const LOOPBACK_VARIABLE: &str = "COHAPTIC_TEST_LOOPBACK";
+
+/// Link of the loopback of a runtime, and what the runtime has in common with the test beds that run its programs.
+pub struct Loopback {
+    words: String,
+    seed: u64,
+    hook: Arc<Hook>,
+    origin: OnceLock<tokio::time::Instant>,
+}
+
+impl Loopback {
+    /// Returns the loopback that the environment asks for, or `None` if [`LOOPBACK_VARIABLE`] is not set or empty.
+    ///
+    /// # Panics
+    ///
+    /// If the value of the variable describes no link. The message names the variable and the place of the fault.
+    #[must_use]
+    #[track_caller]
+    pub fn of_environment() -> Option<Self> {
+        let value = match std::env::var(LOOPBACK_VARIABLE) {
+            Ok(value) => value,
+            Err(VarError::NotPresent) => return None,
+            Err(VarError::NotUnicode(value)) => value.to_string_lossy().into_owned(),
+        };
+        // No closure: the place of the caller would be lost in it.
+        if value.is_empty() { None } else { Some(Self::new(&value)) }
+    }
+
+    /// Returns a loopback of these words.
+    ///
+    /// # Panics
+    ///
+    /// As [`Loopback::of_environment`].
+    #[must_use]
+    #[track_caller]
+    #[expect(clippy::panic, reason = "tests on another network than the one that was asked for are worse than none")]
+    pub fn new(words: &str) -> Self {
+        if let Err(fault) = link::parse(words) {
+            panic!(
+                "{LOOPBACK_VARIABLE} cannot be the loopback of the runtime of tokio at {}: {fault}\nexpected words of tc-netem such as `delay 20ms loss 1%`, or no \
+                 variable for real sockets",
+                Location::caller()
+            );
+        }
+        // The seed of `select!` is needed before the program is known.
+        let seed = Seed::choose(None, &Place::here()).value;
+        Self { words: words.to_owned(), seed, hook: Arc::default(), origin: OnceLock::new() }
+    }
+
+    /// Returns the seed with which the runtime must be built, from which `tokio::select!` chooses where it begins.
+    #[must_use]
+    pub const fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// Prepares the builder of the runtime, which must be one of a runtime with one thread.
+    pub fn prepare(&self, builder: &mut tokio::runtime::Builder) {
+        on_tokio::prepare(builder, &self.hook);
+    }
+
+    /// Runs `future` on a test bed of one host until the future is over. `block_on` must run the future that it gets on the runtime.
+    ///
+    /// # Panics
+    ///
+    /// As [`Testbed::run`](crate::Testbed::run).
+    #[track_caller]
+    pub fn block_on<F: Future>(&self, future: F, block_on: impl FnOnce(Pin<&mut dyn Future<Output = ()>>)) -> F::Output {
+        Testbed::of_loopback(&*self.words).run_foreign(future, |core, future, watched, recorded| {
+            on_tokio::run_beside(core, future, block_on, (&self.hook, &self.origin), watched, recorded)
+        })
+    }
+}
+
+impl fmt::Debug for Loopback {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Loopback").field("words", &self.words).finish_non_exhaustive()
+    }
+}
