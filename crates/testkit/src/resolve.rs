@@ -33,7 +33,7 @@ pub trait ToSocketAddrs {
 }
 
 /// Returns the error of a description without addresses, as tokio returns it.
-fn none() -> io::Error {
+pub(crate) fn none() -> io::Error {
     io::Error::new(io::ErrorKind::InvalidInput, "could not resolve to any address")
 }
 
@@ -42,19 +42,6 @@ pub(crate) fn each<T>(addresses: impl ToSocketAddrs, mut attempt: impl FnMut(Soc
     let mut failed = none();
     for address in addresses.to_socket_addrs()? {
         match attempt(address) {
-            Ok(value) => return Ok(value),
-            Err(error) => failed = error,
-        }
-    }
-    Err(failed)
-}
-
-/// Like [`each`], but waits for each attempt.
-#[cfg(feature = "tcp")]
-pub(crate) async fn each_in_turn<T>(addresses: Vec<SocketAddr>, mut attempt: impl AsyncFnMut(SocketAddr) -> io::Result<T>) -> io::Result<T> {
-    let mut failed = none();
-    for address in addresses {
-        match attempt(address).await {
             Ok(value) => return Ok(value),
             Err(error) => failed = error,
         }

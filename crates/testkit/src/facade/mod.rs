@@ -4,7 +4,6 @@
 //! for the test bed of the thread, which `crate::runtime` registers for each run.
 
 mod settings;
-mod signals;
 
 use std::io;
 use std::net::SocketAddr;

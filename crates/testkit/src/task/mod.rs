@@ -3,6 +3,8 @@
 mod join;
 #[cfg(feature = "facade")]
 mod others;
+#[cfg(feature = "facade")]
+mod signals;
 
 use std::cell::{Cell, RefCell};
 use std::future::Future;

@@ -15,7 +15,7 @@ use super::{Info, KIND, TcpConfig};
 use crate::context::Call;
 use crate::core::{ConnId, Core, HoldId, Shared};
 use crate::errno::Errno;
-use crate::resolve::{ToSocketAddrs, each_in_turn};
+use crate::resolve::{ToSocketAddrs, none};
 
 /// TCP connection of a host of the running test bed, with the methods of tokio's `TcpStream` in the same meaning.
 ///
@@ -99,11 +99,20 @@ impl TcpStream {
 
     /// Opens a connection to the first of the addresses that answers, one after the other.
     pub(crate) async fn connect_to(shared: &Arc<Shared>, host: NodeId, addresses: Vec<SocketAddr>) -> io::Result<Self> {
-        each_in_turn(addresses, async |address| {
+        let mut failed = none();
+        // A loop and not an asynchronous closure, whose future would not be `Send` wherever this one is spawned.
+        for address in addresses {
             let config = shared.with(|core| core.tcp_config(host).clone());
-            Self::connect_on(Arc::clone(shared), host, None, address, config)?.established().await
-        })
-        .await
+            let connected = match Self::connect_on(Arc::clone(shared), host, None, address, config) {
+                Ok(begun) => begun.established().await,
+                Err(error) => Err(error),
+            };
+            match connected {
+                Ok(stream) => return Ok(stream),
+                Err(error) => failed = error,
+            }
+        }
+        Err(failed)
     }
 
     /// Sends the SYN. `bound` is the held port with the local address, or `None` for any free port.
