@@ -228,6 +228,24 @@ mod tests {
         }
     }
 
+    /// A segment of 1448 octets takes 2304 octets of memory until its last octet is read. A segment of 50 octets takes 832, which have room for 147 octets more.
+    #[test]
+    fn memory_is_free_when_the_last_octet_of_a_segment_is_read() {
+        let (mut assembler, mut next) = (Assembler::default(), 0);
+        let insert = |assembler: &mut Assembler, next: &mut u64, octets: usize| {
+            assembler.insert(next, *next, &vec![0; octets]);
+            assembler.memory()
+        };
+        assert_eq!([1448, 1448].map(|octets| insert(&mut assembler, &mut next, octets)), [2304, 4608]);
+        assert_eq!([1000, 447, 1, 1448].map(|octets| (assembler.read(&mut vec![0; octets]), assembler.memory()).1), [4608, 4608, 2304, 0]);
+        assert_eq!([50, 147, 1].map(|octets| insert(&mut assembler, &mut next, octets)), [832, 832, 1664]);
+        let gap = next + 10;
+        assembler.insert(&mut next, gap, &[0; 10]);
+        assert_eq!(assembler.memory(), 2496);
+        assembler.forget_gaps();
+        assert_eq!(assembler.memory(), 1664);
+    }
+
     #[test]
     fn the_block_that_changed_last_comes_first() {
         let (mut assembler, mut next) = (Assembler::default(), 0);

@@ -36,6 +36,8 @@ mod tests {
     fn segments_take_the_memory_of_linux() {
         let seen = [1, 197, 198, 645, 646, 1448, 1669, 1670].map(|octets| of_received(octets).0);
         assert_eq!(seen, [832, 832, 1280, 1280, 2304, 2304, 2304, 4352]);
+        // Over the loopback interface.
+        assert_eq!([5000, 20_000].map(|octets| of_received(octets).0), [5832, 20_832]);
         assert_eq!((of_sent(1448), of_sent(1428)), (2304, 2304));
     }
 }

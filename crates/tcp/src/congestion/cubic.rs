@@ -183,6 +183,23 @@ mod tests {
         assert_eq!(curve.at(curve.k), 100);
     }
 
+    /// As in `bictcp_acked`, round trips in the first second of an epoch do not count. After a timeout, the search for the end of slow start begins anew
+    /// (`bictcp_state`).
+    #[test]
+    fn slow_start_ends_once_and_not_soon_after_a_reduction() {
+        let mut cubic = Cubic::new(true);
+        cubic.step(Instant::ZERO, 16, 1);
+        // Returns whether one of ten acknowledgements of a round from the second `second` on ends slow start.
+        let ends = |cubic: &mut Cubic, second: u64, latest: u64| {
+            let sample = RoundTrip { latest: Duration::from_millis(latest), una: second * 10, next: second * 10 + 5, burst: Duration::ZERO };
+            (0..10).any(|k| cubic.ends_slow_start(Instant::ZERO + Duration::from_millis(second * 1000 + k * 3), Some(16), sample))
+        };
+        assert!(!ends(&mut cubic, 0, 50) && cubic.least_rtt.is_zero());
+        assert_eq!([(1, 100), (2, 200), (3, 200)].map(|(second, latest)| ends(&mut cubic, second, latest)), [false, true, false]);
+        cubic.restart();
+        assert_eq!([(4, 100), (5, 200)].map(|(second, latest)| ends(&mut cubic, second, latest)), [false, true]);
+    }
+
     #[test]
     fn a_second_loss_below_the_first_makes_room() {
         let mut cubic = Cubic::default();

@@ -87,11 +87,20 @@ mod tests {
 
     const LEAST: Duration = Duration::from_millis(100);
 
-    /// Returns the index of the acknowledgement that ends slow start, of `count` acknowledgements `apart` with `latest` as round trip.
-    fn ends_at(window: u32, count: u64, apart: Duration, latest: Duration) -> Option<u64> {
+    /// Returns the index of the acknowledgement that ends slow start, of `count` acknowledgements `apart` with `latest` as round trip and `least` as the
+    /// least round trip.
+    fn ends_after(window: u32, count: u64, apart: Duration, latest: Duration, least: Duration) -> Option<u64> {
         let mut hystart = HyStart::default();
         let sample = RoundTrip { latest, una: 1, next: 1_000_000, burst: Duration::from_millis(1) };
-        (0..count).find(|k| hystart.ends(Instant::ZERO + apart * u32::try_from(*k).unwrap(), window, LEAST, sample))
+        let mut ends = |k: &u64| hystart.ends(Instant::ZERO + apart * u32::try_from(*k).unwrap(), window, least, sample);
+        let index = (0..count).find(&mut ends);
+        // Slow start ends once: the search does not begin anew before a timeout.
+        assert_eq!(index.and_then(|index| (index + 1..index + count).find(ends)), None);
+        index
+    }
+
+    fn ends_at(window: u32, count: u64, apart: Duration, latest: Duration) -> Option<u64> {
+        ends_after(window, count, apart, latest, LEAST)
     }
 
     #[test]
@@ -99,6 +108,8 @@ mod tests {
         // (100 ms + 1 ms)/2 = 50.5 ms: the 51st millisecond is the first one beyond.
         assert_eq!(ends_at(16, 200, Duration::from_millis(1), LEAST), Some(51));
         assert_eq!(ends_at(16, 200, Duration::from_millis(2), LEAST), Some(26));
+        // Acknowledgements each 500 µs: the 102nd comes at 51 ms, the 101st at 50.5 ms, which is above half of the round trip without the length of a burst.
+        assert_eq!(ends_at(16, 200, Duration::from_micros(500), LEAST), Some(102));
         // A gap of more than 2 ms is no train, and a window below 16 is left alone.
         assert_eq!(ends_at(16, 200, Duration::from_micros(2001), LEAST), None);
         assert_eq!(ends_at(15, 200, Duration::from_millis(1), LEAST), None);
@@ -109,5 +120,11 @@ mod tests {
         let grown = LEAST + Duration::from_micros(12_501);
         assert_eq!(ends_at(16, 200, Duration::from_millis(3), grown), Some(8));
         assert_eq!(ends_at(16, 200, Duration::from_millis(3), LEAST + Duration::from_micros(12_500)), None);
+        // The growth is at least 4 ms and at most 16 ms: an eighth of 16 ms is 2 ms, and an eighth of 200 ms is 25 ms.
+        for (least, growth) in [(16, 4), (200, 16)] {
+            let (least, grown) = (Duration::from_millis(least), Duration::from_millis(least + growth));
+            assert_eq!(ends_after(16, 200, Duration::from_millis(3), grown, least), None);
+            assert_eq!(ends_after(16, 200, Duration::from_millis(3), grown + Duration::from_micros(1), least), Some(8));
+        }
     }
 }

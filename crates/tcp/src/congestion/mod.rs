@@ -146,3 +146,20 @@ impl Congestion {
         self.window = self.window.max(least);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `tcp_cwnd_restart`: half for each timeout, down to the initial window, and a threshold of three quarters of the window before the pause.
+    #[test]
+    fn a_pause_shrinks_the_window_and_keeps_the_threshold() {
+        let timeout = Duration::from_millis(200);
+        for (idle, window) in [(200, 100), (201, 50), (401, 25), (601, 12), (801, 10), (10_000, 10)] {
+            let mut congestion = Congestion::new(&TcpConfig::default());
+            congestion.window = 100;
+            congestion.rest(Duration::from_millis(idle), timeout, 75);
+            assert_eq!((congestion.window, congestion.threshold), (window, if idle > 200 { 75 } else { UNBOUNDED }), "{idle} ms");
+        }
+    }
+}

@@ -75,3 +75,39 @@ impl Connection {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use cohaptic_units::Instant;
+
+    use crate::{Connection, TcpConfig};
+
+    fn connection(config: TcpConfig) -> Connection {
+        let address = "10.0.0.1:1".parse().unwrap();
+        Connection::connect(Instant::ZERO, config, address, address, 0).unwrap()
+    }
+
+    /// Linux reports 3 until a reordering was seen (`tcp_reordering`), and 300 at most (`tcp_max_reordering`).
+    #[test]
+    fn the_reported_reordering_is_bounded() {
+        let mut connection = connection(TcpConfig::default());
+        let reported = [0, 3, 5, 300, 301].map(|degree| {
+            connection.rack.degree = degree;
+            connection.info().reordering
+        });
+        assert_eq!(reported, [3, 3, 5, 300, 300]);
+    }
+
+    /// `tcp_sndbuf_expand`: memory for twice the window, at least for ten segments, each of 2304 octets. The buffer never shrinks.
+    #[test]
+    fn the_send_buffer_follows_the_window_upwards() {
+        let mut connection = connection(TcpConfig { least_send_buffer: 1, ..TcpConfig::default() });
+        connection.send.mss = 1448;
+        let sizes = [1, 10, 11, 100, 50, 10_000].map(|window| {
+            connection.congestion.window = window;
+            connection.expand_send_buffer();
+            connection.send.capacity
+        });
+        assert_eq!(sizes, [46_080, 46_080, 50_688, 460_800, 460_800, 4 << 20]);
+    }
+}

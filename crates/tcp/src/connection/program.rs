@@ -177,10 +177,10 @@ impl Connection {
     /// Lets acknowledgements leave at once (`true`) or wait (`TCP_QUICKACK`). As in Linux, the setting is not permanent: later traffic changes it.
     pub fn set_quickack(&mut self, quickack: bool) {
         self.receive.is_interactive = !quickack;
-        if quickack {
-            self.receive.quick = self.receive.quick.max(self.config.quick_acks);
-            // An acknowledgement that waits already leaves now.
-            self.receive.ack_now |= self.receive.ack_at.is_some();
+        if quickack && self.receive.ack_at.is_some() {
+            // An acknowledgement that waits already leaves now, as after reading (`tcp_cleanup_rbuf`).
+            let unacked = usize::try_from(self.receive.next - self.receive.acked).unwrap_or(usize::MAX);
+            self.receive.ack_now |= unacked > self.receive.segment || self.receive.assembler.unread() == 0;
         }
     }
 

@@ -92,7 +92,7 @@ impl Connection {
     pub(super) fn set_tail_timer(&mut self, now: Instant, has_advanced: bool) -> bool {
         let board = &self.send.board;
         let is_wanted = self.config.tail_loss_probe && self.receive.has_sack && matches!(self.recovery.phase, CaState::Open | CaState::Cwr);
-        let Some(first) = board.first().filter(|_| is_wanted && self.state.may_send() && self.tail.end.is_none()) else { return false };
+        let Some(first) = board.first().filter(|_| is_wanted && self.state.may_send()) else { return false };
         let mut wait = match self.round_trips.srtt() {
             // The peer may delay the acknowledgement of a single segment.
             Some(srtt) => 2 * srtt + if board.packets_out() == 1 { self.config.least_variance.max(TWO_TICKS) } else { TWO_TICKS },
@@ -116,8 +116,12 @@ impl Connection {
         }
         if self.tail.end.is_none() {
             self.probe = Some(Probe::Tail);
+            self.set_retransmission_timer(now, true);
+        } else {
+            // As in Linux, data that was sent while a probe was on the way does not put off the timeout of the first segment (`tcp_send_loss_probe`).
+            self.timer = Some((now, Timer::TailProbe));
+            self.set_retransmission_timer(now, false);
         }
-        self.set_retransmission_timer(now, true);
     }
 
     /// Handles the end of the retransmission timer: repeats the SYN, ends the connection, or enters the phase Loss.

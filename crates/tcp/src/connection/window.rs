@@ -24,7 +24,7 @@ impl Connection {
         let window = free.max(current);
         // An unchanged window is rounded up to whole units, because rounding down would move its edge back.
         let window = window.next_multiple_of(unit).min(most);
-        self.receive.edge = self.receive.edge.max(self.receive.next + window);
+        self.receive.edge = self.receive.next + window;
         u16::try_from(window >> self.receive.scale).unwrap_or(u16::MAX)
     }
 

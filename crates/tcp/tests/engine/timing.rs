@@ -48,6 +48,11 @@ fn a_syn_is_given_up_when_its_repetitions_or_their_time_are_spent() {
         world.run_until(millis(300_000));
         assert_eq!(world.programs[0].error, Some((millis(end * 1000), Error::TimedOut)), "{syn_retries}, {linear_syn_retries}");
     }
+    // A long user timeout does not add repetitions.
+    let config = TcpConfig { user_timeout: Some(Duration::from_secs(1000)), ..TcpConfig::default() };
+    let mut world = World::new("delay 10ms", 1).config(&config).dropping(|_, _| true).connect();
+    world.run_until(millis(1_100_000));
+    assert_eq!(world.programs[0].error, Some((millis(131_000), Error::TimedOut)));
     let config = TcpConfig { user_timeout: Some(Duration::from_millis(2500)), ..TcpConfig::default() };
     let mut world = World::new("delay 10ms", 1).config(&config).logged().dropping(|_, _| true).connect();
     world.run_until(millis(300_000));

@@ -265,7 +265,11 @@ fn links_change_while_it_runs() {
 
 /// Returns how many of `sizes`, sent again and again, a buffer of the default size keeps.
 fn kept(address: &'static str, sizes: &'static [usize]) -> Vec<usize> {
-    Testbed::new(["a", "b"]).links("delay 1ms").seed(1).run(move |bed| async move {
+    kept_in(212_992, address, sizes)
+}
+
+fn kept_in(buffer: usize, address: &'static str, sizes: &'static [usize]) -> Vec<usize> {
+    Testbed::new(["a", "b"]).links("delay 1ms").receive_buffer(buffer).seed(1).run(move |bed| async move {
         let any = if address.starts_with('[') { "[::]" } else { "0.0.0.0" };
         let (a, b) = (bed.host("a").bind(format!("{any}:0")).unwrap(), bed.host("b").bind(format!("{any}:5")).unwrap());
         for size in sizes.iter().cycle().take(300) {
@@ -278,6 +282,14 @@ fn kept(address: &'static str, sizes: &'static [usize]) -> Vec<usize> {
         }
         counts
     })
+}
+
+/// `__udp_enqueue_schedule_skb`: a datagram is kept if nothing waits, whatever memory it takes. A small datagram takes 832 octets.
+#[test]
+fn an_empty_buffer_takes_any_datagram() {
+    for (buffer, size, count) in [(1, &[1400], 1), (1663, &[10], 1), (1664, &[10], 2)] {
+        assert_eq!(kept_in(buffer, "10.0.0.2:5", size), [count], "{buffer}");
+    }
 }
 
 /// Measured on Linux 6.18 (`SKB_TRUESIZE`).

@@ -15,6 +15,16 @@ fn said<T>(outcome: io::Result<T>) -> String {
     format!("{:?}: {error}", error.kind())
 }
 
+/// Linux tells `tcp_rmem[1]` of a socket whose buffer grows, and twice the size that was set.
+#[test]
+fn a_socket_tells_the_size_of_its_receive_buffer() {
+    for bed in beds() {
+        let socket =
+            bed.run_twice(|bed| async move { bed.host("a").scope(async { TcpSocket::new_v4().unwrap().recv_buffer_size().unwrap() }).await });
+        assert_eq!(socket, 131_072);
+    }
+}
+
 #[test]
 fn bad_input_is_an_error_that_says_what_is_wrong() {
     for bed in beds() {

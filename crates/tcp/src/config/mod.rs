@@ -1,7 +1,10 @@
-//! Constants of a connection, their defaults and their limits.
+//! Constants of a connection and their defaults.
 
-use core::fmt;
+mod check;
+
 use core::time::Duration;
+
+pub use check::ConfigError;
 
 /// Constants of a connection. [`TcpConfig::default`] has the values of Linux 6, [`TcpConfig::textbook`] the values of textbooks.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -162,33 +165,6 @@ impl Default for TcpConfig {
     }
 }
 
-/// Reason for which [`TcpConfig::check`] refuses a configuration.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[non_exhaustive]
-pub enum ConfigError {
-    /// The MTU \[byte\] is below 128. The headers of IPv6 and TCP with all options take 100 octets.
-    Mtu(usize),
-    /// The named count, size or time is zero.
-    Zero(&'static str),
-    /// The lower bound, named first, is above the upper bound, named second.
-    Order(&'static str, &'static str),
-    /// The receive buffer \[byte\] is above 1 GiB, the largest window (RFC 7323, section 2.3).
-    ReceiveBuffer(usize),
-}
-
-impl fmt::Display for ConfigError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Mtu(octets) => write!(f, "the MTU {octets} is below 128 bytes"),
-            Self::Zero(name) => write!(f, "{name} is zero"),
-            Self::Order(least, greatest) => write!(f, "{least} is above {greatest}"),
-            Self::ReceiveBuffer(octets) => write!(f, "the receive buffer {octets} is above 1 GiB"),
-        }
-    }
-}
-
-impl core::error::Error for ConfigError {}
-
 impl TcpConfig {
     /// Returns TCP as in textbooks: Reno with NewReno, an initial window of 3 segments, timeouts of at least 1 s, a fixed window, no selective
     /// acknowledgements, no timestamps and no tail loss probes. If ECN is on, a SYN without ECN follows a reset, as RFC 3168 says and Linux does not.
@@ -208,47 +184,6 @@ impl TcpConfig {
             linear_syn_retries: 0,
             receive_buffer: Some(6 << 20),
             ..Self::default()
-        }
-    }
-
-    /// Checks the limits of the constants.
-    ///
-    /// # Errors
-    ///
-    /// Returns the first limit that a constant breaks.
-    pub fn check(&self) -> Result<(), ConfigError> {
-        if self.mtu < 128 {
-            return Err(ConfigError::Mtu(self.mtu));
-        }
-        // Without keep-alive, the defaults stand in and pass both checks of `keepalive`.
-        let keepalive = self.keepalive.unwrap_or_default();
-        let zeros = [
-            ("ttl", self.ttl == 0),
-            ("initial_window", self.initial_window == 0),
-            ("initial_timeout", self.initial_timeout.is_zero()),
-            ("receive_buffer", self.receive_buffer == Some(0)),
-            ("least_receive_buffer", self.least_receive_buffer == 0),
-            ("least_send_buffer", self.least_send_buffer == 0),
-            ("the interval of keep-alive probes", keepalive.interval.is_zero()),
-            ("the idle time before keep-alive probes", keepalive.idle.is_zero()),
-            // A timeout of zero would never let an answer arrive, so one of the two bounds must be above zero.
-            ("least_variance and least_timeout", self.least_variance.is_zero() && self.least_timeout.is_zero()),
-        ];
-        if let Some((name, _)) = zeros.iter().find(|(_, is_zero)| *is_zero) {
-            return Err(ConfigError::Zero(name));
-        }
-        if self.largest_window() > 1 << 30 {
-            return Err(ConfigError::ReceiveBuffer(self.largest_window()));
-        }
-        let pairs = [
-            ("least_timeout", "greatest_timeout", self.least_timeout > self.greatest_timeout),
-            ("initial_timeout", "greatest_timeout", self.initial_timeout > self.greatest_timeout),
-            ("least_receive_buffer", "greatest_receive_buffer", self.least_receive_buffer > self.greatest_receive_buffer),
-            ("least_send_buffer", "send_buffer", self.least_send_buffer > self.send_buffer),
-        ];
-        match pairs.iter().find(|(.., is_wrong)| *is_wrong) {
-            Some((least, greatest, _)) => Err(ConfigError::Order(least, greatest)),
-            None => Ok(()),
         }
     }
 
