@@ -8,7 +8,7 @@ use crate::sequence::Position;
 /// Most octets of a burst: 64 KiB less the room that Linux keeps for headers (`sk_gso_max_size`).
 pub(crate) const LONGEST_BURST: u64 = 65_536 - 257;
 
-/// Burst that is leaving.
+/// Burst that is leaving, of new or of lost segments.
 #[derive(Clone, Debug)]
 pub(super) struct Burst {
     at: Instant,
@@ -26,6 +26,24 @@ impl Default for Burst {
     }
 }
 
+impl Burst {
+    /// Returns whether the segment at `start` that leaves at `now` belongs to another burst.
+    fn is_over(&self, now: Instant, start: Position) -> bool {
+        self.left == 0 || self.next != start || self.at != now
+    }
+
+    /// Begins a burst of `length` segments, at least one.
+    const fn begin(now: Instant, start: Position, length: u32) -> Self {
+        Self { at: now, next: start, left: length, has_several: length > 1 }
+    }
+
+    /// Notes that the next segment, which ends at `end`, leaves. Returns whether the segment is the last of the burst.
+    const fn takes(&mut self, end: Position) -> bool {
+        (self.left, self.next) = (self.left.saturating_sub(1), end);
+        self.left == 0
+    }
+}
+
 impl Connection {
     /// Returns the rate at which Linux would pace the sender \[byte/s\] (`tcp_update_pacing_rate`), or `None` before the first round trip. This crate paces
     /// nothing; the rate only sets the length of bursts, and a margin of `HyStart`.
@@ -36,33 +54,48 @@ impl Connection {
         Some(u64::try_from(flight * percent * 10_000_000 / srtt).unwrap_or(u64::MAX))
     }
 
-    /// Returns the number of segments in the burst that begins now: what the windows and the data allow, at most half of the congestion window, and at most
-    /// what the rate brings in about a millisecond (`tcp_tso_autosize`).
-    fn burst_length(&self) -> u32 {
-        let mss = self.segment_size().max(1) as u64;
+    /// Returns the most segments of a burst: what the rate brings in about a millisecond, at least two (`tcp_tso_autosize`).
+    fn longest_burst(&self, mss: u64) -> u32 {
         // On a short path bursts may be longer. The shift is the least round trip in units of 512 µs.
         let near = self.round_trips.least().map_or(0, |least| least.as_micros() >> 9);
         let near = u32::try_from(near).ok().and_then(|shift| LONGEST_BURST.checked_shr(shift)).unwrap_or(0);
         let by_rate = (self.pacing_rate().unwrap_or(u64::MAX) >> 10).saturating_add(near).min(LONGEST_BURST) / mss;
+        u32::try_from(by_rate.max(2)).unwrap_or(u32::MAX)
+    }
+
+    /// Returns the number of segments in the burst that begins now: what the windows and the data allow, at most half of the congestion window, and at most
+    /// what fits into half of the peer's largest window (`tcp_bound_to_half_wnd`).
+    fn burst_length(&self) -> u32 {
+        let mss = self.segment_size().max(1) as u64;
         let window = self.congestion.window;
         let quota = window.saturating_sub(self.send.board.in_flight()).min((window / 2).max(1));
         let (unsent, open) = (self.send.buffer.end().saturating_sub(self.send.next), self.send.window_end().saturating_sub(self.send.next));
         // A last segment below the full size belongs to the burst if neither the window nor Nagle's algorithm holds it back.
         let takes_rest = unsent <= open && (self.config.nodelay || self.send.is_shut || self.send.small_end <= self.send.una);
         let segments = if takes_rest { unsent.div_ceil(mss) } else { unsent.min(open) / mss };
-        let by_octets = u32::try_from(segments).unwrap_or(u32::MAX);
-        quota.min(u32::try_from(by_rate.max(2)).unwrap_or(u32::MAX)).min(by_octets).max(1)
+        let by_octets = u32::try_from(segments.min(self.half_window() / mss)).unwrap_or(u32::MAX);
+        quota.min(self.longest_burst(mss)).min(by_octets).max(1)
     }
 
-    /// Notes that the new segment from `start` to `end` leaves at `now`. Returns whether the segment is the last of a burst of several. Called before the
-    /// segment counts as sent.
-    pub(super) fn ends_burst(&mut self, now: Instant, start: Position, end: Position) -> bool {
-        if self.send.burst.left == 0 || self.send.burst.next != start || self.send.burst.at != now {
-            let left = self.burst_length();
-            self.send.burst = Burst { at: now, next: start, left, has_several: left > 1 };
+    /// Notes that the new segment from `start` to `end` leaves at `now`. Returns whether the segment is the last of a burst, and whether the burst has several
+    /// segments. Called before the segment counts as sent.
+    pub(super) fn ends_burst(&mut self, now: Instant, start: Position, end: Position) -> (bool, bool) {
+        if self.send.burst.is_over(now, start) {
+            self.send.burst = Burst::begin(now, start, self.burst_length());
         }
-        let burst = &mut self.send.burst;
-        (burst.left, burst.next) = (burst.left - 1, end);
-        burst.left == 0 && burst.has_several
+        (self.send.burst.takes(end), self.send.burst.has_several)
+    }
+
+    /// Notes that the lost segment from `start` to `end` leaves again at `now`. Returns whether the segment is the last of several that Linux repeats as one:
+    /// lost neighbours that were sent in one burst, as far as the congestion window and the rate allow (`tcp_xmit_retransmit_queue`). Called before the segment
+    /// counts as sent again.
+    pub(super) fn ends_repetition(&mut self, now: Instant, start: Position, end: Position) -> bool {
+        if self.send.repetition.is_over(now, start) {
+            let board = &self.send.board;
+            let quota = self.congestion.window.saturating_sub(board.in_flight());
+            let most = quota.min(self.longest_burst(self.segment_size().max(1) as u64));
+            self.send.repetition = Burst::begin(now, start, board.lost_in_burst(start, self.send.window_end(), most).max(1));
+        }
+        self.send.repetition.takes(end) && self.send.repetition.has_several
     }
 }

@@ -136,10 +136,13 @@ impl Connection {
 
     /// Returns the most octets of data in a segment without selective acknowledgements, at least 48 unless the MSS is smaller.
     fn segment_size(&self) -> usize {
-        // At most half of the peer's largest window, so that a small window takes two segments (RFC 9293, section 3.8.6.2.1).
-        let window = usize::try_from(self.send.max_window).unwrap_or(usize::MAX);
-        let most = if window > 536 { window / 2 } else { window };
-        self.send.mss.min(most.max(48))
+        self.send.mss.min(usize::try_from(self.half_window()).unwrap_or(usize::MAX).max(48))
+    }
+
+    /// Returns half of the peer's largest window, so that a small window takes two segments (RFC 9293, section 3.8.6.2.1), or a tiny window as a whole.
+    fn half_window(&self) -> u64 {
+        let window = self.send.max_window;
+        if window > 536 { window / 2 } else { window }
     }
 
     /// Returns the blocks for a selective acknowledgement: first the duplicate, if there is one, because RFC 2883 gives the first place a meaning.

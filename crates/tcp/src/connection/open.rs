@@ -13,7 +13,7 @@ use crate::connection::timers::TWO_TICKS;
 use crate::connection::window::{first_window, tuning};
 use crate::error::Error;
 use crate::info::State;
-use crate::scoreboard::{News, Scoreboard};
+use crate::scoreboard::{Ending, News, Scoreboard};
 use crate::segment::{Flags, Options, Segment, TIMESTAMPS_LENGTH};
 use crate::send_buffer::SendBuffer;
 use crate::sequence::{extend, first};
@@ -48,7 +48,7 @@ impl Connection {
             connection.receive.first_window = first_window(&connection.config, connection.advertised_mss());
             connection.receive.edge = connection.receive.next + u64::from(connection.receive.first_window);
             connection.send.window = u64::from(syn.window);
-            connection.send.max_window = connection.send.window;
+            // As in Linux, the largest window counts from the segment that establishes the connection.
             connection.state = State::SynReceived;
             connection.send_syn(now);
         } else {
@@ -76,6 +76,7 @@ impl Connection {
             mss: DEFAULT_MSS,
             small_end: first,
             burst: Default::default(),
+            repetition: Default::default(),
             is_shut: false,
             last_data_at: now,
             delivered: 0,
@@ -138,7 +139,7 @@ impl Connection {
     /// Sends the SYN, or the SYN with ACK, for the first time.
     fn send_syn(&mut self, now: Instant) {
         self.send.next = self.send.first + 1;
-        self.send.board.push(self.send.first, self.send.next, now, false);
+        self.send.board.push(self.send.first, self.send.next, now, Ending::default());
         self.timer = Some((now.saturating_add(self.config.initial_timeout), Timer::Retransmission));
         let syn = self.build_syn(now);
         self.replies.push_back(syn);

@@ -38,8 +38,10 @@ pub(super) struct Send {
     pub(super) mss: usize,
     /// End of the last segment below the full size (for Minshall's form of Nagle's algorithm).
     pub(super) small_end: Position,
-    /// Burst that is leaving.
+    /// Burst of new segments that is leaving.
     pub(super) burst: Burst,
+    /// Burst of lost segments that is leaving again.
+    pub(super) repetition: Burst,
     /// The program has shut this half, so that a FIN follows the data.
     pub(super) is_shut: bool,
     /// Instant at which data, or the SYN, was sent last.

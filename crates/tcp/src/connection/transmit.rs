@@ -4,6 +4,7 @@ use cohaptic_units::Instant;
 
 use super::{Connection, Probe, Timer};
 use crate::info::CaState;
+use crate::scoreboard::Ending;
 use crate::segment::{Ecn, Flags, Segment};
 use crate::sequence::{Position, on_wire};
 
@@ -42,12 +43,13 @@ impl Connection {
     fn lost_again(&mut self, now: Instant) -> Option<Segment<'static>> {
         let board = &self.send.board;
         let lost = board.next_lost()?;
-        let (start, end, pushes) = (lost.start, lost.end, lost.pushes);
+        let (start, end, pushes) = (lost.start, lost.end, lost.ending.pushes);
         let is_first = start == self.send.una;
         // The first segment may leave also beyond a shrunken window of the peer: the answer tells the present window.
         if board.in_flight() >= self.congestion.window || (!is_first && end > self.send.window_end()) {
             return None;
         }
+        let ends_burst = self.ends_repetition(now, start, end);
         self.send.board.sent_again(start, now, true);
         if matches!(self.recovery.phase, CaState::Cwr | CaState::Recovery) {
             self.recovery.reduction.sent += 1;
@@ -55,7 +57,7 @@ impl Connection {
         if is_first && !matches!(self.timer, Some((_, Timer::Reordering))) {
             self.set_retransmission_timer(now, true);
         }
-        Some(self.again(now, start, end, pushes))
+        Some(self.again(now, start, end, pushes || ends_burst))
     }
 
     /// Returns an earlier segment once more, and counts the repetition for the undo.
@@ -125,13 +127,13 @@ impl Connection {
         let segment = self.build(now, start, end);
         let has_data = !segment.payload.is_empty();
         let pushes = has_data && start + segment.payload.len() as u64 == self.send.buffer.end();
-        let ends_burst = self.ends_burst(now, start, end);
+        let (is_last, has_several) = self.ends_burst(now, start, end);
         if self.send.board.in_flight() == 0 {
             // The curve of CUBIC must not rise during the pause that ends here.
             self.congestion.shift(now.saturating_duration_since(self.send.last_data_at));
         }
         self.send.next = end;
-        self.send.board.push(start, end, now, pushes);
+        self.send.board.push(start, end, now, Ending { pushes, ends_burst: is_last });
         self.send.last_data_at = now;
         // After an answer, later acknowledgements wait for data to travel with.
         self.receive.is_interactive |= has_answered;
@@ -145,7 +147,7 @@ impl Connection {
         }
         self.set_tail_timer(now, false);
         let ecn = if self.send.has_ecn && has_data { Ecn::Capable0 } else { Ecn::NotCapable };
-        let flags = segment.flags.with_if(Flags::PSH, pushes || (has_data && ends_burst));
+        let flags = segment.flags.with_if(Flags::PSH, pushes || (has_data && is_last && has_several));
         Segment { ecn, flags, ..segment }
     }
 
@@ -185,7 +187,8 @@ impl Connection {
     /// Sends the last segment again as a probe. The estimate of the segments on the way does not change.
     fn last_again(&mut self, now: Instant) -> Option<Segment<'static>> {
         let last = self.send.board.last()?;
-        let (start, end, pushes) = (last.start, last.end, last.pushes);
+        let (start, end, pushes) = (last.start, last.end, last.ending.pushes);
+        self.send.board.split_last();
         self.send.board.sent_again(start, now, false);
         Some(self.again(now, start, end, pushes))
     }

@@ -30,8 +30,16 @@ pub(crate) struct Sent {
     again: bool,
     /// The segment was repeated at least once.
     ever_again: bool,
-    /// The segment has the flag PSH, because the program's data ended with it when it was sent first.
+    pub(crate) ending: Ending,
+}
+
+/// End of a segment when the segment was sent first.
+#[derive(Clone, Copy, Default, Debug)]
+pub(crate) struct Ending {
+    /// The segment has the flag PSH, because the program's data ended with it.
     pub(crate) pushes: bool,
+    /// The segment is the last of its burst. Linux repeats only segments of one burst together.
+    pub(crate) ends_burst: bool,
 }
 
 /// Instant and number of a transmission. The number orders transmissions of the same instant.
@@ -90,11 +98,11 @@ impl Scoreboard {
     }
 
     /// Appends a new segment, sent at `at`. The segment must begin where the last segment ends.
-    pub(crate) fn push(&mut self, start: Position, end: Position, at: Instant, pushes: bool) {
+    pub(crate) fn push(&mut self, start: Position, end: Position, at: Instant, ending: Ending) {
         self.transmissions += 1;
         let order = self.transmissions;
         self.by_time.push_back(((at, order), start));
-        self.queue.push_back(Sent { start, end, at, order, sacked: false, lost: false, again: false, ever_again: false, pushes });
+        self.queue.push_back(Sent { start, end, at, order, sacked: false, lost: false, again: false, ever_again: false, ending });
     }
 
     /// Returns the index in `queue` of the segment that contains `start`.
@@ -179,6 +187,30 @@ impl Scoreboard {
                     news.note_order(sent.start, highest_sacked);
                 }
             }
+        }
+    }
+
+    /// Returns how many segments from the lost segment at `start` on are lost and wait to be sent again, belong to one burst, and end before `window_end`; at
+    /// most `most`.
+    pub(crate) fn lost_in_burst(&self, start: Position, window_end: Position, most: u32) -> u32 {
+        let Some(first) = self.index(start) else { return 0 };
+        let mut count = 0;
+        for sent in self.queue.range(first..) {
+            if count == most || !sent.lost || sent.again || sent.end > window_end {
+                break;
+            }
+            count += 1;
+            if sent.ending.ends_burst {
+                break;
+            }
+        }
+        count
+    }
+
+    /// Takes the last segment out of its burst, because the segment is repeated alone.
+    pub(crate) fn split_last(&mut self) {
+        if let Some(before) = self.queue.len().checked_sub(2).and_then(|index| self.queue.get_mut(index)) {
+            before.ending.ends_burst = true;
         }
     }
 
