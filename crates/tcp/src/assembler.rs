@@ -3,18 +3,24 @@
 use alloc::collections::{BTreeMap, VecDeque};
 use alloc::vec::Vec;
 
+use bytes::{Buf, Bytes};
+
 use crate::memory;
 use crate::ranges::Ranges;
-use crate::send_buffer::KEPT;
 use crate::sequence::Position;
+
+/// Entries up to which an empty queue keeps its memory.
+const KEPT: usize = 16;
 
 /// Octets in order, which the program can read, and pieces that wait for missing octets before them.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Assembler {
-    /// Octets in order, not yet read by the program.
-    ready: VecDeque<u8>,
+    /// Octets in order, not yet read by the program, as they arrived. No piece is empty.
+    ready: VecDeque<Bytes>,
+    /// Number of octets in `ready`.
+    unread: usize,
     /// Data out of order, by the position of its first octet.
-    pieces: BTreeMap<Position, Vec<u8>>,
+    pieces: BTreeMap<Position, Bytes>,
     /// Number of octets in `pieces`.
     waiting: usize,
     /// Memory that the pieces take in Linux \[byte\].
@@ -42,7 +48,7 @@ struct Held {
 
 impl Assembler {
     /// Takes in `data`, whose first octet is at `start`. Moves `next`, the position of the first missing octet, over all octets now in order.
-    pub(crate) fn insert(&mut self, next: &mut Position, start: Position, data: &[u8]) {
+    pub(crate) fn insert(&mut self, next: &mut Position, start: Position, data: Bytes) {
         let end = start + data.len() as u64;
         if end <= *next {
             return;
@@ -51,9 +57,9 @@ impl Assembler {
         let offset = |position: Position| usize::try_from(position - start).unwrap_or(data.len());
         if start > *next {
             let (pieces, waiting, memory) = (&mut self.pieces, &mut self.waiting, &mut self.waiting_memory);
-            // Only missing parts are copied, so that an octet that arrives twice takes memory once.
+            // Only missing parts are kept, so that an octet that arrives twice counts once.
             self.ranges.insert(start, end, |from, to| {
-                let piece = data[offset(from)..offset(to)].to_vec();
+                let piece = data.slice(offset(from)..offset(to));
                 *waiting += piece.len();
                 *memory += memory::of_received(piece.len()).0;
                 let before = pieces.insert(from, piece);
@@ -62,7 +68,7 @@ impl Assembler {
             self.remember(start);
             return;
         }
-        self.hold(&data[offset(*next)..]);
+        self.hold(data.slice(offset(*next)..));
         *next = end;
         if !self.ranges.is_empty() {
             self.join(next);
@@ -76,15 +82,19 @@ impl Assembler {
     }
 
     /// Appends octets in order. Short data may fit into the memory of the segment before.
-    fn hold(&mut self, data: &[u8]) {
-        self.ready.extend(data);
-        if let Some(last) = self.segments.back_mut().filter(|last| last.room >= data.len()) {
-            (last.octets, last.room) = (last.octets + data.len(), last.room - data.len());
-            return;
+    fn hold(&mut self, data: Bytes) {
+        let octets = data.len();
+        if let Some(last) = self.segments.back_mut().filter(|last| last.room >= octets) {
+            (last.octets, last.room) = (last.octets + octets, last.room - octets);
+        } else {
+            let (memory, room) = memory::of_received(octets);
+            self.segments.push_back(Held { octets, memory, room });
+            self.ready_memory += memory;
         }
-        let (memory, room) = memory::of_received(data.len());
-        self.segments.push_back(Held { octets: data.len(), memory, room });
-        self.ready_memory += memory;
+        if octets > 0 {
+            self.unread += octets;
+            self.ready.push_back(data);
+        }
     }
 
     /// Moves the pieces from `next` up to the first gap to the octets in order.
@@ -95,8 +105,8 @@ impl Assembler {
             self.waiting_memory -= memory::of_received(piece.len()).0;
             // The data in order may have ended inside this piece: its first `known` octets are already there.
             let known = usize::try_from(*next - start).map_or(piece.len(), |known| known.min(piece.len()));
-            self.hold(&piece[known..]);
             *next += (piece.len() - known) as u64;
+            self.hold(piece.slice(known..));
         }
         self.ranges.remove_below(*next);
         if self.ranges.is_empty() {
@@ -128,13 +138,13 @@ impl Assembler {
         !self.ranges.is_empty()
     }
 
-    pub(crate) fn unread(&self) -> usize {
-        self.ready.len()
+    pub(crate) const fn unread(&self) -> usize {
+        self.unread
     }
 
     /// Returns the number of octets held, in order or not.
-    pub(crate) fn held(&self) -> usize {
-        self.ready.len() + self.waiting
+    pub(crate) const fn held(&self) -> usize {
+        self.unread + self.waiting
     }
 
     /// Returns the memory that Linux counts for all octets held \[byte\].
@@ -149,19 +159,33 @@ impl Assembler {
 
     /// Copies octets in order into `to` and keeps the octets. Returns the number of octets.
     pub(crate) fn peek(&self, to: &mut [u8]) -> usize {
-        // The ring has at most two contiguous parts.
-        let (first, second) = self.ready.as_slices();
-        let count = to.len().min(self.ready.len());
-        let split = count.min(first.len());
-        to[..split].copy_from_slice(&first[..split]);
-        to[split..count].copy_from_slice(&second[..count - split]);
+        let mut count = 0;
+        for piece in &self.ready {
+            let room = &mut to[count..];
+            if room.is_empty() {
+                break;
+            }
+            let taken = piece.len().min(room.len());
+            room[..taken].copy_from_slice(&piece[..taken]);
+            count += taken;
+        }
         count
     }
 
     /// Moves octets in order into `to`. Returns the number of octets.
     pub(crate) fn read(&mut self, to: &mut [u8]) -> usize {
         let count = self.peek(to);
-        self.ready.drain(..count);
+        self.unread -= count;
+        let mut left = count;
+        while let Some(first) = self.ready.front_mut().filter(|_| left > 0) {
+            let taken = left.min(first.len());
+            left -= taken;
+            if taken == first.len() {
+                self.ready.pop_front();
+            } else {
+                first.advance(taken);
+            }
+        }
         let mut left = count;
         while let Some(first) = self.segments.front_mut().filter(|first| left > 0 || first.octets == 0) {
             let taken = left.min(first.octets);
@@ -172,12 +196,9 @@ impl Assembler {
                 self.segments.pop_front();
             }
         }
-        // An empty ring keeps its capacity, and an idle connection is to be small.
-        if self.ready.is_empty() && self.ready.capacity() > KEPT {
-            self.ready = VecDeque::new();
-        }
-        if self.segments.is_empty() {
-            self.segments = VecDeque::new();
+        // An empty queue keeps its capacity, and an idle connection is to be small.
+        if self.unread == 0 && self.ready.capacity().max(self.segments.capacity()) > KEPT {
+            (self.ready, self.segments) = (VecDeque::new(), VecDeque::new());
         }
         count
     }
@@ -192,67 +213,4 @@ impl Assembler {
 }
 
 #[cfg(test)]
-mod tests {
-    use alloc::vec;
-
-    use proptest::prelude::*;
-
-    use super::*;
-
-    proptest! {
-        #[test]
-        fn pieces_in_any_order_make_the_text(starts in prop::collection::vec((0usize..200, 1usize..60), 0..80)) {
-            let text: Vec<u8> = (0..=255).collect();
-            let (mut assembler, mut next, mut covered) = (Assembler::default(), 1000, [false; 256]);
-            for (start, length) in starts {
-                let end = (start + length).min(256);
-                assembler.insert(&mut next, 1000 + start as u64, &text[start..end]);
-                covered[start..end].fill(true);
-                let expected = covered.iter().position(|is_there| !is_there).unwrap_or(256);
-                prop_assert_eq!((next, assembler.unread()), (1000 + expected as u64, expected));
-                for (from, to) in assembler.blocks() {
-                    let span = usize::try_from(from - 1000).unwrap()..usize::try_from(to - 1000).unwrap();
-                    prop_assert!(span.start > expected && covered[span].iter().all(|is_there| *is_there));
-                }
-                prop_assert_eq!(assembler.has_gaps(), covered[expected..].contains(&true));
-                prop_assert_eq!(assembler.held(), assembler.unread() + assembler.pieces.values().map(Vec::len).sum::<usize>());
-            }
-            let memory = |octets: usize| memory::of_received(octets).0;
-            prop_assert_eq!(assembler.waiting_memory, assembler.pieces.values().map(|piece| memory(piece.len())).sum::<usize>());
-            prop_assert_eq!(assembler.ready_memory, assembler.segments.iter().map(|held| held.memory).sum::<usize>());
-            prop_assert_eq!(assembler.unread(), assembler.segments.iter().map(|held| held.octets).sum::<usize>());
-            let mut read = vec![0; 300];
-            let count = assembler.read(&mut read);
-            prop_assert_eq!(&read[..count], &text[..count]);
-            prop_assert_eq!(assembler.ready_memory, 0);
-        }
-    }
-
-    /// A segment of 1448 octets takes 2304 octets of memory until its last octet is read. A segment of 50 octets takes 832, which have room for 147 octets more.
-    #[test]
-    fn memory_is_free_when_the_last_octet_of_a_segment_is_read() {
-        let (mut assembler, mut next) = (Assembler::default(), 0);
-        let insert = |assembler: &mut Assembler, next: &mut u64, octets: usize| {
-            assembler.insert(next, *next, &vec![0; octets]);
-            assembler.memory()
-        };
-        assert_eq!([1448, 1448].map(|octets| insert(&mut assembler, &mut next, octets)), [2304, 4608]);
-        assert_eq!([1000, 447, 1, 1448].map(|octets| (assembler.read(&mut vec![0; octets]), assembler.memory()).1), [4608, 4608, 2304, 0]);
-        assert_eq!([50, 147, 1].map(|octets| insert(&mut assembler, &mut next, octets)), [832, 832, 1664]);
-        let gap = next + 10;
-        assembler.insert(&mut next, gap, &[0; 10]);
-        assert_eq!(assembler.memory(), 2496);
-        assembler.forget_gaps();
-        assert_eq!(assembler.memory(), 1664);
-    }
-
-    #[test]
-    fn the_block_that_changed_last_comes_first() {
-        let (mut assembler, mut next) = (Assembler::default(), 0);
-        for start in [10, 30, 50, 70, 90, 31] {
-            assembler.insert(&mut next, start, &[0; 5]);
-        }
-        let blocks: Vec<_> = assembler.blocks().collect();
-        assert_eq!(blocks, [(30, 36), (90, 95), (70, 75), (50, 55)]);
-    }
-}
+mod tests;

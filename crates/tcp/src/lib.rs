@@ -58,7 +58,7 @@ pub use config::{ConfigError, CongestionControl, EcnFallback, Keepalive, TcpConf
 pub use connection::Connection;
 pub use error::Error;
 pub use info::{CaState, Info, State};
-pub use segment::{Ecn, Flags, Options, ParseError, SackBlocks, Segment};
+pub use segment::{Ecn, Flags, Options, ParseError, Payload, SackBlocks, Segment};
 
 /// Compiles and runs the code blocks of the README as doc tests.
 #[cfg(doctest)]

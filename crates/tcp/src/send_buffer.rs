@@ -3,63 +3,95 @@
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
+use bytes::{Bytes, BytesMut};
+
 use crate::sequence::Position;
 
-/// Capacity above which an empty buffer releases its memory, so that an idle connection is small \[byte\].
-pub(crate) const KEPT: usize = 1024;
+/// Least memory for octets that are written \[byte\], so that short writes share memory.
+const LEAST_PIECE: usize = 1024;
 
-/// Octets from the first unacknowledged octet on, sent or not.
+/// Octets from the first unacknowledged octet on, sent or not. Segments share the memory of the buffer, so that an octet is copied once on its way from the
+/// writer to the buffer, and once more by the reader.
 #[derive(Clone, Debug)]
 pub(crate) struct SendBuffer {
-    /// The octet at index `i` has the position `start + i`.
-    octets: VecDeque<u8>,
-    /// Position of the first octet in the buffer.
+    /// Octets that segments may share, in the order of positions, with the position of the first octet of each piece.
+    pieces: VecDeque<(Position, Bytes)>,
+    /// Octets after the pieces. Later writes are appended while memory is left.
+    tail: BytesMut,
+    /// Position of the first octet in the buffer. The first piece may begin before this position.
     start: Position,
+    /// Position after the last octet.
+    end: Position,
 }
 
 impl SendBuffer {
-    pub(crate) const fn new(start: Position) -> Self {
-        Self { octets: VecDeque::new(), start }
+    pub(crate) fn new(start: Position) -> Self {
+        Self { pieces: VecDeque::new(), tail: BytesMut::new(), start, end: start }
     }
 
     pub(crate) fn write(&mut self, data: &[u8]) {
-        self.octets.extend(data);
+        if self.tail.capacity() - self.tail.len() < data.len() {
+            self.share_tail();
+            self.tail = BytesMut::with_capacity(data.len().max(LEAST_PIECE));
+        }
+        self.tail.extend_from_slice(data);
+        self.end += data.len() as u64;
+    }
+
+    /// Moves the octets of the tail to the pieces. The tail keeps the rest of its memory.
+    fn share_tail(&mut self) {
+        if !self.tail.is_empty() {
+            let start = self.end - self.tail.len() as u64;
+            self.pieces.push_back((start, self.tail.split().freeze()));
+        }
     }
 
     pub(crate) fn len(&self) -> usize {
-        self.octets.len()
+        usize::try_from(self.end - self.start).unwrap_or(usize::MAX)
     }
 
     /// Returns the position after the last octet.
-    pub(crate) fn end(&self) -> Position {
-        self.start + self.octets.len() as u64
+    pub(crate) const fn end(&self) -> Position {
+        self.end
     }
 
-    /// Returns a copy of the octets from `start` to `end` (exclusive). Positions outside the buffer are left out.
-    pub(crate) fn copy(&self, start: Position, end: Position) -> Vec<u8> {
-        // Index of a position, cut to the buffer: 0 below the first octet, the length above the last octet.
-        let at = |position: Position| usize::try_from(position.saturating_sub(self.start)).map_or(self.octets.len(), |at| at.min(self.octets.len()));
-        let (from, to) = (at(start), at(end));
-        // The ring has at most two contiguous parts.
-        let (first, second) = self.octets.as_slices();
-        let mut copy = Vec::with_capacity(to.saturating_sub(from));
-        if from < first.len() {
-            copy.extend_from_slice(&first[from..to.min(first.len())]);
+    /// Returns the octets from `start` to `end` (exclusive). Positions outside the buffer are left out. Only octets of several writes are copied.
+    pub(crate) fn slice(&mut self, start: Position, end: Position) -> Bytes {
+        let (start, end) = (start.max(self.start), end.min(self.end));
+        if start >= end {
+            return Bytes::new();
         }
-        if to > first.len() {
-            copy.extend_from_slice(&second[from.saturating_sub(first.len())..to - first.len()]);
+        if end > self.end - self.tail.len() as u64 {
+            self.share_tail();
         }
-        copy
+        // The pieces follow each other without gaps.
+        let index = self.pieces.partition_point(|(at, piece)| at + piece.len() as u64 <= start);
+        let part = |(at, piece): &(Position, Bytes)| {
+            let offset = |position: Position| usize::try_from(position.saturating_sub(*at)).unwrap_or(usize::MAX).min(piece.len());
+            piece.slice(offset(start)..offset(end))
+        };
+        let first = self.pieces.get(index).map(part).unwrap_or_default();
+        let length = usize::try_from(end - start).unwrap_or(usize::MAX);
+        if first.len() == length {
+            return first;
+        }
+        let mut copy = Vec::with_capacity(length);
+        for piece in self.pieces.range(index..).take_while(|(at, _)| *at < end) {
+            copy.extend_from_slice(&part(piece));
+        }
+        copy.into()
     }
 
     /// Removes the octets below `position`.
     pub(crate) fn acknowledge(&mut self, position: Position) {
         // `position` may be one above the last octet: the acknowledgement of the FIN, which takes a position but no octet.
-        let count = usize::try_from(position.saturating_sub(self.start)).map_or(self.octets.len(), |count| count.min(self.octets.len()));
-        self.octets.drain(..count);
-        self.start += count as u64;
-        if self.octets.is_empty() && self.octets.capacity() > KEPT {
-            self.octets = VecDeque::new();
+        self.start = position.clamp(self.start, self.end);
+        if self.start == self.end {
+            // An idle connection is to be small.
+            (self.pieces, self.tail) = (VecDeque::new(), BytesMut::new());
+        }
+        while self.pieces.front().is_some_and(|(at, piece)| at + piece.len() as u64 <= self.start) {
+            self.pieces.pop_front();
         }
     }
 
@@ -73,7 +105,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn copies_across_the_seam_of_the_ring() {
+    fn segments_of_several_writes_are_whole() {
         let mut buffer = SendBuffer::new(100);
         let text: Vec<u8> = (0..=255).collect();
         buffer.write(&text);
@@ -82,12 +114,27 @@ mod tests {
             let written: Vec<u8> = (0..5).map(|k| u8::try_from((256 + step * 5 + k) % 256).unwrap()).collect();
             buffer.write(&written);
             let start = 105 + step * 5;
-            let all = buffer.copy(start, buffer.end());
+            let all = buffer.slice(start, buffer.end());
             assert_eq!(all.len(), 256);
             assert!((start - 100..).zip(&all).all(|(at, octet)| u64::from(*octet) == at % 256));
-            assert_eq!(buffer.copy(start + 3, start + 9), all[3..9]);
+            assert_eq!(buffer.slice(start + 3, start + 9), all[3..9]);
         }
         buffer.clear();
-        assert_eq!((buffer.len(), buffer.copy(0, u64::MAX).len()), (0, 0));
+        assert_eq!((buffer.len(), buffer.slice(0, u64::MAX).len()), (0, 0));
+    }
+
+    /// Short writes share a piece of memory, and segments within a piece copy nothing.
+    #[test]
+    fn segments_share_the_memory_of_the_writer() {
+        let mut buffer = SendBuffer::new(0);
+        for octet in 0..100 {
+            buffer.write(&[octet]);
+        }
+        let whole = buffer.slice(0, 100);
+        let part = buffer.slice(10, 20);
+        assert_eq!((part.as_ptr(), part[0]), (whole[10..].as_ptr(), 10));
+        // A later write does not change what was shared.
+        buffer.write(&[100]);
+        assert_eq!((buffer.slice(99, 101), whole.len()), (Bytes::from_static(&[99, 100]), 100));
     }
 }

@@ -1,6 +1,7 @@
 //! Writes `docs/measured-testkit.md`: `cargo run --release > ../../docs/measured-testkit.md` in `benches/peers`. Takes some minutes.
 //!
-//! `--smoke` runs every row once with the least work: its figures say nothing. `udp` and `tcp` print the tables of one of them only.
+//! `--smoke` runs every row once with the least work: its figures say nothing. `udp` and `tcp` print the tables of one of them only, `fan-in` that
+//! of the hosts that write to one.
 
 mod on_bare;
 mod on_testkit;
@@ -103,6 +104,9 @@ fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let is_given = |word: &str| arguments.iter().any(|argument| argument == word);
     let effort = if is_given("--smoke") { Effort { rounds: 1, divisor: 100 } } else { Effort { rounds: ROUNDS, divisor: 1 } };
+    if is_given("fan-in") {
+        return tcp::fan_in(effort);
+    }
     let idle = tcp::idle(effort);
     head();
     if !is_given("tcp") {

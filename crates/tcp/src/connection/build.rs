@@ -1,14 +1,11 @@
 //! Construction of segments: flags, options, and the window to offer.
 
-use alloc::borrow::Cow;
-use alloc::vec::Vec;
-
 use cohaptic_units::Instant;
 
 use super::Connection;
 use crate::config::EcnFallback;
 use crate::info::State;
-use crate::segment::{Ecn, Flags, Options, SackBlocks, Segment, TIMESTAMPS_LENGTH};
+use crate::segment::{Ecn, Flags, Options, Payload, SackBlocks, Segment, TIMESTAMPS_LENGTH};
 use crate::sequence::{Position, on_wire};
 
 impl Connection {
@@ -51,7 +48,7 @@ impl Connection {
             options: Options::default(),
             ecn: Ecn::NotCapable,
             ttl: self.config.ttl,
-            payload: Cow::Borrowed(&[]),
+            payload: Payload::default(),
         }
     }
 
@@ -66,7 +63,7 @@ impl Connection {
     pub(super) fn build(&mut self, now: Instant, start: Position, end: Position) -> Segment<'static> {
         // The FIN has the position after the last octet, so a position beyond the buffer is the FIN.
         let data_end = end.min(self.send.buffer.end()).max(start);
-        let payload = if data_end > start { self.send.buffer.copy(start, data_end) } else { Vec::new() };
+        let payload = self.send.buffer.slice(start, data_end);
         let has_fin = end > data_end;
         let flags = Flags::ACK
             .with_if(Flags::FIN, has_fin)
@@ -79,7 +76,7 @@ impl Connection {
         let options = self.options(now, payload.len());
         let window = self.offer_window();
         self.has_acknowledged();
-        Segment { sequence: on_wire(start), flags, window, options, payload: Cow::Owned(payload), ..self.empty(flags) }
+        Segment { sequence: on_wire(start), flags, window, options, payload: payload.into(), ..self.empty(flags) }
     }
 
     /// Returns timestamps, and as many selective acknowledgements as fit beside `payload` octets of data.

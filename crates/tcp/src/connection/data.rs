@@ -4,14 +4,14 @@ use cohaptic_units::Instant;
 
 use super::Connection;
 use crate::info::State;
-use crate::segment::{Ecn, Flags, Segment};
+use crate::segment::{Ecn, Flags, Payload, Segment};
 use crate::sequence::Position;
 use crate::tuning::Tuning;
 
 impl Connection {
     /// Takes in the data and the FIN of a valid segment that begins at `start`.
     pub(super) fn accept_data(&mut self, now: Instant, segment: &Segment<'_>, start: Position) {
-        let payload = &*segment.payload;
+        let payload = &segment.payload;
         let has_fin = segment.flags.has(Flags::FIN);
         let data_end = start + payload.len() as u64;
         if payload.is_empty() && !has_fin {
@@ -52,7 +52,7 @@ impl Connection {
     }
 
     /// Takes in the octets of `payload` from `start` to `end`, and notes which of them are duplicates. `payload` may be longer: the rest was cut off.
-    fn accept_octets(&mut self, now: Instant, start: Position, end: Position, payload: &[u8]) {
+    fn accept_octets(&mut self, now: Instant, start: Position, end: Position, payload: &Payload<'_>) {
         if start < self.receive.next {
             self.tell_duplicate(start, self.receive.next.min(end));
         } else if let Some((low, high)) = self.receive.assembler.first_within(start, end) {
@@ -64,7 +64,7 @@ impl Connection {
         let count = usize::try_from(end.saturating_sub(start)).unwrap_or(0);
         let known = count < payload.len();
         if count > 0 {
-            self.receive.assembler.insert(&mut self.receive.next, start, &payload[..count]);
+            self.receive.assembler.insert(&mut self.receive.next, start, payload.slice(0..count));
             self.learn_rhythm(now, count);
         }
         // If data was cut off, is out of order or fills a gap, the acknowledgement leaves at once (RFC 5681, section 4.2).

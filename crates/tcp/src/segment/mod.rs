@@ -5,15 +5,16 @@ mod encode;
 mod flags;
 mod options;
 mod parse;
+mod payload;
 mod reply;
 
-use alloc::borrow::Cow;
 use core::net::SocketAddr;
 
 pub use flags::Flags;
 pub(crate) use options::TIMESTAMPS_LENGTH;
 pub use options::{Options, SackBlocks};
 pub use parse::ParseError;
+pub use payload::Payload;
 
 /// Value of the two ECN bits of the IP header (RFC 3168, section 5).
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Default, Debug)]
@@ -73,7 +74,7 @@ pub struct Segment<'a> {
     /// Time to live (IPv4) or hop limit (IPv6).
     pub ttl: u8,
     /// Data of the segment.
-    pub payload: Cow<'a, [u8]>,
+    pub payload: Payload<'a>,
 }
 
 impl Segment<'_> {
@@ -93,6 +94,6 @@ impl Segment<'_> {
     /// Returns the segment with owned data. Borrowed data is copied.
     #[must_use]
     pub fn into_owned(self) -> Segment<'static> {
-        Segment { payload: Cow::Owned(self.payload.into_owned()), ..self }
+        Segment { payload: self.payload.into_owned(), ..self }
     }
 }

@@ -1,6 +1,5 @@
 //! Reading of a segment from the octets of an IP packet.
 
-use alloc::borrow::Cow;
 use core::fmt;
 use core::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 
@@ -118,7 +117,7 @@ impl<'a> Segment<'a> {
             options: Options::read(options),
             ecn,
             ttl,
-            payload: Cow::Borrowed(&tcp[header_length..]),
+            payload: tcp[header_length..].into(),
         })
     }
 }

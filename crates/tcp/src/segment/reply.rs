@@ -1,8 +1,6 @@
 //! Reset in answer to a segment that belongs to no connection.
 
-use alloc::borrow::Cow;
-
-use super::{Ecn, Flags, Options, Segment};
+use super::{Ecn, Flags, Options, Payload, Segment};
 
 impl Segment<'_> {
     /// Returns the RST that answers this segment if neither a connection nor a listener accepts the segment (RFC 9293, section 3.10.7.1). The RST has the time
@@ -31,7 +29,7 @@ impl Segment<'_> {
             options: Options::default(),
             ecn: Ecn::NotCapable,
             ttl,
-            payload: Cow::Borrowed(&[]),
+            payload: Payload::default(),
         })
     }
 }

@@ -1,6 +1,5 @@
 //! Connections under arbitrary segments: no panic, no octet lost or invented, and no acknowledgement of data that has not arrived.
 
-use std::borrow::Cow;
 use std::time::Duration;
 
 use cohaptic_tcp::{Connection, Ecn, Error, Flags, Options, SackBlocks, Segment, TcpConfig};
@@ -122,7 +121,7 @@ fn fire(config: TcpConfig, shots: Vec<Shot>) {
             options,
             ecn: if shot.ecn { Ecn::Congestion } else { Ecn::NotCapable },
             ttl: 64,
-            payload: Cow::Owned(payload),
+            payload: payload.into(),
         };
         most_known = most_known.max(u64::try_from(end_at).unwrap_or(0));
         fin_was_sent |= segment.flags.has(Flags::FIN);
@@ -187,7 +186,7 @@ proptest! {
             options,
             ecn: Ecn::Capable0,
             ttl,
-            payload: Cow::Owned(payload),
+            payload: payload.into(),
         };
         let packet = segment.to_packet();
         prop_assert_eq!(packet.len(), segment.packet_length());

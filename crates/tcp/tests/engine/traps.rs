@@ -1,6 +1,5 @@
 //! Situations in which other implementations have failed.
 
-use std::borrow::Cow;
 use std::time::Duration;
 
 use cohaptic_tcp::{Connection, Ecn, EcnFallback, Error, Flags, Options, Segment, State, TcpConfig};
@@ -28,7 +27,7 @@ fn forged(world: &World, flags: Flags, ahead: u32, payload: &'static [u8]) -> Se
         options: Options::default(),
         ecn: Default::default(),
         ttl: 64,
-        payload: Cow::Borrowed(payload),
+        payload: payload.into(),
     }
 }
 
@@ -60,7 +59,7 @@ fn a_fin_that_overtakes_data_waits_for_it() {
     let fin = forged(&world, Flags::ACK | Flags::FIN, 3, b"");
     world.inject(1, &fin);
     assert_eq!(world.at(1).state(), State::Established);
-    let data = Segment { payload: Cow::Owned((0..3).map(octet).collect()), ..forged(&world, Flags::ACK, 0, b"") };
+    let data = Segment { payload: (0..3).map(octet).collect::<Vec<u8>>().into(), ..forged(&world, Flags::ACK, 0, b"") };
     world.inject(1, &data);
     assert_eq!((world.at(1).state(), world.programs[1].read, world.programs[1].end_at), (State::CloseWait, 3, Some(world.now)));
 }

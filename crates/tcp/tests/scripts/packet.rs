@@ -1,6 +1,5 @@
 //! Segments as scripts write them: numbers relative to the initial ones, options by name.
 
-use std::borrow::Cow;
 use std::fmt;
 use std::net::SocketAddr;
 
@@ -100,7 +99,7 @@ impl Packet {
             options,
             ecn: self.ecn.unwrap_or_default(),
             ttl: 64,
-            payload: Cow::Owned(data.collect()),
+            payload: data.collect::<Vec<u8>>().into(),
         }
     }
 

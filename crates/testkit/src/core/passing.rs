@@ -224,7 +224,7 @@ impl Core {
         if parcel.addresses.kind == Kind::Segment {
             let (bytes, marked) = (std::mem::take(&mut parcel.bytes), parcel.arrival.marked);
             self.spare.put(parcel);
-            return self.arrive_segment(path.to, &bytes.into(), marked);
+            return self.arrive_segment(path.to, bytes, marked);
         }
         let Some(id) = self.socket_for(path.to, &parcel.addresses) else { return Err(self.lose(path, &parcel)) };
         let socket = self.sockets.get_mut(id);

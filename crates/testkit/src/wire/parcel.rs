@@ -1,8 +1,12 @@
 //! Packets of a run, in memory that is reused.
 
 use std::ops::Deref;
+#[cfg(feature = "tcp")]
+use std::sync::OnceLock;
 
 use bytes::Bytes;
+#[cfg(feature = "tcp")]
+use cohaptic_tcp::Segment;
 use cohaptic_units::Instant;
 use cohaptic_wan::{NodeId, Path};
 
@@ -45,6 +49,32 @@ pub(crate) enum Octets {
     Own(Vec<u8>),
     /// Content of every other packet.
     Shared(Bytes),
+    /// Segment between two connections of the run, and the length of its IP packet \[byte\].
+    #[cfg(feature = "tcp")]
+    Segment(Box<Whole>, usize),
+}
+
+/// Segment that travels as it is. Its IP packet, with checksums, is written only if something looks at the octets: a record, a law or a damage.
+#[cfg(feature = "tcp")]
+#[derive(Clone, Debug)]
+pub(crate) struct Whole {
+    pub(crate) segment: Segment<'static>,
+    packet: OnceLock<Bytes>,
+}
+
+#[cfg(feature = "tcp")]
+impl Whole {
+    fn packet(&self) -> &Bytes {
+        self.packet.get_or_init(|| self.segment.to_packet().into())
+    }
+}
+
+#[cfg(feature = "tcp")]
+impl From<Segment<'static>> for Octets {
+    fn from(segment: Segment<'static>) -> Self {
+        let length = segment.packet_length();
+        Self::Segment(Box::new(Whole { segment, packet: OnceLock::new() }), length)
+    }
 }
 
 impl Default for Octets {
@@ -61,6 +91,8 @@ impl Deref for Octets {
         match self {
             Self::Own(octets) => octets,
             Self::Shared(octets) => octets,
+            #[cfg(feature = "tcp")]
+            Self::Segment(whole, _) => whole.packet(),
         }
     }
 }
@@ -76,6 +108,8 @@ impl From<Octets> for Bytes {
         match octets {
             Octets::Own(octets) => octets.into(),
             Octets::Shared(octets) => octets,
+            #[cfg(feature = "tcp")]
+            Octets::Segment(whole, _) => whole.packet().clone(),
         }
     }
 }
@@ -85,11 +119,24 @@ impl From<Octets> for Vec<u8> {
         match octets {
             Octets::Own(octets) => octets,
             Octets::Shared(octets) => octets.into(),
+            #[cfg(feature = "tcp")]
+            Octets::Segment(whole, _) => whole.packet().to_vec(),
         }
     }
 }
 
 impl Octets {
+    /// Returns the number of octets. The packet of a segment is not written for that.
+    #[inline]
+    pub(crate) fn len(&self) -> usize {
+        match self {
+            Self::Own(octets) => octets.len(),
+            Self::Shared(octets) => octets.len(),
+            #[cfg(feature = "tcp")]
+            Self::Segment(_, length) => *length,
+        }
+    }
+
     /// Replaces the content with a copy of `bytes`, in memory of its own if it has some.
     #[inline]
     fn refill(&mut self, bytes: &[u8]) {
@@ -99,7 +146,7 @@ impl Octets {
                 octets.clear();
                 octets.extend_from_slice(bytes);
             }
-            Self::Shared(_) => *self = Self::Own(bytes.to_vec()),
+            _ => *self = Self::Own(bytes.to_vec()),
         }
     }
 }
@@ -130,11 +177,11 @@ impl<A: Default> Spare<A> {
         parcel
     }
 
-    /// Returns a parcel that shares `bytes`.
+    /// Returns a parcel with `segment`.
     #[cfg(feature = "tcp")]
-    pub(crate) fn wrapped(&mut self, addresses: A, bytes: Bytes, ecn_capable: bool) -> Box<Parcel<A>> {
+    pub(crate) fn wrapped(&mut self, addresses: A, segment: Segment<'static>, ecn_capable: bool) -> Box<Parcel<A>> {
         let mut parcel = self.0.pop().unwrap_or_else(empty);
-        *parcel = Parcel::new(addresses, bytes.into(), ecn_capable);
+        *parcel = Parcel::new(addresses, segment.into(), ecn_capable);
         parcel
     }
 

@@ -5,6 +5,8 @@ mod on_turmoil;
 mod on_turmoil_net;
 mod program;
 
+use std::time::Duration;
+
 use cohaptic_benches_peers::{median, version};
 use cohaptic_testkit::TcpConfig;
 use cohaptic_testkit::tcp::CongestionControl;
@@ -45,6 +47,8 @@ pub fn idle(effort: Effort) -> Option<f64> {
 pub fn print(effort: Effort, idle: Option<f64>) {
     println!("## TCP: a gigabyte\n");
     gigabyte(effort);
+    println!("\n## TCP: thirty hosts write to one\n");
+    fan_in(effort);
     println!("\n## TCP: a question after each answer\n");
     questions(effort);
     println!("\n## TCP: ten thousand connections\n");
@@ -62,6 +66,25 @@ fn gigabyte(effort: Effort) {
     let rows: [Row<'_, _>; 2] = [(OWN, "≤ 2", &|| work(false)), (TOKIO, "≤ 3", &|| work(true))];
     for ((subject, asked, _), time) in rows.iter().zip(times(effort, &rows)) {
         println!("| {subject} | {time:.2} | {asked} | {:.2} |", time * 1e6 * MSS / f64::from(octets));
+    }
+}
+
+/// Prints the table of the hosts that write to one.
+pub fn fan_in(effort: Effort) {
+    let (clients, octets) = (30, 1000 * effort.part_of(500) as usize);
+    println!("{clients} hosts each write {octets} octets, 65,536 a call, on a connection of their own to one server, over links of 1 ms.");
+    println!("turmoil carries each call as one message, without segments, acknowledgements and windows.\n");
+    println!("| | \\[ms\\] | against turmoil | asked for |");
+    println!("| --- | ---: | ---: | ---: |");
+    let delay = Duration::from_millis(1);
+    let rows: [Row<'_, _>; 3] = [
+        (OWN, "≤ 2×", &|| on_testkit::fan_in(false, clients, delay, octets)),
+        (TOKIO, "≤ 2.5×", &|| on_testkit::fan_in(true, clients, delay, octets)),
+        (TURMOIL, "", &|| on_turmoil::fan_in(clients, delay, octets)),
+    ];
+    let times = times(effort, &rows);
+    for ((subject, asked, _), time) in rows.iter().zip(&times) {
+        println!("| {subject} | {:.1} | {:.2}× | {asked} |", time * 1e3, time / times[2]);
     }
 }
 

@@ -8,7 +8,7 @@ use cohaptic_benches_common::machine::field;
 use cohaptic_testkit::hit::Verdict;
 use cohaptic_testkit::{Host, Instant, TcpConfig, TcpListener, TcpStream, Testbed, time};
 
-use super::program::{Net, PORT, answer, ask, crowd, give, take};
+use super::program::{Net, PORT, answer, ask, crowd, feed, give, swallow, take};
 use crate::program::DELAY;
 
 impl Net for Host {
@@ -71,6 +71,25 @@ pub fn connections(on_tokio: bool, count: u32, questions: u32) {
         server.spawn(answer(server.clone()));
         let asking = crowd(client.clone(), (server.ip(), PORT).into(), count, questions);
         client.spawn(asking).await.expect("no host crashes").expect("they live");
+    });
+}
+
+/// Hosts that each write a number of octets to one server.
+///
+/// # Panics
+///
+/// If a connection gives an error.
+pub fn fan_in(on_tokio: bool, clients: u32, delay: Duration, octets: usize) {
+    let names: Vec<String> = (0..clients).map(|number| format!("client{number}")).collect();
+    let bed = Testbed::new(names.iter().map(String::as_str).chain(["server"])).links(&format!("delay {}ns", delay.as_nanos()));
+    let bed = if on_tokio { bed.on_tokio() } else { bed };
+    bed.run(|bed| async move {
+        let server = bed.host("server");
+        server.spawn(swallow(server.clone()));
+        let tasks: Vec<_> = names.iter().map(|name| bed.host(name).spawn(feed::<Host>((server.ip(), PORT).into(), octets))).collect();
+        for task in tasks {
+            task.await.expect("no host crashes").expect("it lives");
+        }
     });
 }
 

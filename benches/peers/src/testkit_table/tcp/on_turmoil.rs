@@ -7,7 +7,7 @@ use std::time::Duration;
 use turmoil::Sim;
 use turmoil::net::{TcpListener, TcpStream};
 
-use super::program::{Net, PORT, answer, ask, crowd};
+use super::program::{Net, PORT, answer, ask, crowd, feed, swallow};
 use crate::program::DELAY;
 
 /// The host that runs.
@@ -62,16 +62,36 @@ pub fn connections(count: u32, questions: u32) {
     sim.run().expect("the program ends");
 }
 
-/// Links of the same delay always, queues that do not fill, and the server.
+/// Hosts that each write a number of octets to one server.
+///
+/// # Panics
+///
+/// If turmoil gives an error.
+pub fn fan_in(clients: u32, delay: Duration, octets: usize) {
+    let (mut sim, server) = simulated(delay, Duration::from_secs(60));
+    sim.host("server", || async { Ok(swallow(Here).await?) });
+    for number in 0..clients {
+        sim.client(format!("client{number}"), async move { Ok(feed::<Here>(server, octets).await?) });
+    }
+    sim.run().expect("the program ends");
+}
+
+/// Links of [`DELAY`], and the server that answers.
 fn simulation<'a>(longest: Duration) -> (Sim<'a>, SocketAddr) {
-    let mut sim = turmoil::Builder::new()
-        .min_message_latency(DELAY)
-        .max_message_latency(DELAY)
+    let (mut sim, server) = simulated(DELAY, longest);
+    sim.host("server", || async { Ok(answer(Here).await?) });
+    (sim, server)
+}
+
+/// Links of the same delay always and queues that do not fill, and the address of the server.
+fn simulated<'a>(delay: Duration, longest: Duration) -> (Sim<'a>, SocketAddr) {
+    let sim = turmoil::Builder::new()
+        .min_message_latency(delay)
+        .max_message_latency(delay)
         .tcp_capacity(1024)
         .rng_seed(1)
         .simulation_duration(longest + Duration::from_secs(1))
         .build();
     let server = (sim.lookup("server"), PORT).into();
-    sim.host("server", || async { Ok(answer(Here).await?) });
     (sim, server)
 }

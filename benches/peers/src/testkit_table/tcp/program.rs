@@ -130,3 +130,38 @@ pub async fn take(stream: &mut (impl AsyncRead + Unpin), octets: usize) -> io::R
     }
     Ok(())
 }
+
+/// Takes connections for ever, and reads each until its other end is shut.
+///
+/// # Errors
+///
+/// What the listener gives.
+pub async fn swallow<N: Net>(net: N) -> io::Result<()> {
+    let listener = net.listen().await?;
+    loop {
+        drop(net.spawn(take_all(N::accept(&listener).await?)));
+    }
+}
+
+/// Reads until the other end is shut.
+async fn take_all(mut stream: impl AsyncRead + AsyncWrite + Unpin) -> io::Result<()> {
+    let mut chunk = vec![0; CHUNK];
+    while stream.read(&mut chunk).await? > 0 {}
+    Ok(())
+}
+
+/// Opens a connection, writes a number of octets, and waits until the other end has read them.
+///
+/// # Errors
+///
+/// What the connection gives.
+pub async fn feed<N: Net>(server: SocketAddr, octets: usize) -> io::Result<()> {
+    let mut stream = N::connect(server).await?;
+    let chunk = vec![7; CHUNK];
+    let mut left = octets;
+    while left > 0 {
+        left -= stream.write(&chunk[..left.min(CHUNK)]).await?;
+    }
+    stream.shutdown().await?;
+    stream.read(&mut [0]).await.map(drop)
+}

@@ -16,8 +16,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::net::{IpAddr, SocketAddr};
 use std::time::Duration;
 
-use bytes::Bytes;
-use cohaptic_tcp::{Connection, TcpConfig};
+use cohaptic_tcp::{Connection, Segment, TcpConfig};
 use cohaptic_units::Instant;
 use cohaptic_wan::NodeId;
 
@@ -68,7 +67,7 @@ pub(super) struct Tcp {
     /// Connections in TIME-WAIT, roughly sorted by its end. The end has no visible effect, and so is no event.
     time_waits: VecDeque<(Instant, ConnId)>,
     /// Packets that do not leave their host, with the host, in the order of sending.
-    loopback: VecDeque<(NodeId, Bytes)>,
+    loopback: VecDeque<(NodeId, Segment<'static>)>,
     /// Number of calls by programs so far. An answer to a probe of a window counts until the next call: see [`Core::is_stuck`].
     calls: u64,
 }

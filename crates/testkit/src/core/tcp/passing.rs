@@ -1,20 +1,26 @@
 //! Way of a TCP segment, from its connection to the link and from the link to a connection.
 
-use bytes::Bytes;
 use cohaptic_tcp::{Ecn, Flags, Segment, State};
 use cohaptic_wan::{NodeId, Path};
 
 use super::{ConnId, Core};
 use crate::core::{Ends, Kind};
 use crate::trace::{Happening, Lost, PacketName};
+use crate::wire::Octets;
 
 impl Core {
     /// Handles a packet that has arrived at `host`. `marked` tells whether a queue marked the packet.
-    pub(in crate::core) fn arrive_segment(&mut self, host: NodeId, packet: &Bytes, marked: bool) -> Result<(), Lost> {
+    pub(in crate::core) fn arrive_segment(&mut self, host: NodeId, packet: Octets, marked: bool) -> Result<(), Lost> {
         if !self.is_up(host) {
             return Err(Lost::HostDown);
         }
-        let mut segment = Segment::parse(packet).map_err(|_| Lost::Checksum)?;
+        match packet {
+            Octets::Segment(whole, _) => self.take_segment(host, whole.segment, marked),
+            damaged => self.take_segment(host, Segment::parse(&damaged).map_err(|_| Lost::Checksum)?, marked),
+        }
+    }
+
+    fn take_segment(&mut self, host: NodeId, mut segment: Segment<'_>, marked: bool) -> Result<(), Lost> {
         if !self.is_own(host, segment.destination.ip()) {
             return Err(Lost::NoSuchAddress);
         }
@@ -44,18 +50,18 @@ impl Core {
             return self.take_syn(listener, &segment);
         }
         if let Some(reset) = segment.refusal(self.tcp_config(host).ttl) {
-            self.emit(host, None, &reset);
+            self.emit(host, None, reset);
         }
         Err(Lost::NoSocket)
     }
 
     /// Sends a segment of a connection, or of no connection, such as a refusal. The segment arrives when [`Core::take_arrivals`] is next called, even if its
     /// way takes no time.
-    fn emit(&mut self, host: NodeId, connection: Option<ConnId>, segment: &Segment<'_>) {
+    fn emit(&mut self, host: NodeId, connection: Option<ConnId>, segment: Segment<'static>) {
         let (from, to) = (segment.source.ip(), segment.destination.ip());
         let path = if self.is_own(host, to) {
             let Some(path) = self.loopback_of(host) else {
-                self.tcp.loopback.push_back((host, segment.to_packet().into()));
+                self.tcp.loopback.push_back((host, segment));
                 return;
             };
             path
@@ -66,17 +72,17 @@ impl Core {
         };
         let packet = self.wire.next_packet(path);
         let addresses = Ends::new(segment.source, segment.destination, Kind::Segment);
-        let parcel = self.spare.wrapped(addresses, segment.to_packet().into(), segment.ecn != Ecn::NotCapable);
+        let happening = self.wire.recording().traces.then(|| self.described(packet, connection, &segment));
+        let is_capable = segment.ecn != Ecn::NotCapable;
+        let parcel = self.spare.wrapped(addresses, segment, is_capable);
         // A segment over a path that is cut is lost like any other packet.
         let _ = self.wire.offer(path, parcel);
-        if self.wire.recording().traces {
-            self.note_segment(packet, connection, segment);
-        }
+        happening.into_iter().for_each(|happening| self.wire.note(happening));
     }
 
-    /// Records a segment with relative numbers. The numbers count from the initial sequence numbers as the connection knows them, or the connection of the peer
-    /// if there is no own one; without either the numbers count from zero.
-    fn note_segment(&mut self, packet: PacketName, connection: Option<ConnId>, segment: &Segment<'_>) {
+    /// Returns the entry of a segment in the trace, with relative numbers. The numbers count from the initial sequence numbers as the connection knows them, or
+    /// the connection of the peer if there is no own one; without either the numbers count from zero.
+    fn described(&self, packet: PacketName, connection: Option<ConnId>, segment: &Segment<'_>) -> Happening {
         let (first, peers_first, shift) = if let Some(id) = connection {
             let machine = &self.tcp.end(id).machine;
             let (own, peers) = machine.initial_sequences();
@@ -88,7 +94,7 @@ impl Core {
         };
         // The window of a SYN is never scaled (RFC 7323, section 2.2).
         let shift = if segment.flags.has(Flags::SYN) { 0 } else { shift };
-        self.wire.note(Happening::Segment {
+        Happening::Segment {
             packet,
             ports: [segment.source.port(), segment.destination.port()],
             flags: segment.flags,
@@ -96,14 +102,14 @@ impl Core {
             octets: u32::try_from(segment.payload.len()).unwrap_or(u32::MAX),
             acknowledges: segment.flags.has(Flags::ACK).then(|| segment.acknowledgement.wrapping_sub(peers_first)),
             window: u32::from(segment.window) << shift,
-        });
+        }
     }
 
     /// Delivers the next packet that does not leave its host. Returns whether there was one.
     pub(in crate::core) fn take_from_loopback(&mut self) -> bool {
-        let Some((host, packet)) = self.tcp.loopback.pop_front() else { return false };
+        let Some((host, segment)) = self.tcp.loopback.pop_front() else { return false };
         // Fates of packets are recorded for links only. Loopback is not part of the network.
-        let _ = self.arrive_segment(host, &packet, false);
+        let _ = self.take_segment(host, segment, false);
         true
     }
 
@@ -112,7 +118,7 @@ impl Core {
         let now = self.now();
         let host = self.tcp.end(id).host;
         while let Some(segment) = self.tcp.end_mut(id).machine.poll_transmit(now) {
-            self.emit(host, Some(id), &segment);
+            self.emit(host, Some(id), segment);
         }
         self.recount(id);
         let end = self.tcp.connections.get_mut(id.0);

@@ -1,0 +1,62 @@
+use alloc::vec;
+
+use proptest::prelude::*;
+
+use super::*;
+
+proptest! {
+    #[test]
+    fn pieces_in_any_order_make_the_text(starts in prop::collection::vec((0usize..200, 1usize..60), 0..80)) {
+        let text: Vec<u8> = (0..=255).collect();
+        let (mut assembler, mut next, mut covered) = (Assembler::default(), 1000, [false; 256]);
+        for (start, length) in starts {
+            let end = (start + length).min(256);
+            assembler.insert(&mut next, 1000 + start as u64, Bytes::copy_from_slice(&text[start..end]));
+            covered[start..end].fill(true);
+            let expected = covered.iter().position(|is_there| !is_there).unwrap_or(256);
+            prop_assert_eq!((next, assembler.unread()), (1000 + expected as u64, expected));
+            for (from, to) in assembler.blocks() {
+                let span = usize::try_from(from - 1000).unwrap()..usize::try_from(to - 1000).unwrap();
+                prop_assert!(span.start > expected && covered[span].iter().all(|is_there| *is_there));
+            }
+            prop_assert_eq!(assembler.has_gaps(), covered[expected..].contains(&true));
+            prop_assert_eq!(assembler.held(), assembler.unread() + assembler.pieces.values().map(Bytes::len).sum::<usize>());
+        }
+        let memory = |octets: usize| memory::of_received(octets).0;
+        prop_assert_eq!(assembler.waiting_memory, assembler.pieces.values().map(|piece| memory(piece.len())).sum::<usize>());
+        prop_assert_eq!(assembler.ready_memory, assembler.segments.iter().map(|held| held.memory).sum::<usize>());
+        prop_assert_eq!(assembler.unread(), assembler.segments.iter().map(|held| held.octets).sum::<usize>());
+        let mut read = vec![0; 300];
+        let count = assembler.read(&mut read);
+        prop_assert_eq!(&read[..count], &text[..count]);
+        prop_assert_eq!(assembler.ready_memory, 0);
+    }
+}
+
+/// A segment of 1448 octets takes 2304 octets of memory until its last octet is read. A segment of 50 octets takes 832, which have room for 147 octets more.
+#[test]
+fn memory_is_free_when_the_last_octet_of_a_segment_is_read() {
+    let (mut assembler, mut next) = (Assembler::default(), 0);
+    let insert = |assembler: &mut Assembler, next: &mut u64, octets: usize| {
+        assembler.insert(next, *next, vec![0; octets].into());
+        assembler.memory()
+    };
+    assert_eq!([1448, 1448].map(|octets| insert(&mut assembler, &mut next, octets)), [2304, 4608]);
+    assert_eq!([1000, 447, 1, 1448].map(|octets| (assembler.read(&mut vec![0; octets]), assembler.memory()).1), [4608, 4608, 2304, 0]);
+    assert_eq!([50, 147, 1].map(|octets| insert(&mut assembler, &mut next, octets)), [832, 832, 1664]);
+    let gap = next + 10;
+    assembler.insert(&mut next, gap, Bytes::from_static(&[0; 10]));
+    assert_eq!(assembler.memory(), 2496);
+    assembler.forget_gaps();
+    assert_eq!(assembler.memory(), 1664);
+}
+
+#[test]
+fn the_block_that_changed_last_comes_first() {
+    let (mut assembler, mut next) = (Assembler::default(), 0);
+    for start in [10, 30, 50, 70, 90, 31] {
+        assembler.insert(&mut next, start, Bytes::from_static(&[0; 5]));
+    }
+    let blocks: Vec<_> = assembler.blocks().collect();
+    assert_eq!(blocks, [(30, 36), (90, 95), (70, 75), (50, 55)]);
+}
