@@ -11,13 +11,13 @@ use crate::progress::Progress;
 /// Estimated time \[s\] up to which an analysis has no bar.
 const SHORT: f64 = 1.0;
 
-/// Estimated time \[s\] from which the cost of a part is printed before the part begins, also if standard error is no terminal.
+/// Estimated time of a part \[s\]: from this time on, the cost of the part is printed before the part begins, also if standard error is no terminal.
 const TOLD: f64 = 2.0;
 
 /// Operations per step of the bar.
 const STEP: f64 = 1e6;
 
-/// Watch that ends an analysis when the user asks for the end, and shows nothing.
+/// Watch without output. Ends an analysis when the user asks for the end.
 pub(crate) struct Interruptible;
 
 impl Watch for Interruptible {
@@ -26,10 +26,10 @@ impl Watch for Interruptible {
     }
 }
 
-/// Watch that shows the progress of a long analysis, and ends the analysis when the user asks for the end.
+/// Watch of a long analysis: shows the progress, and ends the analysis when the user asks for the end.
 pub(crate) struct AnalysisWatch {
     shown: std::sync::Mutex<Shown>,
-    /// Largest memory that a part may take \[bytes\].
+    /// Limit of the memory of a part \[bytes\].
     most_memory: u64,
 }
 
@@ -38,7 +38,7 @@ struct Shown {
     bar: Option<Progress>,
     /// Operations of all announced parts.
     expected: f64,
-    /// Operations that are done but not shown yet.
+    /// Operations done but not shown yet.
     left: f64,
 }
 
@@ -64,6 +64,7 @@ impl Watch for AnalysisWatch {
     }
 
     fn begins(&self, cost: &PartCost) {
+        // A short part is over before anybody has read a note about the cost.
         if cost.operations / OPERATIONS_A_SECOND < TOLD {
             return;
         }
@@ -79,6 +80,7 @@ impl Watch for AnalysisWatch {
         let mut shown = self.shown();
         shown.expected += operations;
         let all = estimate(shown.expected);
+        // A part that is long by itself begins the bar. Earlier short parts are in the estimate of the time, and not in the length of the bar.
         if shown.bar.is_some() || operations / OPERATIONS_A_SECOND > SHORT {
             // The bar begins with length 0, because each announced part adds its length.
             let bar = shown.bar.get_or_insert_with(|| {
@@ -118,14 +120,13 @@ pub(crate) fn estimate(operations: f64) -> String {
     }
 }
 
-/// Watch of the cells or values of a picture whose bar counts cells. Shows the progress of long cells after that bar, and ends the cells when `stops` returns
-/// true.
+/// Watch of the cells or values of a picture with a bar of cells. Shows the progress of long cells after the bar, and ends the cells when `stops` returns true.
 pub(crate) struct CellWatch<'a> {
     progress: &'a Progress,
     /// Word for a cell in the note, such as "cell".
     name: &'static str,
     stops: &'a (dyn Fn() -> bool + Sync),
-    /// Operations of all begun cells, operations done, and the largest number of operations that was announced at once.
+    /// Operations of all begun cells, operations done, and the largest number of operations announced at once.
     operations: std::sync::Mutex<[f64; 3]>,
 }
 
@@ -146,6 +147,7 @@ impl<'a> CellWatch<'a> {
 
 /// Returns the note about long cells, or `None` if no begun cell takes longer than [`SHORT`].
 fn note(name: &str, [expected, done, largest]: [f64; 3]) -> Option<String> {
+    // The announced cost is an estimate and may be exceeded, so that the share is limited to 100 %.
     let long = largest / OPERATIONS_A_SECOND > SHORT;
     long.then(|| format!("; a {name} takes {}, {:.0} % of those begun", estimate(largest), 100.0 * (done / expected).min(1.0)))
 }

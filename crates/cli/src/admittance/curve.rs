@@ -1,4 +1,4 @@
-//! One curve of `cohaptic admittance`: from the scene file and the overrides of one `--curve` to the response of one peer.
+//! A curve of `cohaptic admittance`: from the scene file and the overrides of a `--curve` to the response of a peer.
 //!
 //! [`subjects`] reads and linearises every scene before any curve is computed, so that a wrong argument ends the command early.
 
@@ -11,7 +11,7 @@ use crate::failure::{self, Failure, not_analysed};
 use crate::input;
 use crate::variants::Variant;
 
-/// A scene whose admittance the user asks for, ready to be computed at any frequency.
+/// A linearised scene with a peer, ready for the computation of the peer's admittance at any frequency.
 pub(super) struct Subject {
     variant: Variant,
     scene: Scene,
@@ -20,7 +20,7 @@ pub(super) struct Subject {
     chance: Option<Result<MeanSquare, AnalysisError>>,
 }
 
-/// Returns one subject for the scene without changes, then one subject per `--curve`, in the order of the command line.
+/// Returns the subject of the scene without changes, then a subject per `--curve`, in the order of the command line.
 pub(super) fn subjects(arguments: &AdmittanceArguments, watch: &dyn Watch) -> Result<Vec<Subject>, Failure> {
     Variant::all(&arguments.curve, &[])?.into_iter().map(|variant| Subject::new(arguments, variant, watch)).collect()
 }
@@ -28,6 +28,7 @@ pub(super) fn subjects(arguments: &AdmittanceArguments, watch: &dyn Watch) -> Re
 impl Subject {
     fn new(arguments: &AdmittanceArguments, variant: Variant, watch: &dyn Watch) -> Result<Self, Failure> {
         let file = &arguments.scene.scene;
+        // The overrides of the curve come after `--set`: the last override of a key wins.
         let overrides = variant.on_top_of(&arguments.scene.overrides.set);
         let scene = input::with(file, |text, file| Scene::parse(text, file, &overrides));
         let scene = scene.map_err(|error| failure::of_variant(error, variant.option, &variant.overrides))?;
@@ -53,10 +54,10 @@ impl Subject {
     }
 }
 
-/// Largest number of peers that an error message names.
+/// Largest number of peers in an error message.
 const MOST_NAMED: usize = 20;
 
-/// Returns the index of the peer that `--peer` names. The error lists the peers of the scene.
+/// Returns the index of the peer of `--peer`. The error lists the peers of the scene.
 fn place_of(wanted: &str, scene: &Scene, variant: &Variant) -> Result<usize, Failure> {
     scene.peers.iter().position(|peer| peer.name == wanted).ok_or_else(|| {
         let names: Vec<&str> = scene.peers.iter().take(MOST_NAMED).map(|peer| peer.name.as_str()).collect();

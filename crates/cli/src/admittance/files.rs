@@ -1,4 +1,4 @@
-//! The files that `cohaptic admittance --out` writes: one table and one Bode plot of all curves, and the page.
+//! Files of `cohaptic admittance --out`: a table and a Bode plot of all curves, and the page.
 
 use std::path::Path;
 
@@ -35,6 +35,7 @@ pub(super) fn write(folder: &Path, arguments: &AdmittanceArguments, text: &str, 
 /// Returns the page of the curves with their picture.
 fn page(arguments: &AdmittanceArguments, scene: &str, curves: &[Curve], svg: &str) -> String {
     let (file, overrides) = (&arguments.scene.scene, &arguments.scene.overrides.set);
+    // `--at` takes all frequencies as a single value, separated by commas.
     let frequencies: Vec<String> = arguments.at.iter().map(f64::to_string).collect();
     let command = CommandLine::new("admittance", file, overrides)
         .option("--peer", [&arguments.peer])

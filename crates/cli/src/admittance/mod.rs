@@ -1,4 +1,4 @@
-//! `cohaptic admittance`: computes how one peer's hand feels the coupled system, frequency by frequency.
+//! `cohaptic admittance`: computes how a peer's hand feels the coupled system, frequency by frequency.
 //!
 //! This module reads the arguments, chooses the frequencies and writes the answer; `curve` computes, `files` writes the files of `--out`.
 
@@ -17,7 +17,7 @@ use crate::failure::Failure;
 use crate::file::own_folder;
 use crate::{input, output};
 
-/// Computes the admittance of one peer for the scene and for each `--curve`, and writes the answer.
+/// Computes the admittance of a peer for the scene and for each `--curve`, and writes the answer.
 ///
 /// An interrupted analysis still answers with the points finished so far; the returned failure then gives their number.
 pub(crate) fn admittance(arguments: &AdmittanceArguments) -> Result<ExitCode, Failure> {
@@ -29,7 +29,7 @@ pub(crate) fn admittance(arguments: &AdmittanceArguments) -> Result<ExitCode, Fa
         watch.clear();
     }
     let subjects = subjects?;
-    // One list of frequencies serves all curves, so that no frequency may exceed the limit of the peer with the slowest ticks.
+    // All curves have the same frequencies, so that no frequency may exceed the limit of the peer with the slowest ticks.
     let highest = subjects.iter().map(|subject| subject.admittance.highest_frequency()).fold(f64::INFINITY, f64::min);
     let frequencies = frequencies(arguments, highest)?;
     // The folder is locked until the command ends, so that no second command writes into the same folder.

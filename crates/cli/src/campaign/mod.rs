@@ -1,5 +1,4 @@
-//! `cohaptic campaign`: runs a scene with all combinations of varied keys. Also the steps that `compare` shares with campaigns: pool, verdicts, runs and
-//! failures.
+//! `cohaptic campaign`: runs a scene with all combinations of varied keys. Also the steps in common with `compare`: pool, verdicts, runs and failures.
 
 pub(crate) mod sharing;
 
@@ -26,13 +25,13 @@ use crate::shard::Sharing;
 use crate::shell::CommandLine;
 use crate::{input, interrupt, output, shard};
 
-/// Name and version of the program, which the folder of a campaign records.
+/// Name and version of the program, for the record in the folder of a campaign.
 pub(crate) const PROGRAM: &str = concat!("cohaptic ", env!("CARGO_PKG_VERSION"));
 
 /// Judge of combinations, by analysis. Stops when the user asks for the end.
 const JUDGE: ByAnalysis<'static> = ByAnalysis(&Interruptible);
 
-/// Does the missing runs of the whole campaign or of one shard, and prints the results.
+/// Does the missing runs of the whole campaign or of a shard, and prints the results.
 pub(crate) fn campaign(arguments: &CampaignArguments) -> Result<ExitCode, Failure> {
     let sharing = Sharing::of(&arguments.shards, arguments.out.as_deref())?;
     let plan = plan(arguments, sharing)?;
@@ -51,7 +50,9 @@ pub(crate) fn campaign(arguments: &CampaignArguments) -> Result<ExitCode, Failur
     let start = Clock::now();
     let done = pool(arguments.threads, || execute(sharing, out, plan.clone()))?;
     let (report, paths) = done.map_err(|ended| ended.unwrap_or_else(refused))?;
+    // The time covers judging and runs, and not the pictures and pages below.
     let wall_s = start.elapsed().as_secs_f64();
+    // A refused first combination has no scene. The name of the file then stands in for the title.
     let title = plan.scene(0).map_or_else(|_| output::path(input::named(scene)), |scene| scene.title);
     let notes = cohaptic_answers::campaign::notes(&report);
     let mut finished = Finished { plan, title, report, notes };
@@ -72,7 +73,7 @@ pub(crate) fn campaign(arguments: &CampaignArguments) -> Result<ExitCode, Failur
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns the page of a campaign. Its command does the whole campaign, however many shards did the runs.
+/// Returns the page of a campaign. The command on the page does the whole campaign, however many shards did the runs.
 fn page(arguments: &CampaignArguments, finished: &Finished, pictures: &[(&str, String)]) -> String {
     let plan = &finished.plan;
     // Without a scene on the command line, the folder of the campaign tells the path of the scene.
@@ -93,9 +94,10 @@ fn page(arguments: &CampaignArguments, finished: &Finished, pictures: &[(&str, S
     )
 }
 
-/// Returns a path in which no folder is entered and left again, such as `scenes/a.toml` for `out/../scenes/a.toml`.
+/// Returns a path without `FOLDER/..`, such as `scenes/a.toml` for `out/../scenes/a.toml`.
 fn shortened(path: &Path) -> PathBuf {
     path.components().fold(PathBuf::new(), |mut short, part| {
+        // `..` at the beginning of the path, or after another `..`, leaves no named folder and stays.
         let leaves = part == Component::ParentDir && matches!(short.components().next_back(), Some(Component::Normal(_)));
         if leaves {
             short.pop();
@@ -119,7 +121,7 @@ pub(crate) fn pool<T: Send>(threads: Option<u16>, work: impl FnOnce() -> T + Sen
     }
 }
 
-/// Returns the file of the scene for messages: the file that the user named, otherwise the file of the campaign in its folder.
+/// Returns the file to name in messages: the scene of the command line, otherwise the file of the campaign in the folder.
 fn scene_file(arguments: &CampaignArguments) -> &Path {
     arguments.scene.as_deref().unwrap_or_else(|| Path::new("campaign.json"))
 }
@@ -136,6 +138,7 @@ fn plan(arguments: &CampaignArguments, sharing: Sharing<'_>) -> Result<CampaignP
     };
     let variations =
         arguments.vary.iter().map(|text| Variation::parse(text)).collect::<Result<Vec<Variation>, _>>().map_err(|error| refused(error.into()))?;
+    // `--measure` joins the overrides of `--set`, so that the folder records measures with all other keys.
     let set: Vec<String> = arguments.overrides.set.iter().cloned().chain(arguments.measure.override_text()).collect();
     let (text, file) = (input::text(file)?, input::named(file));
     let format = match arguments.format {
@@ -166,7 +169,7 @@ fn execute(sharing: Sharing<'_>, out: &Path, plan: CampaignPlan) -> Result<(Repo
     Ok((report, std::iter::once(campaign.table_file()).chain(campaign.verdicts_file()).collect()))
 }
 
-/// Judge of a merge. Makes no verdict, because a merge takes only the verdicts that shards made.
+/// Judge of a merge. Makes no verdict, because a merge takes only the verdicts of the shards.
 pub(crate) struct Nobody;
 
 impl Judge for Nobody {
@@ -175,7 +178,7 @@ impl Judge for Nobody {
     }
 }
 
-/// Begins or continues a campaign and shows the progress of checking its combinations. For a merge, opens the campaign whose runs shards have done.
+/// Begins or continues a campaign and shows the progress of checking the combinations. For a merge, opens the campaign with the runs of the shards.
 pub(crate) fn open(sharing: Sharing<'_>, plan: CampaignPlan, out: &Path) -> Result<Campaign, Ended> {
     if let Sharing::Merge(folder) = sharing {
         return Campaign::open_whole(plan, folder).map_err(|error| {
@@ -188,7 +191,7 @@ pub(crate) fn open(sharing: Sharing<'_>, plan: CampaignPlan, out: &Path) -> Resu
     opened.map_err(Ended::Error)
 }
 
-/// Returns the failure for a campaign without verdicts on all combinations: the user ended the judging, or a shard that should have judged is missing.
+/// Returns the failure for a campaign without verdicts on all combinations: the user ended the judging, or the verdicts of a shard are missing.
 pub(crate) fn not_all_judged(sharing: Sharing<'_>, judged: u64, combinations: u64, out: &Path) -> Failure {
     let kept = format!("{judged} of {combinations} verdicts are kept in {}", output::path(out));
     match sharing {
@@ -205,7 +208,7 @@ pub(crate) fn not_all_judged(sharing: Sharing<'_>, judged: u64, combinations: u6
 pub(crate) enum Ended {
     /// A failure whose message is complete.
     Said(Failure),
-    /// An error of the campaign, which the caller words with its own options.
+    /// An error of the campaign. The caller adds the names of its own options.
     Error(CampaignError),
 }
 

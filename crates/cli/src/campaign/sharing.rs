@@ -12,7 +12,8 @@ use crate::shard::{Done, Names, Piece, Worker, owner, show};
 
 const NAMES: Names = Names { piece: "part", unit: "run" };
 
-/// Judges the combinations of a shard and does its runs. `judge` returns the number of combinations that have no verdict because the judging was ended.
+/// Judges the combinations of a shard and does the shard's runs. `judge` returns the number of combinations without a verdict, above 0 if the judging was
+/// ended.
 pub(crate) fn shard(
     plan: CampaignPlan,
     shard: Shard,
@@ -50,9 +51,11 @@ fn work(
     if missing.map_err(Ended::Error)? > 0 {
         return Err(ended("each verdict that was made"));
     }
+    // An estimate of the shard's runs: the parts of a campaign need not divide evenly among the shards.
     let running = Shown::running(shared.campaign().runs() / shard.count(), 0);
     let report = shared.run(shard, &Working { shown: &running, worker });
     running.clear();
+    // A fault of the file system, such as a full disk, does not harm whole parts, so that the message tells how to continue.
     let report = report.map_err(|error| {
         if !matches!(error, CampaignError::File { .. }) {
             return Ended::Error(error);
@@ -96,7 +99,7 @@ impl Watch for Working<'_> {
     }
 }
 
-/// Prints which parts of the campaign are done in a folder.
+/// Prints the state of each part of the campaign in a folder: done or missing.
 pub(crate) fn status(json: bool, plan: CampaignPlan, folder: &Path) -> Result<ExitCode, Ended> {
     let parts = SharedCampaign::parts_in(plan, folder).map_err(Ended::Error)?;
     let pieces: Vec<Piece> = parts.iter().map(|part| Piece { units: part.runs, is_done: part.is_done }).collect();

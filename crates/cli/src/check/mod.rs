@@ -27,16 +27,16 @@ struct Checked {
     failures: Vec<String>,
     /// Outcome of each expectation. Empty if the scene could not be checked.
     expectations: Vec<OutcomeDocument>,
-    /// Notes on results that more computing time would make stronger or more exact.
+    /// Notes on results: more computing time would make these results stronger or more exact.
     notes: Vec<String>,
     /// `true` if the scene has an `[expect]` table.
     expects: bool,
-    /// Exit status that this scene alone would give the command.
+    /// Exit status of the command if this scene were the only scene.
     #[serde(skip)]
     status: u8,
 }
 
-/// Checks every scene and prints one line per scene. Continues after a scene that fails or cannot be read.
+/// Checks every scene and prints a line per scene. Failed and unreadable scenes do not end the check.
 pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitCode, Failure> {
     let mut files: Vec<Result<PathBuf, Checked>> = Vec::new();
     let mut first_error = None;
@@ -55,7 +55,7 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitCode, Failure> {
     }
     let progress = Progress::new(files.len() as u64, "checking scenes {bar:30} {pos}/{len}");
     let model = if arguments.general { Model::General } else { Model::Least };
-    // Each slot begins as "interrupted", so that a list printed by a signal names the scenes that were not finished.
+    // Each slot begins as "interrupted", so that a list printed by a signal names the unfinished scenes.
     let begun = files.iter().map(|file| file.as_ref().map_or_else(Clone::clone, |file| Checked::interrupted(file))).collect();
     let known: Arc<Mutex<Vec<Checked>>> = Arc::new(Mutex::new(begun));
     let (keeper, json) = (Arc::clone(&known), arguments.json);
@@ -134,7 +134,7 @@ impl Checked {
         Self::unchecked(path, error.to_string(), scene_status(error))
     }
 
-    /// Returns the result of a scene that was not checked because the user asked for the end before.
+    /// Returns the result of an unchecked scene: the user asked for the end before the check.
     fn interrupted(path: &Path) -> Self {
         Self::unchecked(path, "interrupted before it was checked".to_owned(), INTERRUPTED)
     }

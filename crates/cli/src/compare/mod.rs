@@ -28,6 +28,7 @@ const JUDGE: ByAnalysisOrRuns<'static> = ByAnalysisOrRuns(&Interruptible);
 /// Does the missing runs, and writes and prints the comparison of the strategies.
 pub(crate) fn compare(arguments: &CompareArguments) -> Result<ExitCode, Failure> {
     let asked = Asked::of(arguments).map_err(|error| Failure::Input(format!("--strategies: {error}")))?;
+    // These overrides tell a failure of a strategy from a failure of `--set`, so that the message names `--strategies`.
     let settings: Vec<String> = overrides(&asked.strategies);
     let refused = |error: CampaignError| campaign::failure(error, &arguments.scene.scene, &settings);
     let plan = plan(arguments, &asked).map_err(|error| error.unwrap_or_else(refused))?;
@@ -100,6 +101,7 @@ fn execute(arguments: &CompareArguments, sharing: Sharing<'_>, out: &Path, plan:
     let combinations = plan.combinations();
     let mut campaign = campaign::open(sharing, plan, out)?;
     let judging = Shown::judging(combinations);
+    // A merge makes no verdicts: the shards have made all of them.
     let by: &dyn Judge = if matches!(sharing, Sharing::Merge(_)) { &campaign::Nobody } else { &JUDGE };
     let judged = campaign.judge_apart(by, &judging);
     judging.clear();

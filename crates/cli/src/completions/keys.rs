@@ -1,4 +1,4 @@
-//! Keys of files, one part of the dotted path after the other, and words that a key takes.
+//! Keys of files, part by part of the dotted path, and the words of a key.
 
 use cohaptic_linkfile::document::{Node, Value};
 use cohaptic_linkfile::schema::{Form, Table};
@@ -29,10 +29,10 @@ pub(super) fn offers(root: &'static Table, document: &Node, typed: &str) -> Vec<
     offers
 }
 
-/// Returns the names of the ends of links: the peers of a scene or the programs of a relay. Names that a shell would read as more than a word are left out.
+/// Returns the names of the ends of links: the peers of a scene or the programs of a relay. Names with characters of meaning to a shell are left out.
 pub(super) fn ends(document: &Node) -> Vec<String> {
     let count = entry(Some(document), "scene").and_then(|scene| entry(Some(scene), "count"));
-    // As many as a scene may have. A greater number is refused by the reader, and would take long to list.
+    // Largest number of peers of a scene. The reader refuses a greater number, and the list would take long.
     const MOST: i128 = 100_000;
     if let Some(Value::Integer(Some(count))) = count.map(|count| &count.value) {
         return (1..=(*count).min(MOST)).map(|number| format!("peer{number}")).collect();
@@ -42,7 +42,7 @@ pub(super) fn ends(document: &Node) -> Vec<String> {
     names.filter(|name| is_word(name)).map(str::to_owned).collect()
 }
 
-/// A value that a file can have: its form, and the value that the file has, if any.
+/// A value of a file: the declared form, and the file's own value, if any.
 #[derive(Clone, Copy)]
 struct Place<'a> {
     form: Form,
@@ -61,11 +61,11 @@ fn parts(root: &'static Table, document: &Node, done: &[&str]) -> Vec<Offer> {
     }
 }
 
-/// Returns the places with the path `path`: one for each form that the value may have.
+/// Returns the places with the path `path`: a place per possible form of the value.
 fn places<'a>(root: &'static Table, document: &'a Node, path: &[&str]) -> Vec<Place<'a>> {
     let root_place = Place { form: Form::Table(root), node: Some(document) };
     match path {
-        // Both ends of a link name its entry. An entry has the keys of a link whether the file has the entry or not.
+        // Both ends of a link name the entry of the link. An entry has the keys of a link whether the file has the entry or not.
         ["links", _, _, rest @ ..] if is_list(root, "links") => {
             below(&root_place, &["links", "0"]).iter().flat_map(|link| below(link, rest)).collect()
         }
@@ -77,6 +77,7 @@ fn places<'a>(root: &'static Table, document: &'a Node, path: &[&str]) -> Vec<Pl
 fn below<'a>(place: &Place<'a>, path: &[&str]) -> Vec<Place<'a>> {
     let [first, rest @ ..] = path else { return vec![*place] };
     let node = place.node;
+    // All forms of a value are followed, also forms that the file's own value does not have: the user may want to change the form.
     if let Form::AnyOf(forms) = place.form {
         forms.iter().flat_map(|form| below(&Place { form: *form, node }, path)).collect()
     } else if let Form::Table(table) = place.form {
@@ -89,7 +90,7 @@ fn below<'a>(place: &Place<'a>, path: &[&str]) -> Vec<Place<'a>> {
     }
 }
 
-/// Returns the keys of a table, or the names of the entries of a list, with what follows them: `=` before a value, `.` before a further part.
+/// Returns the keys of a table, or the names of the entries of a list, each with the next sign: `=` before a value, `.` before a further part.
 fn keys(place: &Place<'_>) -> Vec<Offer> {
     let node = place.node;
     let offers = |name: &str, form: &Form, about| {
@@ -100,6 +101,7 @@ fn keys(place: &Place<'_>) -> Vec<Offer> {
         forms.iter().flat_map(|form| keys(&Place { form: *form, node })).collect()
     } else if let Form::Table(table) = place.form {
         let declared = table.keys().flat_map(|key| offers(key.name, &key.form, key.about));
+        // A table with free names declares no keys for these names. The names come from the file.
         let chosen = node.and_then(Node::as_table).into_iter().flat_map(|table| &table.0).map(|entry| entry.name.as_str());
         let chosen = chosen.filter(|name| table.key(name).is_none() && is_word(name));
         declared.chain(table.others.into_iter().flat_map(|form| chosen.clone().flat_map(|name| offers(name, form, "")))).collect()
@@ -110,7 +112,7 @@ fn keys(place: &Place<'_>) -> Vec<Offer> {
     }
 }
 
-/// Returns what can follow a key whose value has this form.
+/// Returns the possible signs after a key with a value of this form.
 fn signs(form: &Form) -> &'static [&'static str] {
     let has_keys = |form: &Form| matches!(form, Form::Table(_)) || matches!(form, Form::List(element) if element.table().is_some());
     if has_keys(form) {
@@ -120,7 +122,7 @@ fn signs(form: &Form) -> &'static [&'static str] {
     if matches!(form, Form::AnyOf(forms) if forms.iter().any(has_keys)) { &["=", "."] } else { &["="] }
 }
 
-/// Returns the words that a value of this form can be.
+/// Returns the possible words of a value of this form. Empty for a form without a closed set of words.
 fn words(form: Form) -> Vec<Offer> {
     if let Form::AnyOf(forms) = form {
         forms.iter().flat_map(|form| words(*form)).collect()
@@ -142,7 +144,7 @@ fn entry<'a>(node: Option<&'a Node>, name: &str) -> Option<&'a Node> {
     node?.as_table()?.get(name).map(|entry| &*entry.node)
 }
 
-/// Returns the entries of a list; none if the value is no list.
+/// Returns the entries of a list. Empty if the value is no list.
 fn entries(node: Option<&Node>) -> impl Iterator<Item = &Node> {
     let list = match node.map(|node| &node.value) {
         Some(Value::List(entries)) => entries.as_slice(),
@@ -151,7 +153,7 @@ fn entries(node: Option<&Node>) -> impl Iterator<Item = &Node> {
     list.iter().map(|entry| &**entry)
 }
 
-/// Returns the part of the path that names the entry of a list.
+/// Returns the last part of the path of a list's entry: the word for the entry in a dotted key.
 fn last_part(entry: &Node) -> &str {
     entry.path.rsplit('.').next().unwrap_or_default()
 }

@@ -1,7 +1,7 @@
-//! `cohaptic completions`: scripts with which shells complete a command line, and the answers that these scripts ask the program for.
+//! `cohaptic completions`: scripts for the completion of command lines by shells, and the program's answers to these scripts.
 //!
 //! Commands and options stand in a script, generated from the definitions of the arguments. Keys, peers and scenes depend on files, so that the scripts for
-//! bash, fish and zsh run the program with the words typed so far, and show what the program prints.
+//! bash, fish and zsh run the program with the words typed so far, and show the answer of the program.
 
 mod keys;
 mod paths;
@@ -25,14 +25,14 @@ use crate::init::shipped_names;
 use crate::output;
 use words::Asked;
 
-/// Text that can stand in place of what was typed, and its meaning, which may be empty.
+/// Proposed text in place of the typed text, and the meaning of the proposal, possibly empty.
 #[derive(Clone, PartialEq, Eq, Debug)]
 struct Offer {
     text: String,
     about: &'static str,
 }
 
-/// Prints the script of a shell or, if words of a command line are given, what can complete the last word.
+/// Prints the script of a shell or, if words of a command line are given, the proposals for the last word.
 pub(crate) fn completions(arguments: &CompletionsArguments) -> Result<ExitCode, Failure> {
     if arguments.words.is_empty() {
         output::raw(shells::script(arguments.shell).as_bytes())?;
@@ -43,8 +43,7 @@ pub(crate) fn completions(arguments: &CompletionsArguments) -> Result<ExitCode, 
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns a line for each text that can stand in place of the last word, in the form that the script of `shell` expects. Empty if the script itself knows
-/// what completes the word.
+/// Returns a line per proposal for the last word, in the form of the script of `shell`. Empty if the script itself completes the word.
 fn answer(shell: Shell, words: &[String]) -> String {
     let split = shells::Split::of(shell, words);
     let mut program = Arguments::program();
@@ -56,10 +55,10 @@ fn answer(shell: Shell, words: &[String]) -> String {
     offers.iter().map(|offer| split.line(&asked.option, offer)).collect()
 }
 
-/// Kind of values that depend on files.
+/// Kinds of values for which the program looks into files.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Kind {
-    /// `KEY=VALUE`, or several of them with commas between them.
+    /// `KEY=VALUE`, or with `many` several `KEY=VALUE` separated by commas.
     Keys { many: bool },
     /// Name of a peer of the scene.
     Peer,
@@ -70,7 +69,7 @@ enum Kind {
 }
 
 impl Kind {
-    /// Returns the kind of the values of an argument of `command`; `None` if they do not depend on files. The name of the value, which the help shows, says so.
+    /// Returns the kind of the values of an argument of `command`, by the name of the value in the help. `None` if the values do not depend on files.
     fn of(arg: &Arg, command: &str) -> Option<Self> {
         let name = arg.get_value_names()?.first()?.as_str();
         match (name, arg.is_positional()) {
@@ -83,7 +82,7 @@ impl Kind {
     }
 }
 
-/// Returns what can stand in place of the value that is asked for.
+/// Returns the proposals for the value at the end of the command line.
 fn offers(asked: &Asked<'_>) -> Vec<Offer> {
     let named = |text: String| Offer { text, about: "" };
     match Kind::of(asked.arg, asked.command) {
@@ -92,6 +91,7 @@ fn offers(asked: &Asked<'_>) -> Vec<Offer> {
         Some(Kind::File) => paths::offers(&asked.typed),
         Some(Kind::Peer) => keys::ends(&document(asked.file)).into_iter().map(named).collect(),
         Some(Kind::Keys { many }) => {
+            // Only the text after the last comma is completed. The text before stands unchanged in each proposal.
             let done = if many { asked.typed.rfind(',').map_or(0, |comma| comma + 1) } else { 0 };
             let (done, typed) = asked.typed.split_at(done);
             let kind = match asked.command {
@@ -105,10 +105,10 @@ fn offers(asked: &Asked<'_>) -> Vec<Offer> {
     }
 }
 
-/// Returns the document of a file. An unreadable file, which may be half written at this time, counts as an empty one: keys are known without it.
+/// Returns the document of a file. An unreadable file, perhaps half written at this time, counts as empty: keys are known without a file.
 fn document(file: Option<&str>) -> Node {
     let path = Path::new(file.unwrap_or_default());
-    // A pipe is not read: its writer means the text for the command that is being typed.
+    // A pipe is not read: the text in the pipe is meant for the typed command.
     let text = if path.is_file() { file_text(path).unwrap_or_default() } else { String::new() };
     let parsed = parse(Sources { file: path, text: &text, overrides: &[] }, |document, _| Some(document.clone()));
     parsed.map_or_else(|_| Node::empty_table(BEGINNING, String::new()), |parsed| parsed.document)

@@ -1,4 +1,4 @@
-//! Files that can be scenes, relay files or router files: those whose names end in `.toml`, and the folders on the way to them.
+//! Possible scenes, relay files and router files: files with names that end in `.toml`, and folders, which may hold such files.
 
 use std::path::Path;
 
@@ -11,12 +11,12 @@ pub(super) fn offers(typed: &str) -> Vec<Offer> {
     let mut offers: Vec<Offer> = entries
         .filter_map(|entry| {
             let entry = entry.ok()?;
-            // A name that is not UTF-8 cannot be compared with what was typed, and one with a line break would read as two.
+            // A name that is not UTF-8 cannot be compared with the typed text, and a name with a line break would read as two names.
             let own = entry.file_name().into_string().ok().filter(|own| !own.contains(char::is_control))?;
             if !own.starts_with(name) || (own.starts_with('.') && !name.starts_with('.')) {
                 return None;
             }
-            // Follows links, which may lead to folders.
+            // `is_dir` follows symbolic links, so that a link to a folder counts as a folder.
             let is_folder = entry.path().is_dir();
             (is_folder || own.ends_with(".toml")).then(|| Offer { text: format!("{folder}{own}{}", if is_folder { "/" } else { "" }), about: "" })
         })

@@ -6,10 +6,10 @@ use clap_complete::Shell;
 use super::{Kind, Offer};
 use crate::arguments::Arguments;
 
-/// First line of the function that completes, in the generated scripts for bash and zsh.
+/// First line of the completing function in the generated scripts for bash and zsh.
 const FUNCTION: &str = "_cohaptic() {\n";
 
-/// Beginning of the function for bash. Without an answer the generated part goes on. `compopt` came with bash 4; without it a space follows each completion.
+/// Beginning of the function for bash. Without an answer the generated part goes on. Bash 3 lacks `compopt`, so that a space follows each completion there.
 const BASH: &str = r#"    local answer
     COMPREPLY=()
     while IFS= read -r answer; do
@@ -50,7 +50,7 @@ end
 complete -c cohaptic -n __cohaptic_has_answers -f -a "(__cohaptic_answers)"
 "#;
 
-/// Returns the script with which a shell completes commands, options and, in bash, fish and zsh, the values that depend on files.
+/// Returns the completion script of a shell: for commands, options and, in bash, fish and zsh, values from files.
 pub(super) fn script(shell: Shell) -> String {
     let mut generated = Vec::new();
     let mut program = Arguments::program();
@@ -64,9 +64,10 @@ pub(super) fn script(shell: Shell) -> String {
     }
 }
 
-/// Returns a line for each option whose values depend on files.
+/// Returns a line per option with values from files.
 fn fish_options(program: &Command) -> String {
     let mut lines: Vec<String> = Vec::new();
+    // All commands are visited, with the subcommands of subcommands. An option of several commands gives a single line.
     let mut commands = vec![program];
     while let Some(command) = commands.pop() {
         commands.extend(command.get_subcommands());
@@ -77,6 +78,7 @@ fn fish_options(program: &Command) -> String {
             }
         }
     }
+    // Sorted, so that the script does not depend on the order of the visit.
     lines.sort();
     lines.concat()
 }
@@ -88,16 +90,16 @@ fn names(arg: &Arg) -> String {
     short.into_iter().chain(long).collect::<Vec<_>>().join(" ")
 }
 
-/// Words of a command line as the program reads them, and the form in which the shell expects an answer.
+/// Words of a command line as the program reads words, and the shell, which determines the form of an answer.
 pub(super) struct Split {
     pub(super) words: Vec<String>,
     shell: Shell,
-    /// Bytes of the last word that the shell takes for other words and does not replace.
+    /// Number of bytes at the beginning of the last word that the shell does not replace, because the shell takes these bytes for earlier words.
     kept: usize,
 }
 
 impl Split {
-    /// Returns the words that a script passed on. Bash splits words at `=` and `:`, and passes these characters on as words of their own.
+    /// Joins the words of a script to words of the program. Bash splits words at `=` and `:`, and passes each of these characters on as a separate word.
     pub(super) fn of(shell: Shell, words: &[String]) -> Self {
         if shell != Shell::Bash {
             return Self { words: words.to_vec(), shell, kept: 0 };
@@ -107,6 +109,7 @@ impl Split {
         let mut kept = 0;
         let mut after_break = false;
         for word in words {
+            // A break, and the word after a break, continue the word before: `a`, `=` and `b` stand for `a=b`.
             match joined.last_mut() {
                 Some(last) if after_break || is_break(word) => {
                     kept = if is_break(word) { last.len() + word.len() } else { last.len() };
@@ -127,7 +130,7 @@ impl Split {
         let Offer { text, about } = offer;
         let meaning = if about.is_empty() { String::new() } else { format!("\t{about}") };
         match self.shell {
-            // Bash replaces the text after the last `=` or `:`, as it is: what the shell would read as more than a word is quoted here.
+            // Bash inserts the answer unchanged after the last `=` or `:`, so that characters with a meaning to the shell are quoted here.
             Shell::Bash => format!("{}\n", quoted(format!("{option}{text}").get(self.kept..).unwrap_or_default())),
             // Zsh replaces the whole word, fish the value.
             Shell::Zsh => format!("{option}{text}{meaning}\n"),
@@ -136,7 +139,7 @@ impl Split {
     }
 }
 
-/// Returns a word with a backslash before each character that has a meaning in bash.
+/// Returns a word with a backslash before each character that may have a meaning in bash.
 fn quoted(word: &str) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || matches!(c, '.' | '/' | '-' | '_' | '=' | ',' | '+' | '@' | '%');
     word.chars().flat_map(|c| (!is_plain(c)).then_some('\\').into_iter().chain([c])).collect()

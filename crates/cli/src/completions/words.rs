@@ -1,8 +1,8 @@
-//! Which argument the last word of a command line belongs to.
+//! Finds the argument of the last word of a command line.
 
 use clap::{Arg, Command};
 
-/// The argument whose value is being typed, at the end of a command line.
+/// The argument at the end of a command line, with the typed part of the value.
 #[derive(Debug)]
 pub(super) struct Asked<'a> {
     /// Name of the command, without the names of the commands above it.
@@ -10,9 +10,9 @@ pub(super) struct Asked<'a> {
     pub(super) arg: &'a Arg,
     /// Part of the last word before the value: `--set=` or `-s` if the value is written together with its option, else empty.
     pub(super) option: String,
-    /// Part of the value that is typed already.
+    /// Typed part of the value.
     pub(super) typed: String,
-    /// First positional argument before the last word: the file of the command, if it takes one.
+    /// First positional argument before the last word: the file of the command, if the command takes a file.
     pub(super) file: Option<&'a str>,
 }
 
@@ -32,11 +32,11 @@ pub(super) fn asked<'a>(program: &'a Command, words: &'a [String]) -> Option<Ask
     Some(Asked { command: state.command.get_name(), arg, option: option.to_owned(), typed, file: state.positionals.first().copied() })
 }
 
-/// Part that a word has in a command line.
+/// Role of a word in a command line.
 enum Word<'a, 'w> {
     /// The value of the option before the word.
     Value(&'a Arg),
-    /// An option, if it is known, and the value in the same word.
+    /// An option (`None` for an unknown option), and the value in the same word.
     Option(Option<&'a Arg>, Option<&'w str>),
     /// A command or a positional argument.
     Positional,
@@ -48,7 +48,7 @@ enum Word<'a, 'w> {
 struct State<'a> {
     command: &'a Command,
     positionals: Vec<&'a str>,
-    /// Option whose value comes next.
+    /// Option before the next word, if the option takes a value.
     pending: Option<&'a Arg>,
     only_positionals: bool,
 }
@@ -57,6 +57,7 @@ impl<'a> State<'a> {
     fn read<'w>(&self, word: &'w str) -> Word<'a, 'w> {
         // A lone dash is standard input, and thus a value.
         let is_option = !self.only_positionals && word.starts_with('-') && word != "-";
+        // `-0.5` looks like an option, and is a value if the option before allows negative numbers.
         let is_number = word.chars().nth(1).is_some_and(|c| c.is_ascii_digit());
         match self.pending {
             Some(arg) if !is_option || (is_number && arg.is_allow_negative_numbers_set()) => Word::Value(arg),
@@ -75,7 +76,7 @@ impl<'a> State<'a> {
         Word::Option(self.command.get_arguments().find(has_name), value)
     }
 
-    /// Reads letters after one dash: flags, and at most one option, whose value is the rest of the word.
+    /// Reads letters after a single dash: flags, and at most one option with the rest of the word as the value.
     fn short<'w>(&self, letters: &'w str) -> Word<'a, 'w> {
         for (place, letter) in letters.char_indices() {
             let found = self.command.get_arguments().find(|arg| arg.get_short() == Some(letter));
@@ -103,7 +104,7 @@ impl<'a> State<'a> {
         }
     }
 
-    /// Returns the positional argument that `word` begins.
+    /// Returns the positional argument for `word`. `None` if `word` may become the name of a subcommand.
     fn positional(&mut self, word: &str) -> Option<&'a Arg> {
         if self.command.get_subcommands().any(|command| command.get_name().starts_with(word)) {
             return None;
@@ -113,7 +114,7 @@ impl<'a> State<'a> {
         all.get(self.positionals.len()).or_else(|| all.last().filter(|arg| takes_many(arg))).copied()
     }
 
-    /// Returns the command that is meant where a file stands in place of a command: `stability FILE` is `stability point FILE`.
+    /// Returns the command for a file in place of a command: `stability FILE` is `stability point FILE`.
     fn file_command(&self) -> Option<&'a Command> {
         self.command.find_subcommand("point")
     }
