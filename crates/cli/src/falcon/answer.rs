@@ -1,4 +1,4 @@
-//! Parts of the answers of `cohaptic falcon`: the structures that the JSON documents of several commands share, and the same values as lines of text.
+//! Parts of the answers of `cohaptic falcon`: the structures in common to the JSON documents of several commands, and the same values as lines of text.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -77,7 +77,7 @@ impl Traffic {
     }
 }
 
-/// Statistics of the forces that were asked for: the limit, the largest force, and the number of changes per kind of change.
+/// Statistics of the requested forces: the limit, the largest force, and the number of changes per kind of change.
 #[derive(Serialize)]
 pub(super) struct Forces {
     pub(super) limit_n: f64,
@@ -89,7 +89,7 @@ pub(super) struct Forces {
 }
 
 impl Forces {
-    /// Reads the statistics of `bench`. Causes for which no force became zero are left out.
+    /// Reads the statistics of `bench`. Causes without a zeroed force are left out.
     pub(super) fn of(bench: &Bench, limit_n: f64, largest_n: f64) -> Self {
         let statistics = bench.statistics();
         let zeroed = ZeroCause::ALL.into_iter().map(|cause| (cause.name(), statistics.zeroed_by(cause))).filter(|(_, count)| *count > 0).collect();
@@ -97,7 +97,7 @@ impl Forces {
     }
 }
 
-/// State of a device as its driver sees it. Triples of encoders are in the order top, right, left; position and velocity are `None` until homed.
+/// State of a device in the view of the driver. Triples of encoders are in the order top, right, left; position and velocity are `None` until homed.
 #[derive(Clone, Serialize)]
 pub(super) struct Seen {
     pub(super) phase: &'static str,
@@ -152,7 +152,7 @@ impl FirmwareState {
 }
 
 impl End {
-    /// Returns the name of the end in JSON documents. A task that has seen enough and a time that is over are both `complete`.
+    /// Returns the name of the end in JSON documents. A complete task and a passed time limit are both `complete`.
     pub(super) const fn name(self) -> &'static str {
         match self {
             Self::Enough | Self::Over => "complete",

@@ -15,7 +15,7 @@ use crate::interrupt;
 /// Time between the beginnings of two exchanges. USB allows at most one exchange per millisecond.
 const PERIOD: Duration = Duration::from_millis(1);
 
-/// Lateness from which a turn counts as late. The serial chip delivers received bytes once per millisecond by its own clock, so that less is no fault.
+/// Least lateness of a late turn. The serial chip delivers received bytes once per millisecond by a clock of its own, so that a smaller lateness is no fault.
 const LATE: Duration = Duration::from_micros(100);
 
 /// The work of a command on a device, called once per exchange.

@@ -1,4 +1,4 @@
-//! Messages that lead a user through homing, from a silent device to an active device.
+//! Messages for a user during homing, from a silent device to an active device.
 
 use cohaptic_falcon::driver::{Phase, Status};
 
@@ -8,7 +8,7 @@ use crate::progress::Progress;
 /// Prints the next step of homing whenever the driver's phase changes.
 #[derive(Debug)]
 pub(super) struct Guide {
-    /// Phase seen last, whose message has been printed if the phase has a message.
+    /// Phase seen last. The message of the phase, if any, has been printed.
     said: Option<Phase>,
     /// `true` if the command asks the device for force. Without force the device never becomes active, and the last step of homing is left out.
     pushes: bool,
@@ -24,6 +24,7 @@ impl Guide {
         if self.said == Some(status.phase) {
             return;
         }
+        // Phases without a message are noted too: a return from such a phase prints the message of the earlier phase again.
         self.said = Some(status.phase);
         if let Some(what) = what_to_do(status.phase, self.pushes) {
             line.aside(|| say(what));

@@ -42,7 +42,7 @@ struct Entry {
     name: String,
 }
 
-/// Statistics and last state of a device that answered.
+/// Statistics and last state of an answering device.
 #[derive(Serialize)]
 struct Answered {
     #[serde(flatten)]
@@ -51,7 +51,7 @@ struct Answered {
     seen: Seen,
 }
 
-/// Probes every Falcon that the arguments select, one after the other, and answers with the results of all.
+/// Probes the selected Falcons in turn, and answers with the results of all.
 pub(super) fn probe(arguments: &ProbeArguments) -> Result<ExitCode, Failure> {
     let firmware = reach::read_firmware(arguments.which.firmware.as_deref())?;
     let targets = reach::targets(&arguments.which)?;
@@ -83,6 +83,7 @@ pub(super) fn probe(arguments: &ProbeArguments) -> Result<ExitCode, Failure> {
 impl Entry {
     fn of(target: &Target, firmware: Option<&Firmware>, length: Duration) -> Result<Self, Failure> {
         let mut entry = Self { identity: Identity::of(target), opened: false, firmware: None, answered: None, error: None, name: target.name() };
+        // Each step may fail. The entry then keeps the results of the steps before, and the error.
         let mut way = match target.open() {
             Ok(way) => way,
             Err(error) => return Ok(Self { error: Some(error.to_string()), ..entry }),

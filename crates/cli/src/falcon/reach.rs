@@ -21,7 +21,7 @@ use crate::realtime::loading;
 /// Amplitudes \[m\] and frequency \[Hz\] of the swaying simulated hand.
 pub(super) const SWAY: ([f64; 3], f64) = ([0.020, 0.015, 0.010], 0.5);
 
-/// A device that the arguments select.
+/// A selected device.
 #[derive(Clone, Debug)]
 pub(super) enum Target {
     Usb(Listed),
@@ -39,7 +39,7 @@ pub(super) enum FirmwareState {
     Loaded,
 }
 
-/// Returns every device that the arguments select, at least one. No device, or none with the serial number, is a failure.
+/// Returns the selected devices, at least one. No connected device, or no device with the serial number, is a failure.
 pub(super) fn targets(which: &WhichFalcon) -> Result<Vec<Target>, Failure> {
     if which.simulated {
         return Ok(vec![Target::Simulated { in_virtual_time: which.virtual_time, switched_on: which.firmware.is_some() }]);
@@ -52,10 +52,11 @@ pub(super) fn targets(which: &WhichFalcon) -> Result<Vec<Target>, Failure> {
 fn meant(all: Vec<Listed>, serial: Option<&str>) -> Result<Vec<Listed>, UsbError> {
     let Some(serial) = serial else { return if all.is_empty() { Err(UsbError::NoDevice) } else { Ok(all) } };
     let meant: Vec<Listed> = all.iter().filter(|listed| listed.serial.as_deref() == Some(serial)).cloned().collect();
+    // The error lists the connected devices, so that the user can choose another serial number.
     if meant.is_empty() { Err(UsbError::NoSuchSerial { serial: serial.to_owned(), others: all }) } else { Ok(meant) }
 }
 
-/// Returns the only device that the arguments select. Several devices are a failure, which lists the devices.
+/// Returns the only selected device. Several devices are a failure with a list of the devices.
 pub(super) fn target(which: &WhichFalcon) -> Result<Target, Failure> {
     let mut all = targets(which)?;
     if all.len() > 1 {
@@ -118,7 +119,7 @@ pub(super) fn read_firmware(path: Option<&Path>) -> Result<Option<Firmware>, Fai
     })
 }
 
-/// Makes sure that the device runs firmware: checks a device without `firmware`, and loads `firmware` into a device that runs none.
+/// Makes sure that the device runs firmware: checks a device without `firmware`, and loads `firmware` into a device without running firmware.
 ///
 /// The error is the obstacle in words, for the user.
 pub(super) fn make_ready(way: &mut AnyTransport, firmware: Option<&Firmware>) -> Result<FirmwareState, String> {
@@ -134,6 +135,7 @@ pub(super) fn make_ready(way: &mut AnyTransport, firmware: Option<&Firmware>) ->
         if let Progress::Loaded { done, .. } = progress {
             bar.reach_number(done as u64);
         }
+        // Events other than single blocks of bytes are printed as lines above the bar.
         if let Some(said) = loading(progress) {
             bar.aside(|| say(&said));
         }

@@ -46,7 +46,7 @@ struct SimulateDocument {
     largest_motor_force_n: f64,
 }
 
-/// A change of the driver's phase: instant of the change \[s\], name of the new phase, colour of its light.
+/// A change of the driver's phase: instant of the change \[s\], name of the new phase, colour of the light.
 #[derive(Clone, Serialize)]
 struct Change {
     t_s: f64,
@@ -54,7 +54,7 @@ struct Change {
     light: &'static str,
 }
 
-/// Runs driver and simulated device in virtual time, with the faults that the arguments ask for, and writes the answer.
+/// Runs driver and simulated device in virtual time, with the faults of the arguments, and writes the answer.
 pub(super) fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failure> {
     let probability = |given: Option<Probability>| given.map_or(0.0, Probability::get);
     let (garbage, drop) = (probability(arguments.garbage), probability(arguments.drop));
@@ -115,7 +115,7 @@ impl SimulateDocument {
     }
 }
 
-/// Simulated hand that `--hand` selects.
+/// Simulated hand of `--hand`.
 enum HeldBy {
     Nobody(StillHand),
     User(Waypoints),
@@ -164,7 +164,7 @@ struct Simulating {
 }
 
 impl Simulating {
-    /// Notes the phase at `at`, if the phase differs from the one noted last.
+    /// Notes the phase at `at`, if the phase differs from the phase noted last.
     fn change(&mut self, at: Duration, phase: Phase) {
         if self.phase == phase {
             return;
@@ -249,7 +249,7 @@ impl Truth {
     }
 }
 
-/// Counts that the simulated device keeps of the packets and bytes from its host.
+/// Counts of the simulated device over the packets and bytes from the host.
 #[derive(Serialize)]
 struct DeviceDocument {
     commands: u64,

@@ -199,6 +199,7 @@ impl Watching {
         }
         self.largest_force = self.largest_force.max(answer::length(status.force));
         if let Some(reading) = status.reading {
+            // The first reading begins the range: before homing no position is known.
             let (lowest, highest) = self.range.get_or_insert((reading.position, reading.position));
             for (axis, part) in reading.position.into_iter().enumerate() {
                 (lowest[axis], highest[axis]) = (lowest[axis].min(part), highest[axis].max(part));
@@ -232,8 +233,8 @@ impl Task for Watching {
     }
 }
 
-/// Returns the state of the device for a terminal: a line about the device, and a line per axis that shows where the grip is. Encoders stand in for a position
-/// that is unknown.
+/// Returns the state of the device for a terminal: a line about the device, and a line per axis with the place of the grip. Encoders stand in for an unknown
+/// position.
 fn shown(at: Duration, status: &Status) -> String {
     let seen = Seen::of(status);
     let pressed = if seen.buttons.is_empty() { "none".to_owned() } else { seen.buttons.join(", ") };
@@ -250,14 +251,15 @@ fn shown(at: Duration, status: &Status) -> String {
     format!("{text}\n  speed {:.3} m/s", answer::length(velocity))
 }
 
-/// Half of the length that a ruler shows \[mm\]. The grip of a Falcon moves by about that much to either side of the origin.
+/// Half of the length of a ruler \[mm\]. The grip of a Falcon moves by about this length to either side of the origin.
 const REACH_MM: f64 = 60.0;
-/// Number of places of a ruler, an odd number, so that the origin has one of its own.
+/// Number of places of a ruler. Odd, so that the origin has a place.
 const PLACES: u8 = 31;
 
 /// Returns a ruler with the grip at `place` \[mm\] and the origin in the middle. A place beyond the ends is shown at the end.
 fn ruler(place: f64) -> String {
     let last = f64::from(PLACES - 1);
+    // Place 0 is `-REACH_MM`, the middle place is the origin, and the last place is `REACH_MM`.
     let grip = ((place / REACH_MM + 1.0) * 0.5 * last).round().clamp(0.0, last);
     (0..PLACES)
         .map(|at| {

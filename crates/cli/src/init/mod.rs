@@ -1,6 +1,6 @@
-//! `cohaptic init`: writes a shipped scene as a commented file, from which a user begins a scene of his own.
+//! `cohaptic init`: writes a shipped scene as a commented file, the beginning of a user's own scene.
 //!
-//! `shipped` holds the texts of the scenes, this module changes the number of peers, and `write` writes the text with its comments.
+//! `shipped` holds the texts of the scenes, this module changes the number of peers, and `write` writes the text with comments.
 
 mod shipped;
 #[cfg(test)]
@@ -55,7 +55,7 @@ fn commented(name: &str, text: &str, peers: Option<u32>) -> Result<String, Failu
     Ok(write::scene(&scene, name, (wanted != own).then_some(own)))
 }
 
-/// Returns one line per name of a shipped scene: the name and the scene's title.
+/// Returns a line per name of a shipped scene: the name and the scene's title.
 fn list() -> Result<String, Failure> {
     let width = shipped::names().map(str::len).max().unwrap_or(0);
     let mut list = String::new();
@@ -94,7 +94,7 @@ fn peer_count(scene: &Table) -> usize {
 fn change_peers(scene: &mut Table, wanted: usize) {
     scene.remove("expect");
     let header = scene.get_mut("scene").and_then(Value::as_table_mut);
-    // Peers of a scene with `count` are called peer1, peer2, … and need no entry: an entry only overrides keys of the peer that the entry names.
+    // Peers of a scene with `count` are called peer1, peer2, … and need no entry: an entry only overrides keys of the named peer.
     let left_out = match header.filter(|header| header.contains_key("count")) {
         Some(header) => {
             header.insert("count".to_owned(), Value::Integer(i64::try_from(wanted).unwrap_or(i64::MAX)));
@@ -114,7 +114,7 @@ fn change_peers(scene: &mut Table, wanted: usize) {
             names.into_iter().skip(wanted).collect()
         }
     };
-    // An entry that names a peer which no longer exists would make the scene invalid.
+    // An entry of a removed peer would make the scene invalid.
     for list in ["links", "timeline"] {
         if let Some(Value::Array(entries)) = scene.get_mut(list) {
             entries.retain(|entry| !mentions(entry, &left_out));
@@ -154,7 +154,7 @@ fn add_like_the_last(peers: &mut Vec<Value>, wanted: usize) {
     }
 }
 
-/// Returns whether an entry of `links` or `timeline` names one of the peers `names`: under `from`, `to` or `peer`, or under `from` or `to` of its `link`.
+/// Returns whether an entry of `links` or `timeline` names a peer of `names`: under `from`, `to` or `peer`, or under `from` or `to` of the entry's `link`.
 fn mentions(entry: &Value, names: &[String]) -> bool {
     let is_one = |value: Option<&Value>| value.and_then(Value::as_str).is_some_and(|name| names.iter().any(|out| out == name));
     let ends = |value: &Value| is_one(value.get("from")) || is_one(value.get("to"));

@@ -1,9 +1,9 @@
-//! The texts of the shipped scenes, compiled into the program. Scenes that read a data file beside them are left out.
+//! The texts of the shipped scenes, compiled into the program. Scenes with a data file are left out, because a written scene would lack the file.
 
 /// Alias names of shipped scenes, each with the scene's own name.
 const OTHER_NAMES: [(&str, &str); 2] = [("paper/5-1", "paper/5-1-ap-2100"), ("paper/5-2", "paper/5-2-ap")];
 
-/// Returns the own name and the text of the scene that has `name` as its own name or as its alias; `None` if no shipped scene has the name.
+/// Returns the own name and the text of the scene with the own name or alias `name`; `None` if no shipped scene has the name.
 pub(super) fn find(name: &str) -> Option<(&'static str, &'static str)> {
     let name = OTHER_NAMES.iter().find(|(other, _)| *other == name).map_or(name, |(_, own)| own);
     SCENES.iter().copied().find(|(own, _)| *own == name)

@@ -1,4 +1,4 @@
-//! Writes a scene as TOML text with a comment for every key. Keys that the scene does not set follow a `#`, as proposals.
+//! Writes a scene as TOML text with a comment for every key. Keys without a value in the scene follow a `#`, as proposals.
 //!
 //! Meanings, units and defaults come from the schema of scene files, so that no text about a key stands twice in the program.
 
@@ -8,10 +8,10 @@ use cohaptic_linkfile::schema::{Form, Key, Need, Table};
 use cohaptic_scene::schema::FileSchema;
 use toml::Value;
 
-/// Column in which the comment of a line begins, unless the key and its value need more columns.
+/// Column in which the comment of a line begins, unless key and value need more columns.
 const COLUMN: usize = 30;
 
-/// Proposed values of keys for which the schema's default, or the lack of a default, would be no useful proposal.
+/// Proposed values of keys without a useful default in the schema.
 const EXAMPLES: [(&str, &str); 6] = [
     ("enclosure", "{ min = -0.1, max = 0.1, stiffness = 1000.0, damping = 5.0 }"),
     ("clock", "{ offset = \"300us\", drift = \"20ppm\" }"),
@@ -21,7 +21,7 @@ const EXAMPLES: [(&str, &str); 6] = [
     ("queue", "{ limit = \"100 packets\" }"),
 ];
 
-/// Keys that are never proposed: each has a meaning only together with other keys, some of them only with an inertia of the object.
+/// Keys without a proposal: each key has a meaning only together with other keys, some only with an inertia of the object.
 const NOT_PROPOSED: [&str; 8] = ["count", "substeps", "netem-profile", "name", "orientation", "angular-velocity", "grasp", "rotation-steps"];
 
 /// Returns `scene` as commented text. `other_number` is the number of peers of the shipped scene `name`, if `scene` has a different number.
@@ -45,7 +45,7 @@ pub(super) fn scene(scene: &toml::Table, name: &str, other_number: Option<usize>
 
 /// Appends one top-level key of the scene: a table, or every entry of a list of tables. A key of another form appends nothing.
 fn part(text: &mut String, key: &Key, value: Option<&Value>) {
-    // Tables whose keys people change are written even if the scene has none.
+    // These tables hold the keys that users change first, and are written even if the scene lacks the table.
     let is_proposed = matches!(key.name, "simulation" | "peer" | "link");
     if let Form::Table(table) = &key.form
         && (value.is_some() || is_proposed)
@@ -57,7 +57,7 @@ fn part(text: &mut String, key: &Key, value: Option<&Value>) {
     }
     if let (Form::List(Form::Table(table)), Some(entries)) = (&key.form, value.and_then(Value::as_array)) {
         for (number, entry) in entries.iter().enumerate() {
-            // The meaning of the list stands above its first entry only.
+            // The meaning of the list stands only above the first entry.
             let about = if number == 0 { format!("# {}.\n", key.about) } else { String::new() };
             let _ = writeln!(text, "\n{about}[[{}]]", key.name);
             if let Some(entry) = entry.as_table() {
@@ -67,7 +67,7 @@ fn part(text: &mut String, key: &Key, value: Option<&Value>) {
     }
 }
 
-/// Appends the keys of `table` that `values` sets and, if `propose`, the remaining keys as proposals. The order is the order of the schema.
+/// Appends the keys of `table` with a value in `values` and, if `propose`, the remaining keys as proposals. The order is the order of the schema.
 fn fields(text: &mut String, table: &Table, values: &toml::Table, propose: bool) {
     for key in table.keys() {
         match values.get(key.name) {
@@ -78,7 +78,7 @@ fn fields(text: &mut String, table: &Table, values: &toml::Table, propose: bool)
     }
 }
 
-/// Appends a key that the scene sets. Comments on an inline table or on a list of tables stand above the key, because the line itself is long.
+/// Appends a key of the scene. Comments on an inline table or on a list of tables stand above the key, because the line itself is long.
 fn field(text: &mut String, key: &Key, value: &Value) {
     if let Some(within) = value.as_table() {
         let _ = writeln!(text, "# {}: {}", key.name, about(key));

@@ -1,4 +1,4 @@
-//! `cohaptic link`: drives one link with a steady stream of packets and measures what the link does.
+//! `cohaptic link`: drives a link with a steady stream of packets and measures the link.
 
 mod library;
 mod spec;
@@ -24,10 +24,10 @@ use crate::{interrupt, output};
 use spec::Spec;
 pub(crate) use spec::link_and_keys;
 
-/// Number of packets without `--packets`, for links that are not a replay.
+/// Number of packets without `--packets`, for links other than a replay.
 const PACKETS: u64 = 100_000;
 
-/// Drives one link, and prints the configured figures beside the measured figures.
+/// Drives a link, and prints the configured figures beside the measured figures.
 pub(crate) fn link(arguments: &LinkArguments) -> Result<ExitCode, Failure> {
     if arguments.list || arguments.show {
         return library::answer(arguments).map(|()| ExitCode::SUCCESS);
@@ -40,6 +40,7 @@ pub(crate) fn link(arguments: &LinkArguments) -> Result<ExitCode, Failure> {
 }
 
 fn drive(arguments: &LinkArguments, spec: Spec) -> Result<(Measured, Written), Failure> {
+    // A replay without `--packets` offers as many packets as the log has.
     let wanted = arguments.packets.map(Into::into).or(spec.packets).unwrap_or(PACKETS);
     let info = PacketInfo { size: arguments.size, ecn_capable: arguments.ecn };
     let stream = SteadyStream { packets: wanted, every: arguments.every, info };
@@ -72,7 +73,7 @@ fn drive(arguments: &LinkArguments, spec: Spec) -> Result<(Measured, Written), F
     Ok((meter.finish(spec.said, spec.asked, [sent, wanted]), Written { packets_per_s, files }))
 }
 
-/// Files that the packets of a link are written to.
+/// Files for the packets of a link.
 struct Sinks {
     fates: Option<Sink<FateWriter<WholeFile>>>,
     capture: Option<Sink<CaptureWriter<WholeFile>>>,

@@ -17,13 +17,13 @@ use crate::arguments::{LinkArguments, Profile};
 use crate::failure::Failure;
 use crate::{file, output};
 
-/// Model of a link, with the figures that the configuration asks for.
+/// Model of a link, with the figures of the configuration.
 pub(super) struct Spec {
     /// Configuration as the user wrote it, for the report.
     pub(super) said: String,
     pub(super) model: LinkModel,
     pub(super) asked: Asked,
-    /// Number of packets in the log of a replay. `None` for other links, and if the number exceeds 64 bits.
+    /// Number of packets in the log of a replay. `None` without a replay, and if the number exceeds 64 bits.
     pub(super) packets: Option<u64>,
 }
 
@@ -80,7 +80,7 @@ fn of_keys(spec: &[String], arguments: &LinkArguments) -> Result<(LinkModel, Ask
     Ok((model, asked))
 }
 
-/// Returns the link that words of tc-netem or keys describe, and the keys of the link. Words are stored under the one key `netem`. An empty `spec` gives an
+/// Returns the link of the words of tc-netem or of the keys, and the keys of the link. Words are stored under the single key `netem`. An empty `spec` gives an
 /// ideal link.
 pub(crate) fn link_and_keys(spec: &[String]) -> Result<(LinkModel, LinkKeys), Failure> {
     let nothing = LinkKeys::default();
@@ -113,11 +113,11 @@ fn not_exact(said: &str, error: &ExactError) -> Failure {
     Failure::Input(format!("{error}\n{}", below(said, error.option())))
 }
 
-/// Returns the link that does exactly what the words say, or the reason why no link can.
+/// Returns the link with exactly the behaviour of the words, or the reason why there is no such link.
 ///
 /// # Errors
 ///
-/// A failure if a table of a distribution that the words name cannot be read.
+/// A failure if the table of a named distribution cannot be read.
 fn exact(netem: &Netem) -> Result<Result<LinkConfig, ExactError>, Failure> {
     let mut fault = None;
     let exact = netem.to_link_config(&mut |name| {
@@ -148,7 +148,7 @@ fn of_words(arguments: &LinkArguments, said: &str) -> Result<(LinkModel, Asked),
             let tables = tables.collect();
             fault.map_or(Ok(()), Err)?;
             let kernel = KernelNetem::new(netem, tables).map_err(|error| Failure::Input(error.to_string()))?;
-            // The report compares with what the words say, also where the kernel is known to do something else.
+            // The report compares with the figures of the words, also where the kernel is known to deviate.
             Ok((kernel.into(), asked))
         }
     }
@@ -179,8 +179,8 @@ fn in_table(name: &TableName, error: &cohaptic_wan::law::DistTableError) -> Fail
     Failure::Input(format!("{}.dist: {error}", name.as_str()))
 }
 
-/// Returns the words with a mark under the option at fault. The user may have abbreviated the option, so the mark stands under the longest word that the name
-/// of the option begins with, and under the first of equal words.
+/// Returns the words with a mark under the option at fault. The user may have abbreviated the option, so the mark stands under the longest word that begins the
+/// name of the option, and under the first of equal words.
 fn below(said: &str, option: &str) -> String {
     let words = said.split(' ').scan(0, |start, word| {
         let at = *start;
@@ -189,6 +189,7 @@ fn below(said: &str, option: &str) -> String {
     });
     let found = words.filter(|(_, word)| !word.is_empty() && option.starts_with(word)).max_by_key(|(at, word)| (word.len(), usize::MAX - at));
     let (at, length) = found.map_or((0, 1), |(at, word)| (at, word.len()));
+    // `at` counts bytes, and a terminal shows characters.
     format!("{said}\n{}{}", " ".repeat(said[..at].chars().count()), "^".repeat(length))
 }
 
