@@ -1,4 +1,4 @@
-//! `cohaptic live`: runs a scene by the wall clock, with peers that are attached by network or as Falcons.
+//! `cohaptic live`: runs a scene by the wall clock, with peers attached by network or as Falcons.
 
 mod answer;
 pub(crate) mod onlookers;
@@ -111,8 +111,7 @@ fn run(arguments: &LiveArguments, path: &Path) -> Result<ExitCode, Failure> {
     Ok(if interrupt::requested() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }
 
-/// Opens everything that the session needs before its time begins: the key, the devices and the sockets. Returns `None` if the user asked for the end while
-/// waiting.
+/// Opens the key, the devices and the sockets before the time of the session begins. Returns `None` if the user asked for the end while waiting.
 fn open(arguments: &LiveArguments, scene: &Scene, content: SceneContent) -> Result<Option<Session>, Failure> {
     let real_time = &arguments.real_time;
     let key = match &arguments.key_file {
@@ -134,15 +133,15 @@ fn open(arguments: &LiveArguments, scene: &Scene, content: SceneContent) -> Resu
 }
 
 fn conduct(scene: &Scene, session: Session, mut host: SessionConductor, control: &LiveControl) -> Result<Report, Failure> {
-    // From its first sample on, the session has a record worth keeping, and it asks the conductor 50 times per second whether to go on. A signal therefore ends
-    // the session in order.
+    // From the first sample on, the session has a record worth keeping, and the session asks the conductor 50 times per second whether to go on. A signal
+    // therefore ends the session in order.
     interrupt::has_results();
     let progress = Progress::through_scene(&scene.title, scene.duration);
     let report = thread::scope(|scope| {
         let running = thread::Builder::new().name("live".to_owned()).spawn_scoped(scope, move || session.run(&mut host));
         let running = running.map_err(|error| Failure::System(format!("the system gives the session no thread: {error}")))?;
         while !running.is_finished() {
-            // The session runs on its own thread, so this sleep does not delay its ticks.
+            // The session runs on a thread of its own, so that this sleep delays no tick.
             thread::sleep(Duration::from_millis(50));
             let latest = control.latest();
             progress.reach(Instant::ZERO.saturating_add(latest.elapsed));
@@ -162,7 +161,7 @@ pub(crate) fn refused(error: SessionError) -> Failure {
     if is_of_system { Failure::System(error.to_string()) } else { Failure::Input(error.to_string()) }
 }
 
-/// Opens the Falcons of the scene and waits until all simulated Falcons are homed by their simulated hands. Returns `None` if the user asked for the end while
+/// Opens the Falcons of the scene and waits until all simulated Falcons are homed by simulated hands. Returns `None` if the user asked for the end while
 /// waiting. Real Falcons are homed by their users during the session.
 fn ready_falcons(scene: &Scene, firmware: Option<&Path>, wishes: Wishes) -> Result<Option<Falcons>, Failure> {
     let told = |peer: &str, progress: boot::Progress| {
@@ -200,7 +199,7 @@ fn ready_falcons(scene: &Scene, firmware: Option<&Path>, wishes: Wishes) -> Resu
     Ok(Some(falcons))
 }
 
-/// Prints the address to which the remote peers of the scene have to send, if there is any remote peer.
+/// Prints the address for the datagrams of remote peers, if the scene has remote peers.
 fn announce(scene: &Scene, address: Option<SocketAddr>, has_key: bool) {
     let Some(address) = address else { return };
     let peers = scene.peers.iter().enumerate().filter(|(_, peer)| matches!(peer.kind, PeerKind::Udp(_)));

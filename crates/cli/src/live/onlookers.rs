@@ -57,7 +57,7 @@ impl Conductor for SessionConductor {
     }
 }
 
-/// Returns the next change of a link that live control asks for, or `None` if no change is waiting.
+/// Returns the next change of a link by live control, or `None` if no change is waiting.
 pub(crate) fn change(wanted: &Receiver<Edit>, pairs: &[(usize, usize)]) -> Option<LinkChange> {
     let Edit { link, keys, model } = wanted.try_recv().ok()?;
     let (from, to) = *pairs.get(link)?;
@@ -126,6 +126,7 @@ fn view(peer: &PeerStatus, axes: usize, now: Instant) -> PeerView {
         Presence::Present => Shown::Present,
         Presence::Stale(_) => Shown::Stale,
     };
+    // A peer without a sample so far has no age.
     let age = state.heard.map(|heard| now.saturating_duration_since(heard));
     let turn = state.turn.map(|turn| TurnView {
         orientation: turn.object.orientation,
@@ -135,15 +136,16 @@ fn view(peer: &PeerStatus, axes: usize, now: Instant) -> PeerView {
     PeerView { status, age, position: state.object.position[..axes].to_vec(), force: peer.force[..axes].to_vec(), turn }
 }
 
-/// Changes of the timeline, ordered by instant: the links that change, by their index in the description, and the keys of each link from this instant on.
+/// Changes of the timeline, ordered by instant: the changed links, by index in the description, and the keys of each link from this instant on.
 pub(super) type Planned = VecDeque<(Instant, Vec<(usize, LinkKeys)>)>;
 
-/// Elapsed time of a session, for onlookers. Shared between the thread of the session, which writes, and the thread of live control, which reads.
+/// Elapsed time of a session, for onlookers. The thread of the session writes the time, and the thread of live control reads the time.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Elapsed(Arc<AtomicU64>);
 
 impl Elapsed {
     pub(super) fn set(&self, now: Instant) {
+        // `Relaxed` suffices, because no other memory depends on the time.
         self.0.store(now.as_nanos(), Ordering::Relaxed);
     }
 
@@ -152,7 +154,7 @@ impl Elapsed {
     }
 }
 
-/// Editor of the links of a session that has a timeline. A change by the timeline replaces all earlier changes by live control of the same link.
+/// Editor of the links of a session with a timeline. A change by the timeline replaces all earlier changes by live control of the same link.
 pub(super) struct TimedLinks {
     pub(super) links: KeyedLinks,
     pub(super) planned: Planned,

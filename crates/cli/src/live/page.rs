@@ -1,4 +1,4 @@
-//! The page `live.html` of a session: what happened, how punctual the session was, and the command that replays the session.
+//! The page `live.html` of a session: the results, the lateness, and the command for a replay.
 
 use std::path::Path;
 
@@ -17,14 +17,14 @@ use crate::run::page::{links, measures, peers};
 use crate::shell::CommandLine;
 use crate::{input, output};
 
-/// Scene of a session, as it was read before the session.
+/// Scene of a session, as read before the session.
 #[derive(Clone, Copy)]
 pub(super) struct Played<'a> {
     pub(super) scene: &'a Scene,
     pub(super) text: &'a str,
-    /// Overrides of the scene, with those that `--for` makes.
+    /// Overrides of the scene, with the overrides of `--for`.
     pub(super) overrides: &'a [String],
-    /// Changes during the session that the scene asks for.
+    /// Changes by the scene during the session.
     pub(super) timeline: &'a Table,
 }
 
@@ -54,6 +54,7 @@ pub(super) fn html(arguments: &LiveArguments, path: &Path, played: &Played<'_>, 
     if !timeline.is_empty() {
         tables = tables.and(Html::heading(2, "Timeline")).and(Html::table(timeline));
     }
+    // DIR stands for the folder of `--out`, because the text of a page must not depend on the folder.
     let replay = CommandLine::new("run", path, overrides).option("--inputs", ["DIR/inputs.csv"]).text();
     tables = tables.and(Html::heading(2, "Again in virtual time")).and(Html::preformatted(&replay));
     let page = AnswerPage {
@@ -69,7 +70,7 @@ pub(super) fn html(arguments: &LiveArguments, path: &Path, played: &Played<'_>, 
     page.html(&Origin { command: &command_line(arguments, path, report), file: &file, overrides, scene: text, pictures: &pictures })
 }
 
-/// Returns the command of the session, with the options that affect what happens in the session.
+/// Returns the command of the session, with all options that affect the session.
 fn command_line(arguments: &LiveArguments, path: &Path, report: &Report) -> String {
     let real_time = &arguments.real_time;
     CommandLine::new("live", path, &arguments.overrides.set)
@@ -97,7 +98,7 @@ fn lateness(report: &Report) -> Table {
     })
 }
 
-/// Returns the table of the peers that were attached from outside; nothing if all peers are simulated.
+/// Returns the table of the attached peers; nothing if all peers are simulated.
 fn attached(scene: &Scene, report: &Report) -> Html {
     let head =
         Table::new().column("peer").column("kind").number("joined").number("samples taken").number("late").number("out of order").number("refused");
@@ -109,7 +110,7 @@ fn attached(scene: &Scene, report: &Report) -> Html {
     if table.is_empty() { Html::default() } else { Html::heading(3, "Attached from outside").and(Html::table(&table)) }
 }
 
-/// Returns the wishes that the system granted and refused to the session, and the numbers of datagrams that the session refused at its socket.
+/// Returns the wishes granted and refused by the system, and the numbers of refused datagrams by cause.
 fn notes(report: &Report) -> Vec<String> {
     let granted: Vec<&str> = report.prepared.granted.iter().copied().map(Wish::name).collect();
     let granted = (!granted.is_empty()).then(|| format!("granted by the system: {}", granted.join(", ")));

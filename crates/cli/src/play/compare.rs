@@ -14,13 +14,13 @@ use serde_json::{Value, json};
 
 use super::scene::{PlayedScene, said};
 
-/// Number of steps into which a record is divided, unless a step would then be shorter than 1 ms. Each curve has one value per step.
+/// Number of steps into which a record is divided, unless a step would then be shorter than 1 ms. Each curve has a value per step.
 const VALUES: u64 = 600;
 
 const AP: &str = "average-position";
 const PD: &str = "proportional-derivative";
 
-/// A part that has ended, with the file of its recorded inputs.
+/// A finished part, with the file of the recorded inputs.
 pub(super) struct Finished {
     pub(super) number: usize,
     pub(super) scene: PlayedScene,
@@ -61,12 +61,14 @@ pub(super) fn compare(finished: &Finished) -> Result<Value, String> {
     if inputs.is_empty() || lasted == Instant::ZERO {
         return Err("nothing was recorded: move the cube, then compare".to_owned());
     }
+    // The force is drawn for the busiest recorded device or, without a recorded device, for the first pointer of the scene.
     let hand = scene.peers.iter().position(|peer| matches!(peer.kind, PeerKind::Pointer(..))).unwrap_or(0);
     let hand = inputs.busiest_device().unwrap_or(hand);
     // A step of at least one millisecond also keeps the divisor in `on_tick` above zero.
     let step = Duration::from_nanos((lasted.as_nanos() / VALUES).max(1_000_000));
     let run = |variant: &Variant| curve(variant, &inputs, hand, step, lasted);
     let runs: Vec<Result<Value, String>> = thread::scope(|scope| {
+        // Each replay has a thread of its own, because people wait for the answer.
         let threads: Vec<_> = variants.iter().map(|variant| scope.spawn(move || run(variant))).collect();
         threads.into_iter().map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
     });
@@ -81,7 +83,7 @@ pub(super) fn compare(finished: &Finished) -> Result<Value, String> {
     }))
 }
 
-/// Replays one variant, and returns its curves and their largest values as JSON. `lasted` is the length of the record.
+/// Replays a variant, and returns the curves with the largest values as JSON. `lasted` is the length of the record.
 fn curve(variant: &Variant, inputs: &Inputs, hand: usize, step: Duration, lasted: Instant) -> Result<Value, String> {
     let scene = variant.scene.scene().map_err(|error| said(&error))?;
     let mut curves = Curves::new(hand, step, scene.peers.len());
@@ -112,9 +114,9 @@ fn curve(variant: &Variant, inputs: &Inputs, hand: usize, step: Duration, lasted
     }))
 }
 
-/// Observer that keeps, per step, the largest distance between two copies \[m\] and the largest coupling force on the hand \[N\].
+/// Observer of a replay. Keeps, per step, the largest distance between two copies \[m\] and the largest coupling force on the hand \[N\].
 struct Curves {
-    /// Index of the peer whose force is kept.
+    /// Index of the peer of the force curve.
     hand: usize,
     step: Duration,
     /// Instant of the ticks seen last; `None` before the first tick.
@@ -123,7 +125,7 @@ struct Curves {
     at: Vec<[f64; 3]>,
     discrepancy: Vec<f64>,
     force: Vec<f64>,
-    /// First instant at which two copies were so far apart that the run counts as diverged.
+    /// First instant with two copies farther apart than a run may be that has not diverged.
     apart: Option<Instant>,
 }
 
@@ -137,10 +139,10 @@ impl Curves {
         usize::try_from(at.as_nanos() / u64::try_from(self.step.as_nanos()).unwrap_or(u64::MAX)).unwrap_or(usize::MAX)
     }
 
-    /// Takes the distances at the instant whose ticks have all been seen. Called once more after the last tick.
+    /// Takes the distances at an instant, after all ticks of the instant. Called once more after the last tick.
     ///
-    /// Peers tick one after the other within an instant. Between the ticks of two peers one copy is a tick older than the other, and fast copies would look
-    /// apart that are at one place.
+    /// Peers tick one after the other within an instant. Between the ticks of two peers, a copy is a tick older than the next copy, and fast copies at the same
+    /// place would look apart.
     fn end_instant(&mut self) {
         let Some(now) = self.now else { return };
         let pairs = self.at.iter().enumerate().flat_map(|(place, one)| self.at[..place].iter().map(move |other| (one, other)));

@@ -19,7 +19,7 @@ pub(super) fn is_there() -> bool {
 pub(super) fn open(url: &str) {
     let mut command = Command::new(OPENER);
     command.arg(url).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
-    // The browser gets a process group of its own, so that the Ctrl-C that ends the session does not end the browser.
+    // The browser gets a process group of its own, so that a Ctrl-C to the session does not end the browser.
     command.process_group(0);
     if let Ok(mut child) = command.spawn() {
         // Some openers run until the browser ends, so that the wait needs a thread of its own. If the thread cannot be started, the system collects the

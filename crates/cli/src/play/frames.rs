@@ -18,7 +18,7 @@ struct Newest {
     part: usize,
     axes: usize,
     motion: Option<Arc<Motion>>,
-    /// Last text that was written, with the number of its motion. Several pages share the text.
+    /// Last written text, with the number of the motion. Several pages share the text.
     text: Option<(u64, Arc<str>)>,
 }
 
@@ -43,7 +43,7 @@ impl Frames {
 
     /// Returns the number and the JSON text of the newest motion. The text is `{}` before the first motion.
     ///
-    /// Between [`begin`](Self::begin) and the first motion of the part, a text that was already written for the part before is returned again.
+    /// Between [`begin`](Self::begin) and the first motion of the part, an already written text of the part before is returned again.
     pub(super) fn text(&self) -> (u64, Arc<str>) {
         let (number, part, axes, motion) = {
             let newest = self.newest();

@@ -58,6 +58,7 @@ pub(crate) fn play(arguments: &PlayArguments) -> Result<ExitCode, Failure> {
     let server = serve_stage(config, Arc::clone(&board), Box::new(PartLinks(Arc::clone(&stage))), Arc::clone(&stage) as _);
     let server = server.map_err(|error| refused_server(&error))?;
     let join = reached_from_elsewhere(server.address(), server.join_url().unwrap_or_default());
+    // The stage is new, so that the address is set only once.
     let _first = stage.join.set(join.clone());
     let announce = || {
         say(&format!("open {}", server.url()));
@@ -73,14 +74,15 @@ pub(crate) fn play(arguments: &PlayArguments) -> Result<ExitCode, Failure> {
     let mut next = beginning;
     for number in 1.. {
         let (part, session, conductor) = prepare(arguments, &stage, &board, number, next, &records, begun)?;
-        // The addresses are printed once the first part is ready, so that a page that opens at once finds a scene.
+        // The addresses are printed once the first part is ready, so that a page opened at once finds a scene.
         if number == 1 {
             announce();
         }
         let report = run_part(session, conductor)?;
+        // A part also ends by a wish of a page. Only a signal or the time of `--for` ends the session.
         let is_over = interrupt::requested() || arguments.length.is_some_and(|length| begun.elapsed() >= length);
         let fell_apart = matches!(report.summary.ending, Ending::Diverged(_));
-        // A diverged part has no state from which another part could begin, so that the next part begins anew.
+        // A diverged part has no finite state for a next part, so that the next part begins anew.
         next = stage.finish(&part, records.inputs(number), fell_apart);
         say(&format!("part {number}: {}, the run is {}", part.scene.coordination.strategy.name(), report.validity));
         if is_over {
@@ -113,7 +115,7 @@ fn check(played: &PlayedScene) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Makes sure that the scene has a pointer for the visitor. Returns the name of the peer that became a pointer if the scene itself has none.
+/// Makes sure that the scene has a pointer for the visitor. Also returns the name of the new pointer, if the scene itself has no pointer.
 fn lend_hand(played: PlayedScene) -> Result<(PlayedScene, Option<String>), Failure> {
     let file = played.file().display().to_string();
     played.with_hand()?.ok_or_else(|| {
@@ -169,7 +171,7 @@ fn run_part(session: Session, mut conductor: PartConductor) -> Result<Report, Fa
 struct PartConductor {
     stage: Arc<PlayStage>,
     look: Look,
-    /// Changes of links that the pages asked for.
+    /// Changes of links by the pages.
     wanted: Receiver<Edit>,
     /// Sender and receiver of each link, in the order of the board.
     pairs: Vec<(usize, usize)>,

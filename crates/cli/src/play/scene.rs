@@ -17,21 +17,21 @@ const DURATION: &str = "1h";
 /// Gains of the visitor's grasp if no simulated peer of the scene touches the object. The default scene of the command has the same gains.
 const GRASP: Gains = Gains { stiffness: 1000.0, damping: 5.0 };
 
-/// A scene as a TOML document, on which changes are made before the scene is parsed.
+/// A scene as a TOML document. Changes are made in the document, and the scene is parsed from the document.
 #[derive(Clone, Debug)]
 pub(super) struct PlayedScene {
     /// The document without `[[peers]]`.
     table: Table,
     /// The entries of `[[peers]]`, one per peer, in the order of the scene.
     peers: Vec<Table>,
-    /// Path of the scene file. Files that the scene names are looked up relative to its folder.
+    /// Path of the scene file. File names in the scene are relative to the folder of the file.
     file: PathBuf,
 }
 
 /// Keys of each link, with the indices of sender and receiver.
 pub(super) type Links = Vec<((usize, usize), LinkKeys)>;
 
-/// Returns the message of an error for a page: the key and what is wrong, without lines of a file.
+/// Returns the message of an error for a page: the key and the fault, without lines of a file.
 pub(super) fn said(error: &SceneError) -> String {
     // People at a page may name a file in a change of links, but must not see the file's content in an error.
     let message = error.bare_message();
@@ -75,9 +75,9 @@ impl PlayedScene {
         Scene::parse_live(&self.text(), &self.file, &[])
     }
 
-    /// Makes a peer a pointer if the scene has no pointer of its own, and then returns the name of the peer too.
+    /// Makes a peer a pointer if the scene has no pointer, and then returns the name of the peer too.
     ///
-    /// The peer is the first simulated peer that touches the object, or else the first simulated peer, which then gets a grasp. Peers whose device turns are
+    /// The peer is the first simulated peer that touches the object, or else the first simulated peer, which then gets a grasp. Peers with a turning device are
     /// left out, because a pointer cannot turn a device. `None` if no peer can become a pointer.
     pub(super) fn with_hand(mut self) -> Result<Option<(Self, Option<String>)>, SceneError> {
         let scene = self.scene()?;
@@ -121,7 +121,7 @@ impl PlayedScene {
         self
     }
 
-    /// Sets the keys of the links. A pair of peers that `links` lacks gets the keys of the first link of `links`. No links change nothing.
+    /// Sets the keys of the links. A pair of peers without an entry in `links` gets the keys of the first link of `links`. No links change nothing.
     pub(super) fn with_links(mut self, links: &Links) -> Self {
         let Some((_, first)) = links.first() else { return self };
         let names = self.names();
@@ -129,7 +129,7 @@ impl PlayedScene {
             let value = |text: &str| toml::from_str::<Table>(&format!("value = {text}")).ok().and_then(|mut table| table.remove("value"));
             keys.iter().filter_map(|(key, text)| Some((key.to_owned(), value(text)?))).collect()
         };
-        // Equal links need no entry per pair, and peers that are added later get the same keys by themselves.
+        // Equal links need no entry per pair, and peers added later get the keys of `link` too.
         if links.iter().all(|(_, other)| other == first) {
             self.table.remove("links");
             self.table.insert("link".to_owned(), Value::Table(keys(first)));
@@ -142,14 +142,14 @@ impl PlayedScene {
             let ends = [("from", pair.0), ("to", pair.1)].map(|(end, place)| (end.to_owned(), Value::from(names[place].as_str())));
             Value::Table(ends.into_iter().chain(keys(known)).collect())
         };
-        // The common `link` table is emptied below, so that every pair needs an entry with all its keys.
+        // The common `link` table is emptied below, so that every pair needs an entry with all keys.
         let entries: Vec<Value> = pairs.map(entry).collect();
         self.table.insert("link".to_owned(), Value::Table(Table::new()));
         self.table.insert("links".to_owned(), Value::Array(entries));
         self
     }
 
-    /// Sets the initial states to the states `peers` of the part before, whose scene was `scene`. A pointer that was held is held from the beginning.
+    /// Sets the initial states to the states `peers` of the part before, whose scene was `scene`. A held pointer is held from the beginning.
     pub(super) fn standing(mut self, peers: &[PeerStatus], scene: &Scene) -> Self {
         let axes = scene.axes.count();
         let numbers = |values: &[f64]| Value::Array(values.iter().copied().map(Value::Float).collect());
@@ -178,6 +178,7 @@ impl PlayedScene {
     pub(super) fn with_peers(mut self, number: usize) -> Self {
         let names = self.names();
         let places: Vec<Vec<f64>> = self.peers.iter().map(|peer| floats(peer.get("position"))).collect();
+        // Axes with a position in every entry. A document without positions gives 0, and the mean is then left out.
         let axes = places.iter().map(Vec::len).min().unwrap_or(0);
         #[expect(clippy::cast_precision_loss, reason = "a handful of peers")]
         let mean = (0..axes).map(|axis| places.iter().map(|place| place[axis]).sum::<f64>() / places.len() as f64);
@@ -186,7 +187,7 @@ impl PlayedScene {
         while self.peers.len() < number {
             let mut other = self.peers.last().cloned().unwrap_or_default();
             let free = (self.peers.len() + 1..).map(|place| format!("peer-{place}")).find(|name| !names.contains(name));
-            // The state of the copied peer is not that of the new peer, which begins without a hand and at rest.
+            // The new peer begins without a hand and at rest, unlike the copied peer.
             for key in ["hand", "velocity", "device-position", "device-velocity", "angular-velocity"] {
                 other.remove(key);
             }
@@ -213,7 +214,7 @@ impl PlayedScene {
     }
 }
 
-/// Returns the table at `key`. A missing value, or a value that is no table, is replaced by an empty table.
+/// Returns the table at `key`. A missing value, or a value of another form, is replaced by an empty table.
 fn section<'a>(table: &'a mut Table, key: &str) -> &'a mut Table {
     let entry = table.entry(key.to_owned()).or_insert_with(|| Value::Table(Table::new()));
     if !entry.is_table() {

@@ -1,7 +1,7 @@
 //! The stage of `cohaptic play`: answers the requests of the pages for hands, for another part, for a comparison, and for files of the last part.
 //!
-//! Threads of the control server call [`Stage`], and the thread of the session calls the inherent methods. Each field that changes is
-//! atomic or has a lock of its own.
+//! Threads of the control server call [`Stage`], and the thread of the session calls the inherent methods. Each changing field is atomic or has a lock of its
+//! own.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -26,7 +26,7 @@ use crate::realtime::{ControlFiles, KeyedLinks};
 /// Longest time that a comparison waits for the present part to end and to be written.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// Changes that a page asks for in the next part. `None` keeps the value of the present part.
+/// Changes for the next part, asked for by a page. `None` keeps the value of the present part.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Wish {
     strategy: Option<String>,
@@ -55,7 +55,7 @@ impl Wish {
     }
 }
 
-/// The part that runs now: its number, counted from 1, and its scene as document and as parsed.
+/// The running part: the number, counted from 1, and the scene, as document and as parsed.
 pub(super) struct Part {
     pub(super) number: usize,
     pub(super) played: PlayedScene,
@@ -67,9 +67,9 @@ pub(super) struct PlayStage {
     pub(super) frames: Frames,
     /// Scene of the first part, to which a reset returns.
     beginning: PlayedScene,
-    /// `true` if the page shows its three guided steps, which describe the default scene only.
+    /// `true` if the page shows the three guided steps. The steps describe the default scene only.
     is_guided: bool,
-    /// Files that changes of links may name.
+    /// Allowed files in changes of links.
     pub(super) files: ControlFiles,
     /// One pointer per possible peer, indexed by peer. The pointers outlive the parts, so that a hand keeps its position across a border.
     pointers: Vec<Pointer>,
@@ -108,7 +108,7 @@ impl PlayStage {
         }
     }
 
-    /// Makes `part` the running part, with `links` as its links.
+    /// Makes `part` the running part with the links `links`.
     pub(super) fn begin(&self, part: Part, links: KeyedLinks) -> Arc<Part> {
         self.frames.begin(part.number, part.scene.axes.count());
         let part = Arc::new(part);
@@ -127,9 +127,9 @@ impl PlayStage {
         self.is_wished.load(Ordering::Relaxed)
     }
 
-    /// Ends `part`, whose inputs were recorded in the file `inputs`, and returns the scene of the next part.
+    /// Ends `part` with the recorded inputs `inputs`, and returns the scene of the next part.
     ///
-    /// `fell_apart` says that the part diverged. The next part then begins from the initial states, as after a reset.
+    /// `fell_apart`: whether the part diverged. The next part then begins from the initial states, as after a reset.
     pub(super) fn finish(&self, part: &Part, inputs: PathBuf, fell_apart: bool) -> PlayedScene {
         let wish = lock(&self.wish).take().unwrap_or_default();
         self.is_wished.store(false, Ordering::Relaxed);
@@ -138,13 +138,14 @@ impl PlayStage {
         next
     }
 
-    /// Returns the scene of the part that would follow `part` by `wish`. Links of peers that go are left out.
+    /// Returns the scene of the next part after `part` by `wish`. Links of removed peers are left out.
     fn next(&self, part: &Part, wish: &Wish) -> PlayedScene {
         let peers: Vec<PeerStatus> = self.frames.last().map(|motion| motion.peers.clone()).unwrap_or_default();
         let number = wish.peers.unwrap_or(part.scene.peers.len());
         let stood = if wish.reset { self.beginning.clone() } else { part.played.clone().standing(&peers, &part.scene) };
         let strategy = wish.strategy.as_deref().unwrap_or_else(|| part.scene.coordination.strategy.name());
         let changed = lock(&self.links).as_ref().map(|links| links.keys.clone()).unwrap_or_default();
+        // `changed` has the order of `pairs`, so that each link keeps the keys of the last change.
         let links: Links = pairs(&part.scene).into_iter().zip(changed).filter(|((from, to), _)| *from < number && *to < number).collect();
         stood.with_strategy(strategy).with_peers(number).with_links(&links)
     }
@@ -153,7 +154,7 @@ impl PlayStage {
         lock(&self.part).clone().ok_or_else(|| "the session has not begun".to_owned())
     }
 
-    /// Returns the last part that has ended, or `None` during the first part.
+    /// Returns the last finished part, or `None` during the first part.
     fn last_finished(&self) -> Option<Arc<Finished>> {
         lock(&self.finished).clone()
     }
@@ -212,7 +213,7 @@ impl Stage for PlayStage {
 
     fn leave_hand(&self, hand: usize) {
         if let Some(pointer) = self.pointers.get(hand) {
-            // Letting go has no position that could be refused, so that the result is always `Ok`.
+            // Letting go has no position to refuse, so that the result is always `Ok`.
             let _ = pointer.tell(None);
             lock(&self.taken)[hand] = false;
         }
@@ -221,9 +222,10 @@ impl Stage for PlayStage {
     fn begin_anew(&self, wish: &Value) -> Result<(), String> {
         let wish = Wish::read(wish)?;
         let part = self.running()?;
-        // A scene that is refused must be refused here: after the present part has ended, the session could not go on.
+        // A refused scene must be refused here: after the present part has ended, the session could not go on.
         self.next(&part, &wish).scene().map_err(|error| said(&error))?;
         *lock(&self.wish) = Some(wish);
+        // The flag ends the present part. `finish` then takes the wish under the lock.
         self.is_wished.store(true, Ordering::Relaxed);
         Ok(())
     }

@@ -1,20 +1,20 @@
-//! Addresses that other machines use to reach this one.
+//! Addresses of this machine for programs on other machines.
 
 use std::net::{IpAddr, SocketAddr, UdpSocket};
 
-/// Returns the address at which other machines reach a socket that listens on all addresses of this machine, such as 0.0.0.0. `None` if the socket listens on
-/// one address, and if the machine has no network.
+/// Returns this machine's address for other machines, for a socket on all addresses such as 0.0.0.0. `None` if the socket listens on a single address, and if
+/// the machine has no network.
 pub(crate) fn own_address(listening: SocketAddr) -> Option<SocketAddr> {
     if !listening.ip().is_unspecified() {
         return None;
     }
-    // Connecting a UDP socket sends nothing, but makes the system choose the network card and so the address that other machines can reach.
+    // Connecting a UDP socket sends nothing, but makes the system choose the network card, and so the address within reach of other machines.
     let chosen = |from: &str, to: &str| {
         let socket = UdpSocket::bind((from, 0)).ok()?;
         socket.connect((to, 9)).ok()?;
         socket.local_addr().ok().map(|own| own.ip())
     };
-    // A socket on [::] takes IPv4 too, which more networks have.
+    // A socket on [::] takes IPv4 too, and IPv4 is more widely reachable.
     let of_ipv4 = || chosen("0.0.0.0", "192.0.2.1");
     let own: Option<IpAddr> = if listening.is_ipv4() { of_ipv4() } else { of_ipv4().or_else(|| chosen("::", "2001:db8::1")) };
     own.map(|ip| SocketAddr::new(ip, listening.port()))

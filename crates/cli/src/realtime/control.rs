@@ -20,7 +20,7 @@ use crate::arguments::RealTimeArguments;
 use crate::failure::Failure;
 use crate::file;
 
-/// Board on which a run publishes snapshots, and the server that shows the board if the user gave `--control`.
+/// Board for the snapshots of a run, and the server of the board if the user gave `--control`.
 pub(crate) struct LiveControl {
     board: Arc<Board>,
     server: Option<Server>,
@@ -41,13 +41,13 @@ impl LiveControl {
         Ok(Self { board, server: Some(server) })
     }
 
-    /// Returns the handle through which the run publishes snapshots, or `None` if neither a server nor a terminal shows snapshots.
+    /// Returns the run's handle for publishing snapshots, or `None` if neither a server nor a terminal shows snapshots.
     pub(crate) fn look(&self) -> Option<Look> {
         let is_looked_at = self.server.is_some() || io::stderr().is_terminal();
         is_looked_at.then(|| Look(Arc::clone(&self.board)))
     }
 
-    /// Returns the snapshot that was published last.
+    /// Returns the last published snapshot.
     pub(crate) fn latest(&self) -> Arc<Snapshot> {
         self.board.latest().snapshot
     }
@@ -57,7 +57,7 @@ impl LiveControl {
 ///
 /// # Errors
 ///
-/// [`Failure::File`] if the file cannot be read. [`Failure::Input`] if other users may access the file, or if its content is not a token.
+/// [`Failure::File`] if the file cannot be read. [`Failure::Input`] if other users may access the file, or if the content is not a token.
 pub(crate) fn token_of(arguments: &RealTimeArguments) -> Result<Option<Token>, Failure> {
     let Some(path) = &arguments.token_file else { return Ok(None) };
     let unreadable = |error| Failure::File { verb: "read", path: path.clone(), error };
@@ -79,17 +79,17 @@ pub(crate) fn refused_server(error: &ServeError) -> Failure {
     if is_of_system { Failure::System(error.to_string()) } else { Failure::Input(error.to_string()) }
 }
 
-/// Handle through which a run publishes snapshots on a board.
+/// Handle for publishing the snapshots of a run on a board.
 pub(crate) struct Look(Arc<Board>);
 
 impl Look {
-    /// Creates a handle for `board`, for commands that make the board without [`LiveControl`].
+    /// Creates a handle for `board`, for commands without [`LiveControl`].
     pub(crate) fn on(board: &Arc<Board>) -> Self {
         Self(Arc::clone(board))
     }
 
-    /// Publishes `snapshot`, unless a reader holds the board at this moment: the thread that has to be on time must not wait, and the next snapshot follows
-    /// soon.
+    /// Publishes `snapshot`, unless a reader holds the board at this moment: the calling thread has to be on time and must not wait, and the next snapshot
+    /// follows soon.
     pub(crate) fn publish(&self, snapshot: Snapshot) {
         let _ = self.0.publish(Arc::new(snapshot));
     }
@@ -108,9 +108,9 @@ pub(crate) struct Edit {
 #[derive(Debug)]
 pub(crate) struct KeyedLinks {
     pub(crate) keys: Vec<LinkKeys>,
-    /// Folder that file names in keys are relative to.
+    /// Base folder of file names in keys.
     pub(crate) folder: PathBuf,
-    /// Files that a change may name.
+    /// Allowed files in changes.
     pub(crate) files: ControlFiles,
     pub(crate) changes: Sender<Edit>,
 }
@@ -121,13 +121,13 @@ impl LinkEditor for KeyedLinks {
     }
 
     fn change(&mut self, links: &[usize], keys: &[(String, String)]) -> Result<(), String> {
-        // All edits are checked before the first edit is applied, so that a change of several links applies to all of them or to none.
+        // All edits are checked before the first edit is applied, so that a change of several links applies to all links or to no link.
         let edits = links.iter().map(|link| {
             let old = self.keys.get(*link).ok_or_else(|| format!("there is no link {link}"))?;
             let new = keys.iter().fold(old.clone(), |laid, (key, value)| laid.with(key, value));
             let read = |path: &std::path::Path| self.files.read(old, &self.folder, path);
             let model = new.model_with(&self.folder, FileReader(&read)).map_err(|error| {
-                // The bare message has no excerpt: the person at the other end may name a file but must not see the content of the file.
+                // The bare message has no excerpt: the person at the page may name a file but must not see the content of the file.
                 let said = error.bare_message();
                 let at = error.diagnostic().map_or("", |diagnostic| diagnostic.override_text().unwrap_or_else(|| diagnostic.key()));
                 let at = at.strip_prefix("link.").unwrap_or(at);
@@ -145,7 +145,7 @@ impl LinkEditor for KeyedLinks {
     }
 }
 
-/// Converts the statistics of a link into counters. Fields known only to some commands keep their default values.
+/// Converts the statistics of a link into counters. Fields known only to some commands keep default values.
 pub(crate) fn counters(stats: &LinkStats) -> LinkCounters {
     LinkCounters {
         offered: stats.offered(),

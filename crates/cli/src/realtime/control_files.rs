@@ -14,10 +14,10 @@ use rustix::fs::{Mode, OFlags};
 use crate::arguments::RealTimeArguments;
 use crate::failure::Failure;
 
-/// Files that a person at the other end of live control may name in keys of links.
+/// Files that a person at a page of live control may name in keys of links.
 ///
-/// A person with the token may change links. Keys that name files must neither show the files of the user to that person nor stop the server with a file that
-/// never ends.
+/// A person with the token may change links. Names of files in keys must neither show the files of the user to this person nor stop the server with an endless
+/// file.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ControlFiles {
     /// Folder of `--control-files`, with symbolic links resolved. `None` if only the files that the user named at the start may be named.
@@ -36,8 +36,8 @@ impl ControlFiles {
         Ok(Self { folder: Some(folder) })
     }
 
-    /// Reads the bytes of the file `path`, which the changed keys of a link name. `keys` are the keys of that link before the change. `base` is the folder that
-    /// file names in `keys` are relative to.
+    /// Reads the bytes of the file `path`, named in the changed keys of a link. `keys` are the keys of the link before the change. `base` is the base folder of
+    /// file names in `keys`.
     ///
     /// # Errors
     ///
@@ -53,8 +53,7 @@ impl ControlFiles {
             }
             return read(file);
         }
-        // Earlier changes could add only files of the folder. A file outside the folder that the old keys name is therefore a file that the user named at the
-        // start.
+        // Earlier changes could add only files of the folder. A file of the old keys outside the folder was therefore named by the user at the start.
         if names(keys, base, path) { read(open_regular(path, OFlags::empty())?) } else { Err(self.refusal()) }
     }
 
@@ -78,8 +77,7 @@ impl ControlFiles {
     }
 }
 
-/// Returns whether `keys` name the file `path`. Reads all files that the keys name, because a law whose first table cannot be read does not ask for the second
-/// table.
+/// Returns whether `keys` name the file `path`. Reads all files of the keys, because a law with an unreadable first table does not ask for the second table.
 fn names(keys: &LinkKeys, base: &Path, path: &Path) -> bool {
     let is_named = Cell::new(false);
     let reader = |named: &Path| {

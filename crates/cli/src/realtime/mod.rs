@@ -1,4 +1,4 @@
-//! Parts that the commands that run in real time share (`live`, `relay`, `router` and others): live control, messages, and the options for pacing and priority.
+//! Common parts of the commands in real time (`live`, `relay`, `router` and others): live control, messages, and the options for pacing and priority.
 
 mod addresses;
 mod control;

@@ -25,8 +25,7 @@ pub(crate) fn late(summary: &LatenessSummary) -> String {
     format!("p50 {p50}, p99 {p99}, p99.9 {p999}, worst {max}")
 }
 
-/// Lists the real-time privileges that the system granted, each privilege that the system refused, with advice how to get it, and what to do about a run that
-/// is not valid. One indented line each.
+/// Lists the granted real-time privileges, each refused privilege with advice, and measures against an invalid run, as indented lines.
 pub(crate) fn notes(prepared: &Prepared, validity: Validity) -> String {
     let mut text = String::new();
     let granted: Vec<&str> = prepared.granted.iter().copied().map(Wish::name).collect();
@@ -37,6 +36,7 @@ pub(crate) fn notes(prepared: &Prepared, validity: Validity) -> String {
         let _ = writeln!(text, "  {refused}");
     }
     if !validity.is_valid() {
+        // A run without priority and without a refusal was started with `--no-priority`.
         let missing = match (prepared.refused.is_empty(), prepared.granted.contains(&Wish::Priority)) {
             (false, _) => ", allow what the system refused above",
             (true, false) => ", leave out --no-priority",
@@ -50,7 +50,7 @@ pub(crate) fn notes(prepared: &Prepared, validity: Validity) -> String {
     text
 }
 
-/// Describes the progress of loading the firmware of a Falcon. Returns `None` for events that are too frequent to be printed.
+/// Describes the progress of loading the firmware of a Falcon. Returns `None` for events too frequent for a line.
 pub(crate) fn loading(progress: Progress) -> Option<String> {
     match progress {
         Progress::Attempt(attempt) => Some(format!("loading the firmware, attempt {attempt}")),
@@ -112,7 +112,7 @@ pub(crate) fn status(snapshot: &Snapshot) -> String {
 }
 
 /// Formats the statistics of a link: `4000 offered, 3952 delivered, 40 dropped (loss), 8 on the way; mean delay 24.031 ms, asked 24.000 ms`.
-/// `beside` holds the causes and numbers of packets that were dropped outside the link.
+/// `beside` holds the causes and numbers of packets dropped outside the link.
 pub(crate) fn carried(stats: &LinkStats, asked: &ConfiguredDelay, beside: &[(&str, u64)]) -> String {
     let mut text = format!("{} offered, {} delivered", stats.offered(), stats.delivered());
     let in_link = DropCause::ALL.into_iter().map(|cause| (cause.name(), stats.dropped(cause)));
