@@ -66,7 +66,7 @@ fn port_document(port: &PortReport) -> impl Serialize + use<> {
     }
 }
 
-/// Returns the numbers of datagrams that were refused on arrival, by cause.
+/// Returns the numbers of datagrams refused on arrival, by cause.
 pub(super) fn refused(intake: &IntakeCounts) -> [(&'static str, u64); 4] {
     [("stranger", intake.strangers), ("to-itself", intake.to_itself), ("no-room", intake.no_room), ("overload", intake.overload)]
 }
@@ -75,11 +75,10 @@ pub(super) fn refused(intake: &IntakeCounts) -> [(&'static str, u64); 4] {
 struct Totals {
     /// Received datagrams, including datagrams dropped later.
     packets: u64,
-    /// Datagrams that were dropped by the relay, by its links, or by the kernel on sending. Datagrams that the kernel dropped before the relay read them are
-    /// not counted.
+    /// Datagrams dropped by the relay, by the links, or by the kernel on sending. Drops by the kernel before reading are not counted.
     dropped: u64,
     sent: u64,
-    /// Datagrams that had left their link and were not sent yet when the run ended.
+    /// Datagrams between the end of a link and the sending socket at the end of the run.
     unsent: u64,
 }
 
@@ -102,10 +101,10 @@ impl Totals {
     }
 }
 
-/// Largest number of links with traffic that the text names.
+/// Largest number of links with traffic in the text.
 const MOST_LINKS: usize = 64;
 
-/// Largest number of links without traffic that the text names.
+/// Largest number of links without traffic in the text.
 const MOST_IDLE: usize = 8;
 
 pub(super) fn describe(setup: &Setup, report: &Report, asked: &[ConfiguredDelay]) -> String {
@@ -165,7 +164,7 @@ fn links(links: &[LinkReport], asked: &[ConfiguredDelay], line: &mut impl FnMut(
     }
 }
 
-/// Adds lines about failures at a port: datagrams that were not sent or not read, and datagrams that the kernel dropped.
+/// Adds lines about failures at a port: unsent and unread datagrams, and drops by the kernel.
 fn at(port: &PortReport, line: &mut impl FnMut(String)) {
     let mut all = port.counts.failures.by_reason().map(|(reason, count)| (reason, count)).to_vec();
     all.extend([("oversized", port.counts.oversized), ("errors on reading", port.counts.receive_errors)]);
@@ -181,7 +180,7 @@ fn at(port: &PortReport, line: &mut impl FnMut(String)) {
 
 /// Returns a line about the smallest receive buffer of the ports, if the system granted less than the relay asked for.
 fn small_buffer(ports: &[PortReport]) -> Option<String> {
-    // Linux reports twice the requested size, because it reserves memory for bookkeeping.
+    // Linux reports twice the requested size, because the kernel reserves memory for bookkeeping.
     let wanted = 2 * cohaptic_realtime::udp::EndpointConfig::default().receive_buffer;
     let least = ports.iter().map(|port| port.receive_buffer).filter(|granted| *granted > 0).min()?;
     (least < wanted).then(|| {

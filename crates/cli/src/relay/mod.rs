@@ -74,7 +74,7 @@ fn conduct(
     let progress = Progress::of_traffic(&setup.title);
     let report = thread::scope(|scope| {
         let running = thread::Builder::new().name("relay".to_owned()).spawn_scoped(scope, || {
-            // A receiver cannot be shared between threads, so the closure takes it by value.
+            // A receiver cannot be shared between threads, so the closure takes the receiver by value.
             let heard = heard;
             relay.run(options, &heard, &stop, |view| publisher.offer(|| snapshot(view, &setup.pairs, options.tolerance)))
         });

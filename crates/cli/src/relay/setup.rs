@@ -18,7 +18,7 @@ use crate::input;
 use crate::link::link_and_keys;
 use crate::realtime::{ConfiguredDelay, own_address};
 
-/// Configuration of a relay, with the names and keys that messages and live control need.
+/// Configuration of a relay, with the names and keys for messages and live control.
 pub(super) struct Setup {
     pub(super) title: String,
     pub(super) config: RelayConfig,
@@ -28,7 +28,7 @@ pub(super) struct Setup {
     /// Sender and receiver of each link, in the order of reports.
     pub(super) pairs: Vec<(NodeId, NodeId)>,
     pub(super) keys: Vec<LinkKeys>,
-    /// Folder that file names in keys are relative to.
+    /// Base folder of file names in keys.
     pub(super) folder: PathBuf,
 }
 
@@ -89,6 +89,7 @@ impl Setup {
             title: format!("{listen} -> {to}"),
             config: RelayConfig { seed: arguments.seed.unwrap_or(0), form: Form::Proxy(proxy), limits, changes: Vec::new() },
             tolerance: arguments.real_time.tolerance(),
+            // Node 0 stands for all clients, node 1 for the server.
             nodes: vec!["client".to_owned(), "server".to_owned()],
             pairs: vec![(NodeId(0), NodeId(1)), (NodeId(1), NodeId(0))],
             keys: vec![forth_keys, back_keys],
@@ -97,11 +98,12 @@ impl Setup {
         })
     }
 
-    /// Returns the lines that tell programs where to send. Called after the ports are bound, because the system chooses a port that was given as 0 only then.
+    /// Returns the lines with the addresses for programs. Called after the ports are bound, because the system replaces the port 0 only then.
     pub(super) fn opened<'a>(&mut self, ports: impl Iterator<Item = (&'a str, SocketAddr)>) -> Vec<String> {
         let (title, form) = (&mut self.title, &self.config.form);
         let mut line = |(place, (_, port)): (usize, (&str, SocketAddr))| match form {
             Form::Proxy(proxy) => {
+                // The title names the port that the system chose.
                 *title = format!("{port} -> {}", proxy.to);
                 format!("listening on {port} for datagrams to {}", proxy.to)
             }
@@ -146,7 +148,7 @@ fn words(spec: &[OsString]) -> Result<Vec<String>, Failure> {
     spec.iter().map(word).collect()
 }
 
-/// Refuses an address that is not on this machine's loopback interface.
+/// Refuses an address outside this machine's loopback interface.
 fn local(option: &str, address: SocketAddr) -> Result<(), Failure> {
     if address.ip().is_loopback() {
         return Ok(());

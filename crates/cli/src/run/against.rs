@@ -1,4 +1,4 @@
-//! `run.html` of a run with `--against`: the scene and its variant on one page, side by side.
+//! `run.html` of a run with `--against`: scene and variant on the same page.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,11 +16,11 @@ use crate::arguments::RunArguments;
 use crate::failure::Failure;
 use crate::input;
 
-/// A run with all that a page shows of it.
+/// Results of a run for a page.
 #[derive(Clone, Copy)]
 pub(super) struct Shown<'a> {
     pub(super) scene: &'a Scene,
-    /// Overrides of the scene, those of `--against` last.
+    /// Overrides of the scene, with the overrides of `--against` last.
     pub(super) overrides: &'a [String],
     pub(super) summary: &'a Summary,
     pub(super) measured: &'a [MeasuredValue],
@@ -58,7 +58,7 @@ pub(super) fn html(arguments: &RunArguments, runs: [Shown<'_>; 2]) -> Result<Str
     Ok(page.with(scene_text(&text)).html())
 }
 
-/// Places the contents of both runs below each other, each with the title of its scene above it. A run without content is left out.
+/// Places the contents of both runs below each other, each under the title of the scene. A run without content is left out.
 fn each(runs: &[Shown<'_>; 2], content: impl Fn(usize, &Shown<'_>) -> Html) -> Html {
     let with_title = |(number, shown): (usize, &Shown<'_>)| {
         let content = content(number, shown);
@@ -67,7 +67,7 @@ fn each(runs: &[Shown<'_>; 2], content: impl Fn(usize, &Shown<'_>) -> Html) -> H
     runs.iter().enumerate().map(with_title).fold(Html::default(), Html::and)
 }
 
-/// Returns the names without repetitions, in the order in which they come first.
+/// Returns the names without repetitions, in the order of first occurrence.
 fn each_once<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     let mut seen = BTreeSet::new();
     names.filter(|name| seen.insert(*name)).collect()
@@ -80,14 +80,14 @@ fn compared_facts(arguments: &RunArguments, runs: &[Shown<'_>; 2]) -> Html {
     let value = |facts: &[(&str, Html)], name: &str| {
         facts.iter().find(|(known, _)| *known == name).map_or_else(|| NOTHING.into(), |(_, value)| value.clone())
     };
-    // The variant can have facts that the scene has not, such as overrides.
+    // The variant can have facts beyond the facts of the scene, such as overrides.
     let names = each_once(facts.iter().flatten().map(|(name, _)| *name)).into_iter();
     Html::table(&names.fold(head, |table, name| table.row(std::iter::once(Html::text(name)).chain(facts.iter().map(|facts| value(facts, name))))))
 }
 
 /// Returns the table of measures with a column of values for each run; empty if both scenes measure nothing.
 fn compared_measures(runs: &[Shown<'_>; 2]) -> Html {
-    // The variant can measure other things than the scene, so that values are found by the names of their measures.
+    // The variant can have other measures than the scene, so that values are found by the names of measures.
     let named = |shown: &Shown<'_>| shown.measured.iter().map(|measured| (measured.name.text(shown.scene), *measured)).collect::<Vec<_>>();
     let measured = runs.each_ref().map(named);
     let by_name = measured.each_ref().map(|measured| measured.iter().cloned().collect::<BTreeMap<String, MeasuredValue>>());

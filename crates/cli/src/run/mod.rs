@@ -134,7 +134,7 @@ struct Run {
     page: Option<PageParts>,
 }
 
-/// Parts of a page that a run has for its page alone.
+/// Parts of a run for the page alone.
 struct PageParts {
     /// Results of the scene's expectations.
     outcomes: Vec<Outcome>,
@@ -142,13 +142,13 @@ struct PageParts {
 }
 
 impl Run {
-    /// Returns what a page shows of the run; `None` for a run without a page.
+    /// Returns the results for a page; `None` for a run without a page.
     fn shown<'a>(&'a self, scene: &'a Scene, overrides: &'a [String]) -> Option<Shown<'a>> {
         let (summary, measured) = (&self.summary, &self.measured);
         self.page.as_ref().map(|PageParts { outcomes, pictures }| Shown { scene, overrides, summary, measured, outcomes, pictures })
     }
 
-    /// Writes the page of the run into its folder, if the run has both.
+    /// Writes the page of the run into the folder, if the run has a page and a folder.
     fn write_page(&mut self, folder: Option<&Path>, page: Option<String>) -> Result<(), Failure> {
         if let Some((folder, page)) = folder.zip(page) {
             let file = folder.join("run.html");
@@ -214,7 +214,7 @@ fn execute<O: Observer>(arguments: &RunArguments, scene: &Scene, what: What<'_>,
         }
         What::Replayed(inputs) => replay(scene, inputs, observer),
     };
-    // A run may end before it asks the observer for the first time. Its summary is a result too.
+    // A short run may end without asking the observer. The summary of such a run is a result too.
     interrupt::has_results();
     summary
 }

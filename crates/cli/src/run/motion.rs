@@ -20,9 +20,9 @@ const STEP_S: f64 = 0.05;
 /// Positions of the copies and of the devices, per frame. Filled by the ticks of a run.
 pub(super) struct Places {
     peers: usize,
-    /// Positions, indexed by frame, then by peer. A position that is not known yet equals the position of the frame before.
+    /// Positions, indexed by frame, then by peer. Until the peer's tick for a frame, the position equals the position of the frame before.
     frames: Vec<Vec<Place>>,
-    /// Index of the next frame that lacks a position, indexed by peer.
+    /// Index of the next frame without a position of the peer, indexed by peer.
     next: Vec<usize>,
 }
 
@@ -47,13 +47,13 @@ impl Places {
         self.next.iter().any(|frame| Self::due(*frame) <= at)
     }
 
-    /// Stores the positions of the tick for all frames of the peer that are due: each frame gets the first tick at or after the instant of the frame.
+    /// Stores the positions of the tick in all due frames of the peer: each frame gets the first tick at or after the instant of the frame.
     pub(super) fn add(&mut self, row: &TickRow<'_>) {
         let [copy, device] = [row.object, row.device].map(|state| [0, 1].map(|axis| state.position.get(axis).copied().unwrap_or(0.0)));
         let place = Place { copy, device };
         while Self::due(self.next[row.peer]) <= row.at {
             let frame = self.next[row.peer];
-            // The first peer that reaches a frame adds the frame. Other peers keep their positions of the frame before until their own tick comes, so no entry
+            // The first peer that reaches a frame adds the frame. The remaining peers keep the positions of the frame before until their own ticks, so no entry
             // is ever missing.
             if frame == self.frames.len() {
                 let before = self.frames.last().cloned().unwrap_or_else(|| vec![place; self.peers]);

@@ -157,6 +157,7 @@ pub(crate) fn edits(keys: &BTreeMap<String, String>) -> Table {
         let Some((number, key)) = key.strip_prefix("timeline.").and_then(|rest| rest.split_once('.')) else { continue };
         let Ok(number) = number.parse() else { continue };
         let (at, effects) = changes.entry(number).or_default();
+        // The key `at` of a change is the instant. All further keys are effects of the change.
         if key == "at" { at.clone_from(value) } else { effects.push(format!("{key} = {value}")) }
     }
     let head = Table::new().column("at").column("change");

@@ -14,7 +14,8 @@ use crate::{file, input, output};
 /// Largest number of differences that a message lists.
 const MOST: usize = 20;
 
-/// Reads `inputs.csv` of a session. Returns the inputs, and the differences between `scene` and the scene of the session together with what the record lacks.
+/// Reads `inputs.csv` of a session. Returns the inputs, and the differences between `scene` and the scene of the session together with the missing parts of the
+/// record.
 ///
 /// # Errors
 ///

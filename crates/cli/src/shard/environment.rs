@@ -1,8 +1,8 @@
-//! `--shard auto`: finds the shard of this process from the environment variables that schedulers and launchers set.
+//! `--shard auto`: finds the shard of this process from the environment variables of schedulers and launchers.
 
 use cohaptic_campaign::Shard;
 
-/// Scheduler or launcher, with the environment variables that hold the index of a task and the number of tasks.
+/// Scheduler or launcher, with the environment variables for the index of a task and the number of tasks.
 struct Source {
     name: &'static str,
     index: &'static str,
@@ -13,7 +13,7 @@ struct Source {
 /// Index of the first task.
 enum First {
     Is(u64),
-    /// Name of the variable that holds the index, for schedulers whose users choose the first index.
+    /// Name of the variable of the first index, for schedulers with a first index of the user's choice.
     In(&'static str),
 }
 
@@ -25,11 +25,11 @@ enum Count {
         last: &'static str,
         step: &'static str,
     },
-    /// No variable holds the number: the user gives it, as in `auto/8`.
+    /// No variable holds the number: the user gives the number, as in `auto/8`.
     Unknown,
 }
 
-/// Job arrays: tasks that a scheduler starts one by one. If the variables of several entries are set, the first entry of this list counts.
+/// Job arrays: tasks started singly by a scheduler. If the variables of several entries are set, the first entry of this list counts.
 const ARRAYS: [Source; 7] = [
     Source {
         name: "Slurm array",
@@ -93,6 +93,7 @@ pub(super) fn auto(get: &dyn Fn(&str) -> Option<String>, count: Option<u64>) -> 
             return Err(format!("no scheduler says which shard this is: expected one of the variables {names}, or --shard I/N"));
         }
     };
+    // A number from the user must agree with the number of the scheduler: otherwise some shards would be done by no task.
     let count = match (count, known) {
         (Some(said), Some(known)) if said != known => return Err(format!("{name} has {known} tasks: expected auto, auto/{known}, or --shard I/N")),
         (Some(count), _) | (None, Some(count)) => count,

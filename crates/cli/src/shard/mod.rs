@@ -1,5 +1,5 @@
-//! Work that several processes share: `--shard`, `--merge` and `--status` of campaigns, comparisons, maps and boundaries. Each process does one shard of the
-//! work, and all write into the same folder.
+//! Work shared by several processes: `--shard`, `--merge` and `--status` of campaigns, comparisons, maps and boundaries. Each process does a shard of the work,
+//! and all processes write into the same folder.
 
 mod environment;
 mod status;
@@ -23,16 +23,16 @@ pub(crate) use status::{all_done, logs_in, missing, show};
 use worker::nobody_works_in;
 pub(crate) use worker::{Worker, owner};
 
-/// Part of the work that a command does.
+/// Share of a command in the work.
 #[derive(Clone, Copy)]
 pub(crate) enum Sharing<'a> {
     /// The whole work, in the folder of `--out` if the option is given.
     Whole(Option<&'a Path>),
     /// A single shard, in the folder.
     Shard(Shard, &'a Path),
-    /// Merges the results that shards left in the folder.
+    /// Merges the results of shards in the folder.
     Merge(&'a Path),
-    /// Reports which pieces shards have done in the folder.
+    /// Reports the done pieces of work in the folder.
     Status(&'a Path),
 }
 
@@ -58,7 +58,7 @@ impl<'a> Sharing<'a> {
         Ok(Self::Shard(shard, folder))
     }
 
-    /// Takes the folder for this process alone if the process does the whole work or merges shards. A merge does not check for workers that still hold a lease.
+    /// Takes the folder for this process alone if the process does the whole work or merges shards. A merge does not check for workers with a lease.
     pub(crate) fn own_folder(self) -> Result<Option<OwnFolder>, Failure> {
         match self {
             Self::Whole(None) | Self::Shard(..) | Self::Status(_) => Ok(None),
@@ -73,7 +73,7 @@ impl<'a> Sharing<'a> {
         }
     }
 
-    /// Returns the folder that files are written into, or `None` if `--out` is not given.
+    /// Returns the folder of the files, or `None` if `--out` is not given.
     pub(crate) const fn folder(self) -> Option<&'a Path> {
         match self {
             Self::Whole(folder) => folder,

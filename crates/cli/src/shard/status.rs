@@ -1,4 +1,4 @@
-//! `--status`: reports which pieces of shared work are done, which workers did them, and when the remaining pieces are expected.
+//! `--status`: reports the done pieces of shared work, the workers, and the expected end of the remaining pieces.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -14,7 +14,7 @@ use crate::document_schema::DocumentSchema;
 use crate::failure::Failure;
 use crate::output::{self, NO_FILES};
 
-/// Reads the workers of a folder from their logs, sorted by shard. A worker counts as alive if it holds a lease that is not stale.
+/// Reads the workers of a folder from their logs, sorted by shard. A worker with a lease that is not stale counts as alive.
 fn workers(folder: &Path) -> Result<Vec<Worker>, Failure> {
     let unreadable = |error| Failure::File { verb: "read", path: folder.to_path_buf(), error };
     let leases = cohaptic_files::leases(folder, &owner(), |name| Shard::of_lease(name).is_some()).map_err(unreadable)?;
@@ -25,7 +25,7 @@ fn workers(folder: &Path) -> Result<Vec<Worker>, Failure> {
         let path = entry.map_err(unreadable)?.path();
         let Some(name) = path.file_name().and_then(|name| name.to_str()).filter(|name| is_log(name)) else { continue };
         let lives = alive.iter().any(|owner| cohaptic_campaign::worker_log(owner) == name);
-        // A log that vanishes before it is read belongs to work that another process has just completed.
+        // A log that vanishes before the read belongs to work just completed by another process.
         let text = fs::read_to_string(&path).unwrap_or_default();
         logs.insert(name.to_owned(), Worker::read(&text, lives));
     }
@@ -40,8 +40,9 @@ pub(crate) fn logs_in(folder: &Path) -> Vec<PathBuf> {
     entries.filter(|entry| entry.file_name().to_str().is_some_and(is_log)).map(|entry| entry.path()).collect()
 }
 
-/// Returns the failure of a merge for which pieces are missing, with the shards that have to be done.
+/// Returns the failure of a merge with missing pieces. The message names the shards to do.
 pub(crate) fn missing(folder: &Path, missing: &Missing) -> Failure {
+    // Workers of different divisions may have left logs. The finest division names the shards.
     let shards = workers(folder).ok().and_then(|workers| workers.iter().map(|worker| worker.shard.count()).max());
     Failure::System(format!(
         "{} is not complete: {}.\nRun them with --shard, or all that is missing with --out and without --shard",
@@ -54,13 +55,13 @@ pub(crate) fn missing(folder: &Path, missing: &Missing) -> Failure {
 ///
 /// # Errors
 ///
-/// The failure of [`missing`] with the indices of the pieces that are not done.
+/// The failure of [`missing`] with the indices of the missing pieces.
 pub(crate) fn all_done(folder: &Path, names: Names, pieces: &[Piece]) -> Result<(), Failure> {
     let undone: Vec<u64> = (0..).zip(pieces).filter(|(_, piece)| !piece.is_done).map(|(place, _)| place).collect();
     if undone.is_empty() { Ok(()) } else { Err(missing(folder, &Missing { piece: names.piece, count: pieces.len() as u64, pieces: undone })) }
 }
 
-/// Prints which pieces are done in a folder, and by which workers.
+/// Prints the done pieces of a folder, and the workers.
 pub(crate) fn show(json: bool, folder: &Path, names: Names, pieces: &[Piece]) -> Result<ExitCode, Failure> {
     let status = Status { folder: output::path(folder), names, pieces, workers: workers(folder)? };
     output::answer(json, DocumentSchema::STATUS, &status_document(&status), || status_words(&status), NO_FILES)?;

@@ -22,7 +22,7 @@ pub(crate) struct Worker {
     log: Mutex<File>,
     /// Set by the heart once another process holds the lease of the shard.
     is_lost: Arc<AtomicBool>,
-    /// Sender that nothing is ever sent through: dropping the sender closes the channel and thereby ends the heart.
+    /// Sender of a channel without messages: dropping the sender closes the channel, and so ends the heart.
     alive: Option<mpsc::Sender<()>>,
     /// Thread that renews the lease ([`renew`]).
     heart: Option<JoinHandle<()>>,
@@ -83,8 +83,7 @@ impl Worker {
         self.begun.elapsed().as_secs_f64()
     }
 
-    /// Logs the end, gives up the lease and returns `outcome`. If the work failed because another process has the shard now, returns an error that says so,
-    /// made by `said`.
+    /// Logs the end, gives up the lease and returns `outcome`. If the work failed because another process has the shard now, returns the error of `said`.
     pub(crate) fn end<T, E>(mut self, outcome: Result<T, E>, said: impl FnOnce(Failure) -> E) -> Result<T, E> {
         let word = match &outcome {
             Ok(_) => "done",
