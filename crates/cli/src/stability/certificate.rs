@@ -1,4 +1,4 @@
-//! Texts of certificates: JSON documents with the scene and all numbers that another program needs to check the verdicts on a set of scenes.
+//! Texts of certificates: JSON documents with the scene and all numbers for a check of the verdicts by another program.
 
 use cohaptic_proofs::{
     BoxCertificate, FrameState, FreeCircle, Guarantee, MomentCertificate, NumberCertificate, PartCertificate, Switching, SwitchingCertificate,
@@ -10,7 +10,7 @@ use serde::Serialize;
 use crate::document_schema::{DocumentSchema, document};
 use crate::failure::Failure;
 
-/// A scene as the user gave the scene: title, text of the file, and `KEY=VALUE` overrides.
+/// A scene as given by the user: title, text of the file, and `KEY=VALUE` overrides.
 pub(super) struct Given<'a> {
     pub(super) title: &'a str,
     pub(super) text: &'a str,
@@ -34,7 +34,7 @@ pub(super) fn of_boxes(
             keys: keys.iter().map(|range| range.key.as_str()).collect::<Vec<_>>(),
             ranges: keys.iter().map(|range| [range.low, range.high]).collect::<Vec<_>>(),
             units: keys.iter().map(|range| range.unit.as_str()).collect::<Vec<_>>(),
-            // Range of the number N of equal peers. The last range of a box is then that of 1/(N - 1). `null` for the scene's number.
+            // Range of the number N of equal peers. The last range of a box is then the range of 1/(N - 1). `null` for the scene's number.
             every_number: every.map(|(from, to)| document! { from: from, to: to }),
             #[serde(flatten)]
             topology: topology.map(|topology| document! { topology: of_topology(topology) }),
@@ -43,7 +43,7 @@ pub(super) fn of_boxes(
     )
 }
 
-/// Returns the certificate of spans of numbers of peers, of which those equal to the peer `growing` (its index) grow in number.
+/// Returns the certificate of spans of numbers of peers. The peers equal to the peer with the index `growing` grow in number.
 pub(super) fn of_numbers(given: &Given<'_>, growing: usize, spans: &[NumberCertificate]) -> Result<String, Failure> {
     let spans = spans.iter().map(|span| {
         document! {
@@ -69,7 +69,7 @@ pub(super) fn of_numbers(given: &Given<'_>, growing: usize, spans: &[NumberCerti
     )
 }
 
-/// Returns the certificate of contacts that open and close.
+/// Returns the certificate of opening and closing contacts.
 pub(super) fn of_switching(given: &Given<'_>, found: &Switching) -> Result<String, Failure> {
     let motions = found.motions.iter().map(|motion| {
         document! {

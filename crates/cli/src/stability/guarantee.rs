@@ -30,6 +30,7 @@ impl Drop for PieceWatch {
 impl Watch for PieceWatch {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
     fn expects(&self, operations: f64) {
+        // A proof announces pieces as it divides boxes, so that the length of the bar grows during the proof.
         self.0.expect(operations as u64);
     }
 
@@ -42,7 +43,7 @@ impl Watch for PieceWatch {
     }
 }
 
-/// Converts an error of a proof to a failure. `option` is the option that asked for the proof, and `family` converts errors about the scene.
+/// Converts an error of a proof to a failure. `option` is the option of the proof, and `family` converts errors about the scene.
 pub(super) fn failure(error: ProofError, option: &str, scene: &Path, family: impl FnOnce(FamilyError) -> Failure) -> Failure {
     if let ProofError::Analysis(error) = &error {
         return if *error == AnalysisError::Stopped { ended() } else { not_analysed(scene, error) };
@@ -55,7 +56,7 @@ pub(super) fn ended() -> Failure {
     Failure::Interrupted(UNFINISHED.to_owned())
 }
 
-/// Returns the note about `pieces` pieces that have a verdict but no certificate; `None` for no such piece.
+/// Returns the note about `pieces` pieces with a verdict but without a certificate; `None` for no such piece.
 pub(super) fn left_open(pieces: usize) -> Option<String> {
     (pieces > 0).then(|| format!("the certificate leaves open {} of those that are decided here", Counted(pieces, "piece")))
 }

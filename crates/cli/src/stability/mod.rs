@@ -1,6 +1,6 @@
 //! `cohaptic stability`: analyses and proves the stability of scenes without simulating the scenes.
 //!
-//! `point` judges one scene, `map` a plane of two keys, and `boundary` a range of one key. The remaining modules are shared by these three.
+//! `point` judges a scene, `map` a plane of two keys, and `boundary` a range of a key. The remaining modules are shared by these three.
 
 mod boundary;
 mod certificate;

@@ -18,7 +18,7 @@ use crate::{interrupt, output};
 
 pub(super) const NAMES: Names = Names { piece: "block", unit: "range" };
 
-/// Header line that explains the rows.
+/// Header line with the meaning of the rows.
 pub(super) const ROW: &str = "each row: the number of the proof, from and to of each key, and 0 if it is stable, 1 unstable, 2 undecided";
 
 /// Removes the files of rows of a finished proof and the workers' logs.
@@ -41,7 +41,7 @@ pub(super) struct Proofs<'a> {
     pub(super) threads: usize,
 }
 
-/// The known pieces of one proof, and the file to which newly decided pieces are written.
+/// The known pieces of a proof, and the file for newly decided pieces.
 pub(super) struct Pieces<'a> {
     /// Index of the proof, which is also the number of its rows.
     number: usize,
@@ -60,7 +60,7 @@ fn bits(ranges: &[[f64; 2]]) -> Vec<u64> {
 }
 
 impl<'a> Pieces<'a> {
-    /// Selects the pieces of proof `number` among the rows of all proofs. Rows that are no piece are skipped, and their pieces are proven again.
+    /// Selects the pieces of proof `number` among the rows of all proofs. Rows of another form are skipped, and their pieces are proven again.
     pub(super) fn of(number: usize, rows: &[Row], file: Option<&'a Mutex<(RowsFile, Option<Failure>)>>) -> Self {
         let piece = |(_, values): &Row| {
             let (place, values) = values.split_last()?;

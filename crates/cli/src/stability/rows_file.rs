@@ -1,8 +1,8 @@
 //! Files of rows of numbers, which keep the progress of a long computation, so that the same command continues an interrupted computation.
 //!
-//! A file begins with a header of text lines, which identifies the computation. Each row is one line: the number of the row, the values with the fewest digits
-//! that read back as the same `f64`, and the fingerprint of the line up to there. An incomplete last line, as a power failure leaves it, is ignored. A line
-//! with a wrong fingerprint is skipped, and its row is computed again.
+//! A file begins with a header of text lines, which identifies the computation. Each row is a line: the number of the row, the values with the fewest digits
+//! for the same `f64`, and the fingerprint of the text before. An incomplete last line, as after a power failure, is ignored. A line with a wrong fingerprint
+//! is skipped, and the row is computed again.
 //!
 //! Each worker of a shared folder writes a file of its own, `NAME.WORKER.partial` beside `NAME.partial`, and reads the files of all workers.
 
@@ -27,7 +27,7 @@ pub(crate) struct RowsFile {
     made_folder: bool,
 }
 
-/// A row: its number, by which the computation recognises the row, and its values.
+/// A row: the number, by which the computation recognises the row, and the values.
 pub(crate) type Row = (usize, Vec<f64>);
 
 /// Place of the files of rows of one computation.
@@ -74,7 +74,7 @@ impl Kept<'_> {
         Ok((rows, paths))
     }
 
-    /// Opens or creates the file of `worker` (`None`: of a process that works alone) and its folder. Returns the file and the rows of all workers.
+    /// Opens or creates the file of `worker` (`None`: of a process that works alone) and the folder. Returns the file and the rows of all workers.
     ///
     /// Nothing is written if a file in the folder belongs to another computation.
     pub(crate) fn open(self, worker: Option<&str>) -> Result<(RowsFile, Vec<Row>), Failure> {
@@ -100,18 +100,19 @@ fn begun(path: &Path, header: &[String]) -> Result<Begun, Failure> {
 }
 
 impl RowsFile {
-    /// Opens or creates the file at `path`, and creates its folder. Returns the file and the rows in it; a new file has none.
+    /// Opens or creates the file at `path`, and creates the folder. Returns the file and the rows of the file; a new file has no rows.
     ///
     /// Nothing is written if the file belongs to another computation.
     fn open(path: PathBuf, header: &[String]) -> Result<(Self, Vec<Row>), Failure> {
         let begun = begun(&path, header)?;
+        // `abandon` removes the folder only if this call created the folder.
         let made_folder = path.parent().is_some_and(|folder| !folder.exists());
         let opened = Self::open_at(&path, begun.whole, header);
         let file = opened.map_err(|error| Failure::File { verb: "write", path: path.clone(), error })?;
         Ok((Self { path, others: Vec::new(), file, made_folder }, begun.rows))
     }
 
-    /// Opens the file after its first `whole` bytes, and writes the header into a file that has none.
+    /// Opens the file after the first `whole` bytes, and writes the header into a file without a header.
     fn open_at(path: &Path, whole: usize, header: &[String]) -> io::Result<File> {
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder)?;
@@ -130,6 +131,7 @@ impl RowsFile {
         for value in values {
             line.push_str(&format!(" {value:?}"));
         }
+        // The fingerprint covers the number and all values, so that a damaged digit is found on reading.
         let fingerprint = Fingerprint::of(&line);
         line.push_str(&format!(" {fingerprint}\n"));
         let written = self.file.write_all(line.as_bytes());

@@ -1,4 +1,4 @@
-//! Parses the ranges of open keys from arguments, and translates errors of a family of scenes to the options that the user typed.
+//! Parses the ranges of open keys from arguments, and translates errors of a family of scenes to the user's options.
 
 use std::path::{Path, PathBuf};
 
@@ -14,17 +14,17 @@ pub(super) fn range(option: &str, text: &str) -> Result<KeyRange, Failure> {
     KeyRange::parse(text).map_err(|error| Failure::Input(format!("{option}: {error}")))
 }
 
-/// Origins of the texts that the command puts into a scene: the file and the options of the user.
+/// Origins of the texts in a scene: the file and the options of the user.
 pub(super) struct Said<'a> {
     pub(super) file: &'a Path,
-    /// Options that leave a key open, each with its parsed range.
+    /// Options with an open key, each with the parsed range.
     pub(super) ranges: &'a [(&'static str, KeyRange)],
-    /// Option that overrides keys, with its `KEY=VALUE` texts.
+    /// Option of the overrides, with the `KEY=VALUE` texts.
     pub(super) overrides: (&'static str, &'a [String]),
 }
 
 impl Said<'_> {
-    /// Converts an error of the family to a failure that names the user's option, or the scene file if no option is the cause.
+    /// Converts an error of the family to a failure with the name of the user's option, or of the scene file if no option is the cause.
     pub(super) fn failure(&self, error: FamilyError) -> Failure {
         match error {
             FamilyError::Scene(error) => {
@@ -40,7 +40,7 @@ impl Said<'_> {
             | FamilyError::Twice { .. }
             | FamilyError::Values { .. }
             | FamilyError::Outside { .. }) => {
-                // Errors about a range begin with its key, by which the option is found.
+                // Errors about a range begin with the key of the range, so that the key finds the option.
                 let about =
                     |(option, range): &&(&'static str, KeyRange)| error.to_string().starts_with(&format!("{} ", range.key)).then_some(*option);
                 match self.ranges.iter().find_map(|range| about(&range)) {
@@ -51,7 +51,7 @@ impl Said<'_> {
         }
     }
 
-    /// Returns the option that put the `KEY=VALUE` text into the scene; `None` for `--set`.
+    /// Returns the option of the `KEY=VALUE` text; `None` for `--set`.
     fn option_of(&self, text: &str) -> Option<&'static str> {
         let (option, overrides) = self.overrides;
         if overrides.iter().any(|given| given == text) {

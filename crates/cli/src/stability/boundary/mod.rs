@@ -1,4 +1,4 @@
-//! `cohaptic stability boundary`: finds the values of one key at which the stability of a scene changes.
+//! `cohaptic stability boundary`: finds the values of a key at which the stability of a scene changes.
 //!
 //! Without `--prove` the spectral radius is sampled, and each crossing of the limit is located to a tolerance. `prove` decides whole stretches of the range,
 //! and `sharing` divides the search among shards.
@@ -30,7 +30,7 @@ use crate::{input, interrupt, output, shard};
 /// Time after which a search without a visible progress bar prints an estimate of its length.
 const TOLD: Duration = Duration::from_secs(1);
 
-/// Name of the files of rows in which checked values are kept.
+/// Name of the files of rows with checked values.
 const ROWS: &str = "boundary.rows";
 
 /// Checked arguments of the command. Nothing is written before the check has passed.
@@ -40,7 +40,7 @@ struct Order {
     range: KeyRange,
     options: BoundaryOptions,
     family: Family,
-    /// Header of the file of rows, which identifies the search.
+    /// Header of the file of rows. The header identifies the search.
     header: Vec<String>,
 }
 
@@ -68,7 +68,7 @@ pub(crate) fn boundary(arguments: &BoundaryArguments) -> Result<ExitCode, Failur
     let found = match found {
         Ok(found) => found,
         Err(error) => {
-            // A new file of rows is useless if the search fails. A file that had rows before is kept.
+            // A new file of rows is useless if the search fails. A file with earlier rows is kept.
             if let Some(rows) = rows.filter(|_| known.is_empty()) {
                 rows.abandon();
             }
@@ -142,13 +142,13 @@ impl Order {
     }
 }
 
-/// Returns the value of each row with the cell found at the value. Rows that are too short are skipped.
+/// Returns the value of each row with the cell found at the value. Too short rows are skipped.
 fn cells(rows: &[Row]) -> Vec<(f64, Cell)> {
     let cell = |row: &[f64]| Some(Cell { radius: Radius { value: *row.get(1)?, error: *row.get(2)? }, is_nominal: *row.get(3)? != 0.0 });
     rows.iter().filter_map(|(_, row)| Some((*row.first()?, cell(row)?))).collect()
 }
 
-/// Returns the numbers of the row that keeps `value` and its cell; the inverse of [`cells`].
+/// Returns the numbers of the row for `value` and a cell; the inverse of [`cells`].
 fn row(value: f64, Cell { radius, is_nominal }: &Cell) -> [f64; 4] {
     [value, radius.value, radius.error, f64::from(u8::from(*is_nominal))]
 }
@@ -193,7 +193,7 @@ fn failure(arguments: &BoundaryArguments, range: &KeyRange, error: BoundaryError
     }
 }
 
-/// Adds the values checked in this run to the file of rows, and returns the failure that says how to continue.
+/// Adds the values checked in this run to the file of rows, and returns the failure with advice on how to continue.
 fn interrupted(found: &Boundary, rows: Option<RowsFile>, known: &[Row], kept: Option<Kept<'_>>) -> Failure {
     let kept = match (kept, rows) {
         (Some(kept), Some(mut rows)) => {

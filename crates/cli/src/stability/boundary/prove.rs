@@ -23,7 +23,7 @@ use crate::stability::guarantee::{self, PieceWatch};
 use crate::stability::proof_blocks::{self, Pieces, Proofs};
 use crate::stability::rows_file::Kept;
 
-/// Name of the files of rows in which shards keep their decided pieces.
+/// Name of the files of rows with the decided pieces of shards.
 const ROWS: &str = "proof.rows";
 
 /// Proves the line and writes the answer, or does the part of a shard.
@@ -34,6 +34,8 @@ pub(super) fn prove(order: &Order, arguments: &BoundaryArguments, sharing: Shari
     if arguments.certificate {
         TopologyCertificate::of(&order.family).map_err(|error| failure(order, arguments, error))?;
     }
+    // The rows of a proof are pieces, not values: the first and the last line of a search's header are replaced. The tolerance is added, because the pieces
+    // depend on the tolerance.
     let mut header = order.header.clone();
     header[0] = format!("cohaptic {} stability boundary --prove: pieces looked at; the same command goes on from here", env!("CARGO_PKG_VERSION"));
     header.pop();

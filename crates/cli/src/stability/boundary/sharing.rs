@@ -71,6 +71,7 @@ fn search(order: &Order, arguments: &BoundaryArguments, shard: Shard, kept: Kept
         &wanted,
         &cells(&rows),
         |value, cell| {
+            // The number is unique in this worker's file only. Rows are recognised by their value, so that equal numbers of two workers do no harm.
             let number = rows.len() + usize::try_from(looked_at.fetch_add(1, Ordering::Relaxed)).unwrap_or_default();
             let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
             if let Err(failure) = file.0.add(number, &row(value, &cell)) {

@@ -1,4 +1,4 @@
-//! The files of `cohaptic stability map --out`: one table per variant, one picture with the stable region of each variant, and the page.
+//! The files of `cohaptic stability map --out`: a table per variant, a picture with the stable region of each variant, and the page.
 
 use std::path::Path;
 
@@ -49,7 +49,7 @@ pub(super) fn command_line(arguments: &MapArguments) -> String {
         .text()
 }
 
-/// Returns the origin of the answer, for its page.
+/// Returns the origin of the answer, for the page.
 pub(super) fn origin<'a>(order: &'a Order, arguments: &'a MapArguments, command: &'a str, pictures: &'a [(&'a str, &'a str)]) -> Origin<'a> {
     Origin { command, file: &order.file, overrides: &arguments.scene.overrides.set, scene: &order.text, pictures }
 }

@@ -22,7 +22,7 @@ use crate::stability::rows_file::{Kept, Row, RowsFile, fingerprint};
 use crate::stability::source::fingerprint_of;
 use crate::{interrupt, output};
 
-/// Name of the files of rows in which finished rows are kept.
+/// Name of the files of finished rows.
 const ROWS: &str = "map.rows";
 
 /// Texts of the header: the computation, the size (empty for the size of the grid), and the explanation of the rows.
@@ -167,6 +167,7 @@ impl Keeper<'_> {
     }
 
     fn keep(&self, number: usize, row: &MapRow) {
+        // The radii of all cells come first, and then the marks: `sorted` reads the two halves of a row.
         let nominal = row.nominal.iter().map(|nominal| f64::from(u8::from(*nominal)));
         let cells: Vec<f64> = row.radius.iter().copied().chain(nominal).collect();
         let mut guard = self.file.lock().unwrap_or_else(PoisonError::into_inner);
@@ -202,6 +203,7 @@ fn in_turn(order: &Order, known: Vec<Vec<MapRow>>, keeper: &Keeper<'_>) -> Resul
         let map = filled?;
         let whole = map.is_complete();
         maps.push(map);
+        // A map is incomplete only after a stop, which would end the next map at once too.
         if !whole {
             break;
         }

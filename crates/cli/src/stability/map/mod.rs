@@ -34,7 +34,7 @@ struct Order {
     variants: Vec<Variant>,
     /// Families of scenes, indexed by variant.
     families: Vec<Family>,
-    /// Names of the coordination laws, indexed by variant; empty for a variant whose scene is refused at the lower ends of the ranges.
+    /// Names of the coordination laws, indexed by variant; empty for a variant with a refused scene at the lower ends of the ranges.
     laws: Vec<String>,
 }
 
@@ -96,7 +96,7 @@ impl Order {
             let said = Said { file, ranges: &ranges, overrides: (variant.option, &variant.overrides) };
             families.push(Family::new(&text, file, &variant.on_top_of(set), keys()).map_err(|error| said.failure(error))?);
         }
-        // A scene that is refused here is refused with a message by the computation of its first cell.
+        // A scene refused here is refused again, with a message, by the computation of the first cell.
         let scenes: Vec<Option<Scene>> = families.iter().map(|family| source::at_low(family).ok()).collect();
         let title = scenes.first().and_then(Option::as_ref).map_or_else(|| output::path(input::named(file)), |scene| scene.title.clone());
         let laws =

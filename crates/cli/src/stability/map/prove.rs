@@ -33,10 +33,10 @@ pub(super) struct Proof {
     uncertified: Option<usize>,
 }
 
-/// Verdicts in the order in which an answer gives their shares of the area.
+/// Verdicts, in the order of the shares of an answer.
 pub(super) const GUARANTEES: [Guarantee; 3] = [Guarantee::Stable, Guarantee::Unstable, Guarantee::Undecided];
 
-/// Name of the files of rows in which shards keep their decided pieces.
+/// Name of the files of rows with the decided pieces of shards.
 const ROWS: &str = "proof.rows";
 
 /// Proves the region of each variant and writes the answer, or does the part of a shard.
@@ -93,7 +93,7 @@ pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32, shar
         if arguments.certificate && proofs.iter().all(|proof| proof.region.is_whole) {
             files.extend(certificates(order, arguments, &mut proofs, folder)?);
         }
-        // The page comes after the certificates, because it says which boxes these leave open.
+        // The page comes after the certificates, because the page says how many boxes the certificates leave open.
         files.push(write_into(folder, "proof.html", proof_page::html(order, arguments, &proofs, &pictures))?);
         if proofs.iter().all(|proof| proof.region.is_whole) {
             proof_blocks::remove(folder, ROWS)?;
@@ -143,7 +143,7 @@ fn answer(order: &Order, arguments: &MapArguments, proofs: &[Proof], wall_s: f64
             stable: stable,
             unstable: unstable,
             undecided: undecided,
-            // Numbers of boxes at a single delay. These boxes have no area, so that no share counts them.
+            // Numbers of boxes at a single delay. These boxes have no area, so that the shares leave them out.
             lines: document! {
                 stable: proof.region.lines(Guarantee::Stable),
                 unstable: proof.region.lines(Guarantee::Unstable),
@@ -158,7 +158,7 @@ fn answer(order: &Order, arguments: &MapArguments, proofs: &[Proof], wall_s: f64
             unstable_alone: both(&proof.region, Guarantee::Unstable, &proofs[0].region, Guarantee::Stable),
             #[serde(flatten)]
             file: proof.file.as_ref().map(|file| document! { file: file.as_str() }),
-            // Number of boxes with a verdict for which the certificate has no proof; absent without a certificate.
+            // Number of boxes with a verdict but without a proof in the certificate; absent without a certificate.
             #[serde(flatten)]
             certificate: proof.uncertified.map(|uncertified| document! { uncertified: uncertified }),
         }
@@ -187,7 +187,7 @@ fn describe(order: &Order, arguments: &MapArguments, proofs: &[Proof], wall_s: f
     format!("{}\n\n{lines}  {wall_s:.1} s\n", order.title)
 }
 
-/// Returns the lines about the proofs. Lines that belong to the line before them are indented.
+/// Returns the lines about the proofs. Further lines about the same proof are indented.
 pub(super) fn lines(arguments: &MapArguments, proofs: &[Proof]) -> Vec<String> {
     let percent = |share: f64| format!("{} %", figure(100.0 * share, 4));
     let mut lines = Vec::new();
@@ -217,13 +217,15 @@ pub(super) fn lines(arguments: &MapArguments, proofs: &[Proof]) -> Vec<String> {
     lines
 }
 
-/// Returns the share of the area, from 0 to 1, in which region `one` has the verdict `of_one` and region `other` has the verdict `of_other`.
+/// Returns the share of the area, from 0 to 1, with the verdict `of_one` in region `one` and the verdict `of_other` in region `other`.
 fn both(one: &ProvenRegion, of_one: Guarantee, other: &ProvenRegion, of_other: Guarantee) -> f64 {
     let chosen = |region: &ProvenRegion, guarantee| region.boxes.iter().filter(|one| one.guarantee == guarantee).copied().collect::<Vec<ProvenBox>>();
     let (ones, others) = (chosen(one, of_one), chosen(other, of_other));
+    // Length of the overlap of two intervals; 0 if the intervals are apart.
     let side = |one: [f64; 2], other: [f64; 2]| (one[1].min(other[1]) - one[0].max(other[0])).max(0.0);
     let common = ones.iter().flat_map(|one| others.iter().map(move |other| side(one.x, other.x) * side(one.y, other.y))).sum::<f64>();
     let all: f64 = one.boxes.iter().map(|one| (one.x[1] - one.x[0]) * (one.y[1] - one.y[0])).sum();
+    // The sum over no boxes may be -0.0. Adding 0.0 removes the sign.
     common / all + 0.0
 }
 

@@ -22,13 +22,13 @@ pub(super) struct Proof {
     pub(super) certificate: Option<Certificate>,
 }
 
-/// Path of a certificate, and the ranges of numbers that have a verdict but no proof in the certificate.
+/// Path of a certificate, and the ranges of numbers with a verdict but without a proof in the certificate.
 pub(super) struct Certificate {
     pub(super) file: String,
     uncertified: Vec<(u64, Option<u64>)>,
 }
 
-/// Prepares the proof, or returns `None` if no option asks for the proof. A scene to which the proof does not apply is a failure.
+/// Prepares the proof, or returns `None` if no option asks for the proof. A scene outside the reach of the proof is a failure.
 pub(super) fn asked(scene: &Scene, arguments: &PointArguments, path: &Path) -> Result<Option<NumberProof>, Failure> {
     let Some((from, to)) = arguments.every_number else { return Ok(None) };
     NumberProof::new(scene, from, to).map(Some).map_err(|error| failure(error, path))
@@ -89,6 +89,7 @@ pub(super) fn document(scene: &Scene, Proof { every, certificate }: &Proof) -> i
 
 /// Returns each span of numbers of peers, with the reason if the span is undecided.
 fn with_reasons(every: &EveryNumber) -> impl Iterator<Item = (NumberSpan, Option<String>)> {
+    // `open` has a reason per undecided span, in the order of the spans.
     let mut open = every.open.iter();
     every
         .spans
@@ -96,7 +97,7 @@ fn with_reasons(every: &EveryNumber) -> impl Iterator<Item = (NumberSpan, Option
         .map(move |span| (*span, (span.guarantee == Guarantee::Undecided).then(|| open.next().map(|why| reason(span.from, *why))).flatten()))
 }
 
-/// Returns the reason for which the numbers from `from` on are undecided.
+/// Returns the reason why the numbers from `from` on are undecided.
 fn reason(from: u64, why: Openness) -> String {
     match why {
         Openness::Ended => "the proof was stopped".to_owned(),

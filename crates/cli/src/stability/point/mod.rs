@@ -1,6 +1,6 @@
-//! `cohaptic stability point`: judges the stability of one scene.
+//! `cohaptic stability point`: judges the stability of a scene.
 //!
-//! `every_number`, `switching` and `worst` add the proofs that the arguments ask for.
+//! `every_number`, `switching` and `worst` add the proofs of the options.
 
 mod every_number;
 mod switching;
@@ -24,18 +24,18 @@ use crate::failure::{Failure, not_analysed};
 use crate::stability::guarantee;
 use crate::{file, input, output};
 
-/// Returns the failure of an analysis that the user interrupted.
+/// Returns the failure of an interrupted analysis.
 fn ended() -> Failure {
     Failure::Interrupted("the analysis was stopped before its verdict".to_owned())
 }
 
-/// Like [`ended`], but the message includes the worst case if its analysis was complete before the interruption.
+/// Like [`ended`], but the message includes the worst case if the worst case was known before the interruption.
 fn ended_after(worst: Option<&SceneWorstCase>) -> Failure {
     let Some(worst) = worst else { return ended() };
     Failure::Interrupted(format!("the analysis was stopped before its verdict; before that,{}", cohaptic_answers::point::worst_in_words(worst)))
 }
 
-/// Judges the scene, runs the proofs that the arguments ask for, and writes the answer.
+/// Judges the scene, runs the proofs of the options, and writes the answer.
 pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
     let path = &arguments.scene.scene;
     let scene = input::with(path, |text, file| Scene::parse(text, file, &arguments.scene.overrides.set))?;
@@ -63,7 +63,7 @@ pub(crate) fn point(arguments: &PointArguments) -> Result<ExitCode, Failure> {
         // The note says that changes of contacts are left out, but this answer covers the changes.
         judgement.analysis.notes.iter_mut().for_each(|note| *note = note.replace(CHANGES_LEFT_OUT, "changing between them is judged apart, below"));
     }
-    // This proof runs last: if the user interrupts the proof, the answer still has its verdicts so far and all other results.
+    // This proof runs last: if the user interrupts the proof, the answer still has the verdicts so far and all results above.
     let every = every_number::of(asked.as_ref(), &scene, arguments, path)?;
     let more = || {
         let every = every.as_ref().map(|every| every_number::words(&scene, every));
@@ -118,10 +118,11 @@ fn on_graph(scene: &Scene, graph: &str, path: &Path, most_memory: u64) -> Result
     Ok(nominal(scene, analysis, "on a graph"))
 }
 
-/// Reads a file of weights: one line per peer, with numbers separated by commas.
+/// Reads a file of weights: a line per peer, with numbers separated by commas.
 fn weights(file: &Path) -> Result<Graph, Failure> {
     let text = file::read_text(file)?;
     let rows = read_weights(&text).map_err(|fault| {
+        // The fault has a place in bytes. Lines count from 1.
         let line = text[..fault.span.start].matches('\n').count() + 1;
         Failure::Input(format!("{}:{line}: {}", file.display(), fault.message))
     })?;

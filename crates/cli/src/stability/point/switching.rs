@@ -1,4 +1,4 @@
-//! The proof about contacts that open and close, for `--switching`.
+//! The proof about opening and closing contacts, for `--switching`.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -25,7 +25,7 @@ pub(super) struct Proof {
     pub(super) file: Option<String>,
 }
 
-/// Proves the verdict for contacts that open and close and writes the certificate, or returns `None` if no option asks for the proof.
+/// Proves the verdict for opening and closing contacts and writes the certificate, or returns `None` if no option asks for the proof.
 pub(super) fn of(scene: &Scene, arguments: &PointArguments, path: &Path) -> Result<Option<Proof>, Failure> {
     if !arguments.switching {
         return Ok(None);
@@ -51,7 +51,7 @@ fn prove(scene: &Scene, path: &Path) -> Result<Switching, Failure> {
 pub(super) fn document(Proof { found: switching, file }: &Proof) -> impl Serialize + use<> {
     let motions = switching.motions.iter().map(|motion| {
         document! {
-            // Name of the motion; empty if the scene has only one.
+            // Name of the motion; empty if the scene has a single motion.
             motion: motion.name.clone(),
             verdict: motion.guarantee.word(),
             // Factor by which a norm is proven to shrink per frame; `null` unless stable.
