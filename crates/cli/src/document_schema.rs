@@ -1,4 +1,4 @@
-//! Kinds of JSON documents. Each document begins with its kind and version. Also the macro that makes documents.
+//! Kinds of JSON documents, and the macro for documents. Each document begins with its kind and version.
 
 pub(crate) use cohaptic_answers::document;
 use serde::Serialize;
@@ -40,13 +40,13 @@ impl DocumentSchema {
     pub(crate) const PAPER: Self = Self { name: "cohaptic/paper", version: 1 };
     pub(crate) const ERROR: Self = Self { name: "cohaptic/error", version: 1 };
 
-    /// Returns the document with its kind and version before all other keys.
+    /// Returns `document` with kind and version before all other keys.
     pub(crate) const fn of<D: Serialize>(self, document: &D) -> Versioned<'_, D> {
         Versioned { schema: self.name, version: self.version, document }
     }
 }
 
-/// Document with its kind and version.
+/// Document after kind and version.
 #[derive(Serialize)]
 pub(crate) struct Versioned<'a, D: Serialize> {
     schema: &'static str,

@@ -1,6 +1,6 @@
-//! Stand-ins, on other systems, for the commands that need Linux: each stand-in takes the arguments of the command, prints an error, and ends with status 3.
+//! Stand-ins, on other systems, for the commands of Linux: each stand-in takes the arguments of the command, prints an error, and ends with status 3.
 
-/// Makes one module per command that needs Linux. The function of the module fails with a message that says so.
+/// Makes a module per command. The function of the module fails with a message that the command needs Linux.
 macro_rules! need_linux {
     ($($command:ident: $arguments:ident),* $(,)?) => {
         $(

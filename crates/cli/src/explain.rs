@@ -1,4 +1,4 @@
-//! `cohaptic explain`: lists the models that the program chooses for a scene, and with `--cost` measures the cost of the methods.
+//! `cohaptic explain`: lists the program's models of a scene, and with `--cost` measures the cost of the methods.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -18,7 +18,7 @@ use crate::file::{own_folder, write_into};
 use crate::progress::Progress;
 use crate::{input, interrupt, output};
 
-/// Prints what the program models for a scene, and with `--cost` the measured cost of its methods.
+/// Prints the models of a scene, and with `--cost` the measured cost of the methods.
 pub(crate) fn explain(arguments: &ExplainArguments) -> Result<ExitCode, Failure> {
     let scene = read(arguments, &[])?;
     let _own = arguments.out.as_deref().map(own_folder).transpose()?;
@@ -53,10 +53,10 @@ fn measured(arguments: &ExplainArguments, scene: &Scene, explanation: &Explanati
     measured
 }
 
-/// Longest time of an analysis that is measured. Needed because no estimate covers clocks that drift, whose frames are minutes long.
+/// Longest time of a measured analysis. Needed because no estimate covers drifting clocks, with frames of minutes.
 const LONG: Duration = Duration::from_secs(1);
 
-/// Progress of a measurement: shows which method is measured, and ends the measurement when the user asks for the end.
+/// Progress of a measurement: shows the name of the measured method, and ends the measurement when the user asks for the end.
 struct Shown {
     bar: Progress,
     /// Instant at which the current method began.
@@ -79,13 +79,13 @@ impl MeasurementWatch for Shown {
     }
 }
 
-/// Returns the processor time that all threads of the program have used.
+/// Returns the processor time of all threads of the program so far.
 #[cfg(target_os = "linux")]
 fn processor_time() -> Duration {
     rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime).try_into().unwrap_or_default()
 }
 
-/// Returns the wall time since the first call, which is at least the processor time of one thread in that span.
+/// Returns the wall time since the first call: at least the processor time of a single thread.
 #[cfg(not(target_os = "linux"))]
 fn processor_time() -> Duration {
     static START: std::sync::OnceLock<Instant> = std::sync::OnceLock::new();

@@ -23,7 +23,7 @@ pub(crate) const CLOSED: u8 = 141;
 #[derive(Debug)]
 pub(crate) enum Failure {
     Scene(SceneError),
-    /// A fault in an override that an option other than `--set` puts into the scene.
+    /// A fault in an override by another option than `--set`.
     Override {
         option: &'static str,
         error: SceneError,
@@ -31,15 +31,15 @@ pub(crate) enum Failure {
     /// The scene is refused with the values of one combination of a campaign.
     Combination {
         error: Box<SceneError>,
-        /// The option that gave the value with the fault.
+        /// Option with the value at fault.
         option: &'static str,
-        /// Line that names the combination. Empty if the campaign varies nothing.
+        /// Line about the combination. Empty if the campaign varies nothing.
         combination: String,
     },
     Record(RecordError),
     /// A fault in the keys of a link.
     LinkKeys(SceneError),
-    /// A fault in an argument or in a file that was read, as a message.
+    /// A fault in an argument or in an input file, as a message.
     Input(String),
     /// A file that cannot be read or written.
     File {
@@ -61,6 +61,7 @@ impl Failure {
             Self::Scene(error) | Self::Override { error, .. } | Self::LinkKeys(error) => scene_status(error),
             Self::Combination { error, .. } => scene_status(error),
             Self::Input(_) => BAD_INPUT,
+            // A closed pipe gives the status of a program that SIGPIPE ended, as shells expect.
             Self::StandardOutput(error) if error.kind() == io::ErrorKind::BrokenPipe => CLOSED,
             Self::Record(_) | Self::File { .. } | Self::System(_) | Self::StandardOutput(_) => INPUT_OUTPUT,
             Self::Interrupted(_) => INTERRUPTED,
@@ -91,7 +92,7 @@ impl Failure {
         }
     }
 
-    /// Returns the option that gave the override at fault.
+    /// Returns the option of the override at fault.
     pub(crate) const fn option(&self) -> &'static str {
         match self {
             Self::Override { option, .. } => option,

@@ -1,4 +1,4 @@
-//! Reads text files of users, and writes files and folders. Errors become failures that name the file.
+//! Reads text files of users, and writes files and folders. Errors become failures with the name of the file.
 
 use std::io::{self, Read, Write as _};
 use std::path::Path;
@@ -23,6 +23,7 @@ pub(crate) fn read_text(path: &Path) -> Result<String, Failure> {
 /// Converts the bytes of the file `path` to text, with the same error for bytes that are not UTF-8 as [`read_text`].
 pub(crate) fn text_of(bytes: Vec<u8>, path: &Path) -> Result<String, Failure> {
     String::from_utf8(bytes).map_err(|error| {
+        // Lines are counted in the valid text before the first wrong byte.
         let right = &error.as_bytes()[..error.utf8_error().valid_up_to()];
         not_text(path, right.iter().filter(|byte| **byte == b'\n').count() as u64 + 1)
     })
@@ -42,13 +43,14 @@ pub(crate) fn read_fates(path: &Path, from: impl Read) -> Result<FateLog, Failur
     })
 }
 
-/// Opens a large file that the caller reads piece by piece.
+/// Opens a large file for reading piece by piece.
 pub(crate) fn open_large(path: &Path) -> Result<LimitedFile, Failure> {
     LimitedFile::open(path, MOST_CAPTURE_BYTES).map_err(|error| Failure::File { verb: "read", path: path.to_path_buf(), error })
 }
 
 /// Writes a whole file. If the write fails, for example on a full disk, no part of the file is left: unlike a record, the file can be made again.
 pub(crate) fn write_file(path: &Path, content: impl AsRef<[u8]>) -> Result<(), Failure> {
+    // From here on only a second signal ends the program, so that the first signal leaves no half of the file.
     interrupt::has_results();
     write_whole(path, |file| file.write_all(content.as_ref())).map_err(unwritten(path))
 }
@@ -61,7 +63,7 @@ pub(crate) fn write_into(folder: &Path, name: &str, content: impl AsRef<[u8]>) -
 }
 
 /// Takes the folder of `--out` for this process alone, as long as the returned value lives, and creates the folder if it does not exist. Called before the
-/// work, so that a folder that cannot be had does not cost the work.
+/// work, so that a refused folder does not cost the work.
 pub(crate) fn own_folder(path: &Path) -> Result<OwnFolder, Failure> {
     OwnFolder::take(path).map_err(unwritten(path))
 }

@@ -1,4 +1,4 @@
-//! Reads scenes, relay files and router files, which the user names by a path, or by `-` for standard input.
+//! Reads scenes, relay files and router files from a path, or from standard input for `-`.
 
 use std::io::{self, Read as _};
 use std::path::Path;
@@ -39,6 +39,7 @@ pub(crate) fn text(path: &Path) -> Result<String, SceneError> {
         return file_text(path);
     }
     let unreadable = |source| SceneError::Read { path: STANDARD_INPUT.into(), source, place: None };
+    // The lock is held during the read, so that a second caller waits and gets the same bytes.
     let mut read = READ.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     let bytes = match &mut *read {
         Some(bytes) => bytes,

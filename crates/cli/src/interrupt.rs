@@ -1,9 +1,9 @@
 //! Ctrl-C, SIGTERM and SIGHUP: the first asks the command to stop computing, the second ends the program at once.
 //!
-//! A command computes, and then writes its results. The first signal ends the computation within a second, and never the writing. Once a command has results
-//! ([`has_results`]), the command stops computing by itself, because it checks [`requested`], and writes the results however long the writing takes.
-//! A computation that has no result yet and cannot check [`requested`], such as the eigenvalues of a large matrix, is ended after [`TO_STOP`]. A command that
-//! has whole results of some parts while it computes other parts registers a function that writes these results ([`keep`]).
+//! A command computes, and then writes results. The first signal ends the computation within a second, and never the writing. Once a command has results
+//! ([`has_results`]), the command checks [`requested`], stops computing by itself, and writes the results however long the writing takes.
+//! A computation that has no result yet and cannot check [`requested`], such as the eigenvalues of a large matrix, is ended after [`TO_STOP`]. A command with
+//! whole results of some parts, and with other parts still to compute, registers a function for writing the whole results ([`keep`]).
 
 use std::io::Write as _;
 use std::mem;
@@ -23,28 +23,27 @@ static STAGE: Mutex<Stage> = Mutex::new(Stage::Computes);
 enum Stage {
     /// The command has no result yet.
     Computes,
-    /// Parts of the result exist, and this function writes the parts. Used by commands that cannot check [`requested`] often enough to write the parts
-    /// themselves.
+    /// Parts of the result exist, and this function writes the parts. Used by commands with long computations between two checks of [`requested`].
     Keeps(Box<dyn FnOnce() -> String + Send>),
-    /// The command has results and writes them itself.
+    /// The command has results, and writes the results itself.
     HasResults,
     /// The time of the command is over. Only the thread with this id may still write.
     Ends(ThreadId),
 }
 
-/// Time after the first signal in which a command without results may still compute: a second, less the time that a process takes to end.
+/// Longest computation after the first signal, for a command without results: a second, less the time for the end of a process.
 const TO_STOP: Duration = Duration::from_millis(800);
-/// Time in which results are written before a line on standard error says so.
+/// Longest writing of results without a line on standard error.
 const TO_WRITE_SILENTLY: Duration = Duration::from_millis(200);
-/// Time that the program waits for the effects of the last actions.
+/// Wait for the effects of the last actions.
 const LAST_MOMENT: Duration = Duration::from_millis(50);
 
-/// Line about results that take long to write.
+/// Line about results whose writing takes long.
 const WRITES: &str = "what was computed is written before the program ends, however long that takes; a second signal ends the program at once";
-/// Line about a computation that ended without results.
+/// Line about the end of a computation without results.
 const ENDED: &str = "the computation stopped where it stood; complete files are kept";
 
-/// Installs the handler of signals. If that is impossible, signals end the program at once, as the system's default.
+/// Installs the handler of signals. If the system refuses the handler, signals end the program at once, as by default.
 pub(crate) fn listen() {
     let _ = ctrlc::set_handler(|| {
         if ASKED.swap(true, Ordering::Relaxed) {
@@ -57,19 +56,19 @@ pub(crate) fn listen() {
     });
 }
 
-/// Registers an action to do before the program ends at once, such as switching off the force of a device that a person holds. The action must not wait.
+/// Registers an action to do before the program ends at once, such as switching off the force of a device in a person's hand. The action must not wait.
 pub(crate) fn before_exit(act: impl Fn() + Send + 'static) {
     LAST.lock().unwrap_or_else(PoisonError::into_inner).push(Box::new(act));
 }
 
-/// Registers a function that writes the whole results of parts if the command still computes [`TO_STOP`] after a signal. The function returns a line about what
-/// was written. A call of [`has_results`] removes the function.
+/// Registers a function for writing the whole results of parts. The function is called if the command still computes [`TO_STOP`] after a signal, and returns a
+/// line about the written results. A call of [`has_results`] removes the function.
 pub(crate) fn keep(act: impl FnOnce() -> String + Send + 'static) {
     *stage() = Stage::Keeps(Box::new(act));
 }
 
 /// Marks that the command has results: from now on only a second signal ends the program before the command does. The caller checks [`requested`] between any
-/// two steps that it still computes. All functions that print, or write a whole file, call this function themselves.
+/// two further steps of computation. All functions that print, or write a whole file, call this function themselves.
 ///
 /// Does not return if the time of the command is over already.
 pub(crate) fn has_results() {
@@ -79,7 +78,8 @@ pub(crate) fn has_results() {
         Stage::HasResults => {}
         Stage::Ends(by) => {
             drop(stage);
-            // The other thread may be printing. This thread waits for the end of the program, so that no part of a second document mixes with that output.
+            // The thread `by` may be printing. This thread waits for the end of the program, so that no part of a second document mixes with the output of
+            // `by`.
             while thread::current().id() != by {
                 thread::park();
             }
@@ -115,13 +115,14 @@ fn end_in_time() {
 fn said_of(act: Box<dyn FnOnce() -> String + Send>) -> String {
     let (done, is_done) = mpsc::channel::<()>();
     let late = thread::Builder::new().name("late".to_owned()).spawn(move || {
+        // The channel closes at the end of the writing. A time-out therefore means that the writing takes long.
         if is_done.recv_timeout(TO_WRITE_SILENTLY) == Err(mpsc::RecvTimeoutError::Timeout) {
             say(WRITES);
         }
     });
     let said = act();
     drop(done);
-    // The line of that thread has to come before the last line of the program.
+    // The line of the thread `late` has to come before the last line of the program.
     let _ = late.map(thread::JoinHandle::join);
     said
 }

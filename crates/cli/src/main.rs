@@ -1,8 +1,8 @@
-//! `cohaptic`: runs, checks, explains and analyses scenes of people who move one object together over a bad network, in virtual time and by the
-//! wall clock; drives and estimates links; reproduces a paper.
+//! `cohaptic`: runs, checks, explains and analyses scenes of people who move an object together over a bad network, in virtual time and by the wall clock;
+//! drives and estimates links; reproduces a paper.
 //!
-//! This program alone prints what the libraries compute, apart from `cohaptic-accuracy`. Results go to standard output, everything else to standard error. Exit
-//! status: 0 done, 1 an expectation failed, 2 a bad argument or scene, 3 an input or output error, 130 interrupted, 141 standard output was closed.
+//! This program alone prints the results of the libraries, apart from `cohaptic-accuracy`. Results go to standard output, everything else to standard error.
+//! Exit status: 0 done, 1 an expectation failed, 2 a bad argument or scene, 3 an input or output error, 130 interrupted, 141 standard output was closed.
 #![expect(non_camel_case_types, reason = "`document!` makes a type parameter of each key")]
 #![cfg_attr(not(target_os = "linux"), allow(dead_code, unused_imports, reason = "the commands that need Linux use them"))]
 
@@ -57,6 +57,7 @@ use arguments::{Arguments, Command};
 use elsewhere::{falcon, live, play, relay, router};
 
 fn main() -> ExitCode {
+    // `--json` is looked for before the arguments are parsed, because a refused argument is answered with a document too. Words after `--` are no options.
     if std::env::args_os().skip(1).take_while(|argument| argument != "--").any(|argument| argument == "--json") {
         output::want_json();
     }

@@ -41,13 +41,12 @@ pub(crate) fn wants_json_error() -> bool {
     WANTS_JSON.load(Ordering::Relaxed) && !ANSWERED.load(Ordering::Relaxed)
 }
 
-/// Prints text that ends with a line break. Control characters, which titles and names of files may contain, are escaped, because they could disturb a
-/// terminal.
+/// Prints text that ends with a line break. Control characters in titles and names of files are escaped, because control characters could disturb a terminal.
 pub(crate) fn text(text: &str) -> Result<(), Failure> {
     raw(visible_lines(text).as_bytes())
 }
 
-/// Prints one JSON document with its kind and version. Numbers that are not finite become `null`.
+/// Prints a JSON document with kind and version. Numbers that are not finite become `null`.
 pub(crate) fn json(schema: DocumentSchema, document: &impl Serialize) -> Result<(), Failure> {
     // The document is written as one text, because standard output makes one system call per line otherwise.
     let mut text = serde_json::to_vec_pretty(&schema.of(document)).map_err(io::Error::from).map_err(Failure::StandardOutput)?;
@@ -71,17 +70,18 @@ pub(crate) fn answer(
     Ok(())
 }
 
-/// Files of an answer that writes no files.
+/// Files of an answer without files.
 pub(crate) const NO_FILES: [&str; 0] = [];
 
 /// Prints bytes unchanged, such as a scene, a schema or a manual page.
 pub(crate) fn raw(content: &[u8]) -> Result<(), Failure> {
     interrupt::has_results();
+    // Set before the write: after a part of a document, a second document would only make the output unreadable.
     ANSWERED.store(true, Ordering::Relaxed);
     cohaptic_files::print(content).map_err(Failure::StandardOutput)
 }
 
-/// Prints the names of the written files on standard error, one per line, for people. JSON documents contain the names of their files.
+/// Prints the names of the written files on standard error, one per line, for people. A JSON document contains the names itself.
 pub(crate) fn wrote(files: impl IntoIterator<Item = impl AsRef<Path>>) {
     if is_quiet() {
         return;

@@ -139,13 +139,14 @@ fn draw(text: &mut String, table: &Table) {
     }
 }
 
-/// Appends a name and its value to `text`. The value is broken between words at [`WIDTH`] and indented.
+/// Appends a name and a value to `text`. The value is broken between words at [`WIDTH`] and indented.
 fn wrap(text: &mut String, name: &str, value: &str) {
     let indent = 12;
     let _ = write!(text, "  {name:<width$}", width = indent - 2);
     let mut column = indent;
     for word in value.split_whitespace() {
         let length = word.chars().count();
+        // No break comes before the first word of a line: a word longer than the line fits no better on the next line.
         if column > indent && column + 1 + length > WIDTH {
             let _ = write!(text, "\n{:indent$}", "");
             column = indent;

@@ -28,7 +28,7 @@ impl Progress {
         Self::new(length, "{prefix} {bar:30} {percent:>3} %  {elapsed} passed, {eta} left{msg}").titled(title)
     }
 
-    /// Creates a bar through `count` runs of a campaign, of which `done` runs are done already.
+    /// Creates a bar through `count` runs of a campaign. `done` runs are done already.
     pub(crate) fn through_runs(count: u64, done: u64) -> Self {
         let progress = Self::new(count, "{bar:30} {percent:>3} %  {pos}/{len} runs, {per_sec}, {eta} left");
         progress.reach_number(done);
@@ -47,7 +47,7 @@ impl Progress {
         self.0.inc_length(number);
     }
 
-    /// Creates a line without a bar, for a run that continues until it is stopped.
+    /// Creates a line without a bar, for a run without a known end.
     pub(crate) fn of_traffic(title: &str) -> Self {
         Self::new(0, "{prefix}: {msg}, {elapsed} passed").titled(title)
     }
@@ -73,7 +73,7 @@ impl Progress {
         self.0.inc(number);
     }
 
-    /// Shows one line, which the next call replaces.
+    /// Shows a line in place of the line before.
     pub(crate) fn show(&self, line: String) {
         self.0.set_message(line);
         self.0.tick();

@@ -1,5 +1,4 @@
-//! Reports a command that ended without its result: as a message on standard error, and under `--json` also as a document on standard output in place of the
-//! answer.
+//! Reports a command without a result: as a message on standard error, and under `--json` also as a document on standard output in place of the answer.
 
 use std::io::{self, IsTerminal as _, Write as _};
 use std::process::ExitCode;

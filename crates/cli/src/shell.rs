@@ -1,4 +1,4 @@
-//! Quotes words of a command for POSIX shells, and makes the commands that pages show.
+//! Quotes words of a command for POSIX shells, and makes the commands of pages.
 
 use std::fmt::Display;
 use std::path::Path;
@@ -13,13 +13,14 @@ pub(crate) fn path(path: &Path) -> String {
 /// Returns a word that POSIX shells read as `word`. Words of plain characters stay unquoted.
 pub(crate) fn quoted(word: &str) -> String {
     let plain = |letter: char| letter.is_ascii_alphanumeric() || "-_./=:,%+@".contains(letter);
+    // Between single quotes a shell reads all characters but the quote as they are. A quote ends the quoted text, stands escaped, and begins quoted text again.
     if !word.is_empty() && word.chars().all(plain) { word.to_owned() } else { format!("'{}'", word.replace('\'', "'\\''")) }
 }
 
-/// Placeholder for the folder of `--out` in a [`CommandLine`]. The content of a page must not depend on the folder that the page is written to.
+/// Placeholder for the folder of `--out` in a [`CommandLine`]. The content of a page must not depend on the folder of the page.
 const FOLDER: &str = "DIR";
 
-/// Command that makes the files of a folder again, as a line for a POSIX shell. Options that change no file, such as `--json`, are left out.
+/// Command for making the files of a folder again, as a line for a POSIX shell. Options without an effect on files, such as `--json`, are left out.
 pub(crate) struct CommandLine {
     words: Vec<String>,
     reads_standard_input: bool,
@@ -32,7 +33,7 @@ impl CommandLine {
         line.option("--set", set)
     }
 
-    /// Appends an option once for each of its values, so that an option without a value is left out.
+    /// Appends an option once per value, so that an option without a value is left out.
     pub(crate) fn option(mut self, name: &str, values: impl IntoIterator<Item = impl Display>) -> Self {
         self.words.extend(values.into_iter().map(|value| format!("{name} {}", quoted(&value.to_string()))));
         self
@@ -49,7 +50,7 @@ impl CommandLine {
         self.option("--out", [FOLDER])
     }
 
-    /// Returns the line. A scene from standard input gets a placeholder for its file.
+    /// Returns the line. A scene from standard input gets a placeholder for the file.
     pub(crate) fn text(mut self) -> String {
         self.words.extend(self.reads_standard_input.then(|| "< scene.toml".to_owned()));
         self.words.join(" ")

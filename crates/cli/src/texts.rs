@@ -41,6 +41,7 @@ pub(crate) fn man(arguments: &ManArguments) -> Result<ExitCode, Failure> {
         written.push(path);
         left.extend(command.get_subcommands());
     }
+    // Commands come from a stack, in an order of no use to readers.
     written.sort();
     output::wrote(&written);
     Ok(ExitCode::SUCCESS)

@@ -4,14 +4,14 @@ use cohaptic_campaign::split_at_commas;
 
 use crate::failure::Failure;
 
-/// Variant of a scene that a picture shows.
+/// Variant of a scene in a picture.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Variant {
     /// Name in documents and messages. The unchanged scene is called "as it stands". Legends name the law: see [`cohaptic_answers::legend_name`].
     pub(crate) name: String,
     /// Overrides of the variant, applied after all `--set`.
     pub(crate) overrides: Vec<String>,
-    /// Option that gave the overrides, for messages.
+    /// Option of the overrides, for messages.
     pub(crate) option: &'static str,
 }
 
@@ -36,7 +36,7 @@ impl Variant {
         Ok(all)
     }
 
-    /// Returns all overrides of the variant: the overrides `set`, then its own.
+    /// Returns all overrides of the variant: the overrides `set`, then the variant's own.
     pub(crate) fn on_top_of(&self, set: &[String]) -> Vec<String> {
         set.iter().chain(&self.overrides).cloned().collect()
     }
