@@ -55,7 +55,7 @@ const STRATEGIES: Choices<Coordination, { Coordination::ALL.len() }> = {
 const PULLS: Choices<Pull, 2> =
     [("mean", Pull::Mean, "once"), ("sum", Pull::Sum, "times N-1 among N peers; average-position is proportional-derivative then")];
 pub(super) const SCALING: Form = Form::Words(const { &words(&SCALINGS) });
-/// Rules by which gains follow the number of peers.
+/// Rules for the dependence of gains on the number of peers.
 pub(super) const SCALINGS: Choices<Scaling, 2> =
     [("none", Scaling::None, "as they are written"), ("inverse-n", Scaling::InverseN, "times 4(N-1)/N^2 among N peers; of a coupling times 2/N")];
 
@@ -70,7 +70,7 @@ pub(super) static CHANGES: Table = Table::of(&[&[
 .and(|| &CHANGING_LAWS);
 static CHANGING_LAWS: LazyLock<Vec<Key>> = LazyLock::new(|| law_keys(true));
 
-/// Returns a key for each strategy with own parameters: its table of all parameters or, with `changing`, of the parameters that the timeline may change.
+/// Returns a key per strategy with own parameters: the table of all parameters or, with `changing`, of the parameters that the timeline may change.
 fn law_keys(changing: bool) -> Vec<Key> {
     let key_of = |parameter: &LawParameter| match (changing, parameter.default) {
         // In the timeline an absent parameter does not change, so that no default is shown.
@@ -185,10 +185,10 @@ fn read_values(node: &Node, context: Context<'_>, law: Coordination) -> Option<L
     is_read.then_some(values)
 }
 
-/// A changed parameter: its strategy, its index among the parameters of the strategy, and the new value.
+/// A changed parameter: the strategy, the index among the parameters of the strategy, and the new value.
 pub(super) type ParameterChange = (Coordination, usize, LawValue);
 
-/// Reads the tables of strategies in an entry of the timeline. Returns the parameters that change.
+/// Reads the tables of strategies in an entry of the timeline. Returns the changed parameters.
 fn read_parameter_changes(coordination: &mut TableReader<'_>) -> Option<Vec<ParameterChange>> {
     let (mut changes, mut is_read) = (Vec::new(), true);
     for law in Coordination::ALL.iter().copied().filter(|law| law.parameters().iter().any(|parameter| parameter.can_change)) {
@@ -226,7 +226,7 @@ fn read_change(form: LawForm, node: &Node, context: Context<'_>) -> Option<LawVa
 fn read_value(form: LawForm, node: &Node, context: Context<'_>) -> Option<LawValue> {
     let is_automatic = node.as_text() == Some("auto");
     match form {
-        // Before the arms of the same forms that read a value.
+        // Stands before the arms of the same forms for values.
         LawForm::AutomaticDuration | LawForm::AutomaticDamping if is_automatic => Some(LawValue::Automatic),
         LawForm::Duration | LawForm::AutomaticDuration => values::duration(node, context).map(LawValue::Duration),
         // A text is a mistyped "auto". The message for a number alone would not name the word.
@@ -248,7 +248,7 @@ fn read_value(form: LawForm, node: &Node, context: Context<'_>) -> Option<LawVal
     }
 }
 
-/// Changes of the coordination at every peer, from one entry of the timeline. A gain that is `None` stays as it was.
+/// Changes of the coordination at every peer, from an entry of the timeline. A gain of `None` stays as before.
 #[derive(Debug)]
 pub(super) struct CoordinationChanges {
     pub(super) gains: Gains<Option<f64>>,

@@ -1,4 +1,4 @@
-//! Reader of `[expect]`: the results that a run must have.
+//! Reader of `[expect]`: the required results of a run.
 
 use core::time::Duration;
 
@@ -71,7 +71,7 @@ const CAUSES: Choices<DropCause, { DropCause::ALL.len() }> = {
     causes
 };
 
-/// Reads the expectations. `duration` and `peers` are `None` if they were refused. `has_probe` is true if the scene measures the impedance of a hand.
+/// Reads the expectations. `duration` and `peers` are `None` if refused. `has_probe` is true if the scene measures the impedance of a hand.
 pub(crate) fn read_expect(
     node: &Node,
     duration: Option<Duration>,
@@ -104,7 +104,7 @@ pub(crate) fn read_expect(
     })
 }
 
-/// Reads every table of a list, also after a refused table, so that every fault is reported. An empty vector without the list;
+/// Reads every table of a list, also after a refused table, so that every fault is reported. The vector is empty without the list.
 fn each<T>(table: &mut TableReader<'_>, key: &'static str, read: impl Fn(&Node) -> Option<T>) -> Option<Vec<T>> {
     let entries = table.maybe(key, |node, context| values::list(node, context, "a list of tables"))?.unwrap_or_default();
     // Two steps: collecting into an `Option` directly would stop at the first `None`.
@@ -183,7 +183,7 @@ fn read_measure(node: &Node, has_probe: bool, context: Context<'_>) -> Option<Ex
     Some(ExpectMeasure { name: name?, bounds: bounds(ends)? })
 }
 
-/// Reads a link or an access line that the scene has. An absent line is a fault, because no packet passes an absent line.
+/// Reads a link or an access line of the scene. An absent line is a fault, because no packet passes an absent line.
 fn read_existing_link(node: &Node, peers: Option<&[PeerSpec]>, context: Context<'_>) -> Option<LinkSelector> {
     let link = read_link_or_line(node, context)?;
     let (peer, line, there) = match link {
@@ -209,7 +209,7 @@ fn read_ends<'a, T: PartialOrd>(
     context: Context<'_>,
     read: impl Fn(&mut TableReader<'a>, &'static str) -> Option<Option<T>>,
 ) -> Option<(Option<T>, Option<T>)> {
-    // Asked of the nodes, not of the values: a value that was refused is given.
+    // The nodes decide, not the values: a refused value is given.
     let (min_node, max_node) = (table.get("min"), table.get("max"));
     if min_node.is_none() && max_node.is_none() {
         context.fault_at(node, "neither min nor max is given: expected at least one of them");

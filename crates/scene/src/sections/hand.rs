@@ -89,7 +89,7 @@ pub(crate) fn read_hand(node: &Node, context: SceneContext<'_>) -> Option<Option
     Some(Some(Hand::Force(signal)))
 }
 
-/// Reads the vector of an entry of the table that `declaration` declares.
+/// Reads the vector of an entry of the table of `declaration`.
 fn constant(declaration: &Table, entry: &Entry, context: SceneContext<'_>) -> Option<[f64; 3]> {
     read_vector(declaration.key(&entry.name)?.quantity(), &entry.node, context, Spread::Refused)
 }
@@ -100,7 +100,7 @@ pub(super) fn read_hand_torque(hand: &Node, context: SceneContext<'_>) -> Option
     let within = |key: &str| table.get(key).filter(|entry| entry.node.as_table().is_some());
     let sine = within("sine").and_then(|sine| Some((&sine.node, sine.node.as_table()?.get("torque")?)));
     let file = |table: Option<&DocumentTable>, columns: Columns| {
-        // `read_hand` reads the same file and reports its faults. Here, a file with a fault has no torque.
+        // `read_hand` reads the same file and reports the faults. Here, a file with a fault has no torque.
         let torque = table.and_then(|table| table.get("file")).and_then(|file| read_motion_file(&file.node, context, columns)?.torque);
         torque.map(Signal::Table)
     };
@@ -123,8 +123,8 @@ pub(super) fn read_hand_torque(hand: &Node, context: SceneContext<'_>) -> Option
     Some(Some(Signal::Sine { amplitude: amplitude?, frequency: Hertz(frequency?), phase: phase? }))
 }
 
-/// Returns false after a fault if the hand has a sine that the ticks of its peer cannot sample, otherwise true. A hand is computed once per tick, so that a
-/// sine of half the rate of ticks or faster has the values of a slower sine, or zeros alone (Shannon 1949).
+/// Returns false after a fault if the peer's ticks cannot sample the sine of the hand, otherwise true. A hand is computed once per tick, so that a sine of half
+/// the rate of ticks or faster has the values of a slower sine, or zeros alone (Shannon 1949).
 pub(crate) fn hand_is_sampled(hand: Option<&Hand>, tick: Duration, node: &Node, context: Context<'_>) -> bool {
     let (signal, path): (&Signal, &[&str]) = match hand {
         Some(Hand::Force(signal)) => (signal, &["sine", "frequency"]),
@@ -169,10 +169,10 @@ fn read_follows(node: &Node, context: SceneContext<'_>) -> Option<Signal> {
     }
 }
 
-/// Reads a sine. [`read_hand_torque`] reads its torque.
+/// Reads a sine. [`read_hand_torque`] reads the torque of the sine.
 fn read_sine(node: &Node, context: SceneContext<'_>, declaration: &'static Table) -> Option<Signal> {
     let mut table = TableReader::new(node, *context, declaration, "a table such as { amplitude = 2.0, frequency = 0.7, phase = 0.0 }")?;
-    // Marks the key as known, so that `finish` does not refuse it.
+    // Marks the key as known, so that `finish` does not refuse the key.
     if declaration.key("torque").is_some() {
         table.get("torque");
     }

@@ -37,7 +37,7 @@ const INTEGRATORS: Choices<Method, 3> = [
 ];
 const STEPS: &str = "a number of steps a tick, {}";
 
-/// Values of `[scene]`. A field is `None` if its value was refused.
+/// Values of `[scene]`. A field is `None` after a refused value.
 #[derive(Debug, Default)]
 pub(crate) struct Header {
     /// `Some(None)` if the scene has no title.

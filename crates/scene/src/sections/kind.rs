@@ -10,10 +10,10 @@ use cohaptic_units::print::Counted;
 use crate::model::{FalconDevice, FalconSpec, PeerKind, PointerSpec, Silence};
 use crate::quantities::{DAMPING, POSITION, POSITIVE_COUNTS, POSITIVE_FORCE, STIFFNESS};
 
-/// Model of a Falcon in Rakhsha & Constantinescu (2015): mass 0.1 kg, damping 5 N·s/m. For virtual time, and for the device that a pointer pulls.
+/// Model of a Falcon in Rakhsha & Constantinescu (2015): mass 0.1 kg, damping 5 N·s/m. For virtual time, and for the device of a pointer.
 pub(crate) const FALCON_DEVICE: DeviceConfig = DeviceConfig { mass: 0.1, damping: 5.0 };
 
-/// Device of a peer that runs elsewhere and was given no device. Nobody moves this device, and the device touches nothing.
+/// Device of a peer elsewhere, if the scene gives no device. Nobody moves this device, and the device touches nothing.
 pub(crate) const STILL_DEVICE: DeviceConfig = DeviceConfig { mass: 1.0, damping: 0.0 };
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -35,16 +35,16 @@ pub(super) static SILENCE: Table = Table::of(&[&[
     usual("after", Form::PositiveDuration, "\"100ms\"", "After how long a silence the pull fades"),
     usual("fade", Form::PositiveDuration, "\"250ms\"", "How long that takes"),
 ]]);
-/// Keys of a pointer. With the defaults the device of a Falcon follows nearly without overshoot, and the largest force is no greater than that of an adult's
-/// wrist.
+/// Keys of a pointer. With the defaults the device of a Falcon follows nearly without overshoot, and the largest force is no greater than the force of an
+/// adult's wrist.
 pub(super) static POINTER: Table = Table::of(&[&[
     usual("stiffness", number(STIFFNESS), "400", "Stiffness of the arm between pointer and device"),
     usual("damping", number(DAMPING), "20", "Its damping"),
     usual("force-limit", number(POSITIVE_FORCE), "20", "The arm pulls with no greater force"),
     usual("held", Form::Boolean, "false", "Whether the pointer holds the device from the beginning"),
 ]]);
-/// Keys of a Falcon. With 10,000 counts per newton metre, full scale is about the force that the maker names. The limit of 4 N is half of the force that the
-/// device is said to give. The origin is the middle of the workspace.
+/// Keys of a Falcon. With 10,000 counts per newton metre, full scale is about the force in the maker's description. The limit of 4 N is half of the reported
+/// force of the device. The origin is the middle of the workspace.
 pub(super) static FALCON: Table = Table::of(&[&[
     usual("device", Form::Like(&["first", "simulated"]), "\"first\"", "The first that no other peer has, one that is simulated, or a serial number"),
     usual("counts-per-newton-metre", number(POSITIVE_COUNTS), "10000", "Motor counts for a torque at the joint of an arm"),

@@ -106,7 +106,7 @@ fn read_names(node: &Node, has_probe: bool, context: Context<'_>) -> Option<Opti
     Some(Some(names))
 }
 
-/// Reads the name of a measure that the scene has. `has_probe` is true if the scene has a probe, which some measures need.
+/// Reads the name of a measure of the scene. `has_probe` is true if the scene has a probe: some measures need a probe.
 pub(crate) fn read_measure_name(node: &Node, has_probe: bool, context: Context<'_>) -> Option<MeasureName> {
     let text = values::text(node, context, "the name of a measure such as \"energy_j\"")?;
     let of_run = Measure::ALL.iter().find(|measure| measure.scope() == Scope::Run && measure.name() == text);
@@ -120,7 +120,7 @@ pub(crate) fn read_measure_name(node: &Node, has_probe: bool, context: Context<'
         return Some(MeasureName { measure, peer: None });
     }
     let of_peer = text.strip_prefix("peers.").and_then(|rest| rest.rsplit_once('.'));
-    // Split at the last point: the name of a measure has none.
+    // Split at the last point: the name of a measure has no point.
     let known = of_peer.and_then(|(peer, name)| {
         let measure = Measure::ALL.iter().find(|measure| measure.scope() == Scope::Peer && measure.name() == name)?;
         Some((peer, *measure))
@@ -149,7 +149,7 @@ fn read_travel(node: &Node, context: SceneContext<'_>) -> Option<MeasureTravel> 
     Some(MeasureTravel { peer: peer?.unwrap_or(0), distance: distance?, axis: axis? })
 }
 
-/// Reads a probe: a peer whose hand pushes with one sine during the whole scene. Returns its index.
+/// Reads a probe: a peer whose hand pushes with the same sine during the whole scene. Returns the index of the peer.
 fn read_probe(node: &Node, of: Measured<'_>, context: SceneContext<'_>) -> Option<usize> {
     const EXPECTED: &str = "a peer with hand = { sine = { amplitude, frequency } } above 0 Hz";
     let mut table = TableReader::new(node, *context, &PROBE, "a table such as { peer = \"left\" }")?;
@@ -160,7 +160,7 @@ fn read_probe(node: &Node, of: Measured<'_>, context: SceneContext<'_>) -> Optio
     let spec = of.peers?.get(peer)?;
     let changes = of.timeline?.iter().any(|change| matches!(&change.what, ChangeKind::Hand { peer: changed, .. } if *changed == peer));
     let refused = match &spec.hand {
-        // First, because the hand of the beginning says nothing of a hand that changes.
+        // First, because the hand of the beginning says nothing of a changing hand.
         _ if changes => Some("changes in the timeline"),
         Some(Hand::Force(Signal::Sine { amplitude, frequency, .. })) => {
             let pushes = frequency.0 > 0.0 && amplitude.iter().any(|amplitude| *amplitude != 0.0);
@@ -172,7 +172,7 @@ fn read_probe(node: &Node, of: Measured<'_>, context: SceneContext<'_>) -> Optio
         context.fault_at(peer_node, format!("the hand of peer {} {refused}: expected {EXPECTED}", quote(&spec.name)));
         return None;
     }
-    // In virtual time every peer is simulated, whatever its kind.
+    // In virtual time every peer is simulated, whatever the kind.
     if context.live && spec.kind != PeerKind::Simulated {
         let kind = spec.kind.name();
         context.fault_at(

@@ -1,6 +1,6 @@
-//! Readers of the parts of a scene file, one function for each part. A reader that returns an `Option` reports each fault where it finds the fault, and then
-//! returns `None`; a reader of a key that may be absent returns `Some(None)` without the key. Readers go on after a fault, because of all reported faults the
-//! first in the order of the text is shown.
+//! Readers of the parts of a scene file, a function per part. A reader with an `Option` as result reports each fault at the place of the fault, and then
+//! returns `None`; a reader of an optional key returns `Some(None)` without the key. Readers go on after a fault, because of all reported faults the first in
+//! the order of the text is shown.
 
 mod access;
 mod coordination;

@@ -42,24 +42,24 @@ pub(crate) struct Recorded {
     pub(crate) torque: Option<Arc<MotionTable>>,
 }
 
-/// Reads the file that `node` names, relative to the folder of the scene.
+/// Reads the file named by `node`, relative to the folder of the scene.
 pub(crate) fn read_motion_file(node: &Node, context: SceneContext<'_>, columns: Columns) -> Option<Recorded> {
     let path = file_path(node, *context, "the name of a CSV file, relative to the folder of the scene")?;
     let header = columns.header(context.axes?.count());
-    // Files are kept by path and form. The same path with other columns must be parsed again, to be refused by its header.
+    // Files are kept by path and form. The same path with other columns must be parsed again, to be refused by the header.
     let form = format!("{}{}", header.join(","), if context.turns { " and torques" } else { "" });
     read_file(node, *context, &path, &form, |text| parse_rows(text, &header, context.turns))
 }
 
 fn parse_rows(text: &str, motion: &[&str], turns: bool) -> Result<Recorded, Fault> {
-    // `flexible`: rows of another length are refused below, with a message that names the columns.
+    // `flexible`: rows of another length are refused below, with a message about the columns.
     let mut reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).from_reader(text.as_bytes());
     let mut lines: Vec<Range<usize>> = Vec::new();
     let (mut rows, mut torques) = (Vec::new(), Vec::new());
     let (mut header, with_torque) = (motion, [motion, &TORQUE].concat());
     let columns = motion.join(",");
     for record in reader.records() {
-        // End of the last line that was read, for faults without a position of their own.
+        // End of the last read line, for faults without a position.
         let from = lines.last().map_or(0, |line| line.end);
         let record = record.map_err(|error| Fault { span: from..from, message: format!("{error}: expected the columns {columns}") })?;
         // The position is before empty lines, which `line_at` skips.
@@ -124,8 +124,8 @@ fn table_fault(text: &str, lines: &[Range<usize>], error: &TableError) -> Fault 
     }
 }
 
-/// Returns the span of the line in which a record begins, without the line end. `at` is the byte position that the CSV reader gives for the record. Line ends
-/// and empty lines at this position are skipped.
+/// Returns the span of the first line of a record, without the line end. `at` is the byte position of the record by the CSV reader. Line ends and empty lines
+/// at this position are skipped.
 fn line_at(text: &str, at: usize) -> Range<usize> {
     let bytes = text.as_bytes();
     let mut start = at.min(bytes.len());
@@ -168,7 +168,7 @@ fn seconds(text: &str) -> Result<Instant, String> {
     if value < 0.0 {
         return Err(format!("{} is negative: {EXPECTED}", shorten(text)));
     }
-    // The sign is that of zero, or a plus.
+    // The sign belongs to a zero, or is a plus.
     let plain = without_exponent(text.trim_start_matches(['+', '-'])).ok_or_else(|| format!("{} is out of range: {EXPECTED}", shorten(text)))?;
     let span = parse::duration(&format!("{plain}s")).map_err(|_| format!("{} is out of range: {EXPECTED}", shorten(text)))?;
     Instant::ZERO.checked_add(span).ok_or_else(|| format!("{} is out of range: {EXPECTED}", shorten(text)))

@@ -46,12 +46,12 @@ const KEYS: [Key; 19] = [
     optional("pointer", Form::Table(&POINTER), "The arm through which a pointer pulls the device of a peer of kind pointer"),
 ];
 
-/// Returns the keys whose tables are laid over each other key by key. Every other key replaces the key below as a whole.
+/// Returns the keys with tables. These tables are laid over each other key by key. Every other key replaces the key below as a whole.
 pub(crate) fn nested() -> Vec<&'static str> {
     KEYS.iter().chain(&ACCESS).filter(|key| matches!(key.form, Form::Table(_))).map(|key| key.name).collect()
 }
 
-/// Values of the keys of a peer, without its name.
+/// Values of the keys of a peer, without the name.
 #[derive(Clone, Debug)]
 pub(crate) struct PeerKeys {
     pub(crate) kind: PeerKind,
@@ -89,7 +89,7 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, declaration: &'s
     let phase = table.value("phase");
     let contact = table.read("contact", |node, _| read_contact(node, context));
     let device = table.maybe("device", |node, context| read_device(node, context, A_DEVICE));
-    // Device of a peer that was given none. A simulated peer needs a device, and so does another process in virtual time, where the peer is simulated.
+    // Device of a peer without a given device. A simulated peer needs a device, and so does another process in virtual time, where the peer is simulated.
     let absent = match &kind {
         None => None,
         Some(PeerKind::Simulated) => {
@@ -104,10 +104,10 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, declaration: &'s
         }
         Some(PeerKind::Falcon(..) | PeerKind::Pointer(..)) => Some(FALCON_DEVICE),
     };
-    // A peer that runs elsewhere and has no device here touches nothing here.
+    // A peer elsewhere without a device here touches nothing here.
     let contact = if elsewhere && table.get("device").is_none() { Some(Contact::None) } else { contact };
     let coupling = table.maybe("coupling", read_coupling);
-    // In a live session a process elsewhere couples its own copy.
+    // In a live session a process elsewhere computes the coupling itself.
     let needs_coupling = contact.is_some_and(|contact| contact != Contact::None) && !(elsewhere && context.live);
     if needs_coupling {
         table.require("coupling", A_COUPLING);
@@ -122,7 +122,7 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, declaration: &'s
     let access = read_access(&mut table, *context);
     table.finish();
 
-    // Not for `[peer]` on its own: an entry may replace tick or phase.
+    // Not checked for `[peer]` alone: an entry may replace tick or phase.
     if let (Some(tick), Some((update, update_node)), false) = (tick, update, context.partial) {
         let Some(frame) = whole_multiple(update, tick) else {
             let message = format!("coordination.update, {}, is not a whole multiple of the tick, {}: expected one that is", Span(update), Span(tick));
@@ -136,7 +136,7 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, declaration: &'s
             return None;
         }
     }
-    // Against the tick of this peer, from `[peer]` or from its entry.
+    // Checked against the tick of this peer, from `[peer]` or from the entry.
     if let (Some(Some(hand)), Some(tick), Some(node)) = (&hand, tick, hand_node)
         && !hand_is_sampled(Some(hand), tick, node, *context)
     {
@@ -168,7 +168,7 @@ pub(crate) fn read_peer(node: &Node, context: SceneContext<'_>, declaration: &'s
     })
 }
 
-/// Returns `whole` / `part` if it is a whole number above zero.
+/// Returns `whole` / `part` if the quotient is a whole number above zero.
 fn whole_multiple(whole: Duration, part: Duration) -> Option<u64> {
     let (whole, part) = (whole.as_nanos(), part.as_nanos());
     if part == 0 || whole % part != 0 {

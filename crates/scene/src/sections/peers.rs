@@ -74,7 +74,7 @@ fn entry_name<'a>(entry: &'a Node, context: Context<'a>) -> Option<(&'a str, &'a
     Some((text, &name.node))
 }
 
-/// Parts of the document from which the peers are made.
+/// Parts of the document for making the peers.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PeerSources<'a> {
     /// Node of `[peer]`.
@@ -91,16 +91,16 @@ pub(crate) struct PeerSources<'a> {
 #[derive(Clone, Debug)]
 pub(crate) struct PeerRead {
     pub(crate) spec: PeerSpec,
-    /// Keys of the peer about an object that turns.
+    /// Rotational keys of the peer.
     pub(crate) rotation: PeerRotationKeys,
-    /// Place of the peer in the text: of its entry or, without an entry, of `scene.count`.
+    /// Place of the peer in the text: the place of the entry or, without an entry, of `scene.count`.
     pub(crate) place: Place,
 }
 
 /// Reads every peer, in the order of the names. `None` if any peer was refused.
 pub(crate) fn read_peers(sources: PeerSources<'_>, object: Option<&ObjectSpec>, context: SceneContext<'_>) -> Option<Vec<PeerRead>> {
     if let Some(node) = sources.defaults {
-        // `[peer]` is also read on its own, so that a fault in a default is found even if every peer replaces this default.
+        // `[peer]` is also read alone, so that a fault in a default is found even if every peer replaces this default.
         read_peer(node, context.of_part(), &PEER, None);
     }
     // Stands for an absent `[peer]`. Faults such as a missing device are shown at `count`.

@@ -1,4 +1,4 @@
-//! Readers of the keys of an object that turns. The keys stand in several tables, and all need `object.inertia`.
+//! Readers of the keys of a turning object. The keys stand in several tables, and all need `object.inertia`.
 
 use cohaptic_linkfile::document::{Entry, Node, Value};
 use cohaptic_linkfile::reading::values::{self, Quantity, ReadNumber as _};
@@ -11,7 +11,7 @@ use crate::context::SceneContext;
 use crate::model::Axes;
 use crate::quantities::{COMPONENT, INERTIA, ROTATIONAL_STIFFNESS};
 
-/// Keys that have no meaning without an inertia of the object, in any table.
+/// Keys without a meaning if the object has no inertia, in any table.
 const ROTATIONAL: [&str; 8] =
     ["rotational-damping", "rotational-stiffness", "orientation", "angular-velocity", "grasp", "torque", "rotation-steps", "rotation-discrepancy"];
 
@@ -53,10 +53,10 @@ fn read_inertia(node: &Node, file: Context<'_>, axes: Option<Axes>) -> Option<Tr
     check_triangle(&inertia, "a moment of inertia", node, file).then_some(inertia)
 }
 
-/// Returns true if none of three numbers is above the sum of the two others, otherwise false after a fault.
+/// Returns true if each of three numbers is at most the sum of the two others, otherwise false after a fault.
 fn check_triangle(numbers: &Triple, name: &str, node: &Node, context: Context<'_>) -> bool {
     let sum: f64 = numbers.iter().sum();
-    // The tolerance admits a body without thickness, whose largest moment equals the sum of the two others but for rounding.
+    // The tolerance admits a body without thickness: the largest moment equals the sum of the two others but for rounding.
     let above = numbers.iter().any(|number| *number > 0.5 * sum * (1.0 + 1e-12));
     if above {
         context.fault_at(node, format!("{name} is above the sum of the two others: expected three numbers of which none is"));
@@ -64,7 +64,7 @@ fn check_triangle(numbers: &Triple, name: &str, node: &Node, context: Context<'_
     !above
 }
 
-/// Reads a number that holds for all three axes of a body, or a list of three numbers.
+/// Reads a number for all three axes of a body, or a list of three numbers.
 fn read_triple(quantity: Quantity, node: &Node, context: Context<'_>) -> Option<Triple> {
     let Value::List(elements) = &node.value else { return quantity.read(node, context).map(|number| [number; 3]) };
     let numbers: Vec<Option<f64>> = elements.iter().map(|element| quantity.read(element, context)).collect();
@@ -88,7 +88,7 @@ pub(super) fn maybe_triple(table: &mut TableReader<'_>, key: &'static str) -> Op
     table.maybe(key, |node, context| read_triple(quantity, node, context))
 }
 
-/// Reads KR [N·m/rad]. None of its three numbers may be above the sum of the two others.
+/// Reads KR [N·m/rad]. Each of the three numbers may be at most the sum of the two others.
 pub(super) fn read_rotational_stiffness(node: &Node, context: Context<'_>) -> Option<Triple> {
     let stiffness = read_triple(ROTATIONAL_STIFFNESS, node, context)?;
     check_triangle(&stiffness, "a stiffness", node, context).then_some(stiffness)
@@ -115,7 +115,7 @@ pub(super) fn read_orientation(node: &Node, context: Context<'_>) -> Option<[f64
     unit
 }
 
-/// Reads `grasp`, `orientation` and `angular-velocity` of a peer. The other fields are left at their defaults.
+/// Reads `grasp`, `orientation` and `angular-velocity` of a peer. All further fields keep the defaults.
 pub(super) fn read_peer_rotation(table: &mut TableReader<'_>) -> Option<PeerRotationKeys> {
     let grasp = triple(table, "grasp");
     let orientation = table.maybe("orientation", read_orientation);
@@ -144,14 +144,14 @@ pub(super) fn read_coupling_rotation(table: &mut TableReader<'_>) -> Option<Opti
     Some(stiffness.map(|stiffness| Gains { stiffness, damping }))
 }
 
-/// Refuses every rotational key in a scene whose object does not turn, at any depth of the document.
+/// Refuses every rotational key in a scene without a turning object, at any depth of the document.
 pub(crate) fn refuse_rotational_keys(document: &Node, context: Context<'_>) {
     const MESSAGE: &str = "this is about an object that turns: expected object.inertia, or no such key";
     let refuse = |entry: &Entry| context.fault(entry.key, &entry.node.path, MESSAGE);
     match &document.value {
         Value::Table(table) => {
             for entry in &table.0 {
-                // The inertia of a device is a rotational key. The inertia of the object is not: with it the object would turn.
+                // The inertia of a device is a rotational key. The inertia of the object is no such key: with an inertia the object would turn.
                 let of_device = entry.name == "inertia" && entry.node.path != "object.inertia";
                 if of_device || ROTATIONAL.contains(&entry.name.as_str()) {
                     refuse(entry);

@@ -31,7 +31,7 @@ static SET_OF_PEER: Table = Table::over(&[&OF_PEER]);
 const OF_PEER: [Key; 2] =
     [optional("contact", CONTACT, "Of a peer: how the device touches the object"), optional("hand", HAND, "Of a peer: what the user does")];
 
-/// An entry read on its own, before the entries are sorted by time. The effect of an entry depends on the entries before.
+/// An entry read alone, before the entries are sorted by time. The effect of an entry depends on the entries before.
 #[derive(Debug)]
 struct Planned<'a> {
     at: Instant,
@@ -45,7 +45,7 @@ enum PlannedKind<'a> {
     Coordination(CoordinationChanges),
 }
 
-/// Reads the changes and returns them in order of time. `links`, `peers` and `coordination` are the state at the beginning, `None` if it was refused. Calls
+/// Reads the changes and returns the changes in order of time. `links`, `peers` and `coordination` are the state at the beginning, `None` if refused. Calls
 /// `on_links` for each change of links.
 pub(crate) fn read_timeline(
     node: Option<&Node>,
@@ -63,7 +63,7 @@ pub(crate) fn read_timeline(
     // A stable sort: changes at the same instant stay in the order of the file.
     planned.sort_by_key(|entry| entry.at);
 
-    // The state of links, gains and parameters is carried along, because each change is laid over the state that the change before it left.
+    // The state of links, gains and parameters is carried along, because each change is laid over the state after the change before.
     let (mut links, CoordinationSpec { mut gains, mut settings, .. }) = (links?.clone(), *coordination?);
     let mut changes = Vec::with_capacity(planned.len());
     let mut complete = true;
@@ -94,7 +94,7 @@ pub(crate) fn read_timeline(
             }
             PlannedKind::Coordination(CoordinationChanges { gains: Gains { stiffness, damping }, of_turns, send_when, parameters }) => {
                 if stiffness.is_some() || damping.is_some() {
-                    // A change holds both gains. A gain that the entry does not name keeps the value of the change before.
+                    // A change holds both gains. A gain absent from the entry keeps the value of the change before.
                     gains = Gains { stiffness: stiffness.unwrap_or(gains.stiffness), damping: damping.unwrap_or(gains.damping) };
                     changes.push(Change { at, what: ChangeKind::Coordination(gains) });
                 }
@@ -132,7 +132,7 @@ fn read_entry<'a>(node: &'a Node, duration: Option<Duration>, context: SceneCont
     let at = table.read("at", |node, context| read_instant(node, duration, context));
     let (link, peer, coordination) = (table.entry("link"), table.entry("peer"), table.entry("coordination"));
     let set = table.entry("set");
-    // `coordination` holds its own keys and takes no `set`.
+    // `coordination` holds keys directly and takes no `set`.
     if set.is_none() && coordination.is_none() {
         table.miss("set", "a table of the keys that change");
     }
@@ -174,11 +174,11 @@ fn read_peer_changes<'a>(node: &'a Node, context: SceneContext<'a>) -> Option<(O
     Some((contact?, hand?))
 }
 
-/// Returns true if the peer can have this contact, otherwise false after a fault. A peer without a coupling cannot begin to touch: it would touch without a
-/// force.
+/// Returns true if the peer can have this contact, otherwise false after a fault. A peer without a coupling cannot begin to touch: the peer would touch without
+/// a force.
 fn contact_is_possible(peer: &PeerSpec, contact: Contact, node: &Node, context: Context<'_>) -> bool {
     let touches = contact != Contact::None;
-    // The reader of peers has checked the coupling of a peer that touches at the beginning.
+    // The reader of peers has checked the coupling of a peer in contact at the beginning.
     let coupled = peer.contact != Contact::None || peer.coupling.stiffness > 0.0 || peer.coupling.damping > 0.0;
     if touches && !coupled {
         context.fault_at(node, format!("peer \"{}\" has no coupling to touch with: expected \"none\", or a key coupling of this peer", peer.name));
@@ -186,10 +186,10 @@ fn contact_is_possible(peer: &PeerSpec, contact: Contact, node: &Node, context: 
     !touches || coupled
 }
 
-/// Returns true if the peer can have this hand, otherwise false after a fault. An arm adds its mass to the device, so that it cannot appear, vanish or change
+/// Returns true if the peer can have this hand, otherwise false after a fault. An arm adds mass to the device, so that an arm cannot appear, vanish or change
 /// during the run.
 fn hand_is_possible(peer: &PeerSpec, hand: Option<&Hand>, node: &Node, context: Context<'_>) -> bool {
-    // Compared with the hand of the beginning: no change before this one can have another arm.
+    // Compared with the hand of the beginning: no earlier change can have another arm.
     let arm = peer.hand.as_ref().and_then(Hand::arm);
     let same = arm == hand.and_then(Hand::arm);
     if !same {

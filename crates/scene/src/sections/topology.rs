@@ -116,8 +116,8 @@ fn read_neighbours(node: &Node, context: Context<'_>) -> Option<usize> {
     usize::try_from(count).ok()
 }
 
-/// Refuses each entry of a list that names a link which the topology does not have. `within` is the key of the ends `from` and `to` in an entry; `None` if
-/// the entry itself has them.
+/// Refuses each entry of a list with a link outside the topology. `within` is the key of the ends `from` and `to` in an entry; `None` if the entry itself has
+/// the ends.
 pub(crate) fn refuse_unlinked(entries: Option<&Node>, within: Option<&str>, topology: &Topology, context: Context<'_>) {
     let (Some(entries), Some(names)) = (entries, context.names) else { return };
     let Value::List(entries) = &entries.value else { return };
@@ -130,7 +130,7 @@ pub(crate) fn refuse_unlinked(entries: Option<&Node>, within: Option<&str>, topo
             let node = &ends?.as_table()?.get(key)?.node;
             Some((node, names.index(node.as_text()?)?))
         };
-        // An entry without both ends names all links or an access line, or its fault was reported where the entry was read.
+        // An entry without both ends names all links or an access line, or the fault was reported where the entry was read.
         let (Some((_, from)), Some((node, to))) = (end("from"), end("to")) else { continue };
         if from != to && !topology.has_link(from, to) {
             let name = |peer: usize| quote(&names.as_slice()[peer]);
