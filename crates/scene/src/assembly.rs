@@ -38,8 +38,8 @@ impl Scene {
         spec.coupling.scaled(spec.coupling_scaling.coupling_factor(self.number()))
     }
 
-    /// Returns KT [N/m] and BT [N·s/m] of a peer: `gains` times [`Scene::coordination_factor`]. `gains` are the gains of the scene or gains that the timeline
-    /// sets.
+    /// Returns KT [N/m] and BT [N·s/m] of a peer: `gains` times [`Scene::coordination_factor`]. `gains` are the gains of the scene or of a change in the
+    /// timeline.
     ///
     /// # Panics
     ///
@@ -49,8 +49,8 @@ impl Scene {
         gains.scaled(self.coordination_factor(peer))
     }
 
-    /// Returns the factor of KT and BT of a peer, from the number of peers and the number of peers that this peer hears. A law that sums over the other peers
-    /// counts the N − 1 others itself where the scene has no topology, so that the factor does not contain N − 1 for such a law.
+    /// Returns the factor of KT and BT of a peer, from the number of peers and the number of peers heard by this peer. A law with a sum over the other peers
+    /// counts N − 1 itself where the scene has no topology, so that the factor does not contain N − 1 for such a law.
     ///
     /// # Panics
     ///
@@ -62,7 +62,7 @@ impl Scene {
             Pull::Mean => scaling,
             Pull::Sum => scaling * self.heard_by(peer),
         };
-        // The law counts N − 1 peers. On a topology the law is made for two peers instead, N − 1 = 1, and the peers that are heard count here.
+        // The law counts N − 1 peers. On a topology the law is made for two peers instead, N − 1 = 1, and the heard peers count here.
         match self.coordination.strategy.pull() {
             Pull::Sum if self.topology.is_some() => summed * self.heard_by(peer),
             Pull::Sum | Pull::Mean => summed,
@@ -80,7 +80,7 @@ impl Scene {
         spec.device.plant(spec.hand.as_ref())
     }
 
-    /// Returns the copy of the object of a peer, with the damping that the coordination law adds. `place` is the index in [`Scene::peers`].
+    /// Returns the copy of the object of a peer, with the damping of the coordination law. `place` is the index in [`Scene::peers`].
     ///
     /// # Panics
     ///

@@ -1,4 +1,5 @@
-//! Content of a scene: as a fingerprint, and key by key. A record compares the content to find whether it belongs to a scene and, if not, which keys differ.
+//! Content of a scene: as a fingerprint, and key by key. A record compares the content, and so finds whether the record belongs to a scene and, if not, the
+//! differing keys.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -11,8 +12,8 @@ use crate::model::Scene;
 use crate::read::parse_scene;
 
 impl Scene {
-    /// Returns the fingerprint of everything that the scene and the files named by the scene contain. Path, folder, title and notation of values do not
-    /// count: `"1s"` and `"1000ms"` give the same fingerprint.
+    /// Returns the fingerprint of the content of the scene and of all named files. Path, folder, title and notation of values do not count: `"1s"` and
+    /// `"1000ms"` give the same fingerprint.
     #[must_use]
     pub fn fingerprint(mut self) -> Fingerprint {
         self.file = PathBuf::new();
@@ -21,7 +22,7 @@ impl Scene {
     }
 }
 
-/// Keys of a scene as written, overrides included, and the files that the scene names.
+/// Keys of a scene as written, overrides included, and the named files.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct SceneContent {
     /// Values as TOML, indexed by dotted path: the value of `link.delay` is `"24ms"`. Entries of lists have the paths of overrides. The order of entries of
@@ -32,7 +33,7 @@ pub struct SceneContent {
     pub files: BTreeMap<String, Fingerprint>,
 }
 
-/// Returns the keys of a scene file, read as for a live session, and the fingerprints of the files that the scene names.
+/// Returns the keys of a scene file, read as for a live session, and the fingerprints of the named files.
 ///
 /// # Errors
 ///
@@ -53,13 +54,13 @@ pub fn scene_content_of_text(text: &str, file: &Path, overrides: &[String]) -> R
     let is_of = |key: &str, table: &str| key.strip_prefix(table).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
     // `is_of` compares whole names, so that a key such as `measured` would stay.
     keys.retain(|key, _| key != "scene.title" && !is_of(key, "expect") && !is_of(key, "measure"));
-    // Paths relative to the scene's folder: a scene that moves together with its files keeps its content.
+    // Paths relative to the scene's folder: a scene moved together with all files has the same content.
     let folder = file.parent().unwrap_or_else(|| Path::new(""));
     let name = |path: PathBuf| path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().into_owned();
     Ok(SceneContent { keys, files: files.into_iter().map(|(path, bytes)| (name(path), bytes)).collect() })
 }
 
-/// Returns a scene as one text that contains the overrides, a line for each key at the top level. `text` and `file` as in [`Scene::parse`].
+/// Returns a scene as a text with the overrides, a line per key at the top level. `text` and `file` as in [`Scene::parse`].
 ///
 /// # Errors
 ///
@@ -78,7 +79,7 @@ fn collect(node: &Node, path: &str, keys: &mut BTreeMap<String, String>) {
                 collect(&entry.node, &join(path, &entry.name), keys);
             }
         }
-        // A list of tables, such as `peers`: each entry has its own path, by name where the entry has a name.
+        // A list of tables, such as `peers`: each entry has a path, by name where the entry has a name.
         Value::List(elements) if !elements.is_empty() && elements.iter().all(|element| element.as_table().is_some()) => {
             let name = |element: &Node| element.as_table()?.get("name").map(|entry| value_text(&entry.node));
             let names: Option<Vec<String>> = elements.iter().map(|element| name(element)).collect();
@@ -98,13 +99,13 @@ fn collect(node: &Node, path: &str, keys: &mut BTreeMap<String, String>) {
 }
 
 impl SceneContent {
-    /// Returns one line of TOML for the name of a key or of a file and its value: `"link.delay" = "24ms"`. [`SceneContent::read_line`] reads the line.
+    /// Returns a line of TOML for the name of a key or of a file and the value: `"link.delay" = "24ms"`. [`SceneContent::read_line`] reads the line.
     #[must_use]
     pub fn line(name: &str, value: &str) -> String {
         format!("{} = {value}", key_text(name))
     }
 
-    /// Returns name and value of a line, the value as TOML. `None` if the text is not exactly one key with a value.
+    /// Returns name and value of a line, the value as TOML. `None` if the text is not a single key with a value.
     #[must_use]
     pub fn read_line(line: &str) -> Option<(String, String)> {
         // The line is TOML, so that the parser undoes the quotes of names and values.

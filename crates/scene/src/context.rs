@@ -1,4 +1,4 @@
-//! Context that is passed to the readers of a scene's parts.
+//! Context of the readers of a scene's parts.
 
 use core::ops::Deref;
 
@@ -44,7 +44,7 @@ pub(crate) fn read_axis(node: &Node, context: SceneContext<'_>) -> Option<usize>
     check_axis(node, context, axis)
 }
 
-/// Returns the axis if the scene has it, and reports a fault otherwise. `None` without a fault if the number of axes is not known.
+/// Returns the axis if the scene has the axis, and reports a fault otherwise. `None` without a fault if the number of axes is not known.
 pub(crate) fn check_axis(node: &Node, context: SceneContext<'_>, axis: usize) -> Option<usize> {
     let count = context.axes?.count();
     if axis >= count {

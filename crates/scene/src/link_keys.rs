@@ -36,7 +36,7 @@ pub fn link_keys_of_text(text: &str, file: &Path, overrides: &[String]) -> Resul
     Ok(keys)
 }
 
-/// Returns the changes of links in the timeline of a scene: the instant of each change, and all keys of each link that changes. In order of time, as in
+/// Returns the changes of links in the timeline of a scene: the instant of each change, and all keys of each changed link. In order of time, as in
 /// [`Scene::timeline`](crate::Scene::timeline). A change of a live session between two changes of the timeline has no influence on these keys.
 ///
 /// # Errors

@@ -12,7 +12,7 @@ macro_rules! registry {
         }
 
         impl Measure {
-            /// Every measure, in the order in which measures are shown.
+            /// Every measure, in the order of display.
             pub const ALL: &'static [Self] = &[$(Self::$measure,)+];
 
             /// Returns the name, which ends in the unit. The full name of a measure of a peer begins with the peer's name: see [`MeasureName::text`].
@@ -110,7 +110,7 @@ pub struct MeasureName {
 }
 
 impl MeasureName {
-    /// Returns every measure of a scene with this number of peers, in the order in which measures are shown.
+    /// Returns every measure of a scene with this number of peers, in the order of display.
     #[must_use]
     pub fn all(peers: usize) -> Vec<Self> {
         let mut names = Vec::new();

@@ -36,20 +36,20 @@ pub struct Scene {
     pub rotation: Option<Box<RotationSpec>>,
     /// Coordination controller that keeps the copies together.
     pub coordination: CoordinationSpec,
-    /// Method that computes the motion between two ticks.
+    /// Method of computing the motion between two ticks.
     pub integrator: Integrator,
     /// Peers in the order of the file, at least two. Names are unique.
     pub peers: Vec<PeerSpec>,
     /// Neighbours to which each peer sends; `None` if every peer sends to every other peer.
     pub topology: Option<Arc<Topology>>,
-    /// True if a relay stands between the uplinks of peers and the links. A sample then passes its sender's uplink once, and the relay sends a copy to each
+    /// True if a relay stands between the uplinks of peers and the links. A sample then passes the sender's uplink once, and the relay sends a copy to each
     /// receiver.
     pub relay: bool,
     /// Directed links between the peers. An entry between two peers that are not neighbours in the topology has no effect.
     pub links: LinkTable,
     /// Changes during the run, in order of time; changes at the same instant are in the order of the file.
     pub timeline: Vec<Change>,
-    /// Measures that a run computes; `None` if the scene has no table `[measure]`.
+    /// Measures of a run; `None` if the scene has no table `[measure]`.
     pub measure: Option<MeasureSpec>,
     /// Expected results of a run; `None` if the scene is not a test.
     pub expect: Option<Expect>,
@@ -58,8 +58,8 @@ pub struct Scene {
 }
 
 impl fmt::Debug for Scene {
-    /// Writes rotation, topology, relay, measure and `scaled_for` only where the scene has them. Fingerprints of records are made of this text, so that a
-    /// scene without such a part must print as it did before the part existed.
+    /// Writes rotation, topology, relay, measure and `scaled_for` only where the scene has such a part. Fingerprints of records are made of this text, so that
+    /// a scene without the part must print as before the part existed.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         // Destructured without `..`: a new field does not compile until this function decides how to show the field.
         let Self {
@@ -126,23 +126,23 @@ impl Scene {
     }
 }
 
-/// Measures of a run, as `[measure]` asks for them.
+/// Measures of a run, from `[measure]`.
 #[derive(Clone, PartialEq, Debug)]
 pub struct MeasureSpec {
-    /// Measures, at least one, without duplicates, in the order in which they are shown.
+    /// Measures, at least one, without duplicates, in the order of display.
     pub names: Vec<MeasureName>,
-    /// Settings that some measures depend on.
+    /// Settings of some measures.
     pub settings: MeasureSettings,
 }
 
-/// Settings that some measures depend on: a distance, a threshold and a probe.
+/// Settings of some measures: a distance, a threshold and a probe.
 #[derive(Clone, PartialEq, Debug)]
 pub struct MeasureSettings {
-    /// Distance whose first crossing [`Measure::Travel`](crate::Measure::Travel) reports.
+    /// Distance for [`Measure::Travel`](crate::Measure::Travel): the measure reports the first crossing.
     pub travel: MeasureTravel,
     /// Discrepancy above which copies are not settled, for [`Measure::Settling`](crate::Measure::Settling) \[m\]; above zero.
     pub band: f64,
-    /// Index into [`Scene::peers`] of the peer at whose hand the impedance is measured. The hand of this peer pushes with the same sine during the whole
+    /// Index into [`Scene::peers`] of the peer with the probe, for the impedance at the hand of this peer. The hand pushes with the same sine during the whole
     /// scene. `None`: no impedance is measured.
     pub probe: Option<usize>,
 }
@@ -150,7 +150,7 @@ pub struct MeasureSettings {
 /// Distance that a copy travels along an axis.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct MeasureTravel {
-    /// Index into [`Scene::peers`] of the peer whose copy is observed.
+    /// Index into [`Scene::peers`] of the peer with the observed copy.
     pub peer: usize,
     /// Axis: 0 for x, 1 for y, 2 for z.
     pub axis: usize,
@@ -191,15 +191,15 @@ pub struct ObjectSpec {
     pub damping: f64,
     /// True if each of N copies has the mass divided by N, false if each copy has the whole mass.
     pub split_mass: bool,
-    /// Initial position of every copy and of every device \[m\], unless a peer has its own.
+    /// Initial position of every copy and of every device \[m\], unless a peer gives another position.
     pub position: [f64; 3],
-    /// Initial velocity of every copy and of every device [m/s], unless a peer has its own.
+    /// Initial velocity of every copy and of every device [m/s], unless a peer gives another velocity.
     pub velocity: [f64; 3],
-    /// Walls that limit the travel of every copy; `None` for unlimited travel.
+    /// Walls around every copy; `None` for unlimited travel.
     pub enclosure: Option<Enclosure>,
 }
 
-/// Rule by which gains follow the number of peers N.
+/// Dependence of gains on the number of peers N.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Scaling {
     /// Gains as written.
@@ -214,23 +214,22 @@ pub enum Scaling {
 pub struct CoordinationSpec {
     /// Coordination strategy.
     pub strategy: Coordination,
-    /// Rule by which KT and BT follow the number of peers.
+    /// Dependence of KT and BT on the number of peers.
     pub scaling: Scaling,
-    /// Whether KT and BT count once ([`Pull::Mean`]) or once for each peer that is heard ([`Pull::Sum`]).
+    /// Whether KT and BT count once ([`Pull::Mean`]) or once per heard peer ([`Pull::Sum`]).
     pub pull: Pull,
     /// KT [N/m] and BT [N·s/m] as written, before scaling.
     pub gains: Gains,
-    /// Own parameters of all strategies, also of strategies that this scene does not use.
+    /// Own parameters of all strategies, also of unused strategies.
     pub settings: LawSettings,
     /// Period Tn between two samples of a peer; a whole multiple of the tick of every peer, measured on the peer's own clock.
     pub update: Duration,
-    /// Dead bands that select the samples to send; `None` if every sample is sent.
+    /// Dead bands for the choice of samples to send; `None` if every sample is sent.
     pub send_when: Option<SendWhen>,
 }
 
 impl fmt::Debug for CoordinationSpec {
-    /// Writes the pull, the parameters of strategies and the dead bands only where they differ from the defaults: fingerprints of records are made of this
-    /// text.
+    /// Writes the pull, the parameters of strategies and the dead bands only if changed from the defaults: fingerprints of records are made of this text.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { strategy, scaling, pull, gains, settings, update, send_when } = self;
         let mut shown = f.debug_struct("CoordinationSpec");
@@ -257,18 +256,18 @@ pub struct PeerSpec {
     pub kind: PeerKind,
     /// Clock: tick period Tc, offset and drift.
     pub clock: Clock,
-    /// Phase of sending, in ticks: the peer sends at ticks k for which k − phase is a multiple of update/tick. Below update/tick.
+    /// Phase of sending, in ticks: the peer sends at ticks k with k − phase a multiple of update/tick. Below update/tick.
     pub phase: u64,
     /// True if a force computed at a tick is applied at the next tick.
     pub compute_delay: bool,
     /// Contact between the device and the object.
     pub contact: Contact,
-    /// Mass mH and damping bH of the device. A peer of kind `udp` may have been given no device, which only [`Scene::read_live`] accepts. The field then
-    /// holds a device at rest: such a peer touches nothing, and a live session never moves the device.
+    /// Mass mH and damping bH of the device. A peer of kind `udp` may have no device; only [`Scene::read_live`] accepts such a peer. The field then holds a
+    /// device at rest: the peer touches nothing, and a live session never moves the device.
     pub device: DeviceConfig,
     /// KC [N/m] and BC [N·s/m] of the virtual coupling as written, before scaling.
     pub coupling: Gains,
-    /// Rule by which KC and BC follow the number of peers.
+    /// Dependence of KC and BC on the number of peers.
     pub coupling_scaling: Scaling,
     /// Force or arm of the hand; `None` if the hand does nothing.
     pub hand: Option<Hand>,
@@ -280,9 +279,9 @@ pub struct PeerSpec {
     pub device_position: Option<[f64; 3]>,
     /// Initial velocity of the device [m/s]; `None` if the device begins with the velocity of the copy.
     pub device_velocity: Option<[f64; 3]>,
-    /// Access line that all samples of this peer pass before the links; `None` for no such line.
+    /// Access line for all samples of this peer, before the links; `None` for no such line.
     pub uplink: Option<Arc<LinkModel>>,
-    /// Access line that all samples to this peer pass after the links; `None` for no such line.
+    /// Access line for all samples to this peer, after the links; `None` for no such line.
     pub downlink: Option<Arc<LinkModel>>,
 }
 
@@ -304,7 +303,7 @@ impl fmt::Debug for PeerSpec {
     }
 }
 
-/// Place where a peer runs in a live session (`cohaptic live`). In virtual time every peer is simulated, whatever its kind.
+/// Place where a peer runs in a live session (`cohaptic live`). In virtual time every peer is simulated, whatever the kind.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub enum PeerKind {
     /// Device, hand and copy are simulated in this program.
@@ -375,7 +374,7 @@ pub struct FalconSpec {
     pub device: FalconDevice,
     /// Motor counts per newton metre at the joint of an arm; above zero.
     pub counts_per_newton_metre: f64,
-    /// Largest force that is sent to the motors \[N\]; above zero.
+    /// Largest force to the motors \[N\]; above zero.
     pub force_limit: f64,
     /// Origin of the scene in the coordinates of the device \[m\]. The first axis of the scene is the first axis of the device, and so on.
     pub origin: [f64; 3],
@@ -384,7 +383,7 @@ pub struct FalconSpec {
 /// Selection of a Falcon.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub enum FalconDevice {
-    /// The first device that is found and not taken by another peer.
+    /// The first found device not taken by another peer.
     #[default]
     First,
     /// A device simulated down to the bytes of its protocol.
@@ -398,11 +397,11 @@ pub enum FalconDevice {
 pub struct Change {
     /// Instant of the change, since the beginning of the scene.
     pub at: Instant,
-    /// Part of the scene that changes, with its new value.
+    /// Changed part of the scene, with the new value.
     pub what: ChangeKind,
 }
 
-/// Part of the scene that changes, with its new value.
+/// Changed part of the scene, with the new value.
 #[derive(Clone, PartialEq, Debug)]
 pub enum ChangeKind {
     /// A link takes a new configuration. Packets in flight keep their delays.
@@ -416,14 +415,14 @@ pub enum ChangeKind {
         /// New contact.
         contact: Contact,
     },
-    /// The force or the wanted motion of a peer's hand changes. An arm stays the same arm, and a hand without an arm does not get one.
+    /// The force or the wanted motion of a peer's hand changes. An arm stays the same arm, and a hand without an arm does not get an arm.
     Hand {
         /// Index of the peer in [`Scene::peers`].
         peer: usize,
         /// New hand; `None` for a hand that does nothing.
         hand: Option<Hand>,
     },
-    /// The torque of a peer's hand changes. Occurs only in scenes whose object turns, directly after each change of the hand.
+    /// The torque of a peer's hand changes. Occurs only in scenes with a turning object, directly after each change of the hand.
     HandTorque {
         /// Index of the peer in [`Scene::peers`].
         peer: usize,
@@ -432,16 +431,16 @@ pub enum ChangeKind {
     },
     /// KT [N/m] and BT [N·s/m] change at every peer. Values as written, before scaling.
     Coordination(Gains),
-    /// KR [N·m/rad] and BR [N·m·s/rad] change at every peer. Values as written, before scaling; a gain that is `None` stays as it was. Occurs only in scenes
-    /// whose object turns.
+    /// KR [N·m/rad] and BR [N·m·s/rad] change at every peer. Values as written, before scaling; a gain of `None` keeps the value before. Occurs only in scenes
+    /// with a turning object.
     RotationalGains(Gains<Option<Triple>>),
     /// Own parameters of strategies change at every peer. Holds the new parameters of all strategies, changed or not.
     Parameters(Box<LawSettings>),
-    /// The dead bands that select the samples to send change at every peer.
+    /// The dead bands of samples change at every peer.
     SendWhen(SendWhen),
 }
 
-/// Results of a run that `cohaptic check` requires. An absent entry is not checked.
+/// Required results of a run, for `cohaptic check`. An absent entry is not checked.
 #[derive(Clone, PartialEq, Default)]
 pub struct Expect {
     /// Stability of the relative motion: `true` if a small disturbance must die out, `false` if it must grow.
@@ -452,9 +451,9 @@ pub struct Expect {
     pub positions: Vec<ExpectPosition>,
     /// Times at which copies have first moved a given distance from their initial positions.
     pub travel: Vec<ExpectTravel>,
-    /// Fractions of the packets offered to links that were dropped.
+    /// Dropped fractions of the packets offered to links.
     pub loss: Vec<ExpectLoss>,
-    /// Mean delays of the packets that links delivered.
+    /// Mean delays of delivered packets.
     pub delay: Vec<ExpectDelay>,
     /// Values of measures.
     pub measures: Vec<ExpectMeasure>,
@@ -517,12 +516,12 @@ pub struct ExpectOrientation {
 /// An expected position of a copy along an axis.
 #[derive(Clone, PartialEq, Debug)]
 pub struct ExpectPosition {
-    /// Index into [`Scene::peers`] of the peer whose copy is checked.
+    /// Index into [`Scene::peers`] of the peer with the checked copy.
     pub peer: usize,
     /// Axis: 0 for x, 1 for y, 2 for z.
     pub axis: usize,
-    /// Instant of the check. The position is that of the peer's last tick at or before this instant; at the end of the scene, it is the position to which the
-    /// last tick leads.
+    /// Instant of the check. The checked position is the position at the peer's last tick at or before this instant; at the end of the scene, the position
+    /// after the last tick.
     pub at: Instant,
     /// Bounds of the position \[m\].
     pub bounds: Bounds,
@@ -531,20 +530,20 @@ pub struct ExpectPosition {
 /// An expected time of travel of a copy along an axis.
 #[derive(Clone, PartialEq, Debug)]
 pub struct ExpectTravel {
-    /// Index into [`Scene::peers`] of the peer whose copy is checked.
+    /// Index into [`Scene::peers`] of the peer with the checked copy.
     pub peer: usize,
     /// Axis: 0 for x, 1 for y, 2 for z.
     pub axis: usize,
     /// Distance from the initial position of the copy, in either direction \[m\]; above zero.
     pub distance: f64,
-    /// Bounds of the time from the beginning of the scene at which the copy first reaches the distance \[s\].
+    /// Bounds of the time from the beginning of the scene to the first instant at the distance \[s\].
     pub bounds: Bounds,
 }
 
 /// An expected fraction of dropped packets.
 #[derive(Clone, PartialEq, Debug)]
 pub struct ExpectLoss {
-    /// Links over which packets are counted.
+    /// Links of the counted packets.
     pub link: LinkSelector,
     /// Cause of the drops to count; `None` for every cause.
     pub cause: Option<DropCause>,
@@ -566,7 +565,7 @@ pub struct ExpectMeasure {
 /// An expected mean delay of delivered packets.
 #[derive(Clone, PartialEq, Debug)]
 pub struct ExpectDelay {
-    /// Links over which the delay is averaged.
+    /// Links of the averaged delay.
     pub link: LinkSelector,
     /// Least mean delay; `None` for no lower end.
     pub min: Option<Duration>,

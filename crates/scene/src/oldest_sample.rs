@@ -16,7 +16,7 @@ impl Scene {
     /// pattern, with M ticks from sample to sample.
     ///
     /// `None` where the links do not bound the age, or where the bound may change: for links with anything but constant delays and patterns of lost packets,
-    /// access lines that lose packets, changes of links in the timeline, peers whose clocks differ, and dead bands.
+    /// lossy access lines, changes of links in the timeline, peers with different clocks, and dead bands.
     #[must_use]
     pub(crate) fn oldest_sample(&self) -> Option<u64> {
         let clock = self.lasting_clock()?;
@@ -36,15 +36,15 @@ impl Scene {
             (slowest, longest) = (slowest.max(delay), longest.max(run));
         }
         let (ticks, update) = self.ticks_of(slowest.saturating_add(up).saturating_add(down), clock)?;
-        // An overflow gives `None` too: no bound that can be used.
+        // An overflow gives `None` too: no usable bound.
         ticks.checked_add(update.checked_mul(longest.checked_add(1)?)?)?.checked_sub(1)
     }
 
-    /// Returns the age of a sample in the middle of its use, in ticks: ⌈delay/Tc⌉ + ⌊(M − 1)/2⌋, with M ticks from sample to sample. The ticks in which the
-    /// sample in use is older are then as many as the ticks in which it is younger, or one more.
+    /// Returns the age of a sample in the middle of its use, in ticks: ⌈delay/Tc⌉ + ⌊(M − 1)/2⌋, with M ticks from sample to sample. The sample in use is then
+    /// older in as many ticks as younger, or in a tick more.
     ///
-    /// `None` where the age is not the same for all samples: for links that do more than delay or whose delays differ, access lines, dead bands, changes of
-    /// links in the timeline, and peers whose clocks differ.
+    /// `None` where samples have different ages: for links with more than a constant delay or with different delays, access lines, dead bands, changes of links
+    /// in the timeline, and peers with different clocks.
     #[must_use]
     pub(crate) fn middle_age(&self) -> Option<u64> {
         let clock = self.lasting_clock()?;
@@ -64,20 +64,20 @@ impl Scene {
     fn lasting_clock(&self) -> Option<Clock> {
         let clock = self.peers[0].clock;
         let is_link_change = |what: &ChangeKind| matches!(what, ChangeKind::Link(_) | ChangeKind::AllLinks(_));
-        // Where a sample is left out, the sample before it stays in use and gets older.
+        // Where a sample is left out, the sample before stays in use and gets older.
         let thinned = self.leaves_out_samples();
         let differs = self.peers.iter().any(|peer| peer.clock != clock);
         (!thinned && !differs && !self.timeline.iter().any(|change| is_link_change(&change.what))).then_some(clock)
     }
 
-    /// Returns two numbers of ticks: from sending to the use of a sample that travels for `delay`, rounded up, and from sample to sample.
+    /// Returns two numbers of ticks: from sending to the use of a sample with the travel time `delay`, rounded up, and from sample to sample.
     fn ticks_of(&self, delay: Duration, clock: Clock) -> Option<(u64, u64)> {
         let tick = clock.tick.as_nanos();
         let ticks = u64::try_from(delay.as_nanos().div_ceil(tick)).ok()?;
         Some((ticks, u64::try_from(self.coordination.update.as_nanos() / tick).ok()?))
     }
 
-    /// Returns why the coordination law cannot look back as far as its lag; `None` if it can.
+    /// Returns why the coordination law cannot look back as far as the lag; `None` if the law can.
     pub(crate) fn refused_lag(&self) -> Option<&'static str> {
         let is_automatic = self.coordination.settings.of(self.coordination.strategy).any_automatic();
         if self.coordination.strategy == Coordination::LocalLag && is_automatic && self.middle_age().is_none() {
@@ -91,7 +91,8 @@ impl Scene {
             .then_some("the lag is more than 10000 ticks of a peer, which it does not remember: expected at most 10000 ticks")
     }
 
-    /// Returns why a parameter of the coordination law cannot be `"auto"` in this scene; `None` if no parameter is, or if all can be.
+    /// Returns why a parameter of the coordination law cannot be `"auto"` in this scene; `None` if no parameter is automatic, or if all automatic parameters
+    /// are possible.
     pub(crate) fn refused_automatic(&self) -> Option<&'static str> {
         let values = self.coordination.settings.of(self.coordination.strategy);
         let parameters = self.coordination.strategy.parameters();
@@ -110,7 +111,7 @@ impl Scene {
     }
 }
 
-/// Returns the delay of a link and its longest run of lost packets. `None` if the link does anything at random, or anything but delay and lose packets by a
+/// Returns the delay of a link and the longest run of lost packets. `None` if the link does anything at random, or anything but delay and lose packets by a
 /// pattern.
 fn bounded(model: &LinkModel) -> Option<(Duration, u64)> {
     let config = model.as_fixed()?;

@@ -1,5 +1,5 @@
 //! Reader of whole scenes: from files and texts to [`Scene`]. Each part of the document is read by a function of `sections`; this module orders the calls and
-//! checks what concerns several parts.
+//! checks relations between several parts.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -43,12 +43,12 @@ impl Scene {
     ///
     /// # Errors
     ///
-    /// [`FileError::Read`] if the file, or a file that the scene names, cannot be read; [`FileError::Invalid`] for every fault of the content.
+    /// [`FileError::Read`] if the file, or a named file, cannot be read; [`FileError::Invalid`] for every fault of the content.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, FileError> {
         with_text(path, |text| Self::parse(text, path, overrides))
     }
 
-    /// Reads a scene for a live session. Like [`Scene::read`], but a peer of kind `udp`, which is another process, needs neither device nor coupling.
+    /// Reads a scene for a live session. Like [`Scene::read`], but a peer of kind `udp`, another process, needs neither device nor coupling.
     ///
     /// # Errors
     ///
@@ -57,7 +57,7 @@ impl Scene {
         with_text(path, |text| Self::parse_live(text, path, overrides))
     }
 
-    /// Reads a scene from a text. `file` appears in messages, and files that the scene names are relative to the folder of `file`.
+    /// Reads a scene from a text. `file` appears in messages, and named files are relative to the folder of `file`.
     ///
     /// # Errors
     ///
@@ -82,7 +82,7 @@ impl Scene {
     }
 }
 
-/// Returns a fault at the place where the peer with index `peer` is made: its entry `[[peers]]`, or `scene.count`. For faults of a scene that could be read.
+/// Returns a fault at the place where the peer with index `peer` is made: its entry `[[peers]]`, or `scene.count`. For faults of a readable scene.
 #[must_use]
 pub fn at_peer(text: &str, file: &Path, overrides: &[String], peer: usize, message: &str) -> FileError {
     let sources = Sources { file, text, overrides };
@@ -106,7 +106,7 @@ pub fn at_peer(text: &str, file: &Path, overrides: &[String], peer: usize, messa
     refused.err().unwrap_or_else(|| FileError::NoFile { folder: file.to_path_buf(), kind: "scene" })
 }
 
-/// Reads the scene in a text. Calls `on_links` with the links of the beginning, then with the links that each change of the timeline makes.
+/// Reads the scene in a text. Calls `on_links` with the links of the beginning, then with the links after each change of the timeline.
 pub(crate) fn parse_scene(sources: Sources<'_>, live: bool, on_links: OnLinks<'_>) -> Result<Parsed<Scene>, FileError> {
     parse(sources, |document, context| read_document(document, context, live, on_links))
 }
@@ -117,7 +117,7 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
     root.know_all();
     let header_node = root.get("scene");
     let header = root.read("scene", read_header).unwrap_or_default();
-    // Names before the parts below, whose readers look up peers by name.
+    // Names are read before the parts below, because the readers of these parts look up peers by name.
     let Header { title, duration, seed, axes, count } = header;
     let peers_node = root.get("peers");
     let names = count.and_then(|count| read_names(peers_node, count, file));
@@ -151,7 +151,7 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
     });
     let count_entry = header_node.and_then(Node::as_table).and_then(|table| table.get("count"));
     let peers = read_peers(PeerSources { defaults, entries: peers_node, count: count_entry, update }, object.as_ref(), context);
-    // Needs all four parts. If a part was refused, its fault is reported already.
+    // Needs all four parts. If a part was refused, the fault of the part is reported already.
     let rotation = match (object_rotation, rotation_gains, stepping, &peers) {
         (Some(object), Some(gains), Some(stepping), Some(peers)) => rotation(object, gains, stepping.rotation_steps, peers, file),
         _ => None,
@@ -194,7 +194,7 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
     if let Some(names) = &names {
         check_enough(names, peers_node, file);
     }
-    // From here on `?` ends the reading without a fault of its own: whatever is `None` was reported where it was read.
+    // From here on `?` ends the reading without a new fault: each `None` was reported where the value was read.
     let scene = Scene {
         file: context.sources.file.to_path_buf(),
         title: title?.unwrap_or_else(|| default_title(context.sources.file)),
@@ -230,7 +230,7 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
     Some(scene)
 }
 
-/// Returns the scene files that a path means: a file means itself, a folder means every file below the folder that ends in `.toml`, in order of their paths.
+/// Returns the scene files of a path: the file itself or, for a folder, every file below the folder with a name that ends in `.toml`, in order of paths.
 ///
 /// Symbolic links to folders are not followed.
 ///

@@ -9,7 +9,7 @@ use crate::{Change, ChangeKind, Scene};
 /// Rotation of the object of a scene.
 #[derive(Clone, PartialEq, Debug)]
 pub struct RotationSpec {
-    /// Principal moments of inertia of the whole object [kg·m²], each above zero and none above the sum of the two others. Body axes are the principal axes.
+    /// Principal moments of inertia of the whole object [kg·m²], each above zero and at most the sum of the two others. Body axes are the principal axes.
     pub inertia: Triple,
     /// Viscous damping of the rotation of each copy about the body axes [N·m·s/rad]; `None`: the damping of the object times inertia over mass.
     pub damping: Option<Triple>,
@@ -102,7 +102,7 @@ impl Scene {
     #[must_use]
     pub fn copy_spin(&self) -> Option<Spin> {
         let rotation = self.rotation.as_ref()?;
-        // 1/N where the mass is split, otherwise 1. The damping is that of each copy, and is not split.
+        // 1/N where the mass is split, otherwise 1. The damping belongs to each copy, and is not split.
         let share = self.copy_mass() / self.object.mass;
         let damping = rotation.damping.unwrap_or_else(|| rotation.over_mass(self.object.mass, self.object.damping));
         Some(Spin { inertia: rotation.inertia.map(|moment| moment * share), damping })
@@ -116,8 +116,8 @@ impl Scene {
         Some((rotation.inertia.iter().sum::<f64>() / (3.0 * self.object.mass)).sqrt())
     }
 
-    /// Returns the edges of the box of even density that has the mass and the inertia of the object, along the body axes \[m\]: a = √(6·(Jy + Jz − Jx)/m), b
-    /// and c likewise. The object is drawn as this box. `None` if the object does not turn.
+    /// Returns the edges of the box of even density with the mass and the inertia of the object, along the body axes \[m\]: a = √(6·(Jy + Jz − Jx)/m), b and c
+    /// likewise. The object is drawn as this box. `None` if the object does not turn.
     #[must_use]
     pub fn even_box(&self) -> Option<Triple> {
         let inertia = self.rotation.as_ref()?.inertia;
@@ -150,8 +150,8 @@ impl Scene {
     /// Iterates over [`Scene::rotation_gains`] at the beginning and after each change of KT and BT or of KR and BR in the timeline. Empty if the object does
     /// not turn.
     ///
-    /// Default gains follow KT and BT. A gain that the timeline sets is a given gain from then on. No component of KR is above the sum of the two others,
-    /// whether KR is given or is J times a number.
+    /// Default gains follow KT and BT. A gain in the timeline is a given gain from then on. Each component of KR is at most the sum of the two others, whether
+    /// KR is given or is J times a number.
     pub fn rotation_gains_in_time(&self) -> impl Iterator<Item = Gains<Triple>> {
         // `None` if the object does not turn: both iterators below are empty then.
         let begins = self.rotation.as_ref().map(|rotation| (self.coordination.gains, rotation.gains));
@@ -163,7 +163,7 @@ impl Scene {
                         true
                     }
                     ChangeKind::RotationalGains(changed) => {
-                        // A gain that the change does not name stays as it was: given, or following KT and BT.
+                        // A gain absent from the change stays as before: given, or following KT and BT.
                         *given = Gains { stiffness: changed.stiffness.or(given.stiffness), damping: changed.damping.or(given.damping) };
                         true
                     }
@@ -175,7 +175,7 @@ impl Scene {
                     | ChangeKind::Parameters(_)
                     | ChangeKind::SendWhen(_) => false,
                 };
-                // `Some` continues the scan. `flatten` below drops the changes that concern no gain.
+                // `Some` continues the scan. `flatten` below drops the changes without a gain.
                 Some(changed.then_some((*gains, *given)))
             })
         });
@@ -202,7 +202,7 @@ impl Scene {
         State { position: said(spec.device_position, with_copy.position), velocity: said(spec.device_velocity, with_copy.velocity) }
     }
 
-    /// Returns why the object cannot turn in this scene; `None` if it can, or if it does not turn.
+    /// Returns why the object cannot turn in this scene; `None` if the object can turn, or does not turn.
     pub(crate) fn refused_rotation(&self) -> Option<String> {
         let rotation = self.rotation.as_ref()?;
         let strategy = self.coordination.strategy;
@@ -226,7 +226,7 @@ impl Scene {
     }
 }
 
-/// Returns why a strategy has no torque; `None` if the strategy has one.
+/// Returns why a strategy has no torque; `None` if the strategy has a torque.
 const fn why_no_torque(strategy: Coordination) -> Option<&'static str> {
     match strategy {
         Coordination::AveragePosition

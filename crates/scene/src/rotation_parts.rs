@@ -1,4 +1,4 @@
-//! One-axis scenes into which the motion of an object that turns splits exactly, linearised at rest.
+//! Exact split of the motion of a turning object, linearised at rest, into one-axis scenes.
 //!
 //! A copy has the coordinates y = (δp, δθ) in body axes and the mass matrix M = diag(m·I, J), and is grasped at z = G·y with G = \[I, −\[r\]\]: M·ÿ = Gᵀ·FC +
 //! (0, τC) − diag(KT·I, KR)·(y − ȳ) − … (docs/stability.md).
@@ -8,7 +8,7 @@
 //! **One grasp r, default gains.** Gains and damping are then multiples of M, diag(KT·I, KR) = KT/m·M and so on, and Gᵀ·FC alone drives the copies. With W =
 //! G·M⁻¹·Gᵀ = I/m − \[r\]·J⁻¹·\[r\] the grasp point obeys z̈ = W·FC − KT/m·(z − z̄) − BT/m·(ż − ż̄) − bO/m·ż. Device and coupling are equal along all
 //! directions, so that along an eigenvector of W with the eigenvalue μ this is a scene of mass 1/μ with KT, BT and bO divided by m·μ. Three components N·y of
-//! y remain, with N·M⁻¹·Gᵀ = 0: no hand drives these components, and they obey the equation of a copy of mass m that nobody touches. Held samples, means and
+//! y remain, with N·M⁻¹·Gᵀ = 0: no hand drives these components, and each component obeys the equation of an untouched copy of mass m. Held samples, means and
 //! step maps act on all components alike, so that the split holds for any links, clocks and delays.
 
 use cohaptic_peer::coordination::LawValue;
@@ -17,16 +17,16 @@ use cohaptic_peer::{Contact, Coordination, DeviceConfig, Direction, Enclosure, G
 
 use crate::{Axes, CoordinationSpec, ObjectSpec, PeerKind, PeerSpec, RotationSpec, Scene};
 
-/// Split of the motion of an object that turns into one-axis scenes.
+/// Split of the motion of a turning object into one-axis scenes.
 #[derive(Clone, PartialEq, Debug)]
 pub struct RotationParts {
     /// Reason why the motion splits, in words.
     pub reason: &'static str,
-    /// The one-axis scenes, each with the components whose motion it describes. No two parts are equal.
+    /// The one-axis scenes, each with the described components. No two parts are equal.
     pub parts: Vec<RotationPart>,
 }
 
-/// One or several equal components of the motion of an object that turns, as a scene of one axis, at rest.
+/// Equal components of the motion of a turning object, as a one-axis scene at rest.
 ///
 /// If the component is a rotation, the fields of `scene` hold rotational quantities in rotational units: the mass is an inertia [kg·m²], and so on.
 #[derive(Clone, PartialEq, Debug)]
@@ -35,7 +35,7 @@ pub struct RotationPart {
     pub components: Vec<String>,
     /// Scene of each component.
     pub scene: Scene,
-    /// True for each peer that has a device in this component, indexed as [`Scene::peers`]. If false, the peer's device in `scene` is a placeholder without
+    /// True for each peer with a device in this component, indexed as [`Scene::peers`]. If false, the peer's device in `scene` is a placeholder without
     /// meaning.
     pub devices: Vec<bool>,
 }
@@ -49,7 +49,7 @@ impl RotationPart {
 }
 
 impl Scene {
-    /// Returns the one-axis scenes into which the motion near rest splits exactly, or the reason why it does not split; `None` if the object does not turn.
+    /// Returns the exact split of the motion near rest into one-axis scenes, or the reason why the motion does not split; `None` if the object does not turn.
     ///
     /// Forces of hands without an arm, the timeline and initial motions are left out. The samples of the whole scene are longer than the samples of a part.
     #[must_use]
@@ -70,12 +70,12 @@ impl Scene {
             let parts = merged((0..3).map(|axis| self.translation(axis)).chain((0..3).map(|axis| self.turn(rotation, axis))));
             return Some(Ok(RotationParts { reason: "the object is held at its centre alone, so no force turns it", parts }));
         }
-        // Some peer touches: with none, `all` above is true.
+        // Some peer touches: without such a peer, `all` above is true.
         let grasp = grasps().next()?;
         Some(self.why_not_pivots(rotation, grasp).map_or_else(
             || {
                 let touched = effective_masses(self.object.mass, rotation.inertia, grasp).into_iter().enumerate();
-                // Masses 1/μ along the eigenvectors, which the hands drive, then three times the mass of the object, which no hand drives.
+                // Masses 1/μ along the eigenvectors, driven by the hands, then three times the mass of the object, driven by no hand.
                 let touched = touched.map(|(place, mass)| self.with_mass(format!("touched {}", place + 1), mass, true));
                 let pivots = (1..=3).map(|place| self.with_mass(format!("pivot {place}"), self.object.mass, false));
                 let reason = "all who touch the object do so at one point, and gains and damping of turns are the default ones";
@@ -85,13 +85,13 @@ impl Scene {
         ))
     }
 
-    /// Returns true if the motion of an object that turns is small and near rest: copies begin together and at rest, and no hand pushes. Also true if the
-    /// object does not turn.
+    /// Returns true if the motion of a turning object is small and near rest: copies begin together and at rest, and no hand pushes. Also true if the object
+    /// does not turn.
     #[must_use]
     pub fn turns_about_rest(&self) -> bool {
         let Some(rotation) = &self.rotation else { return true };
         let (first, peers) = (rotation.peers[0].attitude, rotation.peers.iter().zip(&self.peers));
-        // A sine or a table counts as a push, also if all its values are zero.
+        // A sine or a table counts as a push, also with all values zero.
         let is_idle = |signal: &Signal| matches!(signal, Signal::Constant(constant) if is_zero(*constant));
         peers.enumerate().all(|(place, (peer, spec))| {
             let together = same(spec.position, self.peers[0].position) && peer.attitude.angle_to(&first.orientation) == 0.0;
@@ -107,7 +107,7 @@ impl Scene {
         })
     }
 
-    /// Returns why the scene does not split into touched scenes and pivots; `None` if it does. `grasp` is the grasp of the first peer that touches.
+    /// Returns why the scene does not split into touched scenes and pivots; `None` if the scene splits. `grasp` is the grasp of the first touching peer.
     fn why_not_pivots(&self, rotation: &RotationSpec, grasp: Triple) -> Option<&'static str> {
         let mut peers = rotation.peers.iter().zip(&self.peers);
         let touches = |spec: &PeerSpec| spec.contact != Contact::None;
@@ -149,7 +149,7 @@ impl Scene {
         RotationPart { components: vec![["x", "y", "z"][axis].to_owned()], scene, devices: vec![true; self.peers.len()] }
     }
 
-    /// Returns the part of the rotation about an axis, 0 for x, of an object that is held at its centre.
+    /// Returns the part of the rotation about an axis, 0 for x, of an object held at the centre.
     fn turn(&self, rotation: &RotationSpec, axis: usize) -> RotationPart {
         // As in `RotationSpec::over_mass`, about one axis.
         let over_mass = |number: f64| number * rotation.inertia[axis] / self.object.mass;
@@ -185,7 +185,7 @@ impl Scene {
         RotationPart { components: vec![["rx", "ry", "rz"][axis].to_owned()], scene, devices }
     }
 
-    /// Returns the scene with an object of this mass, and with gains and damping in proportion. `touched` is false for a component that no hand drives.
+    /// Returns the scene with an object of this mass, and with gains and damping in proportion. `touched` is false for a component without a driving hand.
     fn with_mass(&self, component: String, mass: f64, touched: bool) -> RotationPart {
         let share = mass / self.object.mass;
         let object = ObjectSpec { mass, damping: self.object.damping * share, ..self.object_at_rest() };
@@ -235,7 +235,7 @@ fn at_rest(spec: &PeerSpec) -> PeerSpec {
     PeerSpec { kind: PeerKind::Simulated, hand, position, velocity, device_position: None, device_velocity: None, ..spec.clone() }
 }
 
-/// Returns the peer without contact, with a placeholder as its device. The placeholder is the same for all peers.
+/// Returns the peer without contact, with a placeholder device. The placeholder is the same for all peers.
 fn untouched(spec: PeerSpec) -> PeerSpec {
     PeerSpec { contact: Contact::None, device: DeviceConfig { mass: 1.0, damping: 0.0 }, hand: None, ..spec }
 }
@@ -270,7 +270,7 @@ fn effective_masses(mass: f64, inertia: Triple, grasp: Triple) -> [f64; 3] {
     let u = unit(cross(along, axis));
     let v = cross(along, u);
     let weighed = |a: Triple, b: Triple| radius * radius * (0..3).map(|axis| a[axis] * b[axis] / inertia[axis]).sum::<f64>();
-    // Eigenvalues of the symmetric matrix of W across r, from its mean and half its difference.
+    // Eigenvalues of the symmetric matrix of W across r, from the mean and half the difference of the diagonal.
     let (of_u, of_v, of_both) = (weighed(v, v), weighed(u, u), -weighed(u, v));
     let (middle, apart) = (1.0 / mass + 0.5 * (of_u + of_v), hypot(0.5 * (of_u - of_v), of_both));
     // W is positive definite, so that `middle` exceeds `apart`.

@@ -9,7 +9,7 @@ use crate::{ChangeKind, CoordinationSpec, Scene};
 
 /// Factory of the coordination strategy of each peer, for any number of axes.
 ///
-/// [`FromScene`] makes the strategy that the scene names. Implement this trait to simulate or to analyse a scene with a strategy of your own.
+/// [`FromScene`] makes the strategy of the scene. Implement this trait to simulate or to analyse a scene with a strategy of your own.
 pub trait Strategies {
     /// Type of the strategy for A axes.
     type Strategy<const A: usize>: Strategy<A>;
@@ -27,7 +27,7 @@ pub trait Strategies {
     }
 }
 
-/// Factory of the strategy that the scene names, with gains scaled by the number of peers.
+/// Factory of the strategy of the scene, with gains scaled by the number of peers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct FromScene;
 
@@ -83,7 +83,7 @@ impl Scene {
         self.law(peer).into_iter().chain(changes)
     }
 
-    /// Returns β [N·s/m], the damping that the strategy adds to the copy of a peer.
+    /// Returns β [N·s/m], the damping of the copy of a peer by the strategy.
     ///
     /// # Panics
     ///
@@ -106,7 +106,7 @@ impl Scene {
         self.coordination.strategy.law(&LawParameters { gains, peers: 2, ..self.law_parameters(peer) })
     }
 
-    /// Returns the damping that the strategy adds to the rotation of a peer's copy about each body axis [N·m·s/rad]; zero if the object does not turn.
+    /// Returns the damping of the rotation of a peer's copy by the strategy, about each body axis [N·m·s/rad]; zero if the object does not turn.
     ///
     /// A given β is a damping of the mass, so that it is multiplied by inertia over mass. An automatic β is the same about every axis, from the largest
     /// component of KR: a radian of rotation about any axis changes the torque by at most this component, so that the springs of rotations inject no energy
@@ -141,7 +141,7 @@ impl Scene {
         (*strategy == Coordination::ClientServer).then(|| settings.of(*strategy).place(0))
     }
 
-    /// Returns the kind of samples: the values that samples carry in addition to the state.
+    /// Returns the kind of samples: the values in samples in addition to the state.
     #[must_use]
     pub const fn sample_kind(&self) -> SampleKind {
         if self.rotation.is_some() { SampleKind::Attitude } else { self.coordination.strategy.kind() }
@@ -174,7 +174,7 @@ impl Scene {
         let own = settings.of(*strategy);
         LawParameters {
             gains: self.coordination_gains(*gains, peer),
-            // On a topology the gains contain the number of peers that are heard. The law is made for two peers, N − 1 = 1.
+            // On a topology the gains contain the number of heard peers. The law is made for two peers, N − 1 = 1.
             peers: if self.topology.is_some() { 2 } else { self.number() },
             tick: self.peers[peer].clock.tick,
             // Both ages look at every link, and only automatic parameters need the ages.

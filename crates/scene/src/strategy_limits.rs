@@ -6,12 +6,12 @@ use cohaptic_peer::{Coordination, Drift, Integrator};
 use crate::{ChangeKind, Scene};
 
 impl Scene {
-    /// Returns why the coordination cannot work with the parameters of the beginning; `None` if it can.
+    /// Returns why the coordination cannot work with the parameters of the beginning; `None` if the coordination works.
     pub(crate) fn refused_coordination(&self) -> Option<String> {
         self.refused_automatic().or_else(|| self.refused_lag()).map(str::to_owned).or_else(|| self.refused_strategy())
     }
 
-    /// Returns why the timeline cannot change parameters of the strategy as it does; `None` if it can.
+    /// Returns why the changes of the strategy's parameters in the timeline are impossible; `None` if all changes are possible.
     pub(crate) fn refused_changes(&self) -> Option<String> {
         let settings = self.timeline.iter().filter_map(|change| match &change.what {
             ChangeKind::Parameters(settings) => Some(settings),
@@ -38,7 +38,7 @@ impl Scene {
         settings.map(|settings| self.with_parameters(settings)).find_map(refused)
     }
 
-    /// Returns why the strategy cannot work in this scene; `None` if it can.
+    /// Returns why the strategy cannot work in this scene; `None` if the strategy works.
     pub(crate) fn refused_strategy(&self) -> Option<String> {
         let strategy = self.coordination.strategy;
         let (predicts, exchanges_waves, modulates) =

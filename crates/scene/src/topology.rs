@@ -1,4 +1,4 @@
-//! Topologies: the peers to which each peer sends, in scenes in which not every peer sends to every other peer.
+//! Topologies: the receivers of each peer, in scenes where not every peer sends to every other peer.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use cohaptic_wan::LinkModel;
 
 use crate::{LinkTable, Scene};
 
-/// Neighbours of each peer: the peers to which it sends and from which it hears. Neighbours are mutual, and so are weights.
+/// Neighbours of each peer: the peer sends to all neighbours and hears all neighbours. Neighbours are mutual, and so are weights.
 ///
 /// Memory grows with the number of pairs of neighbours, not with the number of pairs of peers.
 #[derive(Clone, PartialEq, Debug)]
@@ -28,7 +28,7 @@ pub struct Topology {
 /// Form of a topology.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum TopologyKind {
-    /// A ring: half of the neighbours of a peer come before it, half after it.
+    /// A ring: half of the neighbours of a peer come before the peer, half after the peer.
     Ring {
         /// Number of neighbours of each peer.
         neighbours: usize,
@@ -55,8 +55,7 @@ pub struct WeightsError {
 }
 
 impl Topology {
-    /// Returns a ring of `peers` peers with `neighbours` neighbours each, half of them on either side. `None` unless `neighbours` is even, above 0 and below
-    /// `peers`.
+    /// Returns a ring of `peers` peers with `neighbours` neighbours each, half on either side. `None` unless `neighbours` is even, above 0 and below `peers`.
     #[must_use]
     pub fn ring(peers: usize, neighbours: usize) -> Option<Self> {
         // Below `peers`, the steps to both sides never reach the same peer.
@@ -95,7 +94,7 @@ impl Topology {
                 return refuse(row, None, message);
             }
             for (column, weight) in weights.iter().enumerate() {
-                // `get`, because the row of the mirrored weight may be too short: its length is checked later, when the loop gets there.
+                // `get`, because the row of the mirrored weight may be too short: the length of the row is checked later, when the loop gets there.
                 let mutual = rows[column].get(row).copied();
                 let wrong = if !weight.is_finite() || *weight < 0.0 {
                     "expected a finite number that is not negative".to_owned()
@@ -113,7 +112,7 @@ impl Topology {
         let neighbours = |row: &Vec<f64>| row.iter().enumerate().filter(|(_, weight)| **weight > 0.0).map(|(peer, _)| peer).collect();
         let mut graph = Self::unweighted(TopologyKind::Graph, rows.iter().map(neighbours));
         let weights: Vec<f64> = rows.iter().flatten().copied().filter(|weight| *weight > 0.0).collect();
-        // An empty list for weights that are all 1, so that such a graph prints and computes as a graph without weights.
+        // An empty list if all weights are 1, so that such a graph prints and computes as a graph without weights.
         if weights.iter().any(|weight| weight.to_bits() != 1.0_f64.to_bits()) {
             graph.weights = weights;
         }
@@ -141,7 +140,7 @@ impl Topology {
         let mut reached = vec![false; self.peers()];
         let mut next = vec![0];
         while let Some(peer) = next.pop() {
-            // A peer may be in `next` several times. Only its first visit continues.
+            // A peer may be in `next` several times. Only the first visit continues.
             if !std::mem::replace(&mut reached[peer], true) {
                 next.extend(self.neighbours(peer).iter().map(|other| *other as usize).filter(|other| !reached[*other]));
             }
@@ -242,7 +241,7 @@ impl Topology {
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
     pub fn relative_weights(&self, peer: usize) -> Option<Vec<f64>> {
-        // Compared by bits: weights that are equal change no mean, and weights are never NaN.
+        // Compared by bits: equal weights change no mean, and weights are never NaN.
         let weights = self.weights(peer).filter(|weights| weights.windows(2).any(|pair| pair[0].to_bits() != pair[1].to_bits()))?;
         // Two weights differ, so that there are at least two and the divisor is not zero.
         let mean = self.degree(peer) / weights.len() as f64;
@@ -256,7 +255,7 @@ impl Topology {
     }
 }
 
-/// Reads a matrix of weights from a text: one row per line, numbers between commas. Empty lines are skipped.
+/// Reads a matrix of weights from a text: a row per line, numbers between commas. Empty lines are skipped.
 ///
 /// # Errors
 ///
@@ -272,7 +271,7 @@ pub fn read_weights(text: &str) -> Result<Vec<Vec<f64>>, Fault> {
     rows.iter().map(|row| row.1.trim().split(',').map(|field| number(row, field)).collect()).collect()
 }
 
-/// Returns the lines that are not empty, with line numbers from 1.
+/// Returns the lines with text, with line numbers from 1.
 fn rows_of(text: &str) -> Vec<(usize, &str)> {
     text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()).map(|(number, line)| (number + 1, line)).collect()
 }
@@ -290,7 +289,7 @@ pub(crate) fn parse_graph(text: &str, peers: usize) -> Result<Arc<Topology>, Fau
     }
     Topology::graph(&rows).map(Arc::new).map_err(|WeightsError { row, column, message }| {
         let line = at(row);
-        // Sum of the lengths of the fields before `column`, each with its comma.
+        // Sum of the lengths of the fields before `column`, commas included.
         let before = |column: usize| text[line.clone()].split(',').take(column).map(|field| field.len() + 1).sum::<usize>();
         let span = column.map_or_else(
             || line.clone(),
@@ -320,7 +319,7 @@ impl Scene {
         self.topology.as_ref().map_or(peers * (peers - 1), |topology| topology.links() as u64)
     }
 
-    /// Returns the configurations of the links of the scene, each with the number of links that have it, which is at least one.
+    /// Returns the configurations of the links of the scene, each with the number of links of this configuration, at least 1.
     #[must_use]
     pub fn used_links(&self) -> Vec<(&Arc<LinkModel>, u64)> {
         let Some(topology) = &self.topology else { return self.links.used().collect() };
@@ -335,8 +334,8 @@ impl Scene {
         configs.iter().zip(counts).filter(|(_, count)| *count > 0).collect()
     }
 
-    /// Returns the scene without its topology: all peers send to all. If all links of the topology have one configuration, all links of the returned scene
-    /// have it; otherwise the table of links stays as it is.
+    /// Returns the scene without its topology: all peers send to all. A configuration common to all links of the topology becomes the configuration of all
+    /// links of the returned scene; otherwise the table of links stays as before.
     #[must_use]
     pub fn without_topology(&self) -> Self {
         let links = match self.used_links().as_slice() {
@@ -348,7 +347,7 @@ impl Scene {
         Self { topology: None, links, ..self.clone() }
     }
 
-    /// Returns why the scene cannot have its topology or its relay; `None` if it can.
+    /// Returns why the scene cannot have the topology or the relay; `None` if the scene can.
     pub(crate) fn refused_topology(&self) -> Option<String> {
         let strategy = self.coordination.strategy;
         // A relay copies each sample to all receivers, so that samples must not differ by receiver.
@@ -359,7 +358,7 @@ impl Scene {
             ));
         }
         self.topology.as_ref()?;
-        // Only a law follows a mean of the peers that are heard. Every other strategy needs all peers.
+        // Only a law follows a mean of the heard peers. Every other strategy needs all peers.
         if self.law(0).is_none() {
             return Some(format!(
                 "the strategy {} has every peer hear every other: expected kind = \"full\", or a strategy that follows the mean of what it hears",
@@ -371,17 +370,17 @@ impl Scene {
             .then(|| "an object that turns is followed only where all peers send to all: expected kind = \"full\", or no object.inertia".to_owned())
     }
 
-    /// Returns the number by which a sum over heard peers multiplies the gains of a peer: the sum of the weights of its neighbours, or N − 1 without a
+    /// Returns the number by which a sum over heard peers multiplies the gains of a peer: the sum of the weights of the neighbours, or N − 1 without a
     /// topology.
     #[must_use]
     pub(crate) fn heard_by(&self, peer: usize) -> f64 {
         self.topology.as_ref().map_or_else(|| crate::assembly::count(self.number() - 1), |topology| topology.degree(peer))
     }
 
-    /// Returns true if the gains of peers depend on the peers that each peer hears, and so differ from peer to peer.
+    /// Returns true if the gains of peers depend on the heard peers, and so differ from peer to peer.
     #[must_use]
     pub fn has_gains_by_peer(&self) -> bool {
-        // A pull towards a mean does not depend on the number of peers that are heard.
+        // A pull towards a mean does not depend on the number of heard peers.
         let sums = [self.coordination.strategy.pull(), self.coordination.pull].contains(&Pull::Sum);
         self.topology.as_ref().is_some_and(|topology| sums && !topology.is_regular())
     }

@@ -11,9 +11,9 @@ use serde_json::Value;
 pub enum FileSchema {
     /// A scene file.
     Scene,
-    /// A relay file, which `cohaptic relay` reads.
+    /// A relay file, for `cohaptic relay`.
     Relay,
-    /// A router file, which `cohaptic router` reads.
+    /// A router file, for `cohaptic router`.
     Router,
 }
 
@@ -41,8 +41,8 @@ impl FileSchema {
         }
     }
 
-    /// Returns the unit of a key whose value is a plain number: `"N/m"` of `coordination.stiffness` and of `peers.anna.coupling.stiffness`. Empty for a key
-    /// whose value carries its own unit (`link.delay`), is not a number or has no unit, and for a text that names no key.
+    /// Returns the unit of a key with a plain number: `"N/m"` of `coordination.stiffness` and of `peers.anna.coupling.stiffness`. Empty for a key with the unit
+    /// in the value (`link.delay`), for a key without a number or without a unit, and for a text that names no key.
     #[must_use]
     pub fn unit_of(self, key: &str) -> &'static str {
         self.root().form(key).map_or("", unit)
