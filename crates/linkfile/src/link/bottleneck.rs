@@ -10,7 +10,7 @@ use crate::document::Node;
 use crate::link::keys::LINK_TABLE;
 use crate::reading::{Context, TableReader, values};
 
-/// Reads the bottleneck, whose line sends at a rate or at the instants `recorded`. Returns `Some(None)` for a link without a bottleneck.
+/// Reads the bottleneck: a line with a rate, or with the instants `recorded` of sending. Returns `Some(None)` for a link without a bottleneck.
 pub(super) fn read_bottleneck(table: &mut TableReader<'_>, recorded: Option<DeliveryTrace>, context: Context<'_>) -> Option<Option<Bottleneck>> {
     let (rate_entry, trace_entry) = (table.entry("rate"), table.entry("trace"));
     let parts = [table.entry("queue"), table.entry("overhead"), table.entry("cells")];
@@ -18,6 +18,7 @@ pub(super) fn read_bottleneck(table: &mut TableReader<'_>, recorded: Option<Deli
     let queue = table.maybe("queue", read_queue);
     let overhead = table.read("overhead", values::signed_size);
     let cells = table.read("cells", unless(NONE, read_cells));
+    // Every key is read before the first `?`, so that the first fault of the text is found.
     let (rate, queue, overhead, cells) = (rate?, queue?, overhead?, cells?);
     let service = match (rate, recorded) {
         (None, None) => None,
@@ -69,6 +70,7 @@ fn read_cells(node: &Node, context: Context<'_>) -> Option<Cells> {
             found
         }
     };
+    // A cell without payload would carry no packet. The overhead may be zero.
     let payload = table.read("payload", size(1));
     let overhead = table.read("overhead", size(0));
     table.finish();

@@ -30,7 +30,7 @@ pub(super) fn read_corruption(node: &Node, context: Context<'_>) -> Option<Optio
     let rate = table.maybe_value("bit-error-rate");
     let bits = match table.entry("bit-error-rate") {
         Some(rate_entry) => {
-            // Asked for before `finish`, so that they count as known and get the message below.
+            // Asked for before `finish`, so that these keys count as known and get the message below.
             let others = ["probability", "correlation", "bits"].map(|key| table.entry(key));
             table.finish();
             if let Some(other) = others.into_iter().flatten().next() {

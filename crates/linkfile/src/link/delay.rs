@@ -16,10 +16,11 @@ pub(super) fn read_delay(table: &mut TableReader<'_>, keys: &Node, context: Cont
     let jitter = table.maybe("jitter", read_jitter);
     let (mean, jitter) = (mean?, jitter?);
     let Some(Read { jitter, own_mean }) = jitter else { return Some(Delay::constant(mean.unwrap_or_default())) };
-    // A part without a delay will be laid over a delay that is not known here, so jitter and mean cannot be checked together.
+    // A part without a delay will be laid over a delay not known here, so jitter and mean cannot be checked together.
     if context.partial && mean.is_none() {
         return Some(Delay::default());
     }
+    // The key `delay` goes before the mean of a file of delays.
     let mean = mean.or(own_mean).unwrap_or_default();
     Delay::with_jitter(mean, jitter).map_err(|error| values::refuse(context, &[delay_node, jitter_node], keys, &error)).ok()
 }
@@ -56,7 +57,7 @@ fn read_jitter(node: &Node, context: Context<'_>) -> Option<Read> {
     Some(Read { jitter, own_mean: own.map(|(mean, _)| mean) })
 }
 
-/// Reads `correlation` (per packet) or `correlation-time`, of which at most one may be given.
+/// Reads `correlation` (per packet) or `correlation-time`. Both together are a fault.
 fn read_correlation(table: &mut TableReader<'_>, node: &Node, context: Context<'_>) -> Option<Correlation> {
     let (per_packet, in_time) = (table.entry("correlation"), table.entry("correlation-time"));
     if per_packet.is_none() && in_time.is_none() {
@@ -70,7 +71,7 @@ fn read_correlation(table: &mut TableReader<'_>, node: &Node, context: Context<'
     values::of_key(table.key("correlation-time"), &chosen.node, context).map(Correlation::InTime)
 }
 
-/// Rounds nanoseconds to a duration. The delays of a file lie between 0 and 9·10¹⁸ ns, and so do their mean and standard deviation.
+/// Rounds nanoseconds to a duration. The delays of a file lie between 0 and 9·10¹⁸ ns, and so do mean and standard deviation.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "moments of numbers from 0 to 9e18")]
 fn nanos(value: f64) -> Duration {
     Duration::from_nanos(value.round() as u64)

@@ -58,6 +58,7 @@ fn empirical(text: &str) -> Result<Arc<Empirical>, Fault> {
     }
     let mut delays = Vec::new();
     for (line, content) in lines {
+        // The bound keeps every delay below 2⁶³ ns: the law has nanoseconds.
         let seconds = content.trim().parse::<f64>().ok().filter(|seconds| (0.0..=9e9).contains(seconds));
         let fault = || Fault { span: line_span(text, line), message: format!("{}: {DELAY}", quote(content.trim())) };
         delays.push(seconds.ok_or_else(fault)? * 1e9);

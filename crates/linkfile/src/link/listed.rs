@@ -7,7 +7,7 @@ use super::is_none;
 use crate::document::Node;
 use crate::reading::{Context, TableReader, values};
 
-/// Reads the keys of all listed impairments of a link. Returns `None` if one of the impairments was refused.
+/// Reads the keys of all listed impairments of a link. Returns `None` if an impairment was refused.
 pub(super) fn read_listed(table: &mut TableReader<'_>, context: Context<'_>) -> Option<Impairments> {
     let mut impairments = Impairments::default();
     let mut complete = true;
@@ -25,7 +25,7 @@ fn read_impairment(impairments: &mut Impairments, key: &Key, node: &Node, contex
         Some(parameters) => Some(read_values(parameters, node, context)?),
         None => None,
     };
-    // A part will be laid over values that are not known here, so an impairment without all required values cannot be built and checked.
+    // A part will be laid over values not known here, so an impairment without all required values cannot be built and checked.
     if let (Some(parameters), Some(values), true) = (parameters, &values, context.partial)
         && parameters.keys().any(|key| key.need == Need::Required && values.get(key.name).is_none())
     {
@@ -41,6 +41,7 @@ fn read_values(parameters: &'static Table, node: &Node, context: Context<'_>) ->
     let mut values = Vec::new();
     let mut complete = true;
     for key in parameters.keys() {
+        // In a part, a required parameter may come from the table below.
         let may_be_missing = key.need == Need::Optional || (context.partial && key.need == Need::Required);
         let read = if may_be_missing { table.maybe_value(key.name) } else { table.value(key.name).map(Some) };
         complete &= read.is_some();
@@ -50,7 +51,7 @@ fn read_values(parameters: &'static Table, node: &Node, context: Context<'_>) ->
     complete.then_some(Values(values))
 }
 
-/// Reports the refusal of an impairment, at the parameter that it blames or else at the whole value.
+/// Reports the refusal of an impairment, at the blamed parameter or else at the whole value.
 fn refuse(refusal: &Refusal, node: &Node, context: Context<'_>) {
     let blamed = node.as_table().and_then(|table| table.get(refusal.key)).map_or(node, |entry| &*entry.node);
     values::refuse(context, &[Some(blamed)], node, &refusal.message);

@@ -25,6 +25,7 @@ pub(super) fn read_loss(node: &Node, context: Context<'_>) -> Option<Loss> {
     table.finish();
     let chosen = only_one(node, context, &models, EXPECTED)?;
     let value = &*chosen.node;
+    // Only a pattern of chosen losses repeats, so that `every` beside another model is a mistake.
     if let Some(every) = every.filter(|_| !matches!(chosen.name.as_str(), "packets" | "times")) {
         context.fault(every.key, &every.node.path, format!("every means nothing with {}: expected it with packets or times", chosen.name));
         return None;
@@ -42,6 +43,7 @@ pub(super) fn read_loss(node: &Node, context: Context<'_>) -> Option<Loss> {
 /// Reads a chain of Gilbert and Elliott: per packet with `p` and `r`, or in continuous time with `mean-good` and `mean-bad`.
 fn read_gilbert_elliott(node: &Node, context: Context<'_>) -> Option<Loss> {
     let mut table = TableReader::new(node, context, LINK_TABLE.table("loss.gilbert-elliott"), CHAIN)?;
+    // A mean time selects the chain in continuous time. `p` and `r` beside a mean time are then refused.
     let in_time = table.get("mean-good").is_some() || table.get("mean-bad").is_some();
     let (h, k) = (table.value("h"), table.value("k"));
     if in_time {

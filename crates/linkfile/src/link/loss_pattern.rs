@@ -56,10 +56,11 @@ pub(super) fn read_range(text: &str) -> Option<Range<u64>> {
     let number = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit()).then(|| text.parse::<u64>().ok()).flatten();
     let (first, last) = text.split_once('-').unwrap_or((text, text));
     let (first, last) = (number(first.trim())?, number(last.trim())?);
+    // The end of the range is the number after `last`, and must fit into 64 bits too.
     (first <= last).then(|| Some(first..last.checked_add(1)?)).flatten()
 }
 
-/// Reports the refusal of a pattern, at the element or at the period that the error blames.
+/// Reports the refusal of a pattern, at the blamed element or period.
 fn refuse(error: &PatternError, node: &Node, elements: &[&Node], every: Option<&Node>, context: Context<'_>) {
     let at = match error {
         PatternError::Empty { index } | PatternError::Order { index } => elements.get(*index).copied(),

@@ -28,7 +28,7 @@ use crate::reading::{Context, TableReader, values};
 
 pub use modulators::read_modulators;
 
-/// Reads the keys of a link. Returns `None` after it has reported a fault.
+/// Reads the keys of a link. Returns `None` after a reported fault.
 pub fn read_link(node: &Node, context: Context<'_>) -> Option<LinkModel> {
     read_link_of(&LINK_TABLE, node, context)
 }
@@ -36,7 +36,7 @@ pub fn read_link(node: &Node, context: Context<'_>) -> Option<LinkModel> {
 /// Reads the keys of a link in a table with the keys of `declaration`. Keys of the declaration that do not belong to a link are left to the caller.
 pub(crate) fn read_link_of(declaration: &'static Table, node: &Node, context: Context<'_>) -> Option<LinkModel> {
     let mut table = TableReader::new(node, context, declaration, "a table of link keys such as { delay = \"24ms\" }")?;
-    // A first pass over all declared keys reports the unknown ones. The second pass below reads only the keys of a link.
+    // A first pass over all declared keys reports the unknown keys. The second pass below reads only the keys of a link.
     table.know_all();
     table.finish();
     let resolved = profile::resolve(node, context)?;
@@ -46,6 +46,7 @@ pub(crate) fn read_link_of(declaration: &'static Table, node: &Node, context: Co
     };
     let keys = in_force(node, context)?;
     let mut table = TableReader::new(&keys, context, &LINK_TABLE, "a table of link keys")?;
+    // `in_force` has refused or removed all other keys beside a replay or words of tc.
     if let Some(replay) = table.get("replay").filter(|replay| !is_none(replay)) {
         return trace::read_replay(replay, context).map(LinkModel::Replay);
     }
@@ -58,7 +59,7 @@ pub(crate) fn read_link_of(declaration: &'static Table, node: &Node, context: Co
     }
 }
 
-/// Reads the keys of one configuration of a link.
+/// Reads the keys of a configuration of a link.
 fn read_config(keys: &Node, context: Context<'_>) -> Option<LinkConfig> {
     let mut table = TableReader::new(keys, context, &LINK_TABLE, "a table of link keys")?;
     let delay = delay::read_delay(&mut table, keys, context);
@@ -81,7 +82,7 @@ fn read_config(keys: &Node, context: Context<'_>) -> Option<LinkConfig> {
     let limit = table.read("limit", unless(UNLIMITED, queue::read_packets));
     let listed = listed::read_listed(&mut table, context);
     let outages = table.read("outage", outage::read_outages);
-    // A refused recording gives neither delivery nor path. The link would be read as one without a recording.
+    // A refused recording gives neither delivery nor path. The link would be read as a link without a recording.
     trace?;
     Some(LinkConfig {
         mtu: mtu?,
@@ -118,7 +119,7 @@ fn unless<T>(word: &'static str, read: fn(&Node, Context<'_>) -> Option<T>) -> i
     move |node: &Node, context: Context<'_>| if node.as_text() == Some(word) { Some(None) } else { read(node, context).map(Some) }
 }
 
-/// Returns whether two keys were written in the same table, as opposed to one being laid over the other.
+/// Returns whether two keys were written in the same table, as opposed to a key laid over another table.
 fn written_together(a: &Entry, b: &Entry) -> bool {
     let table = |entry: &Entry| entry.node.path.rsplit_once('.').map(|(table, _)| table.to_owned());
     // Each override is a source of its own, so a key from an override always counts as laid over the keys of the file.
@@ -144,15 +145,15 @@ fn read_chance(node: &Node, context: Context<'_>) -> Option<Chance> {
     chance
 }
 
-/// Reads the keys `probability` and `correlation` of a table that may have other keys.
+/// Reads the keys `probability` and `correlation` of a table that may have further keys.
 fn read_chance_in(table: &mut TableReader<'_>, node: &Node, context: Context<'_>) -> Option<Chance> {
     let nodes = [table.get("probability"), table.get("correlation")];
     let (probability, correlation) = (table.value("probability"), table.value("correlation"));
     Chance::correlated(probability?, correlation?).map_err(|error| values::refuse(context, &nodes, node, &error)).ok()
 }
 
-/// Returns the keys that apply. `netem` and `replay` describe the whole link, and remove all keys below. Another key in the same table as such a
-/// description, or laid over the description, is a fault.
+/// Returns the keys in force. `netem` and `replay` describe the whole link, and remove all keys below. Another key in the same table as such a description, or
+/// laid over the description, is a fault.
 fn in_force<'a>(node: &'a Node, context: Context<'_>) -> Option<Cow<'a, Node>> {
     let table = node.as_table()?;
     // Entries stand in the order of laying over, so the last whole description applies.
@@ -160,6 +161,7 @@ fn in_force<'a>(node: &'a Node, context: Context<'_>) -> Option<Cow<'a, Node>> {
     let Some((place, whole)) = whole else { return Some(Cow::Borrowed(node)) };
     let mut taken_away = Vec::new();
     for (index, entry) in table.0.iter().enumerate() {
+        // The profile belongs to the words of tc.
         let belongs = entry.name == whole.name || (whole.name == "netem" && entry.name == "netem-profile");
         let known = LINK_TABLE.key(&entry.name).is_some();
         if belongs || !known || is_none_of_whole(entry) {

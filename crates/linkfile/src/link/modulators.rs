@@ -1,5 +1,5 @@
-//! Readers of `[\[modulators\]]` and `modulated`. A modulator is a chain of states with a name, so that several links can follow the same chain. The keys
-//! under `modulated` hold while the modulator is in one of its states.
+//! Readers of `[\[modulators\]]` and `modulated`. A modulator is a chain of states with a name, so that several links can follow the same chain. The keys of a
+//! state under `modulated` hold while the modulator is in this state.
 
 use std::sync::Arc;
 
@@ -31,10 +31,10 @@ pub fn read_modulators(node: Option<&Node>, context: Context<'_>) -> Option<Arc<
     complete.then(|| Arc::new(modulators))
 }
 
-/// Modulator, and the names of its states in the order of the states.
+/// Modulator, and the names of the states in order.
 type Read = (Modulator, Vec<String>);
 
-/// Reads one modulator: its name, the node of the name, the chain, and the names of its states.
+/// Reads a modulator: the name, the node of the name, the chain, and the names of the states.
 fn read_modulator<'a>(node: &'a Node, context: Context<'a>) -> Option<(String, &'a Node, Read)> {
     let mut table = TableReader::new(node, context, &MODULATOR, "a table with name and states")?;
     let (name_node, states_node) = (table.get("name"), table.get("states"));
@@ -107,7 +107,7 @@ fn read_states(node: &Node, context: Context<'_>) -> Option<(Vec<String>, Vec<Mo
     Some((names, states))
 }
 
-/// Reads the weights of the next states, indexed by state: the name of one state, or names with weights.
+/// Reads the weights of the next states, indexed by state: the name of a state, or names with weights.
 fn read_next(node: &Node, context: Context<'_>, names: &[String]) -> Option<Vec<f64>> {
     let mut weights = vec![0.0; names.len()];
     let place = |name: &str, at: &dyn Fn(String)| {
@@ -143,7 +143,7 @@ pub(super) fn read_modulated(node: &Node, keys: &Node, context: Context<'_>) -> 
     };
     // The keys of link kinds (such as `modulated` itself) do not belong to the configuration of a state.
     let base = keys.without(&LINK_KIND_PARAMETERS.each_ref().map(|key| key.name));
-    // The keys of the link are also read alone, so that a fault in a key that every state replaces is found.
+    // The keys of the link are also read alone, so that a fault in a key is found even if every state replaces the key.
     let sound = read_config(&base, context.of_part());
     let Some(by) = table.get("by") else {
         context.fault_at(node, "missing key by: expected the name of a modulator");
@@ -166,6 +166,7 @@ pub(super) fn read_modulated(node: &Node, keys: &Node, context: Context<'_>) -> 
             complete = false;
         }
     }
+    // All states are read before the results are collected, so that the first fault of the text is found.
     let configs: Vec<Option<LinkConfig>> = states
         .iter()
         .map(|state| match table.get(state) {

@@ -65,7 +65,7 @@ fn read_exact(node: &Node, words: &str, netem: &Netem, context: Context<'_>) -> 
         Err(error) => {
             let message = with_expectation(error.to_string());
             let place = option_span(words, error.option()).map_or(node.place, |span| place_of_word(node, words, &span, context));
-            // The fault of a missing or wrong table has been reported, and the error only follows from that fault.
+            // The fault of a missing or wrong table has been reported, and the error only follows from the missing table.
             if complete {
                 context.fault(place, &node.path, message);
             }

@@ -35,7 +35,7 @@ fn read_random(node: &Node, context: Context<'_>) -> Option<RandomOutages> {
     Some(RandomOutages { up: up?, down: down? })
 }
 
-/// Reads outages of an idle link: the idle time after which the link goes down, and the time that the link takes to come back.
+/// Reads outages of an idle link: the idle time before the link goes down, and the time until the link comes back.
 fn read_idle(node: &Node, context: Context<'_>) -> Option<IdleOutages> {
     let mut table = TableReader::new(node, context, LINK_TABLE.table("outage.idle"), "a table such as { after = \"10s\", down = \"2s\" }")?;
     let (after, down) = (table.value("after"), table.value("down"));
@@ -51,7 +51,7 @@ fn read_scheduled(node: &Node, context: Context<'_>) -> Option<Outages> {
     for outage in read {
         outages.push(outage?);
     }
-    // The shortest prefix of the list that is refused ends with the faulty outage.
+    // The shortest refused prefix of the list ends with the faulty outage.
     Outages::new(outages.clone())
         .map_err(|error| {
             let fits = |count: &usize| Outages::new(outages[..*count].to_vec()).is_ok();
@@ -84,7 +84,7 @@ pub(super) fn read_sojourn(node: &Node, context: Context<'_>) -> Option<Sojourn>
     Some(sojourn)
 }
 
-/// Reads a sojourn given as a table with one law.
+/// Reads a sojourn given as a table with the name of a law.
 fn read_law(node: &Node, context: Context<'_>) -> Option<Sojourn> {
     let mut table = TableReader::new(node, context, LINK_TABLE.table("outage.random.up"), SOJOURN)?;
     let laws = [table.entry("fixed"), table.entry("uniform"), table.entry("erlang"), table.entry("exponential")];

@@ -8,12 +8,12 @@ use crate::document::{Node, quote};
 use crate::link::keys::LINK_TABLE;
 use crate::reading::{Context, TableReader, only_one, values};
 
-/// Queue without the line that serves it.
+/// Queue without the serving line.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Queue {
     /// Room for waiting packets. `None` for an unlimited queue.
     pub(super) limit: Option<QueueLimit>,
-    /// Discipline that drops or marks packets.
+    /// Discipline of dropping or marking packets.
     pub(super) discipline: Discipline,
 }
 
@@ -23,6 +23,7 @@ const LIMIT: &str = "a limit such as \"100 packets\", \"64kB\" or \"50ms\"";
 /// Reads a queue: limit and discipline.
 pub(super) fn read_queue(node: &Node, context: Context<'_>) -> Option<Queue> {
     let mut table = TableReader::new(node, context, LINK_TABLE.table("queue"), "a table such as { limit = \"100 packets\" }")?;
+    // The limit is read first, because plain RED takes thresholds from the limit.
     let limit = table.read_expecting("limit", LIMIT, unless(UNLIMITED, read_limit));
     let discipline = table.read("discipline", |node, context| read_discipline(node, context, limit.flatten()));
     table.finish();
@@ -32,6 +33,7 @@ pub(super) fn read_queue(node: &Node, context: Context<'_>) -> Option<Queue> {
 /// Reads a limit of a queue: a number of packets, a size in bytes, or a time.
 pub(super) fn read_limit(node: &Node, context: Context<'_>) -> Option<QueueLimit> {
     let text = values::text(node, context, LIMIT)?;
+    // The three forms differ by their units, so that the order of the attempts does not matter.
     let packets = || values::packets(text).map(QueueLimit::Packets);
     let bytes = || cohaptic_units::parse::size(text).ok().map(QueueLimit::Bytes);
     let time = || cohaptic_units::parse::duration(text).ok().map(QueueLimit::Time);
@@ -53,7 +55,7 @@ pub(super) fn read_packets(node: &Node, context: Context<'_>) -> Option<u64> {
     packets
 }
 
-/// Reads a discipline by name or as a table. `limit` is the limit of the queue, from which plain RED takes its thresholds.
+/// Reads a discipline by name or as a table. `limit` is the limit of the queue, for the thresholds of plain RED.
 fn read_discipline(node: &Node, context: Context<'_>, limit: Option<QueueLimit>) -> Option<Discipline> {
     if let Some(name) = node.as_text() {
         return match name {
@@ -88,8 +90,8 @@ fn read_codel(node: &Node, context: Context<'_>) -> Option<CoDel> {
     Some(CoDel { target: target?, interval: interval?, mtu: mtu?, ecn: ecn? })
 }
 
-/// Reads RED without parameters, with the advice of Floyd: the upper threshold is three times the lower one, and a tenth of the packets is dropped at the upper
-/// threshold. The upper threshold is half of the queue's limit, so that the queue rarely reaches the limit.
+/// Reads RED without parameters, with the advice of Floyd: the upper threshold is three times the lower threshold, and a tenth of the packets is dropped at the
+/// upper threshold. The upper threshold is half of the queue's limit, so that the queue rarely reaches the limit.
 fn read_plain_red(node: &Node, context: Context<'_>, limit: Option<QueueLimit>) -> Option<Discipline> {
     const EXPECTED: &str = "a limit in bytes of at least 6B beside it, or { red = { min, max } }";
     let Some(QueueLimit::Bytes(limit)) = limit else {
@@ -99,7 +101,7 @@ fn read_plain_red(node: &Node, context: Context<'_>, limit: Option<QueueLimit>) 
     read_red(&nothing(node), context, Some([Bytes::new(limit.get() / 6), Bytes::new(limit.get() / 2)])).map(Discipline::Red)
 }
 
-/// Returns a table without keys in place of a word, for a discipline with its defaults.
+/// Returns a table without keys in place of a word, for a discipline with all defaults.
 fn nothing(word: &Node) -> Node {
     Node::empty_table(word.place, word.path.clone())
 }
@@ -116,6 +118,7 @@ fn read_red(node: &Node, context: Context<'_>, thresholds: Option<[Bytes; 2]>) -
     table.finish();
     let red = Red::new(min?, max?, probability?, weight?, packet?, ecn?);
     red.map_err(|error| {
+        // Each refusal is shown at the parameter at fault. Of both thresholds, the later in the text is shown.
         let nodes: &[Option<&Node>] = match error {
             cohaptic_wan::RedError::Weight(_) => &[weight_node],
             cohaptic_wan::RedError::MeanPacket => &[packet_node],

@@ -12,6 +12,7 @@ use crate::reading::{Context, TableReader, only_one, values};
 /// Reads `"25%"` (such packets jump ahead), or `{ probability, correlation }` with `gap`, with `behind` and `at-most`, or with `later`. Returns `Some(None)` if
 /// no packet is ever moved.
 pub(super) fn read_reorder(node: &Node, context: Context<'_>) -> Option<Option<Reorder>> {
+    // A gap of 1 lets any packet jump, with the given probability.
     let any = Displacement::Jump { gap: NonZeroU32::MIN };
     if node.as_table().is_none() {
         let packets = Chance::independent(values::probability(node, context)?);

@@ -9,12 +9,13 @@ use crate::document::Node;
 use crate::link::keys::LINK_TABLE;
 use crate::reading::{Context, TableReader, values};
 
-/// Reads the law of the gaps between slots, and the packets and bytes that may leave in one slot.
+/// Reads the law of the gaps between slots, and the largest numbers of packets and bytes per slot.
 pub(super) fn read_slots(node: &Node, context: Context<'_>) -> Option<Slots> {
     const EXPECTED: &str = "\"none\" or a table such as { min = \"10ms\", max = \"20ms\" }";
     let mut table = TableReader::new(node, context, LINK_TABLE.table("slots"), EXPECTED)?;
     let ends = [table.entry("min"), table.entry("max")];
     let law = [table.entry("delay"), table.entry("jitter")];
+    // `min` and `max` give a uniform law, `delay` and `jitter` any other law. The first given key stands for the pair in a message.
     let slots = match (ends.into_iter().flatten().next(), law.into_iter().flatten().next()) {
         (Some(end), Some(law)) => {
             let (first, last) = if end.key < law.key { (end, law) } else { (law, end) };
@@ -39,7 +40,7 @@ pub(super) fn read_slots(node: &Node, context: Context<'_>) -> Option<Slots> {
     Some(slots)
 }
 
-/// Reads gaps that are uniform between `min` and `max`. Without `max`, every gap is `min`.
+/// Reads uniform gaps between `min` and `max`. Without `max`, every gap is `min`.
 fn read_ends(table: &mut TableReader<'_>, node: &Node, context: Context<'_>) -> Option<Slots> {
     let nodes = [table.get("min"), table.get("max")];
     let (min, max) = (table.value("min"), table.maybe_value("max"));

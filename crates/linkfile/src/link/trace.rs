@@ -103,7 +103,7 @@ fn load(node: &Node, context: Context<'_>, form: Form) -> Option<Trace> {
     let path = file_path(node, context, FILE)?;
     let Form { bytes, between, repeat, start } = form;
     let ends = context.ends;
-    // The end of the run belongs to the form, because it decides whether the recording is refused.
+    // The end of the run belongs to the form, because the end decides whether the recording is refused.
     let read_as = format!("trace {bytes} {between:?} {repeat} {start:?} {ends:?}");
     read_file(node, context, &path, &read_as, |text| match parse(text, bytes, between, repeat)? {
         Trace::Path(path) if start == Start::First => path.from_first().map(Trace::Path).map_err(|error| Fault::in_line(text, None, &error)),
@@ -128,8 +128,9 @@ fn outside(path: &PathTrace, ends: Option<Duration>) -> Option<String> {
     })
 }
 
-/// Parses a recording. A file whose first line is a number has instants of delivery; any other file is a CSV.
+/// Parses a recording. A file with a number as the first line has instants of delivery; any other file is a CSV.
 fn parse(text: &str, bytes: Bytes, between: Between, repeat: bool) -> Result<Trace, Fault> {
+    // Some programs put a byte order mark before the text.
     let content = text.strip_prefix('\u{feff}').unwrap_or(text);
     let first = content.lines().map(str::trim).find(|line| !line.is_empty()).unwrap_or_default();
     if first.parse::<f64>().is_ok() {
@@ -162,13 +163,13 @@ fn first_row_span(text: &str) -> core::ops::Range<usize> {
     line_span(text, line)
 }
 
-/// Reads a log of fates, whose path is relative to the folder of the document.
+/// Reads a log of fates with a path relative to the folder of the document.
 pub(super) fn read_replay(node: &Node, context: Context<'_>) -> Option<Arc<FateLog>> {
     let path = file_path(node, context, "the name of a log of fates, relative to the folder of the scene")?;
     read_file(node, context, &path, "fates", |text| FateLog::parse(text).map(Arc::new).map_err(|error| fault(text, &error)))
 }
 
-/// Returns the fault of a log of fates, with its line if the error has one.
+/// Returns the fault of a log of fates, with the line if the error has a line.
 fn fault(text: &str, error: &FateLogError) -> Fault {
     let line = match error {
         FateLogError::Header { .. } => Some(1),
