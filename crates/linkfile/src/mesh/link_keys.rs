@@ -54,6 +54,7 @@ fn read_overrides(
 ) -> Result<LinkModel, FileError> {
     let parsed = parse_with(Sources { file, text: "", overrides }, reader, |document, context| {
         let context = context.with_modulators(Some(modulators));
+        // Without an override the document has no table `link`, and every key has the default.
         let nothing = Node::empty_table(BEGINNING, "link".to_owned());
         let link = document.as_table().and_then(|table| table.get("link")).map_or(&nothing, |entry| &*entry.node);
         check(link, context);
@@ -62,7 +63,7 @@ fn read_overrides(
     Ok(parsed.whole)
 }
 
-/// Keys of one directed link with values in TOML, in the order of laying over. Of two conflicting keys, the later key applies. Missing keys have the declared
+/// Keys of a directed link with values in TOML, in the order of laying over. Of two conflicting keys, the later key applies. Missing keys have the declared
 /// defaults.
 ///
 /// The display form is an inline table, `{ delay = "24ms", loss = 0.01 }`, which [`LinkKeys::read`] parses.
@@ -92,10 +93,11 @@ impl LinkKeys {
         self.iter().find(|(name, _)| *name == key).map(|(_, value)| value)
     }
 
-    /// Returns a copy of the keys with a further key laid over the others. A value with faulty TOML is taken as a text, as in `--set`: `8ms` needs no quotes.
-    /// Key and value are checked only by [`LinkKeys::model`].
+    /// Returns a copy of the keys with a further key laid over the keys so far. A value with faulty TOML is taken as a text, as in `--set`: `8ms` needs no
+    /// quotes. Key and value are checked only by [`LinkKeys::model`].
     #[must_use]
     pub fn with(&self, key: &str, value: &str) -> Self {
+        // A key that is given again moves to the end, because of two conflicting keys the later key applies.
         let mut keys: Vec<_> = self.keys.iter().filter(|(name, _)| name != key).cloned().collect();
         keys.push((key.to_owned(), value.trim().to_owned()));
         Self { keys, modulators: Arc::clone(&self.modulators) }
@@ -151,7 +153,7 @@ impl fmt::Display for LinkKeys {
 /// Keys of directed links, by the indices of sender and receiver.
 pub type KeysOfLinks = BTreeMap<(usize, usize), LinkKeys>;
 
-/// Returns the keys of a table with their values as TOML.
+/// Returns the keys of a table with values as TOML.
 fn keys_of(table: &Table) -> Vec<(String, String)> {
     table.0.iter().map(|entry| (entry.name.clone(), value_text(&entry.node))).collect()
 }

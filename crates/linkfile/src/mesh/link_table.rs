@@ -15,9 +15,9 @@ use cohaptic_wan::LinkModel;
 pub struct LinkTable {
     /// Number of peers N, at least 2.
     peers: usize,
-    /// Distinct configurations, in order of first use. Each is used by a link.
+    /// Distinct configurations, in order of first use. Each configuration is used by a link.
     configs: Vec<Arc<LinkModel>>,
-    /// Index in `configs` of the configuration that most links have. Of several equally frequent configurations, the first.
+    /// Index in `configs` of the most frequent configuration. Of several equally frequent configurations, the first.
     usual: usize,
     /// Indices in `configs` of the links with another configuration, by sender and receiver.
     exceptions: BTreeMap<(usize, usize), usize>,
@@ -62,13 +62,14 @@ impl LinkTable {
         Self::new(peers, Arc::new(link.into()), [])
     }
 
-    /// Makes the most frequent configuration the usual one, so that equal tables are stored alike. `usual` is an index in `configs`, or `None` if all links are
-    /// exceptions.
+    /// Makes the most frequent configuration the usual configuration, so that equal tables are stored alike. `usual` is an index in `configs`, or `None` if all
+    /// links are exceptions.
     fn canonical(peers: usize, configs: Vec<Arc<LinkModel>>, usual: Option<usize>, mut exceptions: BTreeMap<(usize, usize), usize>) -> Self {
         exceptions.retain(|_, place| Some(*place) != usual);
         let mut counts = vec![0_u64; configs.len()];
         exceptions.values().for_each(|place| counts[*place] += 1);
         if let Some(usual) = usual {
+            // All links without an exception have the usual configuration.
             counts[usual] = link_count(peers) - exceptions.len() as u64;
         }
         // In reverse order, because `max_by_key` returns the last maximum, and the first configuration must win a tie.
@@ -88,7 +89,7 @@ impl LinkTable {
         self.peers
     }
 
-    /// Returns the distinct configurations in order of first use, by sender and then by receiver. Each is used by a link.
+    /// Returns the distinct configurations in order of first use, by sender and then by receiver. Each configuration is used by a link.
     #[must_use]
     pub fn configs(&self) -> &[Arc<LinkModel>] {
         &self.configs
@@ -111,7 +112,7 @@ impl LinkTable {
         self.exceptions.get(&(from, to)).copied().unwrap_or(self.usual)
     }
 
-    /// Returns the index in [`LinkTable::configs`] of the configuration that most links have. Of several equally frequent configurations, the first.
+    /// Returns the index in [`LinkTable::configs`] of the most frequent configuration. Of several equally frequent configurations, the first.
     #[must_use]
     pub const fn usual(&self) -> usize {
         self.usual
@@ -122,7 +123,7 @@ impl LinkTable {
         self.exceptions.iter().map(|(pair, place)| (*pair, *place))
     }
 
-    /// Returns the configurations in order of first use, each with the number of its links, at least one.
+    /// Returns the configurations in order of first use, each with the number of its links, at least 1.
     pub fn used(&self) -> impl Iterator<Item = (&Arc<LinkModel>, u64)> + '_ {
         let mut counts = vec![0; self.configs.len()];
         self.exceptions.values().for_each(|place| counts[*place] += 1);
@@ -137,7 +138,7 @@ impl LinkTable {
     }
 }
 
-/// Change of one link to a new configuration.
+/// Change of a link to a new configuration.
 #[derive(Clone, PartialEq, Debug)]
 pub struct LinkChange {
     /// Index of the sender among the peers or programs.
@@ -159,7 +160,7 @@ pub fn pairs(peers: usize) -> impl Iterator<Item = (usize, usize)> {
 }
 
 /// Returns the first link that is missing in `given`, or `None` if `given` has all links. `given` must be ordered by sender and then by receiver. Takes at most
-/// one step more than `given` has links.
+/// a step more than `given` has links.
 pub(super) fn first_left(peers: usize, given: impl Iterator<Item = (usize, usize)>) -> Option<(usize, usize)> {
     let mut given = given;
     pairs(peers).find(|pair| given.next() != Some(*pair))
@@ -170,7 +171,7 @@ pub(super) fn first_left(peers: usize, given: impl Iterator<Item = (usize, usize
 struct Configs {
     /// Configurations found so far.
     found: Vec<Arc<LinkModel>>,
-    /// Indices in `found`, by mean delay and the bits of the mean loss. Equal configurations have equal keys, and most others have different keys.
+    /// Indices in `found`, by mean delay and the bits of the mean loss. Equal configurations have equal keys, and different configurations rarely do.
     places: BTreeMap<(Duration, u64), Vec<usize>>,
 }
 
@@ -180,6 +181,7 @@ impl Configs {
         let loss = config.as_fixed().and_then(|fixed| fixed.loss.mean()).unwrap_or(0.0);
         // The zeros 0 and -0 are equal and differ in their bits. Adding zero makes both the ordinary zero.
         let alike = self.places.entry((config.mean_delay(), (loss + 0.0).to_bits())).or_default();
+        // Pointers are compared first, because most calls pass the same few configurations.
         let known = alike.iter().find(|place| Arc::ptr_eq(&self.found[**place], config) || self.found[**place] == *config);
         if let Some(place) = known {
             return *place;

@@ -1,7 +1,7 @@
 //! Readers of `[link]` and `[\[links\]]`: the links between the peers.
 //!
-//! A full mesh of N peers has N·(N−1) links, nearly all of them alike. Links are therefore sorted into *classes*: one class for `[link]`, and one for each
-//! entry with other keys. Only classes are read, and only links with an entry are stored. A change in the timeline makes new classes.
+//! A full mesh of N peers has N·(N−1) links, nearly all of them alike. Links are therefore sorted into *classes*: a class for `[link]`, and a class for each
+//! entry with further keys. Only classes are read, and only links with an entry are stored. A change in the timeline makes new classes.
 
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
@@ -21,7 +21,7 @@ use crate::reading::{Context, Modulators, TableReader, values};
 /// Classes of links at some instant of the timeline.
 #[derive(Clone, Debug)]
 pub struct LinkClasses {
-    /// All classes made so far. Classes that no link uses any more stay, so that indices stay valid.
+    /// All classes made so far. Unused classes stay, so that indices stay valid.
     classes: Vec<Class>,
     /// Number of peers.
     peers: usize,
@@ -76,8 +76,8 @@ pub fn read_links(defaults: Option<&Node>, entries: Option<&Node>, context: Cont
     Some(links)
 }
 
-/// Checks the keys of a change without the link that the keys will be laid over, so that a fault is found even if the changed links are not known. Returns
-/// `None` only if the change has no keys.
+/// Checks the keys of a change without the changed links, so that a fault is found even if the links are not known. Returns `None` only if the change has no
+/// keys.
 pub fn read_key_changes(set: &Node, context: Context<'_>) -> Option<()> {
     read_link(set, context.of_part());
     if is_empty(set) {
@@ -87,7 +87,7 @@ pub fn read_key_changes(set: &Node, context: Context<'_>) -> Option<()> {
     Some(())
 }
 
-/// Reads the ends of an entry and, if the entry has other keys, the keys laid over `below`, the keys of `[link]`.
+/// Reads the ends of an entry and, if the entry has further keys, the keys laid over `below`, the keys of `[link]`.
 #[expect(clippy::type_complexity, reason = "used once, above")]
 fn read_entry(
     entry: &Node,
@@ -134,6 +134,7 @@ impl LinkClasses {
         let class = |pair: (usize, usize)| self.own.get(&pair).copied().unwrap_or(self.usual);
         match selector {
             LinkSelector::All => {
+                // The keys are made once per class, because nearly all links share a class.
                 let of_class: Vec<LinkKeys> = (0..self.classes.len()).map(keys).collect();
                 pairs(self.peers).map(|pair| (pair, of_class[class(pair)].clone())).collect()
             }
@@ -142,8 +143,9 @@ impl LinkClasses {
         }
     }
 
-    /// Lays keys over the keys of one link, and returns the changed link. Returns `None` if the keys were refused.
+    /// Lays keys over the keys of a link, and returns the changed link. Returns `None` if the keys were refused.
     pub fn change(&mut self, (from, to): (usize, usize), keys: &Node, context: Context<'_>) -> Option<LinkChange> {
+        // Only this link leaves the class. The class stays for the remaining links.
         let old = self.own.get(&(from, to)).copied().unwrap_or(self.usual);
         let class = self.lay_over(old, keys, context)?;
         self.own.insert((from, to), class);
@@ -176,14 +178,14 @@ impl LinkClasses {
         before.map(class).chain(first.map(|_| self.usual)).chain(after.map(class)).collect()
     }
 
-    /// Returns the index of a new class: the keys of the class `old` with `keys` laid over them. Returns `None` if the keys were refused.
+    /// Returns the index of a new class: `keys` laid over the keys of the class `old`. Returns `None` if the keys were refused.
     fn lay_over(&mut self, old: usize, keys: &Node, context: Context<'_>) -> Option<usize> {
         let merged = keys.over(&self.classes.get(old)?.keys, &[]);
         let config = read_link(&merged, context)?;
         Some(self.add(merged, config))
     }
 
-    /// Adds a class, and returns its index.
+    /// Adds a class, and returns the index of the class.
     fn add(&mut self, keys: Node, config: LinkModel) -> usize {
         self.classes.push(Class { keys, config: Arc::new(config) });
         self.classes.len() - 1

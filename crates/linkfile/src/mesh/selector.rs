@@ -1,4 +1,4 @@
-//! Readers of references from one part of a file to peers and links in another part.
+//! Readers of references to peers and links in another part of a file.
 
 use crate::document::{Node, quote};
 use crate::link::keys::{ENDS_TABLE, LINK_OR_LINE};
@@ -9,16 +9,16 @@ use crate::reading::{Context, Names, TableReader, one_of, only_one, values};
 pub enum LinkSelector {
     /// All links between peers.
     All,
-    /// One directed link.
+    /// A directed link.
     Between {
         /// Index of the sender.
         from: usize,
         /// Index of the receiver.
         to: usize,
     },
-    /// The access line through which a peer sends.
+    /// The access line of a peer for sending.
     Uplink(usize),
-    /// The access line through which a peer receives.
+    /// The access line of a peer for receiving.
     Downlink(usize),
 }
 
@@ -38,7 +38,7 @@ pub fn read_peer_name(node: &Node, context: Context<'_>) -> Option<usize> {
     index
 }
 
-/// Reads the keys `from` and `to` of a table that may have other keys. Two equal ends are a fault.
+/// Reads the keys `from` and `to` of a table that may have further keys. Two equal ends are a fault.
 pub fn read_ends(table: &mut TableReader<'_>, context: Context<'_>) -> Option<(usize, usize)> {
     let to_node = table.get("to");
     let noun = context.names.map_or("peer", Names::noun);
@@ -52,7 +52,7 @@ pub fn read_ends(table: &mut TableReader<'_>, context: Context<'_>) -> Option<(u
     Some((from, to))
 }
 
-/// Reads a selection of links between peers: "all", or the ends of one link.
+/// Reads a selection of links between peers: "all", or the ends of a link.
 pub fn read_links_between(node: &Node, context: Context<'_>) -> Option<LinkSelector> {
     const EXPECTED: &str = "\"all\" or a table such as { from = \"left\", to = \"right\" }";
     if is_all(node, context, EXPECTED)? {

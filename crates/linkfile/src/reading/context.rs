@@ -16,8 +16,8 @@ use super::names::Names;
 use crate::document::{Diagnostic, FileError, Node, Place, Sources};
 use crate::fingerprint::Fingerprint;
 
-/// First reported fault in the order of the texts. Readers go on after a fault, because a later reader can find a fault that stands earlier in the text.
-/// Missing keys come last: of a file with `mas = 0.45` and without a `[coordination]`, the wrong key is reported.
+/// First reported fault in the order of the texts. Readers go on after a fault, because a later reader can find an earlier fault of the text. Missing keys come
+/// last: of a file with `mas = 0.45` and without a `[coordination]`, the wrong key is reported.
 #[derive(Debug, Default)]
 pub(crate) struct Faults(RefCell<Option<((Kind, Place), FileError)>>);
 
@@ -29,13 +29,14 @@ enum Kind {
 }
 
 impl Faults {
-    /// Keeps the fault unless a kept fault stands before it. Of several faults at one place, the first reported fault is kept.
+    /// Keeps the fault unless an earlier fault is kept. Of several faults at the same place, the first reported fault is kept.
     fn report(&self, place: Place, error: impl FnOnce() -> FileError) {
         self.report_kind((Kind::Wrong, place), error);
     }
 
     fn report_kind(&self, order: (Kind, Place), error: impl FnOnce() -> FileError) {
         let mut first = self.0.borrow_mut();
+        // `<` keeps the first of several faults at the same place.
         if first.as_ref().is_none_or(|(earlier, _)| order < *earlier) {
             *first = Some((order, error()));
         }
@@ -47,7 +48,7 @@ impl Faults {
     }
 }
 
-/// Modulators of a file by name, each with the names of its states.
+/// Modulators of a file by name, each with the names of the states.
 pub type Modulators = BTreeMap<String, (Modulator, Vec<String>)>;
 
 /// Reader of the files named in a document: a function from a path to the bytes of the file.
@@ -84,7 +85,7 @@ pub struct Context<'a> {
     pub modulators: Option<&'a Arc<Modulators>>,
     /// `true` if a table is read without the table below, over which the table will be laid. No key is reported as missing then.
     pub partial: bool,
-    /// Time from the start of the run to its end. `None` if the run has no fixed end, or if the time was refused.
+    /// Length of the run. `None` if the run has no fixed end, or if the time was refused.
     pub ends: Option<Duration>,
 }
 
@@ -101,7 +102,7 @@ impl<'a> Context<'a> {
         Self { modulators, ..self }
     }
 
-    /// Returns this context with the time at which the run ends.
+    /// Returns this context with the end of the run.
     #[must_use]
     pub const fn with_end(self, ends: Option<Duration>) -> Self {
         Self { ends, ..self }

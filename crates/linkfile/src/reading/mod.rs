@@ -1,7 +1,7 @@
-//! Readers of documents: values are read key by key, and every fault is reported at its place.
+//! Readers of documents: values are read key by key, and every fault is reported at the place of the fault.
 //!
-//! A reader is a function from a [`Node`](crate::document::Node) and a [`Context`] to an `Option`. A reader returns `None` exactly if it has reported a
-//! fault, and goes on after a fault, so that of several faults the fault that stands first in the text is found.
+//! A reader is a function from a [`Node`](crate::document::Node) and a [`Context`] to an `Option`. A reader returns `None` exactly after a reported fault, and
+//! goes on after a fault, so that of several faults the first in the text is found.
 
 mod context;
 pub mod named_file;

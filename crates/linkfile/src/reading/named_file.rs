@@ -36,11 +36,11 @@ impl Fault {
     }
 }
 
-/// Returns the bytes of a line, counted from 1, without the space around the content. A line after the last one is the empty span at the end of the text.
+/// Returns the bytes of a line, counted from 1, without the space around the content. A line after the last line is the empty span at the end of the text.
 #[must_use]
 pub fn line_span(text: &str, line: usize) -> Range<usize> {
     let Some(found) = text.lines().nth(line.saturating_sub(1)) else { return text.len()..text.len() };
-    // `lines` leaves out line breaks of one or two bytes. `split_inclusive` keeps the breaks, so that its pieces sum up to the start of the line.
+    // `lines` leaves out line breaks of one or two bytes. `split_inclusive` keeps the breaks, so that the pieces sum up to the start of the line.
     let start = text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum::<usize>();
     let indent = found.len() - found.trim_start().len();
     start + indent..start + indent + found.trim().len()
@@ -84,7 +84,7 @@ pub fn read_file<T: Clone + 'static>(
     read
 }
 
-/// Reads the bytes of a file as UTF-8, and records their fingerprint.
+/// Reads the bytes of a file as UTF-8, and records the fingerprint of the bytes.
 fn load(node: &Node, context: Context<'_>, path: &Path) -> Option<String> {
     let bytes = (context.reader.0)(path).map_err(|error| context.unreadable(node, path.to_path_buf(), error)).ok()?;
     context.files.held.borrow_mut().insert(path.to_path_buf(), Fingerprint::of_bytes(&bytes));
@@ -92,7 +92,7 @@ fn load(node: &Node, context: Context<'_>, path: &Path) -> Option<String> {
         Ok(text) => Some(text),
         Err(error) => {
             let at = error.utf8_error().valid_up_to();
-            // The lossy text equals the file up to the first faulty byte, so line and column of the fault are those of the file.
+            // The lossy text equals the file up to the first faulty byte, so line and column of the fault equal line and column in the file.
             let text = String::from_utf8_lossy(error.as_bytes());
             refuse(node, context, path, &text, at..at + 1, "not UTF-8: expected a text file".to_owned());
             None
@@ -100,7 +100,7 @@ fn load(node: &Node, context: Context<'_>, path: &Path) -> Option<String> {
     }
 }
 
-/// Reports a fault in a named file. A message that names no expected text gets a general one.
+/// Reports a fault in a named file. A message without an expected text gets a general text.
 fn refuse(node: &Node, context: Context<'_>, path: &Path, text: &str, span: Range<usize>, message: String) {
     let message = if message.contains("expected") { message } else { format!("{message}: expected another value") };
     let origin = Origin::File(path.to_path_buf());

@@ -20,7 +20,7 @@ pub(super) fn apply(document: &mut Node, overrides: &[String], context: Context<
     }
 }
 
-/// Fault of an override: faulty bytes of its text, dotted path of the key, and message.
+/// Fault of an override: faulty bytes of the text, dotted path of the key, and message.
 struct Refused {
     span: Range<usize>,
     key: String,
@@ -34,7 +34,7 @@ struct Segment<'a> {
     place: Place,
 }
 
-/// Applies one override, whose text has the source number `source`.
+/// Applies an override with the source number `source`.
 fn apply_one(document: &mut Node, text: &str, source: usize) -> Result<(), Refused> {
     let Some(equals) = text.find('=') else {
         return Err(Refused { span: 0..text.len(), key: String::new(), message: "no = in the override: expected KEY=VALUE".to_owned() });
@@ -42,6 +42,7 @@ fn apply_one(document: &mut Node, text: &str, source: usize) -> Result<(), Refus
     let segments = split_path(&text[..equals], source)?;
     let path = segments.iter().map(|segment| segment.name).collect::<Vec<_>>().join(".");
     let value = read_value(text, equals + 1, &path, source)?;
+    // Asked before the value is put: an override of `scene.count` itself counts from the next override on.
     let counted = has_count(document);
     put(document, &segments, value, &Insertion { path: String::new(), counted })
 }
@@ -133,6 +134,7 @@ fn put(node: &mut Node, segments: &[Segment<'_>], value: Node, way: &Insertion) 
 
 /// Puts a value under `peers.left.…`: into the entry with the name, or else with the index. With `count`, a missing entry is made.
 fn put_into_peer(peers: &mut Vec<Arc<Node>>, name: &Segment<'_>, rest: &[Segment<'_>], value: Node, counted: bool) -> Result<(), Refused> {
+    // A name goes before an index, because a peer may be called `0`.
     let found = peers.iter().position(|entry| text_of(entry, "name") == Some(name.name));
     let by_index = || name.name.parse::<usize>().ok().filter(|index| *index < peers.len());
     let index = match found.or_else(by_index) {
@@ -168,6 +170,7 @@ fn put_into_link(links: &mut Vec<Arc<Node>>, from: &Segment<'_>, rest: &[Segment
         }
         (None, None) => {
             let mut entry = Arc::new(entry_named(from, "links", &[("from", from), ("to", to)]));
+            // The value is put first, so that a refused override leaves no entry behind.
             put_into_entry(&mut entry, rest, value, &["from", "to"])?;
             links.push(entry);
             Ok(())
@@ -181,6 +184,7 @@ fn put_into_entry(entry: &mut Arc<Node>, rest: &[Segment<'_>], mut value: Node, 
     if rest.is_empty()
         && let (Some(old), Value::Table(new)) = (entry.as_table(), &mut value.value)
     {
+        // Without these keys, no later override would find the replaced entry.
         for key in address.iter().copied().filter_map(|key| old.get(key)) {
             if new.get(&key.name).is_none() {
                 new.0.push(key.clone());
@@ -191,7 +195,7 @@ fn put_into_entry(entry: &mut Arc<Node>, rest: &[Segment<'_>], mut value: Node, 
     put(entry, rest, value, &way)
 }
 
-/// Returns the element of a list for `timeline.0.…` or `modulators.cell.states.good.…`, by its name or else by its index from 0.
+/// Returns the element of a list for `timeline.0.…` or `modulators.cell.states.good.…`, by name or else by index from 0.
 fn element<'a>(elements: &'a mut [Arc<Node>], index: &Segment<'_>, path: &str) -> Result<&'a mut Node, Refused> {
     let count = elements.len();
     let named = elements.iter().position(|entry| text_of(entry, "name") == Some(index.name));

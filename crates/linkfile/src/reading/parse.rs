@@ -62,12 +62,11 @@ pub struct Parsed<T> {
     pub files: BTreeMap<PathBuf, Fingerprint>,
 }
 
-/// Parses a text, applies the overrides, and passes the tree to `read`, which must return `None` exactly if it has reported a fault.
+/// Parses a text, applies the overrides, and passes the tree to `read`, which must return `None` exactly after a reported fault.
 ///
 /// # Errors
 ///
-/// [`FileError`]. Of several faults of the reader, the fault that stands first in the text; faults in overrides come after faults in the text, and missing keys
-/// come last.
+/// [`FileError`]. Of several faults of the reader, the first in the text; faults in overrides come after faults in the text, and missing keys come last.
 pub fn parse<T>(sources: Sources<'_>, read: impl FnOnce(&Node, Context<'_>) -> Option<T>) -> Result<Parsed<T>, FileError> {
     parse_with(sources, FileReader::ANY, read)
 }
@@ -123,6 +122,7 @@ fn parse_toml(text: &str, sources: Sources<'_>) -> Result<Node, FileError> {
         return Err(invalid(sources.diagnostic(BEGINNING, String::new(), message)));
     }
     let (table, errors) = DeTable::parse_recoverable(text);
+    // The errors need not be in the order of the text.
     let first = errors.iter().min_by_key(|error| error.span().map_or(usize::MAX, |span| span.start));
     if let Some(error) = first {
         let span = error.span().unwrap_or(text.len()..text.len());

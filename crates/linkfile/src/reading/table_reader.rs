@@ -20,7 +20,7 @@ pub struct TableReader<'a> {
     table: &'a Table,
     declaration: &'static Declaration,
     context: Context<'a>,
-    /// Names of the keys that were asked for.
+    /// Names of the requested keys.
     known: Vec<&'static str>,
     /// Names of missing keys, each with the expected text.
     missing: Vec<(&'static str, String)>,
@@ -54,13 +54,14 @@ impl<'a> TableReader<'a> {
     }
 
     fn entry_of(&mut self, key: &'static Key) -> Option<&'a Entry> {
+        // A key is often asked for twice: for the node, and for the value.
         if !self.known.contains(&key.name) {
             self.known.push(key.name);
         }
         self.table.get(key.name)
     }
 
-    /// Returns the value under a key without reading it, or `None` if the key is not given.
+    /// Returns the unread value under a key, or `None` if the key is not given.
     #[track_caller]
     pub fn get(&mut self, name: &'static str) -> Option<&'a Node> {
         self.entry(name).map(|entry| &*entry.node)
@@ -93,7 +94,7 @@ impl<'a> TableReader<'a> {
         self.maybe(name, |node, context| values::of_key(key, node, context))
     }
 
-    /// Reads a word of the file, or else the declared default, and returns the value that `choices` gives for the word.
+    /// Reads a word of the file, or else the declared default, and returns the value of the word in `choices`.
     #[track_caller]
     pub fn choice<T: Clone>(&mut self, name: &'static str, choices: &[(&'static str, T, &'static str)]) -> Option<T> {
         self.read(name, |node, context| values::word(node, context, choices))
@@ -131,7 +132,7 @@ impl<'a> TableReader<'a> {
         }
     }
 
-    /// Reads the table under a key with the reader `read`. If the key is not given, `read` gets a table without keys, in which every key has its default.
+    /// Reads the table under a key with the reader `read`. If the key is not given, `read` gets a table without keys, in which every key has the default.
     #[track_caller]
     pub fn table<T>(&mut self, name: &'static str, read: impl FnOnce(&Node, Context<'a>) -> Option<T>) -> Option<T> {
         match self.get(name) {
@@ -173,7 +174,7 @@ impl<'a> TableReader<'a> {
             let expected = one_of(self.known.iter().copied(), &entry.name);
             self.context.fault(entry.key, &entry.node.path, format!("unknown key: expected {expected}"));
         }
-        // A misspelt key is unknown, and the right key is missing. Only the unknown key is reported, because that is where the user has to look.
+        // A misspelt key is unknown, and the right key is missing. Only the unknown key is reported, because the user has to look there.
         if unknown.is_empty() && !self.context.partial {
             for (key, expected) in &self.missing {
                 self.context.missing(self.node.place, &join(&self.node.path, key), format!("missing key: expected {expected}"));
@@ -185,6 +186,7 @@ impl<'a> TableReader<'a> {
 /// Returns the only given entry of `entries`. No given entry, or more than one, is a fault. `expected` lists the possible keys.
 pub fn only_one<'a>(node: &Node, context: Context<'_>, entries: &[Option<&'a Entry>], expected: &str) -> Option<&'a Entry> {
     let mut given: Vec<&Entry> = entries.iter().copied().flatten().collect();
+    // Sorted by place, so that the second key of the text is at fault.
     given.sort_by_key(|entry| entry.key);
     match given.as_slice() {
         [only] => Some(only),

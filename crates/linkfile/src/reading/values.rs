@@ -1,4 +1,4 @@
-//! Readers of single values. Each reader returns `None` after it has reported a fault.
+//! Readers of single values. Each reader returns `None` after a reported fault.
 
 use core::time::Duration;
 
@@ -61,7 +61,7 @@ pub(super) fn default_of(default: &str) -> Node {
 
 /// Reading of a number within a range.
 pub trait ReadNumber {
-    /// Reads the number of a value. Returns `None` after it has reported a fault: no number, or a number outside the range.
+    /// Reads the number of a value. Returns `None` after a reported fault: no number, or a number outside the range.
     fn read(self, node: &Node, context: Context<'_>) -> Option<f64>;
 }
 
@@ -103,7 +103,7 @@ pub fn number(node: &Node, context: Context<'_>, expected: &str) -> Option<f64> 
 
 /// Converts an integer to a 64-bit float, or returns `None` if the conversion would round.
 fn exact_f64(integer: i128) -> Option<f64> {
-    // Compared as decimal texts, because a comparison as numbers would need another conversion that rounds.
+    // Compared as decimal texts, because a comparison as numbers would round again.
     let decimal = integer.to_string();
     let value: f64 = decimal.parse().ok()?;
     (format!("{value:.0}") == decimal).then_some(value)
@@ -150,7 +150,7 @@ pub fn text<'a>(node: &'a Node, context: Context<'_>, expected: &str) -> Option<
     text
 }
 
-/// Reads one of a few words. Each choice is a word, its value, and the meaning of the word. Returns the value of the word.
+/// Reads a word out of a few. Each choice is a word, the value of the word, and the meaning. Returns the value of the word.
 pub fn word<T: Clone>(node: &Node, context: Context<'_>, choices: &[(&str, T, &str)]) -> Option<T> {
     let words = || choices.iter().map(|(word, ..)| *word);
     let Some(given) = node.as_text() else {
@@ -164,7 +164,7 @@ pub fn word<T: Clone>(node: &Node, context: Context<'_>, choices: &[(&str, T, &s
     chosen
 }
 
-/// Reads a list. Returns its elements.
+/// Reads the elements of a list.
 pub fn list<'a>(node: &'a Node, context: Context<'_>, expected: &str) -> Option<Vec<&'a Node>> {
     let Value::List(elements) = &node.value else {
         context.fault_at(node, format!("found {}: expected {expected}", node.describe()));
@@ -217,6 +217,7 @@ pub fn signed_size(node: &Node, context: Context<'_>) -> Option<i32> {
         None => (false, text),
     };
     let size = match parse::size(plain) {
+        // A size beyond the range of `i64` is refused below as out of range.
         Ok(size) => i64::try_from(size.get()).unwrap_or(i64::MAX),
         Err(error) => {
             // The fault of the shortened text: a message quotes the text whole.
@@ -236,11 +237,12 @@ pub fn signed_size(node: &Node, context: Context<'_>) -> Option<i32> {
 #[must_use]
 pub fn packets(text: &str) -> Option<u64> {
     let number = text.trim().strip_suffix("packets").or_else(|| text.trim().strip_suffix("packet"))?.trim();
+    // `parse` also takes a sign, so the digits are checked here.
     let plain = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
     plain.then(|| number.parse().ok()).flatten()
 }
 
-/// Reports why the emulator refuses the values `nodes` together, at the value that was written last, or at `fallback` if no value is given.
+/// Reports why the emulator refuses the values `nodes` together, at the value written last, or at `fallback` if no value is given.
 pub fn refuse(context: Context<'_>, nodes: &[Option<&Node>], fallback: &Node, error: &dyn core::fmt::Display) {
     let last = nodes.iter().copied().flatten().max_by_key(|node| node.place);
     let error = error.to_string();
@@ -254,6 +256,7 @@ pub fn probability(node: &Node, context: Context<'_>) -> Option<Probability> {
     if node.as_text().is_some() {
         return quantity(node, context, parse::probability);
     }
+    // Adding zero turns a negative zero into an ordinary zero.
     let value = number(node, context, EXPECTED)? + 0.0;
     let probability = Probability::new(value).ok();
     if probability.is_none() {
@@ -281,7 +284,7 @@ fn quantity<T>(node: &Node, context: Context<'_>, parse: fn(&str) -> Result<T, P
     }
 }
 
-/// Returns the expected form that a parser names in its error.
+/// Returns the expected form in the error of a parser.
 fn expected(error: &ParseError) -> &'static str {
     match error {
         ParseError::Number { expected, .. } | ParseError::Unit { expected, .. } | ParseError::Range { expected, .. } => expected,
