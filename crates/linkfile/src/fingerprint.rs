@@ -37,6 +37,7 @@ impl Fingerprint {
 
     /// Continues the hash with more bytes.
     fn and(self, bytes: &[u8]) -> Self {
+        // FNV-1a mixes the byte in before the multiplication, FNV-1 after the multiplication.
         Self(bytes.iter().fold(self.0, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3)))
     }
 }

@@ -1,7 +1,7 @@
 //! Numbers followed by a unit, as overrides write the values of keys.
 
-/// Splits a text such as `24ms`, `5 %` or `1000` into a finite number and a unit, which may be empty. Returns `None` for any other text. The unit is not
-/// checked against the units that a key takes.
+/// Splits a text such as `24ms`, `5 %` or `1000` into a finite number and a unit, possibly empty. Returns `None` for any other text. The unit is not checked
+/// against the units of a key.
 #[must_use]
 pub fn number_and_unit(text: &str) -> Option<(f64, &str)> {
     let text = text.trim();
@@ -13,8 +13,8 @@ pub fn number_and_unit(text: &str) -> Option<(f64, &str)> {
     (value.is_finite() && is_unit).then_some((value, unit))
 }
 
-/// Writes a number with a unit such that a key reads back the same number. A whole number is written as an integer, because keys of integers take nothing
-/// else. A number with a unit is never written with a power of ten, because the readers of quantities take none.
+/// Writes a number with a unit such that a key reads back the same number. A whole number is written as an integer, because keys of integers take only
+/// integers. A number with a unit is never written with a power of ten, because the readers of quantities refuse powers of ten.
 #[must_use]
 pub fn text_of_quantity(value: f64, unit: &str) -> String {
     // From 2^53 on a double stands for several integers, so the number is not written as an integer. Adding zero below makes -0 an ordinary 0.

@@ -49,12 +49,12 @@ impl FileError {
         }
     }
 
-    /// Returns the message of the fault without its place, and without any content of files named in the document. For answers to a person who may name a file
-    /// but must not see its content.
+    /// Returns the message of the fault without the place, and without any content of files named in the document. For answers to a person who may name a file
+    /// but not see the content.
     #[must_use]
     pub fn bare_message(&self) -> String {
         match self.diagnostic() {
-            // The note exists only for a fault in a named file. Message, excerpt and column quote or measure that file.
+            // The note exists only for a fault in a named file. Message, excerpt and column quote or measure the named file.
             Some(Diagnostic { note: Some(_), origin: Origin::File(path), excerpt, .. }) => {
                 format!("line {} of {} is not what this key takes: expected another file", excerpt.line, path.display())
             }
@@ -159,6 +159,7 @@ impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.origin {
             Origin::File(path) => write!(f, "{}:{}:{}: ", escape(&path.display().to_string()), self.excerpt.line, self.excerpt.column)?,
+            // The text of an override shows the place by itself, without line and column.
             Origin::Override(text) => write!(f, "--set {}: ", escape(&shorten(text)))?,
         }
         if !self.key.is_empty() {
@@ -188,6 +189,7 @@ pub fn quote(text: &str) -> String {
 #[must_use]
 pub fn shorten(text: &str) -> String {
     const LONGEST: usize = 80;
+    // The byte of character 80 is looked for, so that the cut never lies within a character.
     match text.char_indices().nth(LONGEST) {
         Some((end, _)) => format!("{}…", &text[..end]),
         None => text.to_owned(),

@@ -50,6 +50,7 @@ impl Sources<'_> {
     /// Returns a diagnostic for a place, with the dotted path of the key and the message.
     #[must_use]
     pub fn diagnostic(&self, place: Place, key: String, message: String) -> Diagnostic {
+        // Source 0 is the file, and has no override.
         let given = place.source.checked_sub(1).and_then(|index| self.overrides.get(index));
         let (origin, text) = match given {
             Some(text) => (Origin::Override(text.clone()), text.as_str()),

@@ -21,7 +21,7 @@ pub struct Node {
     pub path: String,
 }
 
-/// Value of a document. Numbers stay texts or wide integers until a reader knows the type that the key takes.
+/// Value of a document. Numbers stay texts or wide integers until a reader knows the type of the key.
 #[derive(Clone, Debug)]
 pub enum Value {
     /// A text, without quotes and escapes.
@@ -82,11 +82,13 @@ impl Node {
     fn convert(spanned: &toml::Spanned<DeValue<'_>>, path: String, source: usize, offset: usize, depth: usize) -> Result<Self, TooDeep> {
         let span = spanned.span();
         let place = Place::new(source, span.start + offset..span.end + offset);
+        // Checked on the way down, so that the recursion never goes below the bound.
         if depth > DEEPEST {
             return Err(TooDeep(place));
         }
         let value = match spanned.get_ref() {
             DeValue::String(text) => Value::Text(text.to_string()),
+            // 128 bits, so that a message can quote an integer beyond the range of every key.
             DeValue::Integer(integer) => Value::Integer(i128::from_str_radix(integer.as_str(), integer.radix()).ok()),
             DeValue::Float(float) => Value::Float(float.as_str().to_owned()),
             DeValue::Boolean(boolean) => Value::Boolean(*boolean),
@@ -145,6 +147,7 @@ impl Node {
         let mut entries: Vec<Entry> = below.0.iter().filter(|entry| own.get(&entry.name).is_none()).cloned().collect();
         for entry in &own.0 {
             let mut entry = entry.clone();
+            // A table under any other key replaces the table below as a whole.
             if nested.contains(&entry.name.as_str())
                 && let Some(base) = below.get(&entry.name)
             {
@@ -201,15 +204,15 @@ impl Table {
         Arc::make_mut(&mut self.0[index].node)
     }
 
-    /// Sets the value under a key. The key moves to the end of the table, because it is laid over all others.
+    /// Sets the value under a key. The key moves to the end of the table, because the new value is laid over all keys before.
     pub fn insert(&mut self, name: &str, key: Place, node: Node) {
         self.0.retain(|entry| entry.name != name);
         self.0.push(Entry { name: name.to_owned(), key, node: Arc::new(node) });
     }
 }
 
-/// Returns the name of a list element in a path: peers, programs, modulators and their states by name, links by both ends, all other elements by their index
-/// from 0.
+/// Returns the name of a list element in a path: peers, programs, modulators and their states by name, links by both ends, all further elements by index from
+/// 0.
 fn element_name(list: &str, index: usize, element: &DeValue<'_>) -> String {
     let text = |key: &str| element.as_table().and_then(|table| table.get(key)).and_then(|value| value.get_ref().as_str());
     match list {

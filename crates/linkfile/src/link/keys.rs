@@ -15,9 +15,9 @@ const PROFILE: [Key; 1] = [usual(
     "A link of the library by its name, over which the other keys are laid. Takes away all keys below; \"none\" takes it away",
 )];
 
-/// Table of the keys of one link, such as `[link]`.
+/// Table of the keys of a link, such as `[link]`.
 pub static LINK_TABLE: Table = Table::of(&LINK);
-/// Table of the keys of a link that change. The table is laid over the keys of the link.
+/// Table of the changed keys of a link. The table is laid over the keys of the link.
 pub static LINK_CHANGE: Table = Table::over(&LINK);
 
 /// Keys of the two ends of a link.
@@ -26,14 +26,14 @@ pub const ENDS: [Key; 2] =
 /// Table of an entry `[\[links\]]`: both ends, and keys laid over those of `[link]`.
 pub static LINK_ENTRY: Table = Table::over(&joined::<17>(&[&[&ENDS], &LINK]));
 
-/// Word that stands for every link.
+/// Word for every link.
 pub const ALL_LINKS: Words = &[("all", "every link")];
-/// Table that names a link by its ends.
+/// Table with the ends of a link.
 pub(crate) static ENDS_TABLE: Table = Table::of(&[&ENDS]);
 /// Form of the links of a change: `"all"`, or a link by both ends.
 pub const LINKS_BETWEEN: Form = Form::AnyOf(&[Form::Words(ALL_LINKS), Form::Table(&ENDS_TABLE)]);
 
-/// Table that names a link by both ends, or an access line by the peer.
+/// Table with both ends of a link, or with the peer of an access line.
 pub static LINK_OR_LINE: Table = Table::of(&[&[
     optional("from", Form::Text, "The name of the peer that sends"),
     optional("to", Form::Text, "The name of the peer that receives"),

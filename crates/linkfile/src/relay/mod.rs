@@ -15,7 +15,7 @@ use crate::link::read_modulators;
 use crate::mesh::{KeysOfLinks, LinkChange, LinkClasses, LinkSelector, LinkTable, pairs, read_key_changes, read_links, read_links_between};
 use crate::reading::{Context, TableReader, default_title, defaults, parse, values, with_text};
 
-/// Checked content of a relay file, which `cohaptic relay FILE` runs.
+/// Checked content of a relay file, for `cohaptic relay FILE`.
 ///
 /// ```
 /// use std::path::Path;
@@ -58,7 +58,7 @@ pub struct RelayFile {
 /// Program that takes part in a relay.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct RelayProgram {
-    /// Name of the program, which is part of the names of its links.
+    /// Name of the program, a part of the names of links.
     pub name: String,
     /// Address that stands for the program: datagrams sent to this address reach the program. Port 0 lets the system choose a free port.
     pub port: SocketAddr,
@@ -71,7 +71,7 @@ pub struct RelayProgram {
 pub struct RelayChange {
     /// Instant of the change, since the start of the relay.
     pub at: Instant,
-    /// Changed link and its new configuration. Sender and receiver are indices in [`RelayFile::programs`].
+    /// Changed link with the new configuration. Sender and receiver are indices in [`RelayFile::programs`].
     pub link: LinkChange,
 }
 
@@ -127,22 +127,22 @@ impl RelayFile {
     ///
     /// # Errors
     ///
-    /// [`FileError::Read`] if the file, or a file named in it, cannot be read; [`FileError::Invalid`] for any other fault.
+    /// [`FileError::Read`] if the file, or a named file, cannot be read; [`FileError::Invalid`] for any other fault.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, FileError> {
         with_text(path, |text| Self::parse(text, path, overrides))
     }
 
-    /// Reads the text of a relay file. `file` is the path for messages, and its folder is the base of files named in the text.
+    /// Reads the text of a relay file. `file` is the path for messages, and the folder of `file` is the base of files named in the text.
     ///
     /// # Errors
     ///
-    /// As [`RelayFile::read`]. Of several faults, the fault that stands first in the text; faults in overrides come after faults in the text.
+    /// As [`RelayFile::read`]. Of several faults, the first in the text; faults in overrides come after faults in the text.
     pub fn parse(text: &str, file: &Path, overrides: &[String]) -> Result<Self, FileError> {
         parse(Sources { file, text, overrides }, read_document).map(|parsed| parsed.whole.0)
     }
 }
 
-/// Returns the keys of every directed link at the start of a relay, by the indices of its programs. An entry `[[links]]` is laid over `[link]`.
+/// Returns the keys of every directed link at the start of a relay, by the indices of programs. An entry `[[links]]` is laid over `[link]`.
 ///
 /// # Errors
 ///
@@ -160,7 +160,7 @@ pub fn relay_link_keys_of_text(text: &str, file: &Path, overrides: &[String]) ->
     parse(Sources { file, text, overrides }, read_document).map(|parsed| parsed.whole.1.keys(LinkSelector::All))
 }
 
-/// Content of `[relay]`. A field is `None` if its key was refused.
+/// Content of `[relay]`. A field is `None` after a refused key.
 #[derive(Debug, Default)]
 struct Header {
     /// Title, or `Some(None)` if the key is not given.
@@ -178,7 +178,7 @@ fn read_document(document: &Node, context: Context<'_>) -> Option<(RelayFile, Li
     let programs_node = root.get("programs");
     let programs = root.read("programs", |node, context| programs::read_programs(node, header.allow_remote, context));
     let (names, programs) = programs.unzip();
-    // Links and timeline refer to programs and modulators, so those are read first, whatever the order in the file.
+    // Links and timeline refer to programs and modulators, so both are read first, whatever the order in the file.
     let context = context.with_names(names.as_ref());
     let modulators = read_modulators(root.get("modulators"), context);
     let context = context.with_modulators(modulators.as_ref());
@@ -224,15 +224,16 @@ fn read_header(node: &Node, context: Context<'_>) -> Option<Header> {
 /// Minimum of `most-bytes` \[bytes\]: the largest UDP datagram must fit.
 const LEAST_BYTES: u64 = 65_535;
 
-/// Reads `[\[timeline\]]`, the changes of links while the relay runs, and sorts the changes by time. `links` are the links at the start, or `None` if they were
-/// refused.
+/// Reads `[\[timeline\]]`, the changes of links while the relay runs, and sorts the changes by time. `links` are the links at the start, or `None` if refused.
 fn read_timeline(node: Option<&Node>, links: Option<&LinkClasses>, context: Context<'_>) -> Option<Vec<RelayChange>> {
     let Some(node) = node else { return Some(Vec::new()) };
     let entries = values::list(node, context, "entries [[timeline]]")?;
+    // All entries are read before the first entry is used, so that the first fault of the text is found.
     let planned: Vec<_> = entries.iter().map(|entry| read_entry(entry, context)).collect();
     let mut planned: Vec<(Instant, LinkSelector, &Node)> = planned.into_iter().collect::<Option<_>>()?;
     // A stable sort keeps changes at the same instant in the order of the file.
     planned.sort_by_key(|(at, ..)| *at);
+    // Each change is laid over the links after the change before. The links at the start stay as they are.
     let mut links = links?.clone();
     let mut changes = Vec::new();
     for (at, selector, set) in planned {
@@ -240,6 +241,7 @@ fn read_timeline(node: Option<&Node>, links: Option<&LinkClasses>, context: Cont
             changes.push(RelayChange { at, link: links.change((from, to), set, context)? });
             continue;
         }
+        // A relay changes single links, so that a change of all links becomes a change per link.
         let table = links.change_all(set, context)?;
         let all = pairs(table.peers()).map(|(from, to)| LinkChange { from, to, config: table.configs()[table.config_between(from, to)].clone() });
         changes.extend(all.map(|link| RelayChange { at, link }));

@@ -21,7 +21,7 @@ pub(super) static PROGRAM: Table = Table::of(&[&[
     optional("address", Form::Like(&["127.0.0.1:9001"]), "Where it sends from and listens; without it learnt from the first datagram that it sends"),
 ]]);
 
-/// Entry of a program, with the nodes at which faults are reported.
+/// Entry of a program, with the nodes for faults.
 #[derive(Debug)]
 struct Written<'a> {
     program: RelayProgram,
@@ -29,7 +29,7 @@ struct Written<'a> {
     address: Option<&'a Node>,
 }
 
-/// Reads the programs and their names, in the order of the file. Returns `None` if an entry was refused.
+/// Reads the programs and the names of the programs, in the order of the file. Returns `None` if an entry was refused.
 pub(super) fn read_programs(node: &Node, allow_remote: Option<bool>, context: Context<'_>) -> Option<(Names, Vec<RelayProgram>)> {
     let entries = values::list(node, context, "entries [[programs]]")?;
     if entries.len() > MOST_PROGRAMS {
@@ -63,6 +63,7 @@ fn read_program<'a>(entry: &'a Node, allow_remote: Option<bool>, names: &mut Nam
     let address = table.maybe("address", |node, context| {
         const EXPECTED: &str = "an address with a port above zero, such as \"127.0.0.1:9001\"; without this key it is learnt";
         let address = read_address(node, EXPECTED, allow_remote, context)?;
+        // The relay sends to this address. Port 0 and an unspecified address are no destination.
         if address.port() == 0 || address.ip().is_unspecified() {
             context.fault_at(node, format!("no program can be reached at {address}: expected {EXPECTED}"));
             return None;
@@ -135,6 +136,7 @@ fn check_distinct(written: &[Written<'_>], context: Context<'_>) -> bool {
 fn check_families(written: &[Written<'_>], context: Context<'_>) -> bool {
     let mut fit = true;
     for (place, one) in written.iter().enumerate() {
+        // A learnt address is not known yet, and cannot be checked.
         let (Some(address), Some(node)) = (one.program.address, one.address) else { continue };
         let others = written.iter().enumerate().filter(|(other, _)| *other != place);
         if let Some((_, other)) = others.into_iter().find(|(_, other)| other.program.port.is_ipv4() != address.is_ipv4()) {

@@ -4,7 +4,7 @@ use core::fmt;
 use core::net::{IpAddr, Ipv4Addr, Ipv6Addr};
 use core::str::FromStr;
 
-/// Address with the length of its prefix. The leading bits up to that length identify the network.
+/// Address with the length of a prefix. The leading bits up to this length identify the network.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub struct Network {
     /// Address as given, including the bits after the prefix.
@@ -53,6 +53,7 @@ impl Network {
             (IpAddr::V4(own), IpAddr::V4(other)) => {
                 // A prefix of 0 bits shifts by the whole width. `checked_shl` returns `None` then, and the mask is 0.
                 let mask = u32::MAX.checked_shl(32 - u32::from(self.prefix)).unwrap_or(0);
+                // Addresses of the same network differ only outside the mask.
                 (Ipv4Addr::to_bits(own) ^ Ipv4Addr::to_bits(other)) & mask == 0
             }
             (IpAddr::V6(own), IpAddr::V6(other)) => {
@@ -70,7 +71,7 @@ impl fmt::Display for Network {
     }
 }
 
-/// Error: a text is no address, or its prefix is no number or too long.
+/// Error: a text is no address, or the prefix is no number or too long.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("no address: expected one with a prefix such as \"10.1.0.1/24\" or \"fd00::1/64\"")]
 pub struct NoNetwork;

@@ -23,9 +23,9 @@ pub struct RouterFile {
     pub right: Attachment,
     /// Links with distinct names, indexed by [`Target::Link`].
     pub links: Vec<NamedLink>,
-    /// Rules, in the order in which they are tried.
+    /// Rules, in the order of trial.
     pub rules: Vec<RuleSpec>,
-    /// Targets of packets to which no rule applies, indexed by the side from which the packet comes: left, right.
+    /// Targets of packets without a matching rule, indexed by the side of arrival: left, right.
     pub default: [Target; 2],
 }
 
@@ -38,14 +38,14 @@ pub struct Memory {
     pub bytes: Bytes,
 }
 
-/// Link with its name.
+/// Named link.
 #[derive(Clone, PartialEq, Debug)]
 pub struct NamedLink {
     /// Name of the link.
     pub name: String,
     /// Keys of the link, to be shown and changed.
     pub keys: LinkKeys,
-    /// Model of the two links of this name, one in each direction. Each link has a queue, a state and random numbers of its own.
+    /// Model of the two links of this name, a link in each direction. Each link has a queue, a state and random numbers of its own.
     pub model: LinkModel,
 }
 
@@ -71,7 +71,7 @@ impl Side {
         }
     }
 
-    /// Returns the other side, to which packets from this side go.
+    /// Returns the opposite side, the destination of packets from this side.
     #[must_use]
     pub const fn opposite(self) -> Self {
         match self {
@@ -87,7 +87,7 @@ impl Side {
     }
 }
 
-/// Network device to which a side is attached.
+/// Network device of a side.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Attachment {
     /// A TUN device. The host of the device is the end of the network on this side.
@@ -121,9 +121,9 @@ impl Attachment {
 pub struct TunSpec {
     /// Name of the device.
     pub name: String,
-    /// `true` if the device exists already. An existing device keeps its addresses and its MTU.
+    /// `true` if the device exists already. An existing device keeps all addresses and the MTU.
     pub existing: bool,
-    /// Addresses that the device gets.
+    /// Addresses for the device.
     pub addresses: Vec<Network>,
     /// Largest packet of the device \[bytes\], or `None` for the default of the system, 1500.
     pub mtu: Option<u16>,
@@ -156,7 +156,7 @@ pub enum Target {
 /// Rule: conditions on a packet, and the target of packets that meet all conditions. A condition `None` holds for every packet.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct RuleSpec {
-    /// Side from which the packet comes.
+    /// Side of arrival of the packet.
     pub from: Option<Side>,
     /// Network that contains the source address.
     pub source: Option<Network>,
@@ -205,7 +205,7 @@ impl Protocol {
     /// ICMP for IPv6.
     pub const ICMPV6: Self = Self(58);
 
-    /// Protocols that have a name in router files, with the name.
+    /// Protocols with a name in router files, each after the name.
     pub const NAMED: [(&'static str, Self); 4] = [("tcp", Self::TCP), ("udp", Self::UDP), ("icmp", Self::ICMP), ("icmpv6", Self::ICMPV6)];
 
     /// Returns whether the router can read the ports of packets of this protocol: TCP and UDP.

@@ -56,16 +56,16 @@ impl RouterFile {
     ///
     /// # Errors
     ///
-    /// [`FileError::Read`] if the file, or a file named in it, cannot be read; [`FileError::Invalid`] for any other fault.
+    /// [`FileError::Read`] if the file, or a named file, cannot be read; [`FileError::Invalid`] for any other fault.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, FileError> {
         with_text(path, |text| Self::parse(text, path, overrides))
     }
 
-    /// Reads the text of a router file. `file` is the path for messages, and its folder is the base of files named in the text.
+    /// Reads the text of a router file. `file` is the path for messages, and the folder of `file` is the base of files named in the text.
     ///
     /// # Errors
     ///
-    /// As [`RouterFile::read`]. Of several faults, the fault that stands first in the text.
+    /// As [`RouterFile::read`]. Of several faults, the first in the text.
     pub fn parse(text: &str, file: &Path, overrides: &[String]) -> Result<Self, FileError> {
         parse(Sources { file, text, overrides }, read_document).map(|parsed| parsed.whole)
     }
@@ -110,6 +110,7 @@ fn read_links(node: &Node, context: Context<'_>) -> Option<Vec<NamedLink>> {
                 format!("{} cannot be the name of a link: expected letters, digits, - and _, and neither pass nor drop", quote(&entry.name));
             context.fault(entry.key, &entry.node.path, message);
         }
+        // A link with a wrong name is read too, so that the first fault of the text is found.
         let model = read_link(&entry.node, context);
         let keys = LinkKeys::of_table(entry.node.as_table()?, context.modulators?);
         Some(NamedLink { name: is_name.then(|| entry.name.clone())?, keys, model: model? })
@@ -136,7 +137,7 @@ fn read_router(node: &Node, links: Option<&[NamedLink]>, context: Context<'_>) -
     Some((seed?, memory?, default?))
 }
 
-/// Reads `default`: one target for both directions, or a table with a target per direction. The answer is indexed by the side from which packets come.
+/// Reads `default`: a target for both directions, or a table with a target per direction. The answer is indexed by the side of arrival.
 fn read_default(node: &Node, links: Option<&[NamedLink]>, context: Context<'_>) -> Option<[Target; 2]> {
     if !matches!(node.value, Value::Table(_)) {
         return read_target(node, links, context).map(|target| [target; 2]);

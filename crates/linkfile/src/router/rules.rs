@@ -41,7 +41,7 @@ pub(super) fn read_rules(node: &Node, links: Option<&[NamedLink]>, context: Cont
     rules.into_iter().collect()
 }
 
-/// Reads one rule, and refuses a rule that no packet matches.
+/// Reads a rule, and refuses a rule that no packet matches.
 fn read_rule(node: &Node, links: Option<&[NamedLink]>, context: Context<'_>) -> Option<RuleSpec> {
     let mut table = TableReader::new(node, context, &RULE, "a table such as { protocol = \"tcp\", port = 80, link = \"wan\" }")?;
     let network = |node, context| read_network(node, context, "an address or a network such as \"10.1.0.0/16\" or \"fd00::/64\"");
@@ -51,13 +51,14 @@ fn read_rule(node: &Node, links: Option<&[NamedLink]>, context: Context<'_>) -> 
     let destination = table.maybe("destination", network);
     let protocol_node = table.get("protocol");
     let protocol = table.maybe("protocol", read_protocol);
+    // The first given key of ports stands for all three in a message about the protocol.
     let port_node = table.get("source-port").or_else(|| table.get("destination-port")).or_else(|| table.get("port"));
     let source_port = table.maybe("source-port", read_ports);
     let destination_port = table.maybe("destination-port", read_ports);
     let port = table.maybe("port", read_ports);
     let target = table.read("link", |node, context| read_target(node, links, context));
     table.finish();
-    // A condition that was refused ends the reading here: the checks below compare conditions with each other.
+    // A refused condition ends the reading here: the checks below compare conditions with each other.
     let (source, destination, protocol) = (source?, destination?, protocol?);
     if let (Some(source), Some(destination)) = (source, destination)
         && source.address().is_ipv4() != destination.address().is_ipv4()

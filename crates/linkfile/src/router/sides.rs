@@ -23,7 +23,7 @@ pub(super) static SIDE: Table = Table::of(&[&[
     usual("offloads", Form::Boolean, "true", "Packets cross the TUN device in large segments, which the router cuts and joins"),
 ]]);
 
-/// Reads a side: a TUN device, or an interface with its namespace.
+/// Reads a side: a TUN device, or an interface with a namespace.
 pub(super) fn read_side(node: &Node, context: Context<'_>) -> Option<Attachment> {
     let mut table = TableReader::new(node, context, &SIDE, "a table with a tun or an interface")?;
     let interface = table.get("interface");
@@ -33,7 +33,7 @@ pub(super) fn read_side(node: &Node, context: Context<'_>) -> Option<Attachment>
             values::refuse(context, &[Some(tun), Some(interface)], node, &"a side is a tun or an interface: expected only one of them");
             return None;
         }
-        // `finish` reports the keys of a TUN device here, because they were not asked for.
+        // `finish` reports the keys of a TUN device here, because no reader has asked for these keys.
         let name = read_device(interface, context);
         table.finish();
         return Some(Attachment::Interface(InterfaceSpec { name: name?, namespace: namespace? }));
@@ -51,11 +51,12 @@ pub(super) fn read_side(node: &Node, context: Context<'_>) -> Option<Attachment>
         context.fault_at(given, "an existing device is left as it is: expected no such key together with existing = true");
         return None;
     }
+    // The declaration limits the MTU to 65,535, so that the conversion never fails.
     let mtu = mtu?.and_then(|mtu| u16::try_from(mtu).ok());
     Some(Attachment::Tun(TunSpec { name: name?, existing: existing?, addresses: addresses?, mtu, offloads: offloads?, namespace: namespace? }))
 }
 
-/// Checks both sides together: they are of the same kind, and not the same device.
+/// Checks both sides together: the kinds must be equal, and the devices different.
 pub(super) fn check_sides(left: &Attachment, right: &Attachment, right_node: &Node, context: Context<'_>) -> Option<()> {
     let message = match (left, right) {
         (Attachment::Tun(_), Attachment::Interface(_)) | (Attachment::Interface(_), Attachment::Tun(_)) => {

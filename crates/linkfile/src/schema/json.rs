@@ -1,6 +1,6 @@
 //! Catalogue of keys as a JSON Schema.
 //!
-//! The schema follows draft 7, the newest draft that all editors for TOML support. No part refers to another part: Taplo (Even Better TOML) shows no
+//! The schema follows draft 7, the newest draft with the support of all editors for TOML. No part refers to another part: Taplo (Even Better TOML) shows no
 //! description beside a `$ref` and stops at an `allOf`, and Tombi does not follow every `$ref`.
 
 use serde_json::{Map, Value, json};
@@ -99,7 +99,7 @@ fn number(amount: Quantity) -> Value {
     schema
 }
 
-/// Returns the schema of a text that consists of a number and a unit.
+/// Returns the schema of a text of a number and a unit.
 fn with_unit(examples: &[&str]) -> Value {
     json!({ "type": "string", "pattern": WITH_UNIT, "examples": examples })
 }

@@ -1,10 +1,10 @@
-//! Catalogue of keys: every key with its meaning, unit, default and form, for editors and for authors of files.
+//! Catalogue of keys: every key with meaning, unit, default and form, for editors and for authors of files.
 //!
-//! Each table is declared once, beside its reader, which takes names, forms, ranges, units and defaults from the declaration. The catalogue consists of
-//! these declarations, from the table at the top of a file down.
+//! Each table is declared once, beside the reader of the table. The reader takes names, forms, ranges, units and defaults from the declaration. The catalogue
+//! consists of these declarations, from the table at the top of a file down.
 //!
-//! [`json_schema`] returns the catalogue as a JSON Schema. The schema is coarser than the readers: conditions between keys, such as a peer that exists or
-//! two keys that exclude each other, and the choice of the unit are left to the readers.
+//! [`json_schema`] returns the catalogue as a JSON Schema. The schema is coarser than the readers: conditions between keys, such as an existing peer or two
+//! exclusive keys, and the choice of the unit are left to the readers.
 
 mod json;
 /// Declarations of the keys of a link.
