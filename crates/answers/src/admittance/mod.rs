@@ -19,7 +19,7 @@ pub struct Curve {
     pub name: String,
     /// Name of the coordination law, such as `average-position`.
     pub law: String,
-    /// Overrides which make the variant out of the scene.
+    /// Overrides of the variant, on top of the scene.
     pub overrides: Vec<String>,
     /// Title of the scene.
     pub title: String,
@@ -36,7 +36,7 @@ pub struct Curve {
 }
 
 impl Curve {
-    /// Returns the name of the curve in a legend: its law and its overrides.
+    /// Returns the name of the curve in a legend: law and overrides.
     #[must_use]
     pub fn legend(&self) -> String {
         legend_name(&self.law, &self.overrides)
@@ -49,6 +49,7 @@ impl Curve {
 
     /// Returns the magnitude of the admittance of the whole object alone at a frequency \[dB\].
     fn ideal_db(&self, hz: f64) -> f64 {
+        // 20 dB per power of ten, because the admittance is a ratio of amplitudes.
         20.0 * ideal(self.mass, hz).norm().log10()
     }
 
@@ -67,6 +68,7 @@ impl Curve {
     /// Returns a warning if the scene has no steady state or might have none; `None` for a stable scene.
     fn warning(&self) -> Option<&'static str> {
         match self.admittance.verdict() {
+            // A scene can be stable with every delay at the mean, and unstable in the mean square.
             Verdict::Stable => match &self.chance {
                 Some(Ok(moment)) if moment.verdict() == Verdict::Unstable => Some(
                     "the scene is unstable in the mean square: these numbers hold for delays at their mean without losses, and the motion around them grows without end",
@@ -83,7 +85,7 @@ impl Curve {
     }
 }
 
-/// Returns `admittance.csv`: one row per curve and frequency. Numbers have the fewest digits that read back as the same `f64`.
+/// Returns `admittance.csv`: a row per curve and frequency. Numbers have the fewest digits that read back as the same `f64`.
 #[must_use]
 pub fn csv(curves: &[Curve]) -> String {
     let mut text = "curve,hz,magnitude_db,phase_deg,ideal_db\n".to_owned();

@@ -6,13 +6,13 @@ use super::Curve;
 use super::words::{felt_sizes, significant, subject, verdicts};
 use crate::page::{AnswerPage, MOST_ROWS, Origin, more_rows};
 
-/// Returns the page. Its bytes depend on the curves and on their picture alone. `peer`: name of the peer whose device is pushed.
+/// Returns the page. The bytes of the page depend on the curves and on the picture alone. `peer`: name of the peer whose device is pushed.
 #[must_use]
 pub fn html(peer: &str, curves: &[Curve], origin: &Origin<'_>) -> String {
     let title = curves.first().map_or("", |curve| curve.title.as_str());
     let mut page = AnswerPage { title: format!("{title}: what {peer} feels"), tables: Html::heading(2, "Frequencies"), ..AnswerPage::default() };
     let several = curves.len() > 1;
-    // With a single curve, its name would say nothing.
+    // The name of a single curve would say nothing.
     let of = |curve: &Curve, said: &str| if several { format!("{}: {said}", curve.name) } else { said.to_owned() };
     for (number, curve) in curves.iter().enumerate() {
         page.warnings.extend(curve.warning().map(|warning| of(curve, warning)));
@@ -21,7 +21,7 @@ pub fn html(peer: &str, curves: &[Curve], origin: &Origin<'_>) -> String {
             page.sentences.push(of(curve, &format!("moved slowly, {peer} feels {}", felt.join(" and "))));
         }
         page.sentences.extend(verdicts(curve).iter().map(|verdict| of(curve, verdict)));
-        // Curves of one scene mostly have the same notes, which are shown once.
+        // Curves of a scene mostly have the same notes. A repeated note is shown once.
         page.notes.extend(curve.notes().into_iter().filter(|note| curves[..number].iter().all(|before| !before.notes().contains(note))));
         page.tables = page.tables.and(points(curve, several));
     }
@@ -45,7 +45,7 @@ fn is_felt(curve: &Curve) -> bool {
     axis == seen
 }
 
-/// Returns the table of one curve, hidden until opened.
+/// Returns the table of a curve, hidden until opened.
 fn points(curve: &Curve, several: bool) -> Html {
     let head = Table::new().number("frequency [Hz]").number("magnitude [dB]").number("phase [degrees]").number("free mass [dB]");
     let shown = curve.response.points.iter().take(MOST_ROWS);

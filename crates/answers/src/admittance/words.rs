@@ -7,7 +7,7 @@ use cohaptic_stability::{Estimate, Verdict};
 use super::Curve;
 use crate::{AdmittanceWords, figure};
 
-/// Returns the text about all curves, each with its table.
+/// Returns the text about all curves, with the tables.
 #[must_use]
 pub fn words(peer: &str, curves: &[Curve]) -> String {
     let mut text = String::new();
@@ -55,6 +55,7 @@ pub(super) fn significant(hz: f64) -> String {
         return format!("{hz:.4e}");
     }
     let whole = format!("{hz:.0}").len();
+    // Below 1 Hz, eight decimals show at least five digits, because `hz` is at least 1e-4 here.
     let decimals = if hz >= 1.0 { 5_usize.saturating_sub(whole) } else { 8 };
     let text = format!("{hz:.decimals$}");
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
@@ -72,10 +73,11 @@ fn felt(text: &mut String, curve: &Curve) {
     }
 }
 
-/// Returns what a slow hand feels: names, each with a size in words. The spring is listed only if the object is tied to the ground.
+/// Returns the feeling of a slow hand: names, each with a size in words. The spring is listed only if the object is tied to the ground.
 pub(super) fn felt_sizes(curve: &Curve) -> Vec<(&'static str, String)> {
     let fit = curve.fit;
     let [spring, viscosity, inertia] = units(curve);
+    // A free object has a stiffness of exactly zero, without an error.
     let tied = fit.stiffness.value != 0.0 || fit.stiffness.error != 0.0;
     let rows =
         [("a spring", fit.stiffness, spring, tied), ("a viscosity", fit.viscosity, viscosity, true), ("an inertia", fit.inertia, inertia, true)];
@@ -96,7 +98,7 @@ fn shown(verdict: Verdict) -> &'static str {
     }
 }
 
-/// Returns the verdict on the scene, one line per radius.
+/// Returns the verdict on the scene, a line per radius.
 pub(super) fn verdicts(curve: &Curve) -> Vec<String> {
     let radius = curve.admittance.radius();
     let word = shown(radius.verdict());

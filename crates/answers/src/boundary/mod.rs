@@ -44,6 +44,7 @@ impl Searched<'_> {
     fn stable_fraction(&self, kind: VerdictKind) -> f64 {
         let criterion = self.family.criterion();
         let of_kind: Vec<&Cell> = self.found.known.iter().map(|(_, cell)| cell).filter(|cell| criterion.kind(cell.is_nominal) == kind).collect();
+        // A kind without values has the share 0, and not NaN.
         of_kind.iter().filter(|cell| cell.radius.verdict() == Verdict::Stable).count() as f64 / of_kind.len().max(1) as f64
     }
 }

@@ -6,7 +6,7 @@ use cohaptic_units::print::{Counted, SixDigits, six_digits};
 use super::{Searched, words};
 use crate::page::{AnswerPage, MOST_ROWS, Origin, clauses, headed, more_rows, range};
 
-/// Returns the page of a search that has come to its end. Its bytes depend on the search and on its picture alone.
+/// Returns the page of a finished search. The bytes of the page depend on the search and on the picture alone.
 #[must_use]
 pub fn html(searched: &Searched<'_>, origin: &Origin<'_>) -> String {
     let found = searched.found;

@@ -5,7 +5,7 @@ use cohaptic_units::print::csv_field;
 
 use super::Searched;
 
-/// Returns `boundary.csv`: one row per crossing.
+/// Returns `boundary.csv`: a row per crossing.
 #[must_use]
 pub fn crossings_csv(Searched { range, found, .. }: &Searched<'_>) -> String {
     let mut text = format!("{},from,to\n", csv_field(&range.key));
@@ -15,7 +15,7 @@ pub fn crossings_csv(Searched { range, found, .. }: &Searched<'_>) -> String {
     text
 }
 
-/// Returns `samples.csv`: one row per sampled value.
+/// Returns `samples.csv`: a row per sampled value.
 #[must_use]
 pub fn samples_csv(Searched { range, family, found, .. }: &Searched<'_>) -> String {
     let is_mean_square = family.criterion() == Criterion::MeanSquare;

@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::{Finished, Written};
 use crate::document;
 
-/// Returns the answer of `cohaptic campaign --json`. `written`: the time of the campaign and its files; `None` leaves these keys out.
+/// Returns the answer of `cohaptic campaign --json`. `written`: time and files of the campaign; `None` leaves these keys out.
 pub fn document(finished: &Finished, written: Option<&Written>) -> impl Serialize {
     let report = &finished.report;
     let combinations = report.combinations.iter().enumerate().map(|(number, combination)| {

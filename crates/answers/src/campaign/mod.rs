@@ -1,4 +1,4 @@
-//! The answers of campaigns: document and words of a finished campaign, its pictures, and the judge of its combinations.
+//! The answers of campaigns: document, words and pictures of a finished campaign, and the judge of combinations.
 
 mod document;
 mod judge;

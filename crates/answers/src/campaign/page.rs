@@ -6,7 +6,7 @@ use cohaptic_picture::page::{Html, Table};
 use super::{Finished, words};
 use crate::page::{AnswerPage, MOST_ROWS, Origin, headed, more_rows};
 
-/// Returns the page. Its bytes depend on the campaign and on its pictures alone, not on how many of the runs this call has done.
+/// Returns the page. The bytes of the page depend on the campaign and on the pictures alone, not on how many of the runs this call has done.
 #[must_use]
 pub fn html(finished: &Finished, origin: &Origin<'_>) -> String {
     let Finished { plan, title, report, notes } = finished;
@@ -40,6 +40,7 @@ fn seeds(Finished { plan, .. }: &Finished) -> String {
         return "varied".to_owned();
     }
     let Ok(scene) = plan.scene(0) else { return "those of the scene and the following".to_owned() };
+    // Every combination begins with the seed of the scene, so that all combinations share the seeds.
     match plan.runs_of_each() {
         1 => format!("{} for every combination", scene.seed),
         each => format!("{} to {}, the same for every combination", scene.seed, scene.seed + (each - 1)),

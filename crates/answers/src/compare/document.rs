@@ -7,7 +7,7 @@ use super::Finished;
 use crate::campaign::Written;
 use crate::document;
 
-/// Returns the answer of `cohaptic compare --json`. `written`: the time of the comparison and its files; `None` leaves these keys out.
+/// Returns the answer of `cohaptic compare --json`. `written`: time and files of the comparison; `None` leaves these keys out.
 pub fn document(finished: &Finished, written: Option<&Written>) -> impl Serialize {
     let Finished { report, comparison, .. } = finished;
     let strategy = &finished.plan.variations()[0];

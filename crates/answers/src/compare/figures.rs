@@ -74,6 +74,7 @@ pub(super) fn interval(mean: f64, half: Option<f64>) -> String {
     let exponent = if (1e-3..1e6).contains(&size) || size == 0.0 || !size.is_finite() { 0 } else { power(size) };
     let unit = libm::exp10(f64::from(exponent));
     let (mean, certain) = (mean / unit, certain.map(|half| half / unit));
+    // Decimals for four digits of the mean, or for two digits of the half width.
     let digits = certain.map_or_else(|| 3 - power(mean.abs()), |half| 1 - power(half)).clamp(0, 9);
     let digits = usize::try_from(digits).unwrap_or_default();
     let number = |value: f64| signed(format!("{value:.digits$}"));

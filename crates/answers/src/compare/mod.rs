@@ -1,4 +1,4 @@
-//! The answers of a comparison of strategies: document, words, table, page, and the judge of its combinations.
+//! The answers of a comparison of strategies: document, words, table, page, and the judge of combinations.
 
 mod document;
 mod figures;
@@ -18,7 +18,7 @@ pub use words::words;
 /// A finished comparison.
 #[derive(Clone, Debug)]
 pub struct Finished {
-    /// The plan. The values of its first key are the strategies.
+    /// The plan. The values of the first key are the strategies.
     pub plan: CampaignPlan,
     /// Title of the scene of the first run combination.
     pub title: String,

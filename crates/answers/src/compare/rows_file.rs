@@ -1,4 +1,4 @@
-//! The table `compare.csv`: one row per combination and measure.
+//! The table `compare.csv`: a row per combination and measure.
 
 use cohaptic_campaign::{Estimate, Judgement};
 use cohaptic_units::print::csv_field;
@@ -8,7 +8,8 @@ use super::Finished;
 /// Columns after the columns of the keys.
 const COLUMNS: &str = "refused,runs,diverged,verdict,judged,measure,count,mean,low,high,pairs,difference,difference_low,difference_high";
 
-/// Returns the table. Numbers have the fewest digits that read back as the same `f64`; a cell without a number is empty. A refused combination has one row.
+/// Returns the table. Numbers have the fewest digits that read back as the same `f64`; a cell without a number is empty. A refused combination has a single
+/// row.
 #[must_use]
 pub fn csv(finished: &Finished) -> String {
     let comparison = &finished.comparison;
@@ -18,7 +19,7 @@ pub fn csv(finished: &Finished) -> String {
         let (strategy, other) = (combination / comparison.others(), combination % comparison.others());
         let values = finished.keys().iter().zip(finished.places(other)).map(|(key, place)| csv_field(&key.cell(place)) + ",");
         let head = format!("{combination},{},{}", csv_field(&comparison.strategies[strategy]), values.collect::<String>());
-        // The row of a refusal has the reason in its first cell after the keys, and all other cells empty.
+        // The row of a refusal has the reason in the first cell after the keys, and all further cells empty.
         if let Some(reason) = &cell.refused {
             text.push_str(&format!("{head}{}{}\n", csv_field(reason), ",".repeat(COLUMNS.matches(',').count())));
             continue;

@@ -65,7 +65,7 @@ fn head(finished: &Finished, wall_s: f64) -> Vec<String> {
     lines
 }
 
-/// Returns one row per strategy: its number, its diverged runs, and the number of stable combinations.
+/// Returns a row per strategy: number, diverged runs, and the number of stable combinations.
 fn strategies(finished: &Finished) -> Vec<Vec<String>> {
     let comparison = &finished.comparison;
     let mut rows = vec![["", "strategy", "diverged", "stable", "refused"].map(str::to_owned).to_vec()];
@@ -75,6 +75,7 @@ fn strategies(finished: &Finished) -> Vec<Vec<String>> {
         let stable = if sum.judged == 0 {
             NOTHING.to_owned()
         } else if comparison.others() == 1 {
+            // At a single combination, the verdict itself says more than a count.
             finished.judgement(number, 0).map_or_else(String::new, verdict)
         } else {
             format!("{} of {}", sum.stable, sum.judged)
@@ -112,12 +113,12 @@ impl Sum {
     }
 }
 
-/// Returns a verdict and its kind: `stable (mean-square)`; a dash without a verdict.
+/// Returns a verdict with the kind: `stable (mean-square)`; a dash without a verdict.
 pub(super) fn verdict(judgement: &Judgement) -> String {
     judgement.verdict().map_or_else(|| NOTHING.to_owned(), |verdict| format!("{} ({})", verdict.word, verdict.judged))
 }
 
-/// Returns the reasons of refusals in order of appearance, each with its number of combinations.
+/// Returns the reasons of refusals in order of appearance, each with the number of combinations.
 pub(super) fn refusals(finished: &Finished) -> Vec<(String, usize)> {
     let comparison = &finished.comparison;
     let mut counts: Vec<(String, usize)> = Vec::new();
@@ -132,7 +133,7 @@ pub(super) fn refusals(finished: &Finished) -> Vec<(String, usize)> {
     counts
 }
 
-/// Returns one row per combination of the other keys and strategy.
+/// Returns a row per combination of the other keys and strategy.
 fn rows(finished: &Finished, measure: usize, shown: &Shown) -> Vec<Vec<String>> {
     let comparison = &finished.comparison;
     let heads = finished.keys().iter().map(|key| key.key().to_owned());
@@ -154,6 +155,7 @@ pub(super) fn cells(figures: &Figures, shown: &Shown, of_each: u64) -> [String; 
         estimate.map_or_else(
             || NOTHING.to_owned(),
             |estimate| {
+                // A mean over fewer runs is marked: diverged runs, and runs without a value, are missing.
                 let fewer = if estimate.count < of_each { format!(" (n {})", estimate.count) } else { String::new() };
                 shown.estimate(&estimate) + &fewer
             },
@@ -173,7 +175,7 @@ pub(super) fn side(figures: &Figures) -> &'static str {
     }
 }
 
-/// Returns the numbers of combinations with a lower and a higher value than the baseline: one row per measure, one column per strategy.
+/// Returns the numbers of combinations with a lower and a higher value than the baseline: a row per measure, a column per strategy.
 fn overview(finished: &Finished) -> Vec<Vec<String>> {
     let comparison = &finished.comparison;
     let numbers = (2..=comparison.strategies.len()).map(|number| number.to_string());
@@ -200,6 +202,7 @@ fn table(rows: Vec<Vec<String>>) -> Vec<String> {
     let columns = rows.first().map_or(0, Vec::len);
     let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
     let widths: Vec<usize> = (0..columns).map(width).collect();
+    // A column is at the right only if every cell with text is a number.
     let is_number = |column: usize| {
         let mut cells = rows.iter().skip(1).map(|row| row[column].as_str()).filter(|cell| !cell.is_empty() && *cell != NOTHING).peekable();
         cells.peek().is_some() && cells.all(|cell| cell.starts_with(|letter: char| letter.is_ascii_digit() || matches!(letter, '−' | '(')))

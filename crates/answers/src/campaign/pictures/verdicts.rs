@@ -1,4 +1,4 @@
-//! The picture of a campaign's verdicts: the radius over one key, stable and unstable regions over two keys.
+//! The picture of a campaign's verdicts: the radius over a key, stable and unstable regions over two keys.
 
 use cohaptic_campaign::Judgement;
 use cohaptic_picture::{Axis, Fill, Line, Look, Marker, Panel, Picture};
@@ -14,8 +14,8 @@ const HIGHEST: f64 = 2.0;
 /// Legend of radii without the random parts of the links.
 const NOMINAL: &str = "nominal: nothing is left to chance";
 
-/// The radii of a campaign, converted to one criterion. As in a map, a scene without random links counts with the square of its spectral radius among
-/// mean-square radii.
+/// The radii of a campaign, converted to the criterion of the picture. As in a map, a scene without random links counts with the square of the spectral radius
+/// among mean-square radii.
 struct Radii {
     criterion: Criterion,
     /// Name of the radius; the name of a nominal radius if every verdict is nominal.
@@ -65,7 +65,7 @@ impl Radii {
 
     /// Returns the radius by the criterion of the picture; `None` without a verdict.
     fn radius(&self, judgement: &Judgement) -> Option<f64> {
-        // The mean-square radius of a scene without random parts is the square of its spectral radius.
+        // The mean-square radius of a scene without random parts is the square of the spectral radius.
         let squared = self.criterion == Criterion::MeanSquare && is_spectral(judgement);
         judgement.verdict().map(|verdict| if squared { verdict.radius * verdict.radius } else { verdict.radius })
     }
@@ -112,7 +112,7 @@ fn regions(sheet: &Sheet<'_>, along: (&Along, &Along), facet: usize, criterion: 
     let judgement = |column: usize, row: usize| sheet.report.judgements.get(sheet.combination(facet, &[column, row]));
     let word = |column: usize, row: usize| judgement(column, row).and_then(Judgement::verdict).map(|verdict| &*verdict.word);
     let is = |verdict: Verdict| move |column: usize, row: usize| word(column, row) == Some(verdict.word());
-    // In the mean square, a scene without random links counts with the square of its spectral radius, which is its mean-square radius.
+    // In the mean square, a scene without random links counts with the square of the spectral radius: the mean-square radius of such a scene.
     let verdicts = sheet.report.judgements.iter().filter(|judgement| judgement.verdict().is_some());
     let kinds = Kinds::of(criterion, verdicts.map(is_nominal));
     let panel = Panel::new(along.0.axis(), along.1.axis());

@@ -1,4 +1,4 @@
-//! Arranges the keys of a comparison: one key along the pictures, and keys with one panel per value.
+//! Arranges the keys of a comparison: a key along the pictures, and keys with a panel per value.
 
 use cohaptic_campaign::Variation;
 
@@ -9,7 +9,7 @@ const MOST_PANELS: usize = 16;
 
 /// The varied keys other than the strategy, arranged in pictures.
 pub(super) struct Layout {
-    /// The first key of numbers, along x; `None` if there is none.
+    /// The first key of numbers, along x; `None` without a key of numbers.
     pub(super) x: Option<Along>,
     /// Further keys with several values: index of the key, and number of values.
     facets: Vec<(usize, usize)>,
@@ -32,7 +32,7 @@ impl Layout {
         self.facets.iter().map(|(_, count)| count).product()
     }
 
-    /// Returns the reason, in words, why pictures are not drawn; `None` if they are drawn.
+    /// Returns the reason, in words, why pictures are not drawn; `None` for drawn pictures.
     pub(super) fn undrawn(&self, keys: &[Variation]) -> Option<String> {
         let names: Vec<&str> = self.facets.iter().map(|(key, _)| keys[*key].key()).collect();
         (self.panels() > MOST_PANELS).then(|| {
@@ -44,7 +44,7 @@ impl Layout {
         })
     }
 
-    /// Returns the title of a panel, its values as `KEY=VALUE`; empty for a single panel.
+    /// Returns the title of a panel, the values as `KEY=VALUE`; empty for a single panel.
     pub(super) fn title(&self, keys: &[Variation], panel: usize) -> String {
         let places = self.places(panel, None);
         self.facets.iter().map(|(key, _)| keys[*key].label(places[*key])).collect::<Vec<String>>().join(", ")
@@ -52,10 +52,11 @@ impl Layout {
 
     /// Returns the combination of the keys in a panel, at index `at` along x.
     pub(super) fn other(&self, panel: usize, at: Option<usize>) -> usize {
+        // A combination is a number in a mixed base, with the last key as the lowest digit.
         self.places(panel, at).into_iter().zip(&self.counts).fold(0, |other, (place, count)| other * count + place)
     }
 
-    /// Returns the key along y of a map: the only key with panels, if its values are numbers.
+    /// Returns the key along y of a map: the only key with panels, if the values of the key are numbers.
     pub(super) fn y(&self, keys: &[Variation]) -> Option<Along> {
         match (&self.x, self.facets.as_slice()) {
             (Some(_), [(key, _)]) => Along::of_numbers(*key, &keys[*key]),
@@ -65,6 +66,7 @@ impl Layout {
 
     fn places(&self, panel: usize, at: Option<usize>) -> Vec<usize> {
         let mut places = vec![0; self.counts.len()];
+        // The number of the panel is a number in a mixed base too, over the keys with panels.
         let mut left = panel;
         for (key, count) in self.facets.iter().rev() {
             places[*key] = left % count;

@@ -19,9 +19,9 @@ use scale::Scale;
 /// Origin of the numbers, shown on the page.
 #[derive(Clone, PartialEq, Debug)]
 pub struct PageSource<'a> {
-    /// For each strategy: its description, and its parameters with their values in the scene, in words.
+    /// Description of each strategy, and the parameters with the values in the scene, in words.
     pub strategies: Vec<(&'static str, String)>,
-    /// Command which makes the page.
+    /// Command for making the page.
     pub command: String,
     /// Command of the campaign with the same table of runs.
     pub campaign: String,
@@ -29,7 +29,7 @@ pub struct PageSource<'a> {
     pub scene: &'a str,
 }
 
-/// Returns the page. Its bytes depend on the scene, the runs and the strategies alone.
+/// Returns the page. The bytes of the page depend on the scene, the runs and the strategies alone.
 #[must_use]
 pub fn html(finished: &Finished, source: &PageSource<'_>) -> String {
     let sheet = Sheet { finished, layout: Layout::of(finished.keys()) };
@@ -91,7 +91,7 @@ fn stability(sheet: &Sheet<'_>) -> Html {
     picture.and(Html::details("Verdicts and diverged runs", tables::stability(sheet.finished))).and(diverged)
 }
 
-/// Returns the section of measures: one section per measure, or common pictures of all measures if each measure needs one panel only.
+/// Returns the section of measures: a section per measure, or common pictures of all measures if each measure needs a single panel.
 fn measures(sheet: &Sheet<'_>) -> Html {
     let Finished { comparison, .. } = sheet.finished;
     let scales: Vec<Scale> = (0..comparison.measures.len()).map(|measure| Scale::of(comparison, measure)).collect();
@@ -101,9 +101,11 @@ fn measures(sheet: &Sheet<'_>) -> Html {
         content = content.and(Html::paragraph(why.as_str()));
     }
     let each = sheet.layout.panels() > 1;
+    // A measure with a single panel needs no section with a picture.
     if undrawn.is_none() && !each {
         let pictures = sheet.all(&scales);
         let cut = if scales.iter().any(|scale| scale.is_cut) { CUT } else { "" };
+        // The caption about cut values stands once, below the last picture.
         let last = pictures.len().saturating_sub(1);
         for (number, picture) in pictures.iter().enumerate() {
             content = content.and(figure("", picture, if number == last { cut } else { "" }));

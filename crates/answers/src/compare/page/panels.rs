@@ -15,7 +15,7 @@ const MOST_MARKED: usize = 24;
 /// Half height of the bar of an interval, in rows.
 const HALF_BAR: f64 = 0.16;
 
-/// Greatest number of panels in one of the pictures that show all measures. More panels would stand too far from the legend.
+/// Greatest number of panels in a picture of all measures. More panels would stand too far from the legend.
 const PANELS: usize = 6;
 
 /// Returns the number of panels side by side.
@@ -45,7 +45,7 @@ impl Sheet<'_> {
         self.finished.comparison.strategies.iter().map(String::as_str).enumerate()
     }
 
-    /// Draws all measures, one panel each, for a comparison without further panels.
+    /// Draws all measures, a panel each, for a comparison without further panels.
     pub(super) fn all(&self, scales: &[Scale]) -> Vec<Picture> {
         let shares = self.any_diverged().then(|| self.diverged_panel(0));
         let panels: Vec<Panel> =
@@ -58,13 +58,13 @@ impl Sheet<'_> {
         if self.layout.x.is_some() { picture.shared_x() } else { self.with_rows(picture.shared_y(), panels) }
     }
 
-    /// Draws one measure, with one panel per value of the keys with panels.
+    /// Draws a measure, with a panel per value of the keys with panels.
     pub(super) fn measure(&self, measure: usize, scale: &Scale) -> Picture {
         let panels = (0..self.layout.panels()).map(|panel| self.titled(self.measure_panel(measure, scale, panel), panel));
         self.arranged(picture(panels.collect()).shared_y(), self.layout.panels())
     }
 
-    /// Draws the shares of diverged runs, with one panel per value of the keys with panels.
+    /// Draws the shares of diverged runs, with a panel per value of the keys with panels.
     pub(super) fn diverged(&self) -> Picture {
         let panels = (0..self.layout.panels()).map(|panel| self.titled(self.diverged_panel(panel), panel));
         self.arranged(picture(panels.collect()).shared_y(), self.layout.panels())
@@ -102,7 +102,7 @@ impl Sheet<'_> {
         self.panel(Axis::new("diverged").range(0.0, 1.0), value)
     }
 
-    /// Draws values with their intervals: over x, or as one row per strategy.
+    /// Draws values with intervals: over x, or as a row per strategy.
     fn panel(&self, axis: Axis, value: impl Fn(usize, Option<usize>) -> Option<(f64, f64, f64)>) -> Panel {
         match &self.layout.x {
             Some(x) => self.over(x, axis, |strategy, at| value(strategy, Some(at))),
@@ -122,11 +122,11 @@ impl Sheet<'_> {
             let line = Line::new(means, Look::of(strategy)).named(name);
             if x.values.len() <= MOST_MARKED { line.marked(Marker::of(strategy)) } else { line }
         });
-        // The baseline lies above the other lines. Its line is the widest, and the other lines have gaps which leave it visible.
+        // The baseline lies above the other lines. The baseline is the widest line, and the other lines have gaps, so that the baseline stays visible.
         Panel::new(x.axis(), axis).with_all(bands).with_all(lines)
     }
 
-    /// Draws one row per strategy, with the first strategy uppermost.
+    /// Draws a row per strategy, with the first strategy uppermost.
     fn rows(&self, axis: Axis, value: impl Fn(usize) -> Option<(f64, f64, f64)>) -> Panel {
         let count = self.finished.comparison.strategies.len();
         let rows: Vec<(usize, f64)> = (0..count).rev().enumerate().map(|(row, strategy)| (strategy, from_place(row))).collect();
@@ -134,7 +134,7 @@ impl Sheet<'_> {
         let mut panel = Panel::new(axis, Axis::new("").categories(names));
         for (strategy, y) in rows {
             let Some((mean, low, high)) = value(strategy) else { continue };
-            // A mean of one run has no interval, and its bar would have no width.
+            // A mean of a single run has no interval, and a bar would have no width.
             if low < high {
                 let bar = vec![(low, y - HALF_BAR), (high, y - HALF_BAR), (high, y + HALF_BAR), (low, y + HALF_BAR)];
                 panel = panel.with(Region::new([bar], Fill::Deep(strategy)));
@@ -144,7 +144,7 @@ impl Sheet<'_> {
         panel
     }
 
-    /// Draws the stable regions: over two keys of numbers one panel per strategy, over one key one row per strategy. `None` without a key of numbers.
+    /// Draws the stable regions: over two keys of numbers a panel per strategy, over a single key a row per strategy. `None` without a key of numbers.
     pub(super) fn stability(&self) -> Option<Picture> {
         let x = self.layout.x.as_ref()?;
         if let Some(y) = self.layout.y(self.finished.keys()) {

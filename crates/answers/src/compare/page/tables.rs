@@ -56,11 +56,12 @@ fn up(words: &str) -> Html {
     Html::mark(Mark::Partly, &format!("▲ {words}"))
 }
 
-/// Returns a table with one row per combination of the other keys and one column per strategy.
+/// Returns a table with a row per combination of the other keys and a column per strategy.
 fn by_strategy(finished: &Finished, cell: impl Fn(usize, usize) -> Html) -> Html {
     let comparison = &finished.comparison;
     let keys = finished.keys().iter().map(Variation::key);
     let head = keys.fold(Table::new(), |table, key| table.number(key));
+    // Without other keys, an empty heading stands in place of the values of a row.
     let head = if finished.keys().is_empty() { head.column("") } else { head };
     let head = comparison.strategies.iter().fold(head, |table, name| table.number(name.as_str()));
     let table = (0..comparison.others()).fold(head, |table, other| {
@@ -84,7 +85,7 @@ pub(super) fn stability(finished: &Finished) -> Html {
     })
 }
 
-/// Returns the table of a measure: means, and below each mean its difference to the baseline.
+/// Returns the table of a measure: means, and below each mean the difference to the baseline.
 pub(super) fn measure(finished: &Finished, measure: usize, shown: &Shown) -> Html {
     let of_each = finished.plan.runs_of_each();
     by_strategy(finished, |strategy, other| {
