@@ -1,4 +1,4 @@
-//! The answers of the estimate of a link: reading measurements, correcting the clocks, fitting the link, and its document and words.
+//! The answers of the estimate of a link: reading measurements, correcting the clocks, fitting the link, and document and words of the link.
 
 mod clocks;
 mod document;

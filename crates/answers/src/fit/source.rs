@@ -66,7 +66,7 @@ pub enum SourceError {
     Content(String),
 }
 
-/// Number of leading bytes which show the kind of a file.
+/// Number of leading bytes for finding the kind of a file.
 const HEAD: u64 = 256;
 const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 

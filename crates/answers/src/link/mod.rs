@@ -1,4 +1,4 @@
-//! The answers about a steady stream over one link: requested and achieved figures of the link, as a document and in words.
+//! The answers about a steady stream over a link: requested and achieved figures of the link, as a document and in words.
 
 mod document;
 mod picture;
@@ -57,9 +57,9 @@ impl Default for Meter {
 impl Meter {
     /// Adds a record. Records must come in the order of their instants.
     pub fn record(&mut self, record: &PacketRecord) {
-        // The only refused record is one out of order, which the emulator never makes.
+        // Only a record out of order is refused, and the emulator never makes such a record.
         let _ = self.accumulator.record(record);
-        // The accumulator has the same limit inside; the comparison needs it from here.
+        // The accumulator has the same limit inside; the comparison needs the limit from here.
         if record.sequence < MOST_MEASURED {
             self.comparison.record(record);
         }

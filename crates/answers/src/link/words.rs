@@ -22,6 +22,7 @@ pub fn words(measured: &Measured) -> String {
     for figure in &measured.figures {
         line(row(figure));
     }
+    // A compared figure has a row already.
     let compared = |name: &str| measured.figures.iter().any(|figure| figure.name == name);
     for (name, asked, achieved, error) in others(measured) {
         if !compared(name) && (asked.is_some() || achieved.is_some()) {

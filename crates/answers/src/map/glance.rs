@@ -37,6 +37,7 @@ pub(super) fn draw(x: &Axis<'_>, y: &Axis<'_>, stable: impl Fn(usize, usize) -> 
                     dots |= if stable(cell_x, cell_y) { *bit } else { 0 };
                 }
             }
+            // Braille patterns begin at 0x2800, and each dot is a bit.
             char::from_u32(0x2800 + u32::from(dots)).unwrap_or(' ')
         };
         let picture: String = (0..WIDTH).map(character).collect();

@@ -14,25 +14,25 @@ pub use document::document;
 pub use page::html;
 pub use words::words;
 
-/// Maps of one scene over the same keys.
+/// Maps of a scene over the same keys.
 #[derive(Clone, Copy, Debug)]
 pub struct Filled<'a> {
     /// Title of the scene.
     pub title: &'a str,
     /// The keys along x and y.
     pub axes: [&'a KeyRange; 2],
-    /// The map of the scene as it stands, followed by the maps of its variants.
+    /// The map of the scene as it stands, followed by the maps of the variants.
     pub maps: &'a [VariantMap],
 }
 
 /// The map of a variant of a scene.
 #[derive(Clone, Debug)]
 pub struct VariantMap {
-    /// Name of the variant in documents: its overrides, or "as it stands" for the scene as it stands.
+    /// Name of the variant in documents: the overrides, or "as it stands" for the scene as it stands.
     pub name: String,
     /// Name of the coordination law, such as `average-position`.
     pub law: String,
-    /// Overrides which make the variant out of the scene.
+    /// Overrides of the variant, on top of the scene.
     pub overrides: Vec<String>,
     /// The radii, indexed by row and column, with the values of both keys.
     pub map: Map,
@@ -70,7 +70,7 @@ impl Filled<'_> {
 }
 
 impl VariantMap {
-    /// Returns the name of the variant in a legend: its law and its overrides.
+    /// Returns the name of the variant in a legend: law and overrides.
     #[must_use]
     pub fn legend(&self) -> String {
         legend_name(&self.law, &self.overrides)
@@ -119,7 +119,7 @@ fn share(part: usize, whole: usize) -> f64 {
     part as f64 / whole.max(1) as f64
 }
 
-/// Returns `map.csv`: one row per cell; x varies fastest.
+/// Returns `map.csv`: a row per cell; x varies fastest.
 #[must_use]
 pub fn csv([x, y]: [&KeyRange; 2], VariantMap { map, criterion, verdicts, .. }: &VariantMap) -> String {
     let keys = format!("{},{}", csv_field(&x.key), csv_field(&y.key));

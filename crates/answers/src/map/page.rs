@@ -8,7 +8,7 @@ use super::{Filled, VariantMap, words};
 use crate::figure;
 use crate::page::{AnswerPage, Origin, clauses, headed, range};
 
-/// Returns the page. Its bytes depend on the maps and on their picture alone, not on how many of the cells this call has computed.
+/// Returns the page. The bytes of the page depend on the maps and on the picture alone, not on how many of the cells this call has computed.
 #[must_use]
 pub fn html(filled: &Filled<'_>, origin: &Origin<'_>) -> String {
     let Filled { title, axes, maps } = *filled;

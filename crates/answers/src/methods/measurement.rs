@@ -9,13 +9,13 @@ use super::runs::{Trajectory, unwatched};
 use super::{Kind, Method, Work};
 use crate::quick_verdict::OPERATIONS_A_SECOND;
 
-/// Time spent on the cost of one method; at least one round is run.
+/// Time spent on the cost of a method; the first round is always run.
 const BUDGET: Duration = Duration::from_millis(50);
-/// Greatest number of rounds of one method. The median of 31 rounds is steady.
+/// Greatest number of rounds of a method. The median of 31 rounds is steady.
 const MOST_ROUNDS: usize = 31;
-/// Time after which further methods get no figures: in scenes of thousands of peers one run takes seconds.
+/// Time after which further methods get no figures: in scenes of thousands of peers a run takes seconds.
 const MOST_TIME: Duration = Duration::from_secs(6);
-/// Greatest number of operations of a measured analysis, by its own estimate: about a second.
+/// Greatest number of operations of a measured analysis, by the estimate of the analysis: about a second.
 const MOST_OPERATIONS: f64 = OPERATIONS_A_SECOND;
 
 /// Observer of a measurement, which can also stop the measurement.
@@ -45,14 +45,14 @@ pub struct Measured {
     pub interrupted: bool,
 }
 
-/// A method with its cost and its error on the scene.
+/// A method with cost and error on the scene.
 #[derive(Clone, PartialEq, Debug)]
 pub struct MeasuredMethod {
     /// Purpose of the method.
     pub kind: Kind,
     /// Name of the method, unique within its kind.
     pub name: String,
-    /// Option which selects the method on the command line; empty for the default.
+    /// Option of the method on the command line; empty for the default.
     pub option: String,
     /// `true` if the scene as it stands uses this method.
     pub chosen: bool,
@@ -93,7 +93,7 @@ enum Outcome {
     Radius(Radius),
 }
 
-/// Returns the rows of one kind; `None` if the watch stopped the measurement.
+/// Returns the rows of a kind; `None` if the watch stopped the measurement.
 fn of_one_kind(methods: &[&Method], begin: Duration, clock: &dyn Fn() -> Duration, watch: &dyn MeasurementWatch) -> Option<Vec<MeasuredMethod>> {
     let mut outcomes = Vec::new();
     for method in methods {
@@ -131,7 +131,7 @@ fn of_one_kind(methods: &[&Method], begin: Duration, clock: &dyn Fn() -> Duratio
     Some(methods.iter().enumerate().map(row).collect())
 }
 
-/// Does the work of a method once. Returns its result, or the reason for having no result; `None` if the watch stopped the measurement.
+/// Does the work of a method once. Returns the result, or the reason for a missing result; `None` if the watch stopped the measurement.
 fn outcome(work: &Work, watch: &dyn MeasurementWatch) -> Option<Result<Outcome, String>> {
     match work {
         Work::Run(run) => Trajectory::of(run, &|| watch.stops()).map(|trajectory| Ok(Outcome::Trajectory(trajectory))),
@@ -170,7 +170,7 @@ fn error(own: &Outcome, reference: &Outcome, turns: bool) -> (Option<f64>, Strin
 
 /// Returns the cost of each method \[ms\]; `None` for a method without a result. The outer `None` means that the watch stopped the measurement.
 ///
-/// The methods take turns, so that a disturbance of the machine affects all of them. The caches are warm, because each method has already run once for its
+/// The methods take turns, so that a disturbance of the machine affects all methods. The caches are warm, because each method has already run once for the
 /// result.
 fn costs(
     methods: &[&Method],
@@ -182,6 +182,7 @@ fn costs(
     for _ in 0..MOST_ROUNDS {
         for ((method, outcome), times) in methods.iter().zip(outcomes).zip(&mut times) {
             let (Ok(work), Ok(_)) = (&method.work, outcome) else { continue };
+            // A cheap method gets more rounds: the median of short times needs more of them.
             if times.iter().sum::<Duration>() < BUDGET {
                 let start = clock();
                 once(work, watch)?;
@@ -208,14 +209,14 @@ fn once(work: &Work, watch: &dyn MeasurementWatch) -> Option<()> {
         Work::Run(run) => drop(std::hint::black_box(unwatched(run, &|| watch.stops())?)),
         Work::Analysis { scene, method } => {
             let limited = Limited { watch, expected: Mutex::new(0.0), is_first: false };
-            // The same analysis has succeeded before, so an error now means that the watch stopped it.
+            // The same analysis has succeeded before, so an error now means that the watch stopped the analysis.
             drop(std::hint::black_box(analyse_watched(scene, *method, &limited).ok()?));
         }
     }
     if watch.stops() { None } else { Some(()) }
 }
 
-/// Watch of an analysis. Stops the analysis if its estimate exceeds [`MOST_OPERATIONS`], if it is the first analysis of a method that takes too long, or if the
+/// Watch of an analysis. Stops the analysis if the estimate exceeds [`MOST_OPERATIONS`], if the first analysis of a method takes too long, or if the
 /// measurement must stop.
 struct Limited<'a> {
     watch: &'a dyn MeasurementWatch,

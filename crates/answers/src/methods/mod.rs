@@ -1,7 +1,7 @@
 //! The methods selectable in a scene, with the cost and the error of each on this scene.
 //!
-//! A [`Method`] is data: its kind, its option on the command line, and the work which shows its cost. [`methods`] lists the methods, and [`measure`] does the
-//! work. The methods of one [`Kind`] do the same work, so their costs and errors are comparable. [`measure`] takes the clock as an argument.
+//! A [`Method`] is data: kind, option on the command line, and the work for measuring the cost. [`methods`] lists the methods, and [`measure`] does the work.
+//! The methods of a [`Kind`] do the same work, so that costs and errors are comparable. [`measure`] takes the clock as an argument.
 
 mod document;
 mod list;
@@ -109,13 +109,13 @@ pub struct Method {
     pub kind: Kind,
     /// Name of the method, unique within its kind.
     pub name: String,
-    /// Option which selects the method on the command line; empty for the default.
+    /// Option of the method on the command line; empty for the default.
     pub option: String,
     /// `true` if the scene as it stands uses this method.
     pub chosen: bool,
     /// `true` if the errors of the methods of this kind are measured against this method.
     pub(crate) is_reference: bool,
-    /// Work which shows the cost and the error, or the reason why the method does not apply to the scene.
+    /// Work for measuring cost and error, or the reason why the method does not apply to the scene.
     pub(crate) work: Result<Work, String>,
 }
 
@@ -126,14 +126,14 @@ impl Method {
     }
 }
 
-/// Work which shows the cost and the error of a method.
+/// Work for measuring cost and error of a method.
 #[derive(Clone, Debug)]
 pub(crate) enum Work {
     Run(Run),
     Analysis { scene: Box<Scene>, method: cohaptic_stability::Method },
 }
 
-/// A run of a scene, or of its beginning.
+/// A run of a scene, or of the beginning of a scene.
 #[derive(Clone, Debug)]
 pub(crate) struct Run {
     /// The scene, with the simulated span as its duration.

@@ -1,6 +1,6 @@
 //! The picture of measured methods: cost on the horizontal axis, error on the vertical axis, both logarithmic.
 //!
-//! An error of exactly zero has no logarithm. Such a point is drawn below all other errors, as a triangle with its tip down.
+//! An error of exactly zero has no logarithm. Such a point is drawn below all other errors, as a triangle with the tip down.
 
 use std::ops::RangeFrom;
 
@@ -8,7 +8,7 @@ use cohaptic_picture::{Axis, Line, Look, Marker, Panel, Picture};
 
 use super::{Kind, Measured, MeasuredMethod};
 
-/// Draws one panel per kind with a cost and an error. The other kinds are in the table only.
+/// Draws a panel per kind with a cost and an error. All further kinds are only in the table.
 #[must_use]
 pub fn cost_picture(title: &str, measured: &Measured) -> Picture {
     let mut looks = 0..;
@@ -29,8 +29,8 @@ pub fn error_in_words(error: Option<f64>) -> String {
     }
 }
 
-/// Draws one kind; `None` if the kind has no points. `looks`: numbers of unused looks, shared by all panels, because names without room beside their points go
-/// to a common legend.
+/// Draws a kind; `None` if the kind has no points. `looks`: numbers of unused looks, shared by all panels, because names without room beside the points go to a
+/// common legend.
 fn panel(kind: Kind, methods: &[MeasuredMethod], looks: &mut RangeFrom<usize>) -> Option<Panel> {
     let drawn: Vec<(&MeasuredMethod, f64, f64)> = methods
         .iter()
@@ -41,7 +41,7 @@ fn panel(kind: Kind, methods: &[MeasuredMethod], looks: &mut RangeFrom<usize>) -
         return None;
     }
     let least = drawn.iter().map(|(_, _, error)| *error).filter(|error| *error > 0.0).fold(f64::INFINITY, f64::min);
-    // One decade below the decade of the least error, so that zero is not mistaken for an error of that size.
+    // One decade below the decade of the least error, so that zero is not mistaken for the least error.
     let floor = if least.is_finite() { 10_f64.powf(least.log10().floor() - 1.0) } else { 1e-16 };
     let decades = |name: &str, unit: String| Axis::new(name).unit(unit).logarithmic().tight().ends_at_ticks();
     let along = decades("Cost", kind.cost_unit().to_owned());
@@ -50,7 +50,7 @@ fn panel(kind: Kind, methods: &[MeasuredMethod], looks: &mut RangeFrom<usize>) -
         up = up.include(floor);
     }
     let point = |((method, cost, error), number): ((&MeasuredMethod, f64, f64), usize)| {
-        // Only zero has the triangle with its tip down.
+        // Only zero has the triangle with the tip down.
         let (height, marker) = if error == 0.0 { (floor, Marker::TriangleDown) } else { (error, Marker::of(number % 6)) };
         let name = if method.chosen { format!("{} (chosen)", method.name) } else { method.name.clone() };
         Line::new([(cost, height)], Look::of(number)).marked(marker).named(name)

@@ -1,4 +1,4 @@
-//! Runs of methods: watched runs, which give the positions of the copies, and unwatched runs, whose time is measured.
+//! Runs of methods: watched runs for the positions of the copies, and unwatched runs for the time.
 
 use std::convert::Infallible;
 
@@ -7,7 +7,7 @@ use cohaptic_units::{Instant, print::Span};
 
 use super::Run;
 
-/// Positions of the copies in the runs of one method.
+/// Positions of the copies in the runs of a method.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Trajectory {
     /// Positions along the compared axes \[m\]: tick by tick, then at the end of the same run, then at the end of an unwatched run, which may use another
@@ -33,11 +33,11 @@ impl Trajectory {
         Some(Self { positions, diverged })
     }
 
-    /// Returns the largest difference of the positions \[m\], or the reason for having none.
+    /// Returns the largest difference of the positions \[m\], or the reason for a missing difference.
     pub(crate) fn difference(&self, other: &Self) -> Result<f64, String> {
         for (trajectory, whose) in [(self, "the run diverges"), (other, "the run of the reference diverges")] {
             if let Some(at) = trajectory.diverged
-                // Two runs which diverge at the same instant can still be compared up to there.
+                // Two runs with the same instant of divergence can still be compared up to this instant.
                 && self.diverged != other.diverged
             {
                 return Err(format!("{whose} at {}", Span(at - Instant::ZERO)));
