@@ -84,6 +84,7 @@ fn judged(scene: &Scene, stable: bool, watch: &dyn Watch, note: impl FnOnce(Stri
         Some(mean_square) => (mean_square.radius, "mean-square radius"),
         None => (judgement.analysis.radius, "spectral radius"),
     };
+    // A marginal or overflowing verdict meets neither expectation.
     let expected = if stable { Verdict::Stable } else { Verdict::Unstable };
     let found = format!("it is {}: the {what} is {} within {:.1e}", judgement.verdict.word(), Number(radius.value), radius.error);
     Judged::Found(Finding { passed: judgement.verdict == expected, found, radius: Some(radius.value).filter(|value| value.is_finite()) })

@@ -1,4 +1,4 @@
-//! The page of an answer, as one HTML file: the answer in sentences, what was asked, the pictures, the tables, the notes, and the text of the scene.
+//! The page of an answer, as a single HTML file: the answer in sentences, the question, the pictures, the tables, the notes, and the text of the scene.
 //!
 //! Each answer has a function `html`, which fills an [`AnswerPage`]. The page has no clock, so equal answers give equal bytes.
 
@@ -10,13 +10,13 @@ use crate::label;
 /// Largest number of rows of a table on a page. Further rows stand only in the files of the folder.
 pub const MOST_ROWS: usize = 400;
 
-/// Largest number of similar sentences at the head of a page, such as one per crossing. The tables have the rest.
+/// Largest number of similar sentences at the head of a page, such as a sentence per crossing. The tables have the rest.
 const MOST_SENTENCES: usize = 20;
 
-/// Origin of an answer, shown on its page.
+/// Origin of an answer, shown on the page.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Origin<'a> {
-    /// Command that makes the page again.
+    /// Command for making the page again.
     pub command: &'a str,
     /// Name of the file of the scene.
     pub file: &'a str,
@@ -35,11 +35,11 @@ pub struct AnswerPage {
     pub title: String,
     /// Sentences in the colour of a failure, before the answer.
     pub warnings: Vec<String>,
-    /// The answer, one paragraph per sentence.
+    /// The answer, a paragraph per sentence.
     pub sentences: Vec<String>,
-    /// Settings of the question besides the scene and its overrides: names with their values.
+    /// Settings of the question besides scene and overrides: names with values.
     pub asked: Vec<(&'static str, Html)>,
-    /// Tables, shown after the pictures, with their headings.
+    /// Tables with headings, shown after the pictures.
     pub tables: Html,
     /// Notes on simplifications.
     pub notes: Vec<String>,
@@ -73,7 +73,7 @@ impl AnswerPage {
     }
 }
 
-/// Returns the section of a page with the command that makes the page again.
+/// Returns the section of a page with the command for making the page again.
 #[must_use]
 pub fn made_by(command: &str) -> Html {
     Html::heading(2, "Made by").and(Html::preformatted(command))
@@ -93,7 +93,7 @@ pub fn overrides(overrides: &[String]) -> Option<(&'static str, Html)> {
     keys.reduce(|before, key| before.and(", ").and(key)).map(|keys| ("Overrides", keys))
 }
 
-/// Returns the sentence about the rows that are not shown of a table with `rows` rows; empty if the page shows all rows. `file` has all rows.
+/// Returns the sentence about the missing rows of a table with `rows` rows; empty if the page shows all rows. `file` has all rows.
 #[must_use]
 pub fn more_rows(rows: u64, what: &str, file: &str) -> Html {
     if rows > MOST_ROWS as u64 { Html::paragraph(format!("{MOST_ROWS} of {rows} {what} are shown; {file} has all.")) } else { Html::default() }
@@ -102,6 +102,7 @@ pub fn more_rows(rows: u64, what: &str, file: &str) -> Html {
 /// Returns the searched range of a key: `coordination.stiffness [N/m], from 0 to 6000`.
 #[must_use]
 pub fn range(key: &KeyRange) -> Html {
+    // `text` repeats the key, and the range names the key once, before both ends.
     let end = |value: f64| key.text(value).replacen(&format!("{}=", key.key), "", 1);
     format!("{}, from {} to {}", label(key), end(key.low), end(key.high)).into()
 }
@@ -121,7 +122,7 @@ pub(crate) fn clauses(clauses: &[String]) -> String {
 
 /// Returns words as a sentence, which begins with a capital letter and ends with a full stop.
 fn sentence(words: &str) -> String {
-    // A first word with one of these characters in it is a key of the scene or the name of a file, and stays as it is.
+    // A first word with such a character is a key of the scene or the name of a file, and stays as written.
     let is_name = words.split_whitespace().next().is_some_and(|first| first.contains(['.', '_', '=']));
     let mut letters = words.chars();
     let first: String = letters.next().map_or_else(String::new, |first| if is_name { first.to_string() } else { first.to_uppercase().collect() });

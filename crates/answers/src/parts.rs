@@ -47,13 +47,14 @@ pub fn rotation(summary: &Summary) -> Option<impl Serialize + use<>> {
     summary.max_rotation_discrepancy.map(|angle| document! { max_rotation_discrepancy_rad: angle })
 }
 
-/// Greatest number of links listed one by one.
+/// Greatest number of links listed singly.
 pub(crate) const MOST_LINKS: u64 = 1000;
 
 /// Returns the document of each link between two peers at the end of a run; `None` if the scene has more than 1000 links.
 pub fn peer_links(scene: &Scene, summary: &Summary) -> Option<Vec<impl Serialize + use<>>> {
     let name = |peer: usize| scene.peers[peer].name.clone();
     let links = || summary.links.iter().map(|link| self::link(name(link.from), name(link.to), &link.stats));
+    // The links of a large mesh would make the document long. Totals and quantiles stand for the links then.
     (summary.links.len() <= MOST_LINKS).then(|| links().collect())
 }
 
@@ -74,7 +75,7 @@ pub fn link_quantiles(summary: &Summary) -> impl Serialize + use<> {
     document! { delivered_fraction: of(summary.links.delivered_fraction()), mean_delay_s: of(summary.links.mean_delay()) }
 }
 
-/// Returns the document of a link with the names of its ends.
+/// Returns the document of a link with the names of both ends.
 pub fn link(from: String, to: String, stats: &LinkStats) -> impl Serialize + use<> {
     document! {
         from: from,

@@ -81,7 +81,7 @@ fn over_links(summary: &Summary) -> Vec<String> {
 #[must_use]
 pub fn packets(summary: &Summary) -> String {
     let total = summary.links.total();
-    // A packet is first counted by the uplink of its sender, or by the link if the sender has no uplink; last by the downlink of its receiver, or by the link.
+    // A packet is first counted by the uplink of the sender, or by the link if the sender has no uplink; last by the downlink of the receiver, or by the link.
     let through = |uplink: bool, count: fn(&LinkStats) -> u64| -> u64 {
         let lines = || summary.access_lines.iter().filter(move |line| line.uplink == uplink);
         // The usual scene has no access lines, and then the totals suffice.

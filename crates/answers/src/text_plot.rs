@@ -1,5 +1,5 @@
 //! Curves over time as text, in braille patterns of Unicode: each character has two columns and four rows of dots. A letter at the end of each curve leads to
-//! its name in the legend below, because a terminal without colours has no other way to tell curves apart.
+//! the name in the legend below, because a terminal without colours has no other way to tell curves apart.
 
 use cohaptic_harness::record::{Bands, SANE_POSITION};
 
@@ -49,6 +49,7 @@ pub(crate) fn text_plot(bands: &Bands, names: &[&str]) -> String {
             last = Some(row((low + high) / 2.0));
             end = last;
         }
+        // Curves without a letter have no entry in the legend, and are counted below.
         if let (Some(name), Some(letter)) = (names.get(curve), ('a'..='z').take(MOST_LETTERS).nth(curve)) {
             if let Some(row) = end {
                 letters[row / 4].push(letter);

@@ -11,7 +11,7 @@ pub fn length(metres: f64) -> String {
     }
 }
 
-/// Returns the unit in which texts write a length, and the factor from metres to this unit.
+/// Returns the unit of a length in texts, and the factor from metres to this unit.
 pub(crate) const fn length_unit(metres: f64) -> (f64, &'static str) {
     if metres.abs() < 1e4 { (1e3, "mm") } else { (1.0, "m") }
 }
@@ -28,18 +28,18 @@ pub(crate) fn nominal(count: usize, [one, several]: [&str; 2]) -> Option<String>
     })
 }
 
-/// Returns the name of a variant of a scene in a legend: the name of its coordination law, and then the `KEY=VALUE` texts that make the variant out of the
-/// scene, without the text that chooses the law.
+/// Returns the name of a variant of a scene in a legend: the name of the coordination law, and then the `KEY=VALUE` texts of the variant, without the text
+/// about the law.
 #[must_use]
 pub fn legend_name(law: &str, overrides: &[String]) -> String {
     let is_law = |text: &&String| text.split_once('=').is_some_and(|(key, _)| key.trim() == LAW);
     std::iter::once(law).chain(overrides.iter().filter(|text| !is_law(text)).map(String::as_str)).collect::<Vec<&str>>().join(", ")
 }
 
-/// Key that chooses the coordination law of a scene.
+/// Key of the coordination law of a scene.
 pub(crate) const LAW: &str = "coordination.strategy";
 
-/// Returns a count with its noun and verb: `1 cell is`, `2 cells are`.
+/// Returns a count with noun and verb: `1 cell is`, `2 cells are`.
 #[must_use]
 pub fn are(number: usize, one: &str) -> String {
     format!("{} {}", Counted(number, one), if number == 1 { "is" } else { "are" })
@@ -48,6 +48,7 @@ pub fn are(number: usize, one: &str) -> String {
 /// Returns a figure with `digits` digits after the decimal point. Values from 10⁶ on and below 10⁻⁴ are written with an exponent.
 #[must_use]
 pub fn figure(value: f64, digits: usize) -> String {
+    // Zero and numbers that are not finite have no power of ten.
     let plain = value == 0.0 || !value.is_finite() || (1e-4..1e6).contains(&value.abs());
     if plain { format!("{value:.digits$}") } else { format!("{value:.digits$e}") }
 }

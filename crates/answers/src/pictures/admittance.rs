@@ -3,12 +3,12 @@
 use cohaptic_picture::{Axis, Line, Look, Marker, Panel, Picture};
 use cohaptic_stability::{Admittance, AdmittanceError, FrequencyResponse, PushedAxis, Verdict, ideal};
 
-/// An admittance, its name in the legend, and its values.
+/// An admittance with a name for the legend and with values.
 #[derive(Clone, Copy, Debug)]
 pub struct AdmittanceCurve<'a> {
     /// Name in the legend, without the verdict: see [`legend_name`](crate::legend_name).
     pub name: &'a str,
-    /// Admittance of a peer, along or about its axes.
+    /// Admittance of a peer, along or about the axes.
     pub admittance: &'a Admittance,
     /// Values at the requested frequencies.
     pub response: &'a FrequencyResponse,
@@ -43,7 +43,7 @@ pub(crate) fn admittance_words(admittance: &Admittance) -> AdmittanceWords {
     AdmittanceWords { what: format!("{seen_name}{velocity} over {push_name}{force}"), over, free, inertia }
 }
 
-/// A curve with its name.
+/// A named curve.
 struct Response {
     name: String,
     look: Look,

@@ -11,13 +11,13 @@ pub(crate) fn label(range: &KeyRange) -> String {
     }
 }
 
-/// Returns the axis of a picture over a key: `Coordination stiffness K_T [N/m]`. A key without a symbol in the paper keeps its own name.
+/// Returns the axis of a picture over a key: `Coordination stiffness K_T [N/m]`. A key without a symbol in the paper keeps the name of the key.
 #[must_use]
 pub fn axis_of(range: &KeyRange) -> Axis {
     axis_of_key(&range.key, &range.unit)
 }
 
-/// Like [`axis_of`], for a key whose values have the given unit, which may be empty.
+/// Like [`axis_of`], for a key with values in the given unit, possibly empty.
 pub(crate) fn axis_of_key(key: &str, unit: &str) -> Axis {
     let named = NAMES.iter().find(|(known, _, _)| *known == key.trim());
     let axis = named.map_or_else(|| Axis::new(key), |(_, name, symbol)| Axis::new(*name).symbol(symbol));
@@ -39,6 +39,7 @@ const NAMES: [(&str, &str, &str); 10] = [
 ];
 
 fn shown_unit<'a>(key: &str, given: &'a str) -> Option<&'a str> {
+    // The unit of the range goes before the unit of the key: `40ms` is in milliseconds.
     Some(given).filter(|unit| !unit.is_empty()).or_else(|| unit(key))
 }
 
@@ -49,6 +50,7 @@ fn unit(key: &str) -> Option<&'static str> {
         "mass" => Some("kg"),
         "stiffness" => Some("N/m"),
         "damping" => Some("N·s/m"),
+        // Only force and amplitude of a hand are in newtons.
         "force" | "amplitude" if words.any(|word| word == "hand") => Some("N"),
         "frequency" => Some("Hz"),
         _ => None,

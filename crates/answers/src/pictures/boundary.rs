@@ -40,11 +40,11 @@ struct Picture<'a> {
     axis: Axis,
     /// Name of the radius, such as spectral radius or mean-square radius.
     radius: &'a str,
-    /// Nominal values of the key with their radii, and their name in the legend.
+    /// Nominal values of the key with the radii, and the name of the nominal values in the legend.
     nominal: (&'a [(f64, f64)], &'a str),
     /// Lower and upper end of the searched range.
     range: (f64, f64),
-    /// Values of the key in rising order, each with its radius.
+    /// Values of the key in rising order, each with the radius.
     samples: &'a [(f64, f64)],
     /// Values of the key at crossings, each with its description.
     crossings: &'a [(f64, String)],

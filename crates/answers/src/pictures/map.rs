@@ -5,7 +5,7 @@ use cohaptic_stability::{Criterion, KeyRange, Kinds, Map, Polyline, nominal_head
 
 use super::axis::axis_of;
 
-/// A map with its name in the legend.
+/// A map with a name for the legend.
 #[derive(Clone, Copy, Debug)]
 pub struct NamedMap<'a> {
     /// Name in the legend, without the verdict: see [`legend_name`](crate::legend_name).
@@ -21,6 +21,7 @@ pub struct NamedMap<'a> {
 /// Draws maps over the same two keys; `None` for an empty list.
 #[must_use]
 pub fn map_picture(title: &str, [x, y]: [&KeyRange; 2], maps: &[NamedMap<'_>]) -> Option<cohaptic_picture::Picture> {
+    // All maps have the keys of the first map, so that the first map gives the axes.
     let first = maps.first()?;
     let kinds = |named: &NamedMap<'_>| Kinds::of(named.criterion, named.map.nominal.iter().flatten().copied());
     let title = format!("{title}: {} below 1", kinds(first).radius_name());
@@ -41,7 +42,7 @@ pub fn map_picture(title: &str, [x, y]: [&KeyRange; 2], maps: &[NamedMap<'_>]) -
     Some(picture.drawn())
 }
 
-/// Most maps whose regions are filled. Where more areas lie on each other, no colour is told from another one, and the edges of further maps stand alone.
+/// Largest number of maps with filled regions. Colours of more areas on each other cannot be told apart, so that further maps have only edges.
 const MOST_FILLED: usize = 6;
 
 /// Content of the picture.
@@ -49,7 +50,7 @@ struct Picture<'a> {
     title: &'a str,
     x: Axis<'a>,
     y: Axis<'a>,
-    /// Stable regions, one per map.
+    /// Stable regions, a region per map.
     areas: Vec<Area>,
     /// Nominal cells of the first variant, indexed by row and column.
     nominal: &'a [Vec<bool>],

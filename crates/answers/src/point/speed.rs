@@ -20,7 +20,7 @@ impl Bounded {
         Self { value: rising(analysis.radius.value), low: rising(low), high: rising(high) }
     }
 
-    /// Returns the number if its bounds are at most one percent apart.
+    /// Returns the number if the bounds are at most one percent apart.
     pub(super) fn known(&self) -> Option<f64> {
         // The comparison is false for NaN and for an infinite bound, as it must be.
         (self.high - self.low <= KNOWN * self.value.abs()).then_some(self.value)

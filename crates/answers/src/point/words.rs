@@ -39,6 +39,7 @@ pub fn words(scene: &Scene, judgement: &Judgement, worst: Option<&SceneWorstCase
     if analysis.modes.len() > 1 {
         modes(analysis, &mut line);
     }
+    // A mode of a single part has nothing to list.
     if let Some(mode) = worst_mode(analysis).filter(|mode| mode.parts.len() > 1) {
         line(String::new());
         let of_mode = [mode.motion.as_str(), mode.contacts.as_str()].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(", ");

@@ -9,7 +9,7 @@ use super::worker::State;
 use super::{Names, Piece, Worker};
 use crate::{document, figure};
 
-/// Shared work and its workers.
+/// Shared work with the workers.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Status<'a> {
     /// Path of the folder as given by the user.
@@ -43,7 +43,7 @@ impl Status<'_> {
         self.ends_in(worker).filter(|_| worker.state == State::Working)
     }
 
-    /// Returns two pairs of numbers of pieces and units: of the whole work, and of its finished pieces.
+    /// Returns two pairs of numbers of pieces and units: of the whole work, and of the finished pieces.
     fn counts(&self) -> [(u64, u64); 2] {
         let of = |is_meant: &dyn Fn(&Piece) -> bool| {
             let meant: Vec<&Piece> = self.pieces.iter().filter(|piece| is_meant(piece)).collect();

@@ -2,7 +2,7 @@
 
 use cohaptic_campaign::Shard;
 
-/// A worker, known by its log and its lease.
+/// A worker, known by log and lease.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Worker {
     /// Shard of the worker.
@@ -13,18 +13,18 @@ pub struct Worker {
     /// Number of finished pieces, and in `units` the number of units in these pieces.
     pub(super) pieces: u64,
     pub(super) units: u64,
-    /// Time from the worker's begin to its last finished piece, or to its end \[s\].
+    /// Time from the begin of the worker to the last finished piece, or to the end \[s\].
     seconds: f64,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum State {
-    /// The worker renews its lease.
+    /// The worker renews the lease.
     Working,
     Done,
     Interrupted,
     Failed,
-    /// The worker has neither written an end nor renewed its lease.
+    /// The worker has neither written an end nor renewed the lease.
     Killed,
 }
 
@@ -46,13 +46,13 @@ impl Worker {
         (self.units > 0 && self.seconds > 0.0).then(|| self.units as f64 / self.seconds)
     }
 
-    /// Reads the log of a worker; `None` if its first line is not whole. `lives`: whether the worker renews its lease.
+    /// Reads the log of a worker; `None` if the first line is not whole. `lives`: whether the worker renews the lease.
     #[must_use]
     pub fn read(text: &str, lives: bool) -> Option<Self> {
         // A line without a line feed is torn, or still being written, and is left out.
         let mut lines = text.split_inclusive('\n').filter_map(|line| line.strip_suffix('\n'));
         let [_, shard, _, process, _, host] = *lines.next()?.split(' ').collect::<Vec<_>>() else { return None };
-        // A log which states no end belongs to a worker at work or to a killed worker.
+        // A log without an end belongs to a worker at work or to a killed worker.
         let state = if lives { State::Working } else { State::Killed };
         let mut worker =
             Self { shard: shard.parse().ok()?, process: process.parse().ok()?, host: host.to_owned(), state, pieces: 0, units: 0, seconds: 0.0 };
