@@ -36,18 +36,18 @@ pub struct AdmissionConfig {
     pub session: u64,
     /// Number of axes of the scene, 1 to 3.
     pub axes: usize,
-    /// Kind of the samples: data that samples carry beyond position and velocity.
+    /// Kind of the samples: data in samples beyond position and velocity.
     pub kind: SampleKind,
-    /// Number of peers of the scene, simulated peers included. Every seat has a place below this number.
+    /// Number of peers of the scene, simulated peers included. The place of every seat is below this number.
     pub peers: u32,
     /// Period of sending Tn, above zero and below 584 years. A welcome carries this period.
     pub update: Duration,
     /// Peers that are other programs, in any order, each at a place of its own.
     pub seats: Vec<Seat>,
-    /// Session key. With a key only programs that hold the key can join. `None`: every program that reaches the socket can join.
+    /// Session key. With a key only programs with the key can join. `None`: every program within reach of the socket can join.
     pub key: Option<SessionKey>,
-    /// Time without an admitted sample after which a peer counts as gone, above zero and below 584 years. Nothing is sent to a peer that is gone, and its seat
-    /// can be taken.
+    /// Time without an admitted sample after which a peer counts as gone, above zero and below 584 years. Nothing is sent to a gone peer, and the seat of a
+    /// gone peer can be taken.
     pub stale_after: Duration,
     /// Limits of position and velocity. `None`: every finite sample is admitted.
     pub limits: Option<Limits>,

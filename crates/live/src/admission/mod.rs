@@ -6,9 +6,9 @@
 //!                      └── Refused: counted by cause, and nothing else has changed
 //! ```
 //!
-//! Without a key the first sample for a seat joins, and the seat belongs to the address of that sample until no sample has been admitted for a while. With a
-//! key a peer says hello, gets a nonce of the server in a welcome, and joins with the first sample that is sealed under keys derived from the nonces of both
-//! sides. The session keeps no state for peers that have only said hello:
+//! Without a key the first sample for a seat joins, and the seat belongs to the address of the sample until no sample has been admitted for a while. With a key
+//! a peer says hello, gets a nonce of the server in a welcome, and joins with the first sample sealed under keys derived from the nonces of both sides. The
+//! session keeps no state for peers that have only said hello:
 //!
 //! - The server's nonce is a keyed hash of the place, of the number of joinings at the seat so far, and of the address that asked. The client's nonce comes
 //!   with every sealed sample. So the session can derive the keys again when a sample needs the keys.
@@ -43,14 +43,14 @@ pub use seats::SeatStatus;
 
 use seats::{Occupant, SeatState};
 
-/// Upper bound (exclusive) of the sequence numbers that a peer may give its samples: 2⁴⁰.
+/// Upper bound (exclusive) of the sequence numbers of a peer's samples: 2⁴⁰.
 pub(crate) const SEQUENCE_END: u64 = 1 << SEQUENCE_BITS;
 
-/// Bits of an admitted sequence number that hold the peer's own number.
+/// Bits of an admitted sequence number for the peer's own number.
 const SEQUENCE_BITS: u32 = 40;
 /// Largest number of joinings at a seat: the numbers from 0 fill the upper bits of an admitted sequence number.
 const JOININGS_END: u64 = 1 << (64 - SEQUENCE_BITS);
-/// Bytes of a sample that hold its sequence number, in little-endian order.
+/// Bytes of a sample with the sequence number, in little-endian order.
 const SEQUENCE_AT: core::ops::Range<usize> = 24..32;
 
 /// Decision about a received datagram.
@@ -65,7 +65,7 @@ pub enum Admission {
         /// The sample without its seal. Its sequence number is unique within the session.
         sample: Admitted,
     },
-    /// The datagram was a hello, to be answered by a welcome.
+    /// The datagram was a hello. A welcome answers the hello.
     Reply {
         /// Receiver of the welcome: the address that sent the hello.
         to: SocketAddr,
@@ -106,7 +106,7 @@ pub struct AdmissionControl {
     key: Option<SessionKey>,
     stale_after: Duration,
     limits: Option<Limits>,
-    /// Secret key of the hash that makes server nonces. Drawn anew for each session, so that no two sessions give the same nonces.
+    /// Secret key of the hash for server nonces. Drawn anew for each session, so that no two sessions give the same nonces.
     secret: Secret,
     /// Seats, sorted by place, so that a place is found by binary search.
     seats: Vec<SeatState>,
@@ -126,17 +126,17 @@ impl core::fmt::Debug for Secret {
 enum Under {
     /// Keys of the present joining, or no keys in a session without a key.
     Present,
-    /// Newly derived keys, for the address that sent the sample. Boxed, so that the box moves and not the keys: moved keys would leave copies in memory.
+    /// Newly derived keys, for the address of the sample. Boxed, so that the box moves and not the keys: moved keys would leave copies in memory.
     New(Box<JoiningKeys>),
 }
 
 impl AdmissionControl {
-    /// Returns an admission control whose seats are all free. Draws 32 bytes from `entropy`, in this call only. With the same bytes, the same datagrams at the
-    /// same instants get the same decisions.
+    /// Returns an admission control with free seats only. Draws 32 bytes from `entropy`, in this call only. With the same bytes, the same datagrams at the same
+    /// instants get the same decisions.
     ///
     /// # Errors
     ///
-    /// [`AdmissionConfigError`] if a number of the configuration is out of its range, two seats have the same place, or `entropy` has no random bytes.
+    /// [`AdmissionConfigError`] if a number of the configuration is out of range, two seats have the same place, or `entropy` has no random bytes.
     pub fn new(config: AdmissionConfig, entropy: &mut impl Entropy) -> Result<Self, AdmissionConfigError> {
         config.check()?;
         let mut secret = Zeroizing::new([0; 32]);
@@ -149,7 +149,7 @@ impl AdmissionControl {
         Ok(Self { session, axes, kind, peers, update, key, stale_after, limits, secret, seats, stats: AdmissionStats::default() })
     }
 
-    /// Decides about a datagram that was received from the address `from` at the instant `now`.
+    /// Decides about a datagram received from the address `from` at the instant `now`.
     ///
     /// Never panics, whatever the bytes are. Memory does not grow with the number of datagrams. Receive into a buffer longer than [`MAX_DATAGRAM`]: a shorter
     /// buffer would cut an oversized datagram to a length that may be admitted.
@@ -212,11 +212,11 @@ impl AdmissionControl {
         if datagram.starts_with(&HELLO_MAGIC) { self.handle_hello(from, datagram) } else { self.handle_sample(now, from, datagram) }
     }
 
-    /// Answers a hello. The decision depends neither on the time nor on earlier hellos: otherwise the hellos of an attacker could keep another peer from its
+    /// Answers a hello. The decision depends neither on the time nor on earlier hellos: otherwise the hellos of an attacker could keep another peer from the
     /// welcome.
     fn handle_hello(&self, from: SocketAddr, datagram: &[u8]) -> Result<Admission, Refusal> {
         let unchecked = Hello::decode(datagram).map_err(Refusal::of_hello)?;
-        // Without a key there is nothing to answer; the hello is counted under a cause that tells its sender's mistake.
+        // Without a key there is nothing to answer; the hello is counted under a cause that tells the sender's mistake.
         let Some(key) = &self.key else { return Err(Refusal::Keyless) };
         let Hello { session, place, client_nonce } = unchecked.hello;
         if session != self.session {
@@ -289,7 +289,7 @@ impl AdmissionControl {
         keys.map(|keys| Under::New(Box::new(keys))).ok_or(otherwise)
     }
 
-    /// Returns the server nonce for a program that asks for the seat from the address `from`. Changes when the seat is taken.
+    /// Returns the server nonce for a program at the address `from` that asks for the seat. Changes when the seat is taken.
     fn server_nonce(&self, index: usize, from: SocketAddr) -> Nonce {
         let seat = &self.seats[index];
         // A socket of IPv6 shows an IPv4 address in mapped form; both forms must give the same nonce. Scope and flow label are left out, because both have a
@@ -301,7 +301,7 @@ impl AdmissionControl {
         nonce_of(&self.secret.0, &[&seat.place().0.to_le_bytes(), &seat.joinings().to_le_bytes(), &ip.octets(), &from.port().to_le_bytes()])
     }
 
-    /// Writes a sample for the peer at `place`. See [`AdmissionControl::seal`], which also counts.
+    /// Writes a sample for the peer at `place`. The caller [`AdmissionControl::seal`] also counts.
     fn make_ready(&self, now: Instant, place: Place, sample: &[u8], out: &mut [u8; MAX_DATAGRAM]) -> Option<(SocketAddr, usize)> {
         let occupant = self.seats[self.find(place)?].present(now, self.stale_after)?;
         let len = match &occupant.keys {

@@ -16,7 +16,7 @@ pub enum Refusal {
     Oversized,
     /// The datagram is neither a sample nor a hello.
     Magic,
-    /// The datagram has another version of the protocol, or its sample is of another kind.
+    /// The datagram has another version of the protocol, or the sample is of another kind.
     Version,
     /// The sample has another number of axes than the scene.
     Axes,
@@ -50,7 +50,7 @@ pub enum Refusal {
     NotJoined,
     /// The sequence number was admitted before, or is too old to tell.
     Replayed,
-    /// The seat was taken 2²⁴ times, so that its numbers of joinings are used up.
+    /// The seat was taken 2²⁴ times, so that the numbers of joinings are used up.
     JoiningsUsedUp,
 }
 
@@ -108,7 +108,7 @@ impl Refusal {
         }
     }
 
-    /// Returns the cause for a sample that cannot be decoded.
+    /// Returns the cause for an undecodable sample.
     pub(super) const fn of_sample(error: DecodeError) -> Self {
         match error {
             DecodeError::TooShort { .. } => Self::TooShort,
@@ -124,7 +124,7 @@ impl Refusal {
         }
     }
 
-    /// Returns the cause for a hello that cannot be decoded or has a wrong tag.
+    /// Returns the cause for an undecodable hello, or for a wrong tag.
     pub(super) const fn of_hello(error: HandshakeError) -> Self {
         match error {
             HandshakeError::Magic => Self::Magic,
@@ -155,7 +155,7 @@ pub struct AdmissionStats {
     pub joinings: u64,
     /// Samples made ready for a peer outside.
     pub sent: u64,
-    /// Samples not sent: the receiver's seat was never taken, its holder is gone, the receiver has no seat, or the sample is too long.
+    /// Samples not sent: the receiver's seat was never taken, the holder of the seat is gone, the receiver has no seat, or the sample is too long.
     pub nobody_there: u64,
     /// Refused datagrams, indexed by cause: `Refusal as usize`.
     refused: [u64; Refusal::ALL.len()],

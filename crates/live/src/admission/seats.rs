@@ -1,4 +1,4 @@
-//! One seat of a session: its holder, the sequence numbers seen from the holder, and the rule by which another program can take the seat.
+//! A seat of a session: the holder, the sequence numbers seen from the holder, and the rule by which another program can take the seat.
 
 use core::time::Duration;
 use std::net::SocketAddr;
@@ -27,7 +27,7 @@ pub struct SeatStatus<'a> {
     pub admitted: u64,
 }
 
-/// A seat, its holder and its counts.
+/// A seat with the holder and the counts.
 #[derive(Debug)]
 pub(super) struct SeatState {
     seat: Seat,
@@ -119,7 +119,7 @@ impl SeatState {
         Ok(true)
     }
 
-    /// Admits a sample of the present joining, unless its number was seen before or is too old to tell.
+    /// Admits a sample of the present joining, unless the number was seen before or is too old to tell.
     fn keep(&mut self, now: Instant, number: u64) -> Result<bool, Refusal> {
         let Some(occupant) = &mut self.occupant else { return Err(Refusal::NotJoined) };
         if !occupant.window.accept(number) {
@@ -131,8 +131,8 @@ impl SeatState {
         Ok(false)
     }
 
-    /// Returns the sequence number that the scene sees for `number` in the present joining: the joining, counted from 0, in the upper bits. So the numbers
-    /// never go back when a peer joins again, and in the first joining `number` is unchanged.
+    /// Returns the sequence number for the scene of `number` in the present joining: the joining, counted from 0, in the upper bits. So the numbers never go
+    /// back when a peer joins again, and in the first joining `number` is unchanged.
     pub(super) const fn number_inside(&self, number: u64) -> u64 {
         self.joinings.saturating_sub(1) << SEQUENCE_BITS | number
     }
@@ -146,7 +146,7 @@ const fn since(then: Instant, now: Instant) -> Duration {
 /// Length of the window of sequence numbers: a late number is admitted once if the number is less than this below the highest number seen.
 pub(crate) const WINDOW: u32 = 128;
 
-/// Sequence numbers seen in one joining: a window of 128 numbers up to the highest number seen, as in RFC 4303, section 3.4.3.
+/// Sequence numbers seen in a joining: a window of 128 numbers up to the highest number seen, as in RFC 4303, section 3.4.3.
 #[derive(Clone, Copy, Debug)]
 struct Window {
     /// Highest number seen.
@@ -156,7 +156,7 @@ struct Window {
 }
 
 impl Window {
-    /// Returns the window after the first number of a joining. That number may be any number.
+    /// Returns the window after the first number of a joining. The first number may be any number.
     const fn beginning_with(number: u64) -> Self {
         Self { highest: number, seen: 1 }
     }

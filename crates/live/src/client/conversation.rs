@@ -1,4 +1,4 @@
-//! State machine of a client: the datagrams that a program sends to the session and receives from the session, from the first hello to the end.
+//! State machine of a client: the datagrams of a program to the session and from the session, from the first hello to the end.
 
 use core::time::Duration;
 use std::collections::BTreeMap;
@@ -15,7 +15,7 @@ pub(crate) const HELLO_EVERY: Duration = Duration::from_millis(250);
 /// Time without a new sample from any peer after which a client begins anew: the session may have been restarted.
 pub(crate) const SILENCE: Duration = Duration::from_secs(1);
 
-/// Identity of a client, and its way of joining.
+/// Identity of a client, and the way of joining.
 #[derive(Clone, Debug)]
 pub enum ClientConfig {
     /// For a session without a key. The parameters of the session must be known beforehand.
@@ -24,7 +24,7 @@ pub enum ClientConfig {
         session: u64,
         /// Place of the client's seat.
         place: Place,
-        /// Parameters of the session, which no welcome tells.
+        /// Parameters of the session: no welcome tells the parameters.
         info: SessionInfo,
     },
     /// For a session with a key. The welcome tells the parameters of the session.
@@ -38,7 +38,7 @@ pub enum ClientConfig {
     },
 }
 
-/// Parameters of a session that a peer must know.
+/// Parameters of a session for a peer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct SessionInfo {
     /// Number of axes of a sample, 1 to 3.
@@ -54,21 +54,21 @@ pub struct SessionInfo {
 /// Meaning of a received datagram.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Heard {
-    /// Newest sample of its sender, to be held from now on. Axes that the session does not have are zero.
+    /// Newest sample of the sender, to be held from now on. Axes beyond the axes of the session are zero.
     Newest(Sample<3>),
-    /// Sample that is not newer than an earlier sample of its sender.
+    /// Sample not newer than an earlier sample of the sender.
     Late(Sample<3>),
     /// Welcome for the hello of this client. The client may now seal samples.
     Welcome,
-    /// Datagram that is not for this client, or not valid.
+    /// Invalid datagram, or a datagram for another program.
     Ignored,
 }
 
-/// Client side of the protocol as a state machine. Received datagrams go in through [`Client::handle_datagram`]. Hellos come out of [`Client::poll_hello`],
-/// and samples out of [`Client::seal`].
+/// Client side of the protocol as a state machine. Received datagrams go in through [`Client::handle_datagram`]. Hellos come out of [`Client::poll_hello`], and
+/// samples out of [`Client::seal`].
 ///
-/// Call [`Client::poll_hello`] at every tick, or at the instant that [`Client::poll_timeout`] returns. That instant may change with each call of
-/// `handle_datagram` or `poll_hello`. A late call delays a hello and has no other effect.
+/// Call [`Client::poll_hello`] at every tick, or at the instant of [`Client::poll_timeout`]. The instant may change with each call of `handle_datagram` or
+/// `poll_hello`. A late call delays a hello and has no other effect.
 #[derive(Debug)]
 pub struct Client {
     session: u64,
@@ -79,24 +79,24 @@ pub struct Client {
     info: Option<SessionInfo>,
     /// Kind of the samples, until a welcome says otherwise.
     kind: SampleKind,
-    /// Data beyond position and velocity in the sample that was opened last.
+    /// Data beyond position and velocity in the sample opened last.
     extra: Extra<3>,
     /// Present joining. `None` before the first welcome, and in a session without a key.
     joined: Option<Joined>,
-    /// Joining for which hellos are sent. `None` while no hello needs an answer. Every repeated hello is the same datagram.
+    /// Joining whose hellos are sent. `None` while no hello needs an answer. Every repeated hello is the same datagram.
     joining: Option<Joining>,
     /// Earliest instant of the next hello.
     next_hello: Instant,
     /// Instant of the latest new sample, or of the latest new beginning.
     heard: Instant,
-    /// Highest sequence number received, by sender. Has at most as many entries as the scene has peers, because `open` refuses other senders.
+    /// Highest sequence number received, by sender. Has at most as many entries as the scene has peers, because `open` refuses further senders.
     newest: BTreeMap<u32, u64>,
     /// Number of welcomes taken.
     joinings: u64,
 }
 
 impl Client {
-    /// Returns a client that has sent nothing yet, for a session whose samples are states.
+    /// Returns a client before the first datagram, for a session with samples of states.
     #[must_use]
     pub fn new(config: ClientConfig, now: Instant) -> Self {
         let (session, place, key, info) = match config {
@@ -120,13 +120,13 @@ impl Client {
         }
     }
 
-    /// Returns the client, for a session whose samples are of the kind `kind`.
+    /// Returns the client, for a session with samples of the kind `kind`.
     #[must_use]
     pub fn with_kind(self, kind: SampleKind) -> Self {
         Self { kind, ..self }
     }
 
-    /// Returns the data beyond position and velocity of the sample that [`Client::handle_datagram`] returned last.
+    /// Returns the data beyond position and velocity of the sample returned last by [`Client::handle_datagram`].
     #[must_use]
     pub const fn extra(&self) -> &Extra<3> {
         &self.extra
@@ -150,8 +150,8 @@ impl Client {
         self.joinings
     }
 
-    /// Returns the hello that is to be sent now, if any. With a key, hellos are sent before the first welcome and while no new sample comes. Without a key
-    /// there are no hellos, but after a silence the client forgets the sequence numbers of all peers.
+    /// Returns the next hello, if a hello is due now. With a key, hellos are sent before the first welcome and while no new sample comes. Without a key there
+    /// are no hellos, but after a silence the client forgets the sequence numbers of all peers.
     ///
     /// # Errors
     ///
@@ -189,7 +189,7 @@ impl Client {
         if self.key.is_some() && self.joined.is_none() { self.next_hello } else { self.silent_from().max(self.next_hello) }
     }
 
-    /// Handles a datagram from the session, received at `now`. Never panics. A datagram that is not for this client, or not valid, changes nothing.
+    /// Handles a datagram from the session, received at `now`. Never panics. An invalid datagram, or a datagram for another program, changes nothing.
     pub fn handle_datagram(&mut self, now: Instant, datagram: &[u8]) -> Heard {
         if let Some(joining) = &self.joining
             && let Ok(joined) = joining.handle_welcome(datagram)
@@ -201,7 +201,7 @@ impl Client {
             self.joined = Some(joined);
             self.joining = None;
             self.joinings += 1;
-            // The session may have been restarted, and its peers may count from 0 again.
+            // The session may have been restarted, and the peers of the session may count from 0 again.
             self.begin_anew(now);
             return Heard::Welcome;
         }
@@ -210,8 +210,8 @@ impl Client {
         self.take(now, sample)
     }
 
-    /// Writes the datagram that carries `sample` to the session, sealed if there is a key, and returns its length. Returns `None` if `sample` is longer than a
-    /// sample can be, and, with a key, before the first welcome.
+    /// Writes the datagram with `sample` for the session, sealed if there is a key, and returns the length of the datagram. Returns `None` if `sample` is too
+    /// long for a sample, and, with a key, before the first welcome.
     pub fn seal(&self, sample: &[u8], out: &mut [u8; MAX_DATAGRAM]) -> Option<usize> {
         match (&self.key, &self.joined) {
             (Some(_), joined) => joined.as_ref()?.seal(sample, out),
@@ -237,7 +237,7 @@ impl Client {
         (sample.session == self.session && other && mine).then_some((sample, extra))
     }
 
-    /// Decides whether a sample is newer than all earlier samples of its sender. Only a newer sample ends a silence: a recorded sample must not.
+    /// Decides whether a sample is newer than all earlier samples of the sender. Only a newer sample ends a silence: a recorded sample must not.
     fn take(&mut self, now: Instant, sample: Sample<3>) -> Heard {
         if self.newest.get(&sample.sender).is_some_and(|&newest| sample.sequence <= newest) {
             return Heard::Late(sample);

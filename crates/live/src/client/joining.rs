@@ -1,4 +1,4 @@
-//! Datagrams of one joining in a session with a key.
+//! Datagrams of a joining in a session with a key.
 //!
 //! Send [`Joining::hello`] every quarter of a second, until [`Joining::handle_welcome`] accepts a received datagram. Then seal each sent sample with
 //! [`Joined::seal`], and open each received datagram with [`Joined::open`].
@@ -9,7 +9,7 @@ use crate::handshake::{HANDSHAKE_LEN, HandshakeError, Hello, Welcome};
 use crate::seal::{JoiningKeys, MAX_DATAGRAM, NONCE_LEN, SEAL_LEN, Sealed};
 use crate::{Entropy, EntropyError, Nonce, Place, SessionKey};
 
-/// Peer that asks for a seat: a hello that is not answered yet.
+/// Peer that asks for a seat: a hello without an answer so far.
 #[derive(Clone, Debug)]
 pub struct Joining {
     hello: Hello,
@@ -19,13 +19,13 @@ pub struct Joining {
 }
 
 impl Joining {
-    /// Returns a joining for a session whose samples are states, or carry attitudes if the welcome says so. `client_nonce` must never have been used before.
+    /// Returns a joining for a session with samples of states, or of attitudes if the welcome says so. `client_nonce` must never have been used before.
     #[must_use]
     pub fn new(session: u64, place: Place, key: &SessionKey, client_nonce: Nonce) -> Self {
         Self { hello: Hello { session, place, client_nonce }, key: key.clone(), kind: SampleKind::State }
     }
 
-    /// Returns the joining, for a session whose samples are of the kind `kind`.
+    /// Returns the joining, for a session with samples of the kind `kind`.
     #[must_use]
     pub fn with_kind(self, kind: SampleKind) -> Self {
         Self { kind, ..self }
@@ -78,7 +78,7 @@ pub enum WelcomeError {
     Other,
 }
 
-/// Peer that has the keys of its joining. The peer has its seat as soon as its first sample is admitted.
+/// Peer with the keys of its joining. The peer has the seat as soon as the first sample is admitted.
 #[derive(Debug)]
 pub struct Joined {
     welcome: Welcome,
@@ -99,12 +99,12 @@ impl Joined {
         self.kind
     }
 
-    /// Writes the sealed sample to `out` and returns its length. Returns `None` if `sample` is longer than a sample can be.
+    /// Writes the sealed sample to `out` and returns the length. Returns `None` if `sample` is too long for a sample.
     pub fn seal(&self, sample: &[u8], out: &mut [u8; MAX_DATAGRAM]) -> Option<usize> {
         self.keys.to_door.seal(&self.keys.client_nonce, sample, out)
     }
 
-    /// Returns the sample in a datagram from the session. The sample may be late or repeated: compare its sequence number with earlier samples of the same
+    /// Returns the sample in a datagram from the session. The sample may be late or repeated: compare the sequence number with earlier samples of the same
     /// sender.
     ///
     /// # Errors
