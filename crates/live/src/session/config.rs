@@ -1,4 +1,4 @@
-//! Configuration of a session, and the errors that keep a session from beginning or going on.
+//! Configuration of a session, and the errors of a session that cannot begin or go on.
 
 use std::io;
 use std::net::SocketAddr;
@@ -12,12 +12,12 @@ use cohaptic_scene::SceneContent;
 
 use crate::{AdmissionConfigError, SessionKey};
 
-/// Configuration of a session: its socket, its pace and its record. Peers, links and duration come from the scene.
+/// Configuration of a session: socket, pace and record. Peers, links and duration come from the scene.
 #[derive(Clone, Debug)]
 pub struct SessionConfig {
-    /// Local address of the socket to which peers of kind `udp` send. Not used in a scene without such peers.
+    /// Local address of the socket for peers of kind `udp`. Not used in a scene without such peers.
     pub listen: SocketAddr,
-    /// `true` if a session without a key may listen at an address that other machines can reach.
+    /// `true` if a session without a key may listen at an address within reach of other machines.
     pub allow_remote: bool,
     /// Session key. If set, every datagram must carry a tag made with the key. `None`: datagrams carry no tags.
     pub key: Option<SessionKey>,
@@ -25,20 +25,19 @@ pub struct SessionConfig {
     pub pacing: Pacing,
     /// Requests to the system for the thread of the session, such as priority and processor.
     pub wishes: Wishes,
-    /// Largest lateness of ticks and releases with which the session still counts as valid.
+    /// Largest lateness of ticks and releases in a valid session.
     pub tolerance: Tolerance,
     /// Folder of the record. `None`: nothing is recorded.
     pub out: Option<PathBuf>,
     /// Extent of the record. Not used without `out`.
     pub recorded: Recorded,
-    /// Keys and files of the scene, from [`cohaptic_scene::scene_content`], kept in the record. A replay with another scene names the keys and files that
-    /// differ. With empty content, a replay can only say that the scenes differ.
+    /// Keys and files of the scene, from [`cohaptic_scene::scene_content`], kept in the record. A replay with another scene names the differing keys and files.
+    /// With empty content, a replay can only say that the scenes differ.
     pub content: SceneContent,
 }
 
 impl SessionConfig {
-    /// Returns a configuration that sleeps until deadlines, asks the system for the default wishes, tolerates a lateness of 1 ms, and has no key and no
-    /// record.
+    /// Returns a configuration that sleeps until deadlines, asks the system for the default wishes, tolerates a lateness of 1 ms, and has no key and no record.
     #[must_use]
     pub fn new(listen: SocketAddr) -> Self {
         Self {
@@ -55,7 +54,7 @@ impl SessionConfig {
     }
 }
 
-/// Files that a session records.
+/// Files of a session's record.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Recorded {
     /// All files: `inputs.csv`, motions, packets and lateness.
@@ -69,7 +68,7 @@ pub enum Recorded {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SessionError {
-    /// The session would listen without a key at an address that other machines reach, and [`SessionConfig::allow_remote`] is not set.
+    /// The session would listen without a key at an address within reach of other machines, and [`SessionConfig::allow_remote`] is not set.
     #[error(
         "anybody who reaches {address} could take part: expected an address of this computer such as 127.0.0.1:7400, or a session key (--key-file), or \
          --allow-remote if everybody there may"

@@ -1,4 +1,4 @@
-//! Implementation of [`cohaptic_realtime::Driven`] for a session: the steps that the loop of [`cohaptic_realtime::drive()`] calls.
+//! Implementation of [`cohaptic_realtime::Driven`] for a session: the steps of the loop of [`cohaptic_realtime::drive()`].
 
 use std::os::fd::BorrowedFd;
 use std::time::Duration;
@@ -27,7 +27,7 @@ impl Driven for Session {
         self.outside.as_ref().and_then(Outside::readable)
     }
 
-    /// Reads one batch of datagrams and hands each admitted sample to the scene, at the instant at which the kernel received the datagram.
+    /// Reads a batch of datagrams and hands each admitted sample to the scene, at the instant at which the kernel received the datagram.
     fn receive(&mut self, now: Instant) -> Result<Received, SessionError> {
         let Self { outside, live, watch, clock, is_stopped, .. } = self;
         // Before a sample is handed over, the scene handles the ticks due before the sample. The lateness of these ticks counts up to now.
@@ -35,12 +35,12 @@ impl Driven for Session {
         let Some(outside) = outside else { return Ok(Received { count: 0, until: now }) };
         let count = outside.receive(clock, |at, peer, sample| {
             if !*is_stopped {
-                // `handle_sample` fails only if the record cannot be written. A sample that the scene refuses is counted by the scene. Once the record has
+                // `handle_sample` fails only if the record cannot be written. A sample refused by the scene is counted by the scene. Once the record has
                 // failed, the rest of the batch is dropped: the run is over.
                 *is_stopped = live.handle_sample(at, peer, sample, watch).is_err();
             }
         })?;
-        // Logical time passes to `now` even if more datagrams wait than one batch holds: otherwise a flood would delay ticks.
+        // Logical time passes to `now` even if more datagrams wait than a batch holds: otherwise a flood would delay ticks.
         Ok(Received { count, until: now })
     }
 
@@ -48,7 +48,7 @@ impl Driven for Session {
         self.live.poll_timeout()
     }
 
-    /// Handles the next deadline, if due. Handles one deadline per call, so that samples received before the following deadline are read first.
+    /// Handles the next deadline, if due. Handles a single deadline per call, so that samples received before the following deadline are read first.
     fn handle_timeout(&mut self, now: Instant) -> bool {
         // The tick is handled with its deadline as instant, not with `now`: the lateness must not change the motion.
         if let Some(due) = self.live.poll_timeout().filter(|due| *due <= now && !self.is_stopped) {
@@ -58,7 +58,7 @@ impl Driven for Session {
         false
     }
 
-    /// Queues and sends the samples that the network has delivered to peers in other programs. Returns the number of samples that had a receiver.
+    /// Queues and sends the samples for peers in other programs that the network has delivered. Returns the number of samples with a receiver.
     fn send(&mut self) -> u64 {
         let Self { outside, live, watch, clock, is_stopped, .. } = self;
         let Some(outside) = outside else { return 0 };
@@ -70,7 +70,7 @@ impl Driven for Session {
                 count += 1;
             }
         }
-        // All samples are queued before the first is sent, so that one call of the kernel can send many.
+        // All samples are queued before the first is sent, so that a call of the kernel can send many samples.
         outside.flush();
         count
     }

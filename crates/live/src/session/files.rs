@@ -1,5 +1,5 @@
-//! Two files of the record: `releases.csv` has a row for each datagram sent to another program, with its deadline and its lateness. `lateness.csv` has the
-//! histograms of the lateness of ticks and releases.
+//! Two files of the record: `releases.csv` has a row for each datagram sent to another program, with deadline and lateness. `lateness.csv` has the histograms
+//! of the lateness of ticks and releases.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;

@@ -1,7 +1,7 @@
 //! The session: a [`LiveScene`] driven by the wall clock, and the socket to other programs, whose datagrams pass an
 //! [`AdmissionControl`](crate::AdmissionControl).
 //!
-//! One thread does all work that has a deadline. The thread sleeps until a deadline is due, or until a datagram arrives that may have to be sent on to another
+//! One thread does all work with a deadline. The thread sleeps until a deadline is due, or until a datagram arrives that may have to be sent on to another
 //! program. The scene gets a logical instant with each event: the deadline itself, or the instant at which the kernel received the datagram. Files, live
 //! control and the terminal have threads of their own.
 
@@ -33,7 +33,7 @@ pub use config::{Recorded, SessionConfig, SessionError};
 pub use motion::{EndedPacket, Motion};
 pub use status::{LinkStatus, PeerStatus, Report, SocketCounts, Status};
 
-/// Conductor of a session: observes the session, changes links, and ends the session. The session calls the conductor on the thread that has deadlines, so the
+/// Conductor of a session: observes the session, changes links, and ends the session. The session calls the conductor on the thread with the deadlines, so the
 /// methods must neither wait nor take long.
 pub trait Conductor {
     /// Returns whether the session goes on. Called about 50 times a second.
@@ -59,7 +59,7 @@ pub trait Conductor {
     }
 }
 
-/// Change of one directed link, effective from the instant at which the session takes the change.
+/// Change of a directed link, effective from the instant at which the session takes the change.
 #[derive(Clone, Debug)]
 pub struct LinkChange {
     /// Sender, as index of a peer in the scene.
@@ -72,7 +72,7 @@ pub struct LinkChange {
     pub model: LinkModel,
 }
 
-/// Session that is ready to begin: the socket is bound and the files of the record are created.
+/// Session ready to begin: the socket is bound and the files of the record are created.
 #[derive(Debug)]
 pub struct Session {
     live: LiveScene,
@@ -120,7 +120,7 @@ impl Session {
 
     /// Runs the session on the calling thread until the scene ends or diverges, or until the conductor ends the session. Time begins with this call.
     ///
-    /// The calling thread asks the system for the configured wishes, and keeps the granted ones after the run. Give the session a thread of its own.
+    /// The calling thread asks the system for the configured wishes, and keeps the granted wishes after the run. Give the session a thread of its own.
     ///
     /// # Errors
     ///
@@ -184,8 +184,7 @@ impl Session {
         self.is_stopped |= outcome.is_err();
     }
 
-    /// Applies the changes that the conductor wants, ends the scene if the conductor says so, and shows the state: the motion at each look, the status if
-    /// `show`.
+    /// Applies the conductor's changes, ends the scene if the conductor says so, and shows the state: the motion at each look, the status if `show`.
     fn look(&mut self, conductor: &mut impl Conductor, now: Instant, show: bool) -> Result<(), Stopped> {
         // Changes come before the question whether to go on, so that a change made just before the end is in the record.
         while let Some(LinkChange { from, to, keys, model }) = conductor.next_change() {
@@ -210,7 +209,7 @@ impl Session {
         // A histogram can be merged only into another histogram, and both are still needed alone.
         let mut all = self.watch.ticks.clone();
         all.merge(&self.watch.releases);
-        // Ticks are those of the peers simulated here, and of Falcons; only peers in other programs are sent datagrams.
+        // Ticks are the ticks of the peers simulated here, and of Falcons; only peers in other programs are sent datagrams.
         let what = if self.watch.releases.count() > 0 { "ticks and datagrams" } else { "ticks" };
         self.config.tolerance.judge(&all, what)
     }

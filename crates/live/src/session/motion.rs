@@ -7,7 +7,7 @@ use cohaptic_wan::Fate;
 
 use super::status::PeerStatus;
 
-/// States of all peers at one instant, and packets that ended since the previous instant.
+/// States of all peers at an instant, and packets that ended since the previous instant.
 #[derive(Clone, Debug)]
 pub struct Motion {
     /// Logical time since the beginning of the session.
@@ -18,7 +18,7 @@ pub struct Motion {
     pub packets: Vec<EndedPacket>,
 }
 
-/// Packet that was delivered or lost.
+/// Delivered or lost packet.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct EndedPacket {
     /// Sender, as index of a peer in the scene.
@@ -33,7 +33,7 @@ pub struct EndedPacket {
 
 /// Delivered packets per shown packet. At 125 Hz, eight packets a second are shown for each link.
 const ONE_IN: u64 = 16;
-/// Largest number of packets in one [`Motion`]. Bounds the memory and the work if a link loses everything.
+/// Largest number of packets in a [`Motion`]. Bounds the memory and the work if a link loses everything.
 const MOST: usize = 64;
 
 /// Packets to be shown with the next [`Motion`].

@@ -1,5 +1,5 @@
-//! Connection to peers in other programs: the UDP socket, and the admission that decides about received datagrams. Samples go in and out here; this module
-//! knows nothing of the scene's physics.
+//! Connection to peers in other programs: the UDP socket, and the admission of received datagrams. Samples go in and out here; this module knows nothing of the
+//! scene's physics.
 
 use std::net::SocketAddr;
 use std::os::fd::BorrowedFd;
@@ -27,18 +27,18 @@ pub(super) struct Outside {
     passes_on: bool,
     /// `true` if the last reading filled a whole batch, so that more datagrams may wait in the kernel.
     is_more: bool,
-    /// Buffer in which each outgoing datagram is made before the socket copies the datagram into its queue.
+    /// Buffer for making each outgoing datagram before the socket copies the datagram into the queue.
     sealed: [u8; MAX_DATAGRAM],
     /// Welcomes to be sent with the next [`Outside::flush`], with the address of each receiver. At most as many as a batch has datagrams.
     replies: Vec<(SocketAddr, [u8; HANDSHAKE_LEN])>,
 }
 
-/// Largest position \[m\] and velocity [m/s] that are admitted. A hand at a desk stays well below both; a larger number comes from a fault, and would throw
-/// every other copy far away through the coordination.
+/// Largest admitted position \[m\] and velocity [m/s]. A hand at a desk stays well below both; a larger number comes from a fault, and would throw every other
+/// copy far away through the coordination.
 const LIMITS: Limits = Limits { position: 10.0, velocity: 100.0 };
-/// Longest datagram that the socket hands on \[byte\]. Longer than [`MAX_DATAGRAM`], so that the admission sees and counts oversized datagrams.
+/// Longest datagram handed on by the socket \[byte\]. Longer than [`MAX_DATAGRAM`], so that the admission sees and counts oversized datagrams.
 const LARGEST: usize = 2048;
-/// Receive buffer of the socket \[byte\]: room for about a thousand datagrams, which is more than a few peers at 125 Hz send in a second.
+/// Receive buffer of the socket \[byte\]: room for about a thousand datagrams, more than a few peers at 125 Hz send in a second.
 const RECEIVE_BUFFER: usize = 1 << 20;
 
 impl Outside {
@@ -53,8 +53,8 @@ impl Outside {
                 Some((Seat { place: Place(place), name: peer.name.clone(), tick: peer.clock.tick }, silence.after))
             })
             .collect();
-        // One time for all seats, the longest of the peers' silences: a seat can be taken again only when the scene, too, counts its peer as silent.
-        // No maximum means no seats: the scene has no peer in another program, and needs no socket.
+        // One time for all seats, the longest of the peers' silences: a seat can be taken again only when the scene, too, counts the peer as silent. No maximum
+        // means no seats: the scene has no peer in another program, and needs no socket.
         let Some(stale_after) = seats.iter().map(|(_, after)| *after).max() else { return Ok(None) };
         let address = config.listen;
         // A mapped IPv4 address must be judged as IPv4: `::ffff:127.0.0.1` is a loopback address, too.
@@ -83,41 +83,41 @@ impl Outside {
         self.socket.local_address()
     }
 
-    /// Returns the socket if a datagram must wake the loop before the next deadline. With one peer outside, samples are for peers of this process only, and
-    /// can wait in the kernel until the next tick: each counts from the instant at which the kernel received the datagram.
+    /// Returns the socket if a datagram must wake the loop before the next deadline. With a single peer outside, samples are for peers of this process only,
+    /// and can wait in the kernel until the next tick: each sample counts from the instant at which the kernel received the datagram.
     pub(super) fn readable(&self) -> Option<BorrowedFd<'_>> {
         (self.passes_on || self.is_more).then(|| std::os::fd::AsFd::as_fd(&self.socket))
     }
 
-    /// Reads one batch of datagrams. Calls `take` for each admitted sample, with the instant at which the kernel received the datagram and the index of the
+    /// Reads a batch of datagrams. Calls `take` for each admitted sample, with the instant at which the kernel received the datagram and the index of the
     /// sending peer. Welcomes are sent with the next [`Outside::flush`]. Returns the number of datagrams read.
     pub(super) fn receive(&mut self, clock: &MonotonicClock, mut take: impl FnMut(Instant, usize, &[u8])) -> std::io::Result<usize> {
         let Self { socket, buffers, admission, is_more, replies, .. } = self;
-        // One batch is more than arrives between two ticks of an orderly session. Further datagrams stay in the kernel until the next reading, which comes
-        // after the next tick if the tick is due: a flood cannot keep the loop from its ticks.
+        // A batch is more than arrives between two ticks of an orderly session. Further datagrams stay in the kernel until the next reading, which comes after
+        // the next tick if the tick is due: a flood cannot keep the loop from its ticks.
         let count = socket.receive(buffers, clock, |datagram| match admission.handle_datagram(datagram.at, datagram.from, datagram.bytes) {
             Admission::Sample { place, sample, .. } => take(datagram.at, place.0 as usize, sample.bytes()),
             Admission::Reply { to, bytes } => replies.push((to, bytes)),
             Admission::Refused(_) => {}
         })?;
-        // A batch that is not full has emptied the socket.
+        // A batch with room left has emptied the socket.
         *is_more = count == UdpEndpoint::BATCH;
         Ok(count)
     }
 
-    /// Seals a sample for the program at the seat of its receiver, and queues the datagram. Returns `None` if no program is present at the seat.
+    /// Seals a sample for the program at the receiver's seat, and queues the datagram. Returns `None` if no program is present at the seat.
     pub(super) fn queue(&mut self, clock: &MonotonicClock, transmit: &Transmit) -> Option<Release> {
         // Peers of a scene are counted in `u32`, so the conversion does not fail for a receiver in the scene.
         let place = Place(u32::try_from(transmit.to).ok()?);
-        // One reading of the clock serves the admission and the lateness, so that the lateness does not contain the time for the seal.
+        // A single reading of the clock serves the admission and the lateness, so that the lateness does not contain the time for the seal.
         let now = clock.now();
         let (to, len) = self.admission.seal(now, place, &transmit.datagram, &mut self.sealed)?;
         self.socket.queue(to, &self.sealed[..len], None);
         Some(Release { to: transmit.to, due: transmit.at, late: now.saturating_duration_since(transmit.at) })
     }
 
-    /// Sends the queued samples, and then the welcomes. In this order a flood of hellos cannot delay samples. A welcome for which the kernel has no room is
-    /// dropped and counted, and the peer repeats its hello.
+    /// Sends the queued samples, and then the welcomes. In this order a flood of hellos cannot delay samples. A welcome without room in the kernel is dropped
+    /// and counted, and the peer repeats the hello.
     pub(super) fn flush(&mut self) {
         self.socket.flush();
         for (to, bytes) in self.replies.drain(..) {
