@@ -1,4 +1,4 @@
-//! Live sessions: a scene driven by the wall clock, in which some of the peers are other programs.
+//! Live sessions: a scene driven by the wall clock, with some of the peers in other programs.
 //!
 //! Use this crate if you host a session with peers in other programs, or write such a peer in Rust. It needs Linux.
 //!

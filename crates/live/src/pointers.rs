@@ -1,8 +1,8 @@
-//! Pointers: mice, pens, fingers and sticks that pull the simulated device of a peer.
+//! Pointers: mice, pens, fingers and sticks for pulling the simulated device of a peer.
 //!
-//! The program that follows a pointer tells its position to a [`Pointer`], at the rate of a display. The session's thread reads the pointer at each tick, as
-//! the thread reads a device. Between two told positions, the read position moves on a straight line at constant speed, so that the hand has a velocity and
-//! makes no steps.
+//! The program of a pointer tells the position to a [`Pointer`], at the rate of a display. The session's thread reads the pointer at each tick, as the thread
+//! reads a device. Between two told positions, the read position moves on a straight line at constant speed, so that the hand has a velocity and makes no
+//! steps.
 
 use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 use std::time::Duration;
@@ -16,10 +16,10 @@ pub const REACH: f64 = 10.0;
 
 /// Time without a new position after which a pointer counts as absent.
 const OLD: Duration = Duration::from_millis(100);
-/// Least duration of a way that follows from arrivals. A way takes as long as the time between the arrivals of the last two positions, from [`QUICKEST`] to
+/// Least duration of a way between two arrivals. A way takes as long as the time between the arrivals of the last two positions, from [`QUICKEST`] to
 /// [`SLOWEST`]. Displays give 60 to 144 positions a second.
 const QUICKEST: Duration = Duration::from_millis(2);
-/// Largest duration of a way that follows from arrivals.
+/// Largest duration of a way between two arrivals.
 const SLOWEST: Duration = Duration::from_millis(50);
 /// Duration of the way to the first position that a session reads. The time since the position before is not known then. The way is slow, so that the arm does
 /// not jerk.
@@ -31,7 +31,7 @@ const CATCHES_UP: f64 = 0.85;
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
 #[error("a pointer at {found:?} m: expected numbers from -{REACH} to {REACH}")]
 pub struct BeyondReach {
-    /// Position that was told \[m\].
+    /// Told position \[m\].
     pub found: [f64; 3],
 }
 
@@ -51,10 +51,10 @@ struct Shared {
     force: [f64; 3],
 }
 
-/// Position that was told last.
+/// Position told last.
 #[derive(Clone, Copy, Debug, Default)]
 struct Told {
-    /// Number of times that the program has told a position or a release. A changed number marks news, even if the position is the same.
+    /// Number of told positions and releases so far. A changed number marks news, even if the position is the same.
     number: u64,
     /// Position \[m\]. `None`: the pointer has let go.
     position: Option<[f64; 3]>,
@@ -78,7 +78,7 @@ impl Pointer {
         Ok(())
     }
 
-    /// Returns the force that the session last computed between device and copy \[N\], for motors in the pointer.
+    /// Returns the force between device and copy computed last by the session \[N\], for motors in the pointer.
     #[must_use]
     pub fn force(&self) -> [f64; 3] {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).force
@@ -128,10 +128,10 @@ impl Way {
     }
 }
 
-/// Pointer as the session reads it.
+/// Pointer in the view of the session.
 struct PointerDevice {
     pointer: Pointer,
-    /// Position that the session read last.
+    /// Position read last by the session.
     told: Told,
     /// Instant of the tick at which the session first read `told`. `None` if `told` is older than the session.
     newest: Option<Instant>,
@@ -154,7 +154,7 @@ impl LiveDevice for PointerDevice {
             self.way = told.position.map(|to| match &self.way {
                 // The new way begins at the present position on the old way, so that the position makes no step.
                 Some(way) => Way { from: way.at(now).position, to, begin: now, span },
-                // Without a way the pointer appears at its position: both ends are the same, and there is no velocity.
+                // Without a way the pointer appears at the told position: both ends are the same, and there is no velocity.
                 None => Way { from: to, to, begin: now, span: QUICKEST },
             });
             (self.told, self.newest) = (told, Some(now));

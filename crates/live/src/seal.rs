@@ -1,4 +1,4 @@
-//! Tags of datagrams, and the keys that make the tags. All tags and keys are HMAC-SHA256 (RFC 2104, FIPS 180-4); a tag is the first 16 bytes.
+//! Tags of datagrams, and the keys of tags. All tags and keys are HMAC-SHA256 (RFC 2104, FIPS 180-4); a tag is the first 16 bytes.
 //!
 //! ```text
 //! sealed sample = sample ‖ client nonce (16) ‖ tag (16)
@@ -21,23 +21,23 @@ use crate::{Place, SessionKey};
 pub(crate) const NONCE_LEN: usize = 16;
 /// Length of a tag \[byte\].
 pub(crate) const TAG_LEN: usize = 16;
-/// Length that a seal adds to a sample: nonce and tag \[byte\].
+/// Length of a seal: nonce and tag \[byte\].
 pub(crate) const SEAL_LEN: usize = NONCE_LEN + TAG_LEN;
 /// Length of the longest datagram of a session \[byte\]. A buffer for receiving must be longer: the system would cut a longer datagram to this length, and the
-/// datagram would pass for a valid one.
+/// datagram would pass for valid.
 pub const MAX_DATAGRAM: usize = wire::MAX_LEN + SEAL_LEN;
 
-/// Random bytes that are used for one joining only.
+/// Random bytes for a single joining.
 pub type Nonce = [u8; NONCE_LEN];
-/// First bytes of an HMAC, which prove that a datagram was made by a holder of the key.
+/// First bytes of an HMAC: a proof that a holder of the key made the datagram.
 pub(crate) type Tag = [u8; TAG_LEN];
 
-/// Label of the key for samples to the session. Different labels give different keys, so that a sample cannot be sent back to its sender.
+/// Label of the key for samples to the session. Different labels give different keys, so that a sample cannot be sent back to the sender.
 const TO_DOOR: &[u8] = b"cohaptic 1 to door";
 /// Label of the key for samples to the peer.
 const TO_PEER: &[u8] = b"cohaptic 1 to peer";
 
-/// Key that tags the samples of one joining in one direction. Kept as an HMAC state that has absorbed the key already: the key need not be hashed again for
+/// Key for the tags of a joining's samples in one direction. Kept as an HMAC state that has absorbed the key already: the key need not be hashed again for
 /// every sample. The state is overwritten when dropped.
 pub(crate) struct WayKey(Hmac<Sha256>);
 
@@ -47,7 +47,7 @@ impl fmt::Debug for WayKey {
     }
 }
 
-/// Keys of one joining, for both directions, and the client's nonce, which every sample carries.
+/// Keys of a joining, for both directions, and the client's nonce, carried by every sample.
 #[derive(Debug)]
 pub(crate) struct JoiningKeys {
     pub(crate) to_door: WayKey,
@@ -56,14 +56,13 @@ pub(crate) struct JoiningKeys {
 }
 
 impl JoiningKeys {
-    /// Returns the keys of the joining of `place` that has the two nonces.
+    /// Returns the keys of the joining of `place` with the two nonces.
     pub(crate) fn derive(key: &SessionKey, session: u64, place: Place, client_nonce: Nonce, server_nonce: Nonce) -> Self {
         let way = |label| WayKey::derive(label, key, session, place, &client_nonce, &server_nonce);
         Self { to_door: way(TO_DOOR), to_peer: way(TO_PEER), client_nonce }
     }
 
-    /// Returns the keys of the joining in which `sealed` was made, with `server_nonce` as nonce of the server. Returns `None` if the tag does not fit these
-    /// keys.
+    /// Returns the keys of the joining of `sealed`, with `server_nonce` as nonce of the server. Returns `None` if the tag does not fit these keys.
     pub(crate) fn of_sample(key: &SessionKey, session: u64, place: Place, sealed: Sealed<'_>, server_nonce: &Nonce) -> Option<Self> {
         // The key of the other direction is derived only after the tag has been verified, so that a forged sample costs one derivation, not two.
         let way = |label| WayKey::derive(label, key, session, place, sealed.client_nonce, server_nonce);
@@ -73,7 +72,7 @@ impl JoiningKeys {
 }
 
 impl WayKey {
-    /// Returns the key of the direction that `label` names.
+    /// Returns the key of the direction named by `label`.
     fn derive(label: &[u8], key: &SessionKey, session: u64, place: Place, client_nonce: &Nonce, server_nonce: &Nonce) -> Self {
         Self(begin(&way_secret(label, key, session, place, client_nonce, server_nonce)[..]))
     }
@@ -106,13 +105,13 @@ impl WayKey {
 pub(crate) struct Sealed<'a> {
     pub(crate) sample: &'a [u8],
     pub(crate) client_nonce: &'a Nonce,
-    /// Sample and nonce together: the bytes from which the tag is computed.
+    /// Sample and nonce together: the tagged bytes.
     pub(crate) body: &'a [u8],
     pub(crate) tag: &'a Tag,
 }
 
 impl<'a> Sealed<'a> {
-    /// Splits a datagram into its parts. Returns `None` if the datagram is shorter than a seal. The sample can be empty.
+    /// Splits a datagram into sample, nonce and tag. Returns `None` if the datagram is shorter than a seal. The sample can be empty.
     pub(crate) fn split(datagram: &'a [u8]) -> Option<Self> {
         let (body, tag) = datagram.split_last_chunk::<TAG_LEN>()?;
         let (sample, client_nonce) = body.split_last_chunk::<NONCE_LEN>()?;
@@ -120,7 +119,7 @@ impl<'a> Sealed<'a> {
     }
 }
 
-/// Returns the tag of `body` under the session key itself, as hellos and welcomes carry it.
+/// Returns the tag of `body` under the session key itself, as in hellos and welcomes.
 pub(crate) fn session_tag(key: &SessionKey, body: &[u8]) -> Tag {
     cut(&mac(key.as_bytes(), &[body]))
 }
@@ -130,7 +129,7 @@ pub(crate) fn verify_session_tag(key: &SessionKey, body: &[u8], tag: &Tag) -> bo
     verify(begin(key.as_bytes()), body, tag)
 }
 
-/// Returns 16 bytes that differ from input to input, and that only a holder of `secret` can predict.
+/// Returns 16 bytes that differ from input to input. Only a holder of `secret` can predict the bytes.
 pub(crate) fn nonce_of(secret: &[u8; 32], parts: &[&[u8]]) -> Nonce {
     cut(&mac(secret, parts))
 }
@@ -141,7 +140,7 @@ fn way_secret(label: &[u8], key: &SessionKey, session: u64, place: Place, client
     mac(key.as_bytes(), &[label, &session.to_le_bytes(), &place.0.to_le_bytes(), client_nonce, server_nonce])
 }
 
-/// Returns an HMAC state that has absorbed `key`.
+/// Returns an HMAC state after absorbing `key`.
 fn begin(key: &[u8]) -> Hmac<Sha256> {
     Hmac::new_from_slice(key).expect("HMAC takes keys of any length")
 }

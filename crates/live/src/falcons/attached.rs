@@ -10,13 +10,13 @@ use cohaptic_units::Instant;
 
 use super::hand::Beginning;
 
-/// Time without a new snapshot after which a device counts as absent. The device's own driver has switched its force off long before.
+/// Time without a new snapshot after which a device counts as absent. The driver of the device has switched the force off long before.
 const OLD: Duration = Duration::from_millis(20);
 
 /// Readiness of a Falcon for a session.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Readiness {
-    /// `true` if the Falcon takes part: the device is homed, and its user has switched forces on.
+    /// `true` if the Falcon takes part: the device is homed, and the user has switched forces on.
     pub is_ready: bool,
     /// `true` if the Falcon is simulated.
     pub is_simulated: bool,
@@ -24,13 +24,13 @@ pub struct Readiness {
     pub phase: Phase,
 }
 
-/// Driven Falcon with `A` axes, and the bookkeeping by which its silence is noticed.
+/// Driven Falcon with `A` axes, and the bookkeeping for noticing a silent Falcon.
 #[derive(Debug)]
 pub(super) struct Attached<const A: usize> {
     device: FalconDevice<A>,
     /// Beginning of the session for the hand on a simulated Falcon. `None` for a real Falcon.
     beginning: Option<Beginning>,
-    /// Newest snapshot: its time on the clock of the device, and the instant of the session at which the snapshot was first seen.
+    /// Newest snapshot: the time on the clock of the device, and the instant of the session at the first look at the snapshot.
     newest: Option<(Instant, Instant)>,
 }
 
@@ -53,13 +53,13 @@ impl<const A: usize> Attached<A> {
     /// Returns the newest snapshot, if the device takes part and has given a new snapshot at most `OLD` ago.
     fn answer(&mut self, now: Instant) -> Option<Snapshot> {
         let snapshot = self.device.snapshot()?;
-        // A repeated time stamp is a repeated snapshot, which keeps the instant of its first appearance.
+        // A repeated time stamp is a repeated snapshot, and keeps the instant of the first appearance.
         let came = match self.newest {
             Some((at, came)) if at == snapshot.at => came,
             _ => now,
         };
         self.newest = Some((snapshot.at, came));
-        // A device whose thread has ended keeps its last snapshot, which may say that the device is ready.
+        // A device with an ended thread keeps the last snapshot, which may say that the device is ready.
         let takes_part = snapshot.is_ready() && self.device.ended().is_none();
         (takes_part && now.saturating_duration_since(came) <= OLD).then_some(snapshot)
     }
@@ -68,12 +68,12 @@ impl<const A: usize> Attached<A> {
 impl<const A: usize> LiveDevice for Attached<A> {
     fn read(&mut self, now: Instant) -> Option<State<3>> {
         let snapshot = self.answer(now);
-        // The hand begins to follow the scene at the first tick at which the session reads the device. Later calls of `begin` change nothing.
+        // The hand begins to follow the scene at the first tick with a reading of the device. Later calls of `begin` change nothing.
         if let (Some(beginning), Some(snapshot)) = (&self.beginning, &snapshot) {
             beginning.begin(snapshot.at);
         }
         snapshot.map(|_| {
-            // Axes that the scene does not have are zero.
+            // Axes beyond the axes of the scene are zero.
             let State { position, velocity } = self.device.state();
             let widen = |values: [f64; A]| core::array::from_fn(|axis| values.get(axis).copied().unwrap_or(0.0));
             State { position: widen(position), velocity: widen(velocity) }

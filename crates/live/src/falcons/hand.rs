@@ -7,12 +7,12 @@ use std::time::Duration;
 use cohaptic_falcon::simulator::{Hand, Waypoints};
 use cohaptic_units::Instant;
 
-/// Beginning of the session on the clock of a simulated device, in nanoseconds. Shared by the session's thread, which sets the beginning, and the device's
-/// thread, which reads the beginning. Until then the hand homes the device.
+/// Beginning of the session on the clock of a simulated device, in nanoseconds. The session's thread sets the beginning, and the device's thread reads the
+/// beginning. Until then the hand homes the device.
 #[derive(Clone, Debug)]
 pub(super) struct Beginning(Arc<AtomicU64>);
 
-/// Value before the session begins: not an instant that a device reaches.
+/// Value before the session begins: no device reaches this instant.
 const NOT_YET: u64 = u64::MAX;
 
 impl Default for Beginning {
@@ -36,7 +36,7 @@ impl Beginning {
     }
 }
 
-/// Hand that homes the device and holds the device at the origin until the session begins. From then on the hand does as the scene says.
+/// Hand for homing the device and holding the device at the origin until the session begins. From then on the hand does as the scene says.
 #[derive(Debug)]
 pub(super) struct SceneHand {
     homing: Waypoints,
@@ -48,12 +48,12 @@ pub(super) struct SceneHand {
 }
 
 impl SceneHand {
-    /// Returns a hand that waits for `beginning`. `origin`: origin of the scene in the frame of the device \[m\].
+    /// Returns a hand before `beginning`. `origin`: origin of the scene in the frame of the device \[m\].
     pub(super) fn new(hand: Option<cohaptic_peer::Hand>, origin: [f64; 3], beginning: Beginning) -> Self {
         Self { homing: Waypoints::homing(Duration::ZERO), hand, origin, beginning }
     }
 
-    /// Mass that an arm adds to the mass of the grip \[kg\]. Zero for other hands.
+    /// Mass of an arm, in addition to the mass of the grip \[kg\]. Zero for other hands.
     pub(super) fn mass(&self) -> f64 {
         match &self.hand {
             Some(cohaptic_peer::Hand::Arm { arm, .. }) => arm.mass,

@@ -1,7 +1,7 @@
-//! Falcons of a scene: opens the Falcons, makes them ready, and hands each Falcon to the session as the device of its peer.
+//! Falcons of a scene: opens the Falcons, makes the Falcons ready, and hands each Falcon to the session as the device of a peer.
 //!
-//! A real Falcon is found over USB, is given its firmware if it has no firmware, and joins the session when its user has homed the device. A simulated Falcon
-//! (`falcon = { device = "simulated" }`) speaks the same bytes, runs in real time, and is held by the hand that the scene gives its peer. That hand homes the
+//! A real Falcon is found over USB, is given the firmware if the Falcon has no firmware, and joins the session when the user has homed the device. A simulated
+//! Falcon (`falcon = { device = "simulated" }`) speaks the same bytes, runs in real time, and is held by the peer's hand of the scene. The hand homes the
 //! device before the session begins.
 
 mod attached;
@@ -31,13 +31,13 @@ pub use attached::Readiness;
 #[derive(Debug, thiserror::Error)]
 #[error("the Falcon of {peer}: {fault}")]
 pub struct FalconFault {
-    /// Name of the peer that has the Falcon.
+    /// Name of the peer with the Falcon.
     pub peer: String,
     /// Fault of the Falcon.
     pub fault: FaultKind,
 }
 
-/// Fault for which a Falcon cannot be used.
+/// Fault of an unusable Falcon.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FaultKind {
@@ -59,7 +59,7 @@ pub enum FaultKind {
     /// The firmware cannot be loaded into the Falcon.
     #[error(transparent)]
     Boot(#[from] BootError),
-    /// The driver of the Falcon cannot be opened, or its thread cannot be started.
+    /// The driver of the Falcon cannot be opened, or the driver's thread cannot be started.
     #[error(transparent)]
     Start(#[from] StartError),
 }
@@ -67,9 +67,9 @@ pub enum FaultKind {
 /// Falcons of a scene, each driven by a thread of its own.
 #[derive(Debug)]
 pub struct Falcons {
-    /// Falcons that the session has not taken yet, indexed by peer. `None` for peers of other kinds and for Falcons that the session has taken.
+    /// Falcons not taken by the session yet, indexed by peer. `None` for peers of other kinds and for taken Falcons.
     devices: Vec<Option<AnyAttached>>,
-    /// Stoppers of all opened Falcons. These stay valid after the session has taken the devices.
+    /// Stoppers of all opened Falcons. A stopper stays valid after the session has taken the device.
     stoppers: Vec<Stopper>,
 }
 
@@ -82,12 +82,12 @@ enum AnyAttached {
 }
 
 impl Falcons {
-    /// Opens every Falcon of the scene. `firmware`: file with the firmware for Falcons that run no firmware. `wishes`: requests to the system for the thread
-    /// of each Falcon. `progress` is called with the name of the peer and with the step, for steps that take time.
+    /// Opens every Falcon of the scene. `firmware`: file with the firmware for Falcons that run no firmware. `wishes`: requests to the system for the thread of
+    /// each Falcon. `progress` is called with the name of the peer and with the step, for steps that take time.
     ///
     /// # Errors
     ///
-    /// [`FalconFault`] of the first Falcon that cannot be used. The Falcons opened before are stopped in good order.
+    /// [`FalconFault`] of the first unusable Falcon. The Falcons opened before are stopped in good order.
     pub fn open(scene: &Scene, firmware: Option<&Path>, wishes: Wishes, mut progress: impl FnMut(&str, Progress)) -> Result<Self, FalconFault> {
         let mut falcons = Self { devices: Vec::new(), stoppers: Vec::new() };
         let mut taken = Vec::new();
@@ -96,7 +96,7 @@ impl Falcons {
                 falcons.devices.push(None);
                 continue;
             };
-            // Each simulated Falcon has random numbers of its own, which are the same in every run of the scene.
+            // Each simulated Falcon has random numbers of its own, the same in every run of the scene.
             let seed = scene.seed.wrapping_add(place as u64);
             let opened = open(scene, peer, spec, seed, firmware, wishes, &mut taken, &mut |told| progress(&peer.name, told));
             let device = opened.map_err(|fault| FalconFault { peer: peer.name.clone(), fault })?;
@@ -106,7 +106,7 @@ impl Falcons {
         Ok(falcons)
     }
 
-    /// Returns the readiness of each Falcon that the session has not taken yet, with the index of its peer.
+    /// Returns the readiness of each Falcon not taken by the session yet, with the index of the peer.
     pub fn readiness(&self) -> impl Iterator<Item = (usize, Readiness)> + '_ {
         self.devices.iter().enumerate().filter_map(|(place, device)| device.as_ref().map(|device| (place, device.readiness())))
     }
@@ -118,13 +118,13 @@ impl Falcons {
         self.readiness().all(|(_, readiness)| readiness.is_ready || !readiness.is_simulated)
     }
 
-    /// Returns a stopper for each opened Falcon. A stopper switches all forces of its Falcon off, and can be used from any thread.
+    /// Returns a stopper for each opened Falcon. A stopper switches all forces of the Falcon off, and can be used from any thread.
     #[must_use]
     pub fn stoppers(&self) -> Vec<Stopper> {
         self.stoppers.clone()
     }
 
-    /// Removes the Falcon of a peer and returns the Falcon as the session's device. Returns `None` if the peer has no Falcon, or its Falcon was taken before.
+    /// Removes the Falcon of a peer and returns the Falcon as the session's device. Returns `None` if the peer has no Falcon, or the Falcon was taken before.
     pub fn take(&mut self, peer: usize) -> Option<Box<dyn LiveDevice>> {
         Some(match self.devices.get_mut(peer)?.take()? {
             AnyAttached::One(device) => Box::new(device),
@@ -134,8 +134,8 @@ impl Falcons {
     }
 }
 
-/// Opens the Falcon of one peer and starts the thread that drives it. `taken`: serial numbers of the real Falcons opened so far; the serial number of this
-/// Falcon is added.
+/// Opens the Falcon of a peer and starts the driving thread. `taken`: serial numbers of the real Falcons opened so far; the serial number of this Falcon is
+/// added.
 #[expect(clippy::too_many_arguments, reason = "what a Falcon is made of, each once")]
 fn open(
     scene: &Scene,
@@ -153,7 +153,7 @@ fn open(
     if spec.device == Which::Simulated {
         let beginning = Beginning::default();
         let hand = SceneHand::new(peer.hand.clone(), spec.origin, beginning.clone());
-        // The hand's arm moves with the grip, so that the mechanics have the mass of both.
+        // The hand's arm moves with the grip, so that the mechanics have the mass of both together.
         let mechanics = MechanicsConfig { mass: peer.device.mass + hand.mass(), damping: peer.device.damping, ..MechanicsConfig::DEFAULT };
         let config = SimulatorConfig { seed, running: true, mechanics, ..SimulatorConfig::default() };
         let transport = SimulatedTransport::in_real_time(Simulator::new(config, hand));
@@ -165,7 +165,7 @@ fn open(
         Which::First | Which::Simulated => first_free(taken)?,
     };
     let mut transport = UsbTransport::open(serial.as_deref())?;
-    // Added only after the Falcon has been opened, so that a failure does not reserve its serial number.
+    // Added only after the Falcon has been opened, so that a failure reserves no serial number.
     taken.extend(serial);
     let options = BootOptions::DEFAULT;
     // A file is not loaded again into a Falcon that already runs firmware.
@@ -180,14 +180,14 @@ fn open(
     start(scene, transport, driver, wishes, None)
 }
 
-/// Returns the serial number of the first listed Falcon that no peer has yet. Returns `None` if every listed Falcon is taken or tells no serial number.
-/// Opening without a serial number then takes the only connected Falcon, or reports the fault.
+/// Returns the serial number of the first listed Falcon without a peer. Returns `None` if every listed Falcon is taken or tells no serial number. Opening
+/// without a serial number then takes the only connected Falcon, or reports the fault.
 fn first_free(taken: &[String]) -> Result<Option<String>, UsbError> {
     let listed = cohaptic_falcon::usb::list()?;
     Ok(listed.into_iter().filter_map(|falcon| falcon.serial).find(|serial| !taken.contains(serial)))
 }
 
-/// Starts the thread that drives a Falcon, with as many axes as the scene.
+/// Starts the driving thread of a Falcon, with as many axes as the scene.
 fn start<T: Transport + Send + 'static>(
     scene: &Scene,
     transport: T,
@@ -204,7 +204,7 @@ fn start<T: Transport + Send + 'static>(
     }
 }
 
-/// Starts the thread that drives a Falcon with `A` axes.
+/// Starts the driving thread of a Falcon with `A` axes.
 fn attach<const A: usize, T: Transport + Send + 'static>(
     transport: T,
     axes: [Axis; A],
@@ -214,7 +214,7 @@ fn attach<const A: usize, T: Transport + Send + 'static>(
 ) -> Result<Attached<A>, FaultKind> {
     let axes = Axes::new(axes).expect("no axis is named twice");
     let device = FalconDevice::start_with(transport, DeviceConfig { driver, ..DeviceConfig::new(axes) }, move || {
-        // The report is dropped: a wish that the system refuses to this thread is also refused to the session's thread, and the session reports the refusal.
+        // The report is dropped: a wish refused to this thread is also refused to the session's thread, and the session reports the refusal.
         let _ = prepare_thread(&wishes);
     })?;
     Ok(Attached::new(device, beginning))

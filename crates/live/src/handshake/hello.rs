@@ -1,4 +1,4 @@
-//! Hello: the datagram with which a peer asks for its seat.
+//! Hello: the datagram of a peer that asks for a seat.
 //!
 //! ```text
 //! offset  size  field
@@ -19,14 +19,14 @@ use crate::{Nonce, Place, SessionKey};
 /// First four bytes of a hello.
 pub(crate) const HELLO_MAGIC: [u8; 4] = *b"CHPH";
 
-/// Request of a peer for its seat.
+/// Request of a peer for a seat.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Hello {
     /// Number of the session.
     pub session: u64,
-    /// Place of the seat that the peer asks for.
+    /// Place of the requested seat.
     pub place: Place,
-    /// Nonce of the client, drawn by the peer for one joining only.
+    /// Nonce of the client, drawn by the peer for a single joining.
     pub client_nonce: Nonce,
 }
 
@@ -57,7 +57,7 @@ impl Hello {
     }
 }
 
-/// Hello whose tag has not been checked: its content may be forged.
+/// Hello before the check of the tag: the content may be forged.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct UncheckedHello<'a> {
     pub(crate) hello: Hello,

@@ -39,7 +39,7 @@ pub enum HandshakeError {
         /// Length of the datagram \[byte\].
         found: usize,
     },
-    /// A byte that must be zero is not zero, or a number is out of its range.
+    /// A byte that must be zero is not zero, or a number is out of range.
     #[error("a reserved byte is not zero or a number is out of its range")]
     Reserved,
     /// The tag is wrong: the datagram was made with another key, or changed.
@@ -70,7 +70,7 @@ fn verify(key: &SessionKey, body: &[u8; BODY_LEN], tag: &Tag) -> Result<(), Hand
     if verify_session_tag(key, body, tag) { Ok(()) } else { Err(HandshakeError::Forged) }
 }
 
-/// Returns the datagram: the body, and its tag under `key`.
+/// Returns the datagram: the body, and the tag of the body under `key`.
 fn finish(key: &SessionKey, body: &[u8; BODY_LEN]) -> [u8; HANDSHAKE_LEN] {
     let mut datagram = [0; HANDSHAKE_LEN];
     datagram[..BODY_LEN].copy_from_slice(body);

@@ -1,4 +1,4 @@
-//! Welcome: the datagram with which the session answers a hello. A welcome tells the peer the parameters of the session.
+//! Welcome: the session's answer to a hello. A welcome tells the peer the parameters of the session.
 //!
 //! ```text
 //! offset  size  field
@@ -67,7 +67,7 @@ impl Welcome {
         finish(key, &body)
     }
 
-    /// Reads a welcome and checks its tag.
+    /// Reads a welcome and checks the tag.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! Session key: 32 secret bytes that all participants of a session have, and the file that holds the key.
+//! Session key: 32 secret bytes common to all participants of a session, and the key's file.
 
 use core::fmt;
 use std::fs::{File, OpenOptions};
@@ -47,8 +47,8 @@ impl fmt::Debug for SessionKey {
     }
 }
 
-/// Largest length of a key file \[byte\]. A key file is text: 64 hexadecimal digits, as `openssl rand -hex 32` makes them, followed by white space at most.
-/// Longer files are refused, and at most one byte beyond this length is read, so that a wrong path cannot fill the memory.
+/// Largest length of a key file \[byte\]. A key file is text: 64 hexadecimal digits, as from `openssl rand -hex 32`, followed by white space at most. Longer
+/// files are refused, and at most one byte beyond this length is read, so that a wrong path cannot fill the memory.
 const MAX_FILE_LEN: u16 = 1024;
 
 /// Reason why a key file cannot be read or written.
@@ -104,14 +104,14 @@ impl SessionKey {
         if let Some(mode) = cohaptic_files::open_to_others(&file).map_err(read_error)? {
             return Err(KeyFileError::Open { path: path.to_owned(), mode });
         }
-        // One allocation that holds the longest text: a growing buffer would leave copies of the key in memory.
+        // One allocation for the longest text: a growing buffer would leave copies of the key in memory.
         let mut text = Zeroizing::new(Vec::with_capacity(2 * usize::from(MAX_FILE_LEN)));
-        // One byte more than allowed is read, so that `parse` can tell a file that is too long.
+        // One byte more than allowed is read, so that `parse` can tell a too long file.
         file.take(u64::from(MAX_FILE_LEN) + 1).read_to_end(&mut text).map_err(read_error)?;
         parse(&text).ok_or_else(|| KeyFileError::Content { path: path.to_owned() })
     }
 
-    /// Draws a new key and writes the key to a new file that only its owner may read. The content is on the disk when this function returns.
+    /// Draws a new key and writes the key to a new file, readable by its owner only. The content is on the disk when this function returns.
     ///
     /// # Errors
     ///
@@ -137,8 +137,8 @@ impl SessionKey {
     }
 }
 
-/// Returns the options that create a file for its owner only, and fail if the file exists. The mode is given on creation, so that the file is at no time open
-/// to other users.
+/// Returns the options for creating a file for its owner only, with an error if the file exists. The mode is given on creation, so that the file is at no time
+/// open to other users.
 fn new_file_options() -> OpenOptions {
     let mut options = OpenOptions::new();
     options.write(true).create_new(true);
