@@ -61,14 +61,14 @@ pub struct Proxy {
     pub forth: LinkModel,
     /// Link from the server back to the clients, shared by all clients.
     pub back: LinkModel,
-    /// Clients at once, at most; each takes one socket. Datagrams of further clients are dropped and counted.
+    /// Largest number of clients at once; each client takes a socket. Datagrams of further clients are dropped and counted.
     pub most_clients: u32,
 }
 
 /// Bounds of a relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Limits {
-    /// Datagrams in flight at once, at most. A datagram that arrives beyond this bound is dropped. Copies made by a link count, but are never refused.
+    /// Largest number of datagrams in flight. A datagram beyond this bound is dropped on arrival. Copies made by a link count, but are never refused.
     pub packets: u64,
     /// Bytes of the datagrams in flight, at most, without headers.
     pub bytes: Bytes,
@@ -178,8 +178,8 @@ impl RelayConfig {
         }
     }
 
-    /// Refuses a relay that would send to one of `ports`, the relay's own ports. Other names of the same address, such as an unspecified address, are
-    /// recognised. Learnt addresses are unknown at this time; the engine drops a datagram from a program to the port standing for the same program.
+    /// Refuses a relay that would send to one of `ports`, the relay's own ports. Recognises further names of an address, such as an unspecified address. Learnt
+    /// addresses are unknown at this time; the engine drops a datagram from a program to the port standing for the same program.
     pub(crate) fn check_targets(&self, ports: &[SocketAddr]) -> Result<(), ConfigError> {
         let targets: Vec<SocketAddr> = match &self.form {
             Form::Mesh(mesh) => mesh.programs.iter().filter_map(|program| program.address).collect(),
@@ -189,7 +189,7 @@ impl RelayConfig {
         targets.into_iter().find_map(own).map_or(Ok(()), Err)
     }
 
-    /// Checks the number of programs, and that every change names a link of the network.
+    /// Checks the number of programs, and refuses a change of a link outside of the network.
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
         let nodes = match &self.form {
             Form::Mesh(mesh) if mesh.programs.len() < 2 || mesh.links.peers() != mesh.programs.len() => {
@@ -198,7 +198,7 @@ impl RelayConfig {
             Form::Mesh(mesh) => mesh.programs.len(),
             Form::Proxy(_) => 2,
         };
-        // The network has a link between any two different nodes, and none from a node to itself.
+        // The network has a link between any two different nodes, and no link from a node to itself.
         let is_link = |from: NodeId, to: NodeId| from != to && (from.index()) < nodes && (to.index()) < nodes;
         match self.changes.iter().find(|change| !is_link(change.from, change.to)) {
             Some(Change { from, to, .. }) => Err(ConfigError::NoLink { from: *from, to: *to }),

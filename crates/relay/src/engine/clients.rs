@@ -1,5 +1,5 @@
-//! Clients of a proxy. This module gives each client address a slot, which stands for a port of the client's own towards the server, and frees the slot after a
-//! silence. Sockets are opened and closed elsewhere.
+//! Clients of a proxy. Each client address gets a slot, standing for a port of the client's own towards the server. A silence frees the slot. Sockets are
+//! opened and closed elsewhere.
 
 use core::time::Duration;
 use std::collections::BTreeMap;
@@ -7,8 +7,8 @@ use std::net::SocketAddr;
 
 use cohaptic_units::Instant;
 
-/// Identity of a client: a slot, and the number of earlier clients in this slot. A datagram in flight for a client that has left therefore never reaches the
-/// next client of the same slot.
+/// Identity of a client: a slot, and the number of earlier clients in this slot. A datagram in flight for a former client therefore never reaches the next
+/// client of the same slot.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct ClientId {
     pub(super) slot: u32,
@@ -41,7 +41,7 @@ pub(super) struct Clients {
 struct Slot {
     /// Address of the client; `None` if the slot is free.
     address: Option<SocketAddr>,
-    /// Number of clients that had this slot before, modulo 2³².
+    /// Number of earlier clients in this slot, modulo 2³².
     generation: u32,
     /// Instant of the latest datagram from or to the client.
     heard: Instant,

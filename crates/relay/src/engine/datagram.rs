@@ -14,7 +14,7 @@ pub enum Port {
     Program(NodeId),
     /// Port of a proxy for clients.
     Listen,
-    /// Port towards the server that belongs to the client in this slot of a proxy.
+    /// Port towards the server of the client in this slot of a proxy.
     Client(u32),
 }
 
@@ -36,7 +36,7 @@ pub struct Arrival<'a> {
 /// Result of the intake of one datagram.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Intake {
-    /// The datagram was admitted, and is or will be offered to its link.
+    /// The datagram was admitted, and the link gets the datagram now or later.
     Offered,
     /// The sender is a new client, and the port [`Port::Client`] with this number is needed from now on. The datagram was offered to its link, or dropped and
     /// counted as overload.
@@ -56,7 +56,7 @@ pub enum Intake {
 pub struct Release<'a> {
     /// Instant of the delivery by the link.
     pub at: Instant,
-    /// Time by which the datagram was offered to its link later than it arrived: see [`IntakeCounts::clamped`].
+    /// Time from the arrival of the datagram to the offer to the link: see [`IntakeCounts::clamped`].
     pub late: Duration,
     /// Port of the relay through which to send the datagram.
     pub port: Port,
@@ -92,6 +92,6 @@ pub struct IntakeCounts {
     pub to_itself: u64,
     /// Datagrams dropped: no room for another client.
     pub no_room: u64,
-    /// Datagrams offered to their link later than they arrived, because logical time had already passed the arrival. Part of `offered`.
+    /// Datagrams offered after the instant of arrival, because logical time had already passed the arrival. Part of `offered`.
     pub clamped: u64,
 }

@@ -26,9 +26,9 @@ use recent::Recent;
 
 /// State machine of a relay: datagrams go in with [`Engine::handle_datagram`] and come out with [`Engine::poll_release`].
 ///
-/// The driver passes each datagram with the instant of its arrival, asks [`Engine::poll_timeout`] for the next deadline, calls [`Engine::handle_timeout`] at
-/// that instant, and drains [`Engine::poll_release`] until it returns `None`. The fates of the datagrams equal the fates in a [`Network`] to which the same
-/// datagrams are offered at the same instants.
+/// The driver passes each datagram with the instant of arrival, and asks [`Engine::poll_timeout`] for the next deadline. At the deadline, the driver calls
+/// [`Engine::handle_timeout`] and drains [`Engine::poll_release`] until `None` is returned. The fates of the datagrams equal the fates in a [`Network`] that
+/// gets the same datagrams at the same instants.
 #[derive(Debug)]
 pub struct Engine {
     network: Network<Arc<Packet>>,
@@ -39,10 +39,10 @@ pub struct Engine {
     pool: Pool,
     /// Latest instant of logical time. Never decreases.
     now: Instant,
-    /// Admitted datagrams that are not offered to their links yet.
+    /// Admitted datagrams before the offer to a link.
     staged: Vec<Staged>,
-    /// Datagrams in flight or staged. Signed, because the network can report the end of a copy before it reports the making of the copy: the number is then too
-    /// low until all events are polled.
+    /// Datagrams in flight or staged. Signed, because the network can report the end of a copy before the making of the copy: the number is then too low until
+    /// all events are polled.
     packets: i64,
     /// Payload bytes of the same datagrams.
     bytes: i64,
@@ -53,7 +53,7 @@ pub struct Engine {
     /// Latest delays of each link, at the index [`Engine::link`].
     recent: Vec<Recent>,
     counts: IntakeCounts,
-    /// Time by which datagrams were offered later than they arrived.
+    /// Time from arrival to offer, of the datagrams offered late.
     clamped: Lateness,
     /// Payload of the release returned last. The caller borrows the payload until the next poll.
     released: Option<Arc<Packet>>,
@@ -71,7 +71,7 @@ enum Routes {
     Clients { clients: Clients, server: SocketAddr },
 }
 
-/// Admitted datagram with its arrival and its link.
+/// Admitted datagram with the instant of arrival and the link.
 #[derive(Debug)]
 struct Staged {
     at: Instant,
@@ -81,7 +81,7 @@ struct Staged {
 }
 
 impl Engine {
-    /// Returns a relay to which no datagram has been passed yet.
+    /// Returns a relay before the first datagram.
     ///
     /// # Errors
     ///
@@ -125,8 +125,8 @@ impl Engine {
         intake
     }
 
-    /// Admits a datagram like [`Engine::handle_datagram`], but offers the datagram only with [`Engine::offer_staged`]. Datagrams read from several sockets are
-    /// thus offered in the order of their arrival.
+    /// Admits a datagram like [`Engine::handle_datagram`], but leaves the offer to [`Engine::offer_staged`]. Datagrams read from several sockets are thus
+    /// offered in the order of arrival.
     pub fn stage(&mut self, arrival: Arrival<'_>) -> Intake {
         let Arrival { at, port, from, bytes, ecn } = arrival;
         let mut opened = None;
@@ -143,7 +143,7 @@ impl Engine {
                     (CLIENT, SERVER, Some(client))
                 }
             },
-            // The server alone may answer at a client's port. Answers of other senders fall through to the last arm.
+            // Only the server may answer at a client's port. Answers of strangers fall through to the last arm.
             (Routes::Clients { clients, server }, Port::Client(slot)) if from == *server => match clients.at_port(slot, at) {
                 None => return self.refuse(Intake::Stranger),
                 client => (SERVER, CLIENT, client),
@@ -151,10 +151,10 @@ impl Engine {
             (Routes::Programs(_) | Routes::Clients { .. }, _) => return self.refuse(Intake::Stranger),
         };
         let length = i64::try_from(bytes.len()).unwrap_or(i64::MAX);
-        // A sum below zero, in the moment when copies are missing from it, is within every limit.
+        // A sum below zero, in the moment when the sum lacks copies, is within every limit.
         let is_full = |held: i64, more: i64, most: u64| u64::try_from(held.saturating_add(more)).is_ok_and(|sum| sum > most);
         if is_full(self.packets, 1, self.limits.packets) || is_full(self.bytes, length, self.limits.bytes.get()) {
-            // Sender and receiver are different nodes here, so they name a link.
+            // Sender and receiver are different nodes here, so there is a link between them.
             let link = self.link(sender, to);
             self.links[link].overload += 1;
             self.refuse(Intake::Overload);
@@ -168,20 +168,20 @@ impl Engine {
         opened.map_or(Intake::Offered, Intake::FromNewClient)
     }
 
-    /// Offers the staged datagrams to their links, in the order of arrival. A datagram that arrived before logical time as it stands is offered at the present
+    /// Offers the staged datagrams to the links, in the order of arrival. A datagram that arrived before logical time as it stands is offered at the present
     /// logical time, and counted as clamped.
     pub fn offer_staged(&mut self) {
         // Datagrams of one socket are staged in order, so sorting is needed only after reading several sockets.
         if !self.staged.is_sorted_by_key(|staged| staged.at) {
             self.staged.sort_by_key(|staged| staged.at);
         }
-        // Taken out for the loop, which changes the rest of `self`, and put back empty to keep the memory.
+        // Taken out for the loop, because the loop changes the rest of `self`. Put back empty to keep the memory.
         let mut staged = core::mem::take(&mut self.staged);
         for Staged { at, from, to, mut packet } in staged.drain(..) {
             if let Some(late) = self.now.checked_duration_since(at).filter(|late| !late.is_zero()) {
                 self.counts.clamped += 1;
                 self.clamped.record(late);
-                // A staged packet has no copies yet, so this is its only owner.
+                // A staged packet has no copies yet, so `packet` is the only owner.
                 if let Some(packet) = Arc::get_mut(&mut packet) {
                     packet.late = late;
                 }
@@ -216,7 +216,7 @@ impl Engine {
         [self.network.poll_timeout(), change, clients].into_iter().flatten().min()
     }
 
-    /// Returns the next datagram that leaves, up to the present logical time, or `None` when all have been polled. Drops and counts datagrams for receivers
+    /// Returns the next datagram to leave, up to the present logical time, or `None` when all have been polled. Drops and counts datagrams for receivers
     /// without a known address.
     pub fn poll_release(&mut self) -> Option<Release<'_>> {
         if let Some(packet) = self.released.take() {
@@ -251,7 +251,7 @@ impl Engine {
                     self.bytes -= length;
                     self.pool.put(event.payload);
                 }
-                // The copy gets an event of its own, `Delivered` or `Dropped`, which subtracts the copy again.
+                // The copy gets an event of its own, `Delivered` or `Dropped`. The arm of that event subtracts the copy again.
                 Fate::Duplicated => {
                     self.packets += 1;
                     self.bytes += length;
@@ -275,11 +275,11 @@ impl Engine {
         }
     }
 
-    /// Changes the model of a link from `now` on, or from the present logical time if that is later: see [`Network::set_link`].
+    /// Changes the model of a link from `now` on, or from the present logical time if `now` has passed: see [`Network::set_link`].
     ///
     /// # Errors
     ///
-    /// [`NetworkError`] if no such link exists; nothing was changed except that time has passed.
+    /// [`NetworkError`] if no such link exists; nothing was changed except the time.
     pub fn set_link(&mut self, now: Instant, from: NodeId, to: NodeId, model: LinkModel) -> Result<(), NetworkError> {
         self.pass(now);
         self.network.set_link(self.now, from, to, model)
@@ -309,13 +309,13 @@ impl Engine {
         &self.counts
     }
 
-    /// Returns the distribution of the time by which datagrams were offered later than they arrived: see [`IntakeCounts::clamped`].
+    /// Returns the distribution of the times from arrival to offer, of the datagrams offered late: see [`IntakeCounts::clamped`].
     #[must_use]
     pub const fn clamped(&self) -> &Lateness {
         &self.clamped
     }
 
-    /// Returns the number of datagrams in flight and their payload bytes. Exact as soon as [`Engine::poll_release`] has returned `None`.
+    /// Returns the number and the payload bytes of the datagrams in flight. Exact as soon as [`Engine::poll_release`] has returned `None`.
     #[must_use]
     pub fn held(&self) -> (u64, Bytes) {
         (u64::try_from(self.packets).unwrap_or(0), Bytes::new(u64::try_from(self.bytes).unwrap_or(0)))
@@ -339,7 +339,7 @@ impl Engine {
         }
     }
 
-    /// Returns the port and the receiver for a datagram delivered by its link, or `None` if the receiver's address is not known. The port is the port standing
+    /// Returns the port and the receiver for a datagram delivered by a link, or `None` if the receiver's address is not known. The port is the port standing
     /// for the sender.
     fn way_out(&self, event: &PacketEvent<Arc<Packet>, Path>) -> Option<(Port, SocketAddr)> {
         match &self.routes {

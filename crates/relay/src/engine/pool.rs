@@ -1,4 +1,4 @@
-//! Pool of datagrams, which reuses the memory of former datagrams.
+//! Pool of datagrams: new datagrams get the memory of former datagrams.
 
 use core::time::Duration;
 use std::sync::Arc;
@@ -12,16 +12,16 @@ use super::clients::ClientId;
 pub(super) struct Packet {
     pub(super) bytes: Vec<u8>,
     pub(super) ecn: Option<Ecn>,
-    /// Client to or from which the datagram goes, if clients share the link (proxy); `None` in a mesh.
+    /// The datagram's client, if clients share the link (proxy); `None` in a mesh.
     pub(super) client: Option<ClientId>,
-    /// Time by which the datagram was offered later than it arrived.
+    /// Time from the arrival of the datagram to the offer to the link.
     pub(super) late: Duration,
 }
 
-/// Idle datagrams. When as many datagrams as ever at once have been in flight, further datagrams need no allocation.
+/// Idle datagrams. Allocations end when the pool holds as many datagrams as were ever in flight at once.
 #[derive(Debug)]
 pub(super) struct Pool {
-    /// Datagrams whose memory can be reused. Each `Arc` has no other owner.
+    /// Datagrams with reusable memory. Each `Arc` has a single owner.
     idle: Vec<Arc<Packet>>,
     /// Capacity of the byte buffers in `idle` together \[bytes\].
     kept: usize,
@@ -38,7 +38,7 @@ impl Pool {
     pub(super) fn take(&mut self, bytes: &[u8], ecn: Option<Ecn>, client: Option<ClientId>) -> Arc<Packet> {
         let mut packet = self.idle.pop().unwrap_or_default();
         self.kept -= packet.bytes.capacity();
-        // Always succeeds: `put` keeps only datagrams without another owner, and a new one has none.
+        // Always succeeds: `put` keeps only datagrams with a single owner, and a new datagram has a single owner, too.
         if let Some(packet) = Arc::get_mut(&mut packet) {
             packet.bytes.clear();
             packet.bytes.extend_from_slice(bytes);
@@ -50,6 +50,7 @@ impl Pool {
     }
 
     /// Takes the memory of a datagram back, unless a copy of the datagram is still in flight or the pool is full.
+    // A datagram beyond the bound is dropped here, so that a burst does not hold memory for the rest of the run.
     pub(super) fn put(&mut self, mut packet: Arc<Packet>) {
         let capacity = packet.bytes.capacity();
         if self.kept + capacity <= self.most_kept && Arc::get_mut(&mut packet).is_some() {

@@ -11,9 +11,9 @@ use crate::config::Program;
 
 /// Addresses of the programs of a mesh.
 ///
-/// A stranger takes the place of the first program, in the order of the configuration, with neither a configured nor a learnt address. If there is no such
-/// program, the stranger takes the place of the first program with a learnt address after a silence of `forget_after`. A stranger never becomes the program to
-/// whose port the stranger sends.
+/// A stranger takes the place of the first program, in the order of the configuration, with neither a configured nor a learnt address. Without such a program,
+/// the stranger takes the place of the first program with a learnt address after a silence of `forget_after`. A stranger never becomes the program at the
+/// target port of the stranger's datagram.
 #[derive(Debug)]
 pub(super) struct Programs {
     /// Program of each known address.
@@ -26,7 +26,7 @@ pub(super) struct Programs {
     last: Option<(SocketAddr, NodeId)>,
 }
 
-/// Current knowledge of one program.
+/// Current knowledge of a program.
 #[derive(Debug)]
 struct Known {
     /// Address of the program; `None` if not learnt yet.
@@ -44,8 +44,8 @@ impl Programs {
         Self { places, programs: programs.iter().map(known).collect(), forget_after, last: None }
     }
 
-    /// Returns the program that sends from `from` to the port of program `to`, or `None` for a stranger without a place. Records `now` as the latest sign of
-    /// the program.
+    /// Returns the program at the address `from` that sends to the port of program `to`, or `None` for a stranger without a place. Records `now` as the latest
+    /// sign of the program.
     pub(super) fn sender(&mut self, from: SocketAddr, to: NodeId, now: Instant) -> Option<NodeId> {
         let place = match self.last {
             Some((address, place)) if address == from => place,
@@ -67,12 +67,12 @@ impl Programs {
 
     /// Gives a stranger the place of a program, or returns `None` if no program can have this address.
     fn learn(&mut self, from: SocketAddr, to: NodeId, now: Instant) -> Option<NodeId> {
-        // The candidates: a configured address is never taken away, and a program does not send to its own port.
+        // The candidates: a configured address is never taken away, and a program does not send to the program's own port.
         let open = |place: &NodeId| *place != to && !self.programs[place.index()].is_given;
         let nodes = || (0..self.programs.len()).map(NodeId::new);
         let silent = |place: &NodeId| now.saturating_duration_since(self.programs[place.index()].heard) >= self.forget_after;
         let unknown = |place: &NodeId| self.programs[place.index()].address.is_none();
-        // Programs that were never heard of come first, so that a silent program keeps its place as long as there is another one.
+        // Unheard programs come first, so that a silent program keeps the place as long as there is a choice.
         let place = nodes().filter(open).find(unknown).or_else(|| nodes().filter(open).find(silent))?;
         if let Some(before) = self.programs[place.index()].address.replace(from) {
             self.places.remove(&before);

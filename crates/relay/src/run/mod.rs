@@ -37,7 +37,7 @@ pub enum RelayError {
     System(#[from] io::Error),
 }
 
-/// Options of a run, which do not change the fates of datagrams.
+/// Options of a run without effect on the fates of datagrams.
 #[derive(Clone, Copy, Debug)]
 pub struct RunOptions {
     /// Way to wait for the next release.
@@ -106,7 +106,7 @@ impl Relay {
         Ok(Self { engine: Engine::new(config)?, ports, release: Lateness::new(), refused_changes: 0 })
     }
 
-    /// Returns the name of each program with the address at which the relay stands in for the program; for a proxy, `listen` with the listening address.
+    /// Returns the name of each program with the relay's address for the program; for a proxy, `listen` with the listening address.
     pub fn ports(&self) -> impl Iterator<Item = (&str, SocketAddr)> {
         self.ports.addresses()
     }
@@ -153,7 +153,7 @@ impl Relay {
         })
     }
 
-    /// Returns the state that a look may see.
+    /// Returns the state for a look.
     const fn view(&self, now: Instant) -> View<'_> {
         View { now, engine: &self.engine, release: &self.release }
     }
@@ -173,7 +173,7 @@ impl Driven for Running<'_> {
     type Clock = MonotonicClock;
     type Error = io::Error;
 
-    /// A little longer than it takes to make a release ready. A datagram that arrives in the last 3 µs before a release is read after the release, and so is
+    /// A little longer than the making of a release takes. A datagram that arrives in the last 3 µs before a release is read after the release, and so is
     /// offered late.
     const AHEAD: Option<Duration> = Some(Duration::from_micros(3));
     const RESTS: bool = true;

@@ -30,7 +30,7 @@ pub(super) struct Ports {
     config: EndpointConfig,
     /// Epoll instance, readable when at least one socket is readable.
     epoll: OwnedFd,
-    /// Receive buffers, shared by all sockets: only one socket is read at a time.
+    /// Receive buffers, shared by all sockets: sockets are read one at a time.
     buffers: ReceiveBuffers,
     /// Slots of new clients whose sockets are still to be opened.
     opened: Vec<u32>,
@@ -42,7 +42,7 @@ pub(super) struct Ports {
     without_socket: u64,
 }
 
-/// Open socket with its queue.
+/// Open socket with the queue.
 #[derive(Debug)]
 struct OpenPort {
     socket: UdpEndpoint,
@@ -68,7 +68,7 @@ struct Tally {
     kernel_drops: u64,
 }
 
-/// Batches read from one socket before other sockets, and due departures, get their turn.
+/// Batches read from a socket before further sockets, and due departures, get their turn.
 const BATCHES: usize = 8;
 
 /// Datagrams taken from the engine before arrivals get their turn.
@@ -107,15 +107,15 @@ impl Ports {
         self.epoll.as_fd()
     }
 
-    /// Hands to the engine the datagrams that have arrived by `now`, the present time of `clock`, and possibly later ones. Returns the instant up to which
-    /// every arrived datagram was handed on. The caller must not let logical time pass that instant: a datagram that is still unread would be offered late.
+    /// Hands the datagrams to the engine that have arrived by `now`, the present time of `clock`, and possibly later datagrams. Returns an instant: every
+    /// datagram up to the instant was handed on. The caller must not let logical time pass the instant, because an unread datagram would be offered late.
     pub(super) fn receive(&mut self, engine: &mut Engine, clock: &MonotonicClock, now: Instant) -> io::Result<Received> {
         let mut heard = Received { count: 0, until: now };
-        // A proxy has one socket until its first client comes, and needs no call of epoll until then.
+        // A proxy has a single socket until the first client comes, and needs no call of epoll until then.
         if self.ports.len() == 1 {
             self.receive_at(0, engine, clock, &mut heard)?;
         } else {
-            // One call of epoll tells which sockets are readable. Without epoll, every socket would need a call of its own.
+            // A call of epoll tells the readable sockets. Without epoll, every socket would need a call of its own.
             let mut events = [MaybeUninit::uninit(); 64];
             let ready = match epoll::wait(&self.epoll, &mut events, Some(&Timespec::default())) {
                 Ok((ready, _)) => &*ready,
@@ -127,14 +127,14 @@ impl Ports {
                 self.receive_at(place, engine, clock, &mut heard)?;
             }
         }
-        // Datagrams of several sockets are offered together, because the engine sorts them by arrival.
+        // Datagrams of several sockets are offered together, because the engine sorts the datagrams by arrival.
         if heard.count > 0 {
             engine.offer_staged();
         }
         Ok(heard)
     }
 
-    /// Reads up to [`BATCHES`] batches from one socket and stages their datagrams in the engine. An index without a socket reads nothing: a client may have
+    /// Reads up to [`BATCHES`] batches from a socket and stages the datagrams in the engine. Reads nothing at an index without a socket: a client may have
     /// left.
     fn receive_at(&mut self, place: usize, engine: &mut Engine, clock: &MonotonicClock, heard: &mut Received) -> io::Result<()> {
         let Some(Some(open)) = self.ports.get_mut(place) else { return Ok(()) };
@@ -153,7 +153,7 @@ impl Ports {
                 }
             })?;
             heard.count += count;
-            // A batch that is not full has emptied the socket.
+            // A batch with room left has emptied the socket.
             if count < UdpEndpoint::BATCH {
                 break;
             }
@@ -182,19 +182,19 @@ impl Ports {
         }
         while let Some(slot) = self.opened.pop() {
             if self.open_at(slot as usize + 1, clients).is_err() {
-                // Usually the limit of file descriptors is reached. The relay goes on with the other clients.
+                // Usually the limit of file descriptors is reached. The relay goes on with the remaining clients.
                 self.without_socket += 1;
                 engine.close_client(slot);
             }
         }
     }
 
-    /// Opens a socket and puts it at the index `place`, which also becomes its number in epoll.
+    /// Opens a socket at the index `place`. The index is also the socket's number in epoll.
     fn open_at(&mut self, place: usize, address: SocketAddr) -> Result<(), BindError> {
         let socket = UdpEndpoint::bind(address, self.config)?;
         epoll::add(&self.epoll, &socket, epoll::EventData::new_u64(place as u64), epoll::EventFlags::IN)
             .map_err(|error| BindError { address, source: error.into() })?;
-        // Slots of clients that have no socket yet stay empty.
+        // Slots of clients without a socket so far stay empty.
         while self.ports.len() <= place {
             self.ports.push(None);
         }
@@ -202,7 +202,7 @@ impl Ports {
         Ok(())
     }
 
-    /// Queues the datagrams that leave now in their sockets. Returns whether the bound [`RELEASES`] ended the taking, so that more may be left.
+    /// Queues the datagrams due now in the sockets. Returns whether the bound [`RELEASES`] ended the taking, so that more datagrams may be left.
     pub(super) fn take_releases(&mut self, engine: &mut Engine) -> bool {
         for _ in 0..RELEASES {
             let Some(release) = engine.poll_release() else { return false };
@@ -213,9 +213,9 @@ impl Ports {
             };
             // The socket exists: the engine forgets a client without a socket, and releases nothing for a forgotten client.
             let Some(Some(port)) = self.ports.get_mut(place) else { continue };
-            // A full outbox drops and counts the datagram: then it has no departure either.
+            // A full outbox drops and counts the datagram: a dropped datagram has no departure either.
             if port.socket.queue(release.to, release.bytes, release.ecn) {
-                // The datagram should have left at this instant, had it been offered on its arrival.
+                // The datagram should have left at this instant, had the offer come with the arrival.
                 let late = u64::try_from(release.late.as_nanos()).unwrap_or(u64::MAX);
                 port.departures.push_back(Instant::from_nanos(release.at.as_nanos().saturating_sub(late)));
                 if !core::mem::replace(&mut port.is_dirty, true) {
@@ -226,14 +226,14 @@ impl Ports {
         true
     }
 
-    /// Sends the queued datagrams and records how late each one is: the time of the clock before the call of the kernel, less the instant when the datagram
-    /// should have left. A late offer to the link counts as lateness, too.
+    /// Sends the queued datagrams and records the lateness of each datagram: the time of the clock before the call of the kernel, less the instant when the
+    /// datagram should have left. A late offer to the link counts as lateness, too.
     pub(super) fn send(&mut self, clock: &MonotonicClock, lateness: &mut Lateness) {
         let ports = &mut self.ports;
         self.dirty.retain(|place| {
-            // A socket is missing if its client has left; datagrams still queued there were dropped with the socket.
+            // The socket of a former client is missing; datagrams still queued there were dropped with the socket.
             let Some(Some(OpenPort { socket, departures, is_dirty })) = ports.get_mut(*place) else { return false };
-            // `count` datagrams were sent or given up, in the order of the queue, so their instants are the first ones.
+            // `count` datagrams were sent or given up, in the order of the queue, so the first `count` instants belong to these datagrams.
             socket.flush_with(
                 || clock.now(),
                 |before, count| departures.drain(..count.min(departures.len())).for_each(|at| lateness.record(before.saturating_duration_since(at))),
@@ -267,7 +267,7 @@ impl Ports {
         self.without_socket
     }
 
-    /// Returns the counts of each port. The ports of all clients, past and present, are one entry.
+    /// Returns the counts of each port. The ports of all clients, past and present, are a single entry.
     pub(super) fn report(&self) -> Vec<PortReport> {
         let mut ports: Vec<PortReport> = Vec::new();
         for (place, (name, address)) in self.addresses().enumerate() {
@@ -282,7 +282,7 @@ impl Ports {
             }
         }
         if let Layout::Proxy { .. } = self.layout {
-            // Clients that have left are in the sums already; the socket at index 0 is the listening one.
+            // Former clients are in the sums already; the socket at index 0 is the listening socket.
             let mut tally = self.left;
             self.ports.iter().skip(1).flatten().for_each(|port| tally.add(&port.socket));
             let granted = self.ports.iter().skip(1).flatten().map(|port| port.socket.granted_receive_buffer()).min();
@@ -323,7 +323,8 @@ impl Tally {
     }
 }
 
-/// Returns a local address, with port number 0, from which `to` can be reached. For a loopback target it is a loopback address, which no other machine reaches.
+/// Returns a local address, with port number 0, from which `to` can be reached. For a loopback target the address is a loopback address, out of reach for other
+/// machines.
 fn beside(to: SocketAddr) -> SocketAddr {
     match (to.is_ipv6(), to.ip().is_loopback()) {
         (true, true) => (Ipv6Addr::LOCALHOST, 0).into(),

@@ -19,16 +19,16 @@ pub struct Report {
     pub prepared: Prepared,
     /// Directed links, ordered by sender and then by receiver.
     pub links: Vec<LinkReport>,
-    /// Ports, in the order of the programs. For a proxy: the listening port, then one entry for the ports of all clients.
+    /// Ports, in the order of the programs. For a proxy: the listening port, then a single entry for the ports of all clients.
     pub ports: Vec<PortReport>,
     /// Counters of arrived datagrams.
     pub intake: IntakeCounts,
     /// Release error: time from the due departure of a datagram to the call of the kernel, for each datagram handed to the kernel. Includes the share in
     /// `clamped`.
     pub release: Lateness,
-    /// Time by which datagrams were offered later than they arrived, of late datagrams only.
+    /// Time from arrival to offer, of late datagrams only.
     pub clamped: Lateness,
-    /// Datagrams in flight at the end, and their payload bytes.
+    /// Number and payload bytes of the datagrams in flight at the end.
     pub held: (u64, Bytes),
     /// Clients sent away because no socket could be opened.
     pub without_socket: u64,
@@ -60,7 +60,7 @@ pub struct PortReport {
     pub address: Option<SocketAddr>,
     /// Datagrams received, sent and lost at the socket.
     pub counts: EndpointCounts,
-    /// Size of the receive buffer in the kernel, in the kernel's own count \[bytes\]; the smallest one of the ports of clients.
+    /// Size of the receive buffer in the kernel, in the kernel's own count \[bytes\]; the smallest size among the ports of clients.
     pub receive_buffer: usize,
     /// Datagrams dropped by the kernel because the receive buffer was full; `None` if the system does not tell.
     pub kernel_drops: Option<u64>,
@@ -106,7 +106,7 @@ impl View<'_> {
         self.release
     }
 
-    /// Returns the number of datagrams in flight, and their payload bytes.
+    /// Returns the number and the payload bytes of the datagrams in flight.
     #[must_use]
     pub fn held(&self) -> (u64, Bytes) {
         self.engine.held()
