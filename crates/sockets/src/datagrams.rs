@@ -20,9 +20,9 @@ pub enum DatagramOption {
     TrafficClass,
     /// Time to live of multicast over IPv4.
     MulticastTtl,
-    /// Whether the socket receives its own multicast over IPv4, a flag.
+    /// Whether the socket receives the socket's own multicast over IPv4, a flag.
     MulticastLoop4,
-    /// Whether the socket receives its own multicast over IPv6, a flag.
+    /// Whether the socket receives the socket's own multicast over IPv6, a flag.
     MulticastLoop6,
 }
 
@@ -61,9 +61,9 @@ pub enum Membership {
 
 /// UDP socket.
 ///
-/// [`Datagrams::poll_receive`] and [`Datagrams::poll_readable`] register the waker of the context if they return [`Poll::Pending`]; `try_receive` returns
+/// [`Datagrams::poll_receive`] and [`Datagrams::poll_readable`] register the waker of the context with [`Poll::Pending`]; `try_receive` returns
 /// [`io::ErrorKind::WouldBlock`] instead. Sending never waits. All methods fail after the host of the socket has crashed, after the run of the test bed, and on
-/// other threads than the one of the run.
+/// every thread but the thread of the run.
 #[expect(clippy::missing_errors_doc, reason = "the documentation of the trait names the errors of all methods")]
 pub trait Datagrams: Configured + fmt::Debug + Send + Sync {
     /// Hands the next datagram and its sender to `take`. The datagram stays in the buffer if `peek` is set.
@@ -78,11 +78,11 @@ pub trait Datagrams: Configured + fmt::Debug + Send + Sync {
     fn send(&self, bytes: &[u8], to: Option<SocketAddr>) -> io::Result<usize>;
     /// Connects the socket to a peer.
     fn connect(&self, to: SocketAddr) -> io::Result<()>;
-    /// Returns the address to which the socket is bound.
+    /// Returns the socket's local address.
     fn local_addr(&self) -> io::Result<SocketAddr>;
-    /// Returns the peer to which the socket is connected.
+    /// Returns the peer of a connected socket.
     fn peer_addr(&self) -> io::Result<SocketAddr>;
-    /// Takes the error that the next call would otherwise return.
+    /// Takes the error of the next call.
     fn take_error(&self) -> io::Result<Option<io::Error>>;
     /// Returns an option.
     fn option(&self, option: DatagramOption) -> io::Result<u32>;

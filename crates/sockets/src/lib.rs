@@ -38,12 +38,12 @@ thread_local! {
     static RUNTIME_SEED: Cell<Option<u64>> = const { Cell::new(None) };
 }
 
-/// Sets the seed of the runtime of tokio that is built next on this thread, from which `tokio::select!` chooses where it begins.
+/// Sets the seed of the next runtime of tokio on this thread. From the seed, `tokio::select!` chooses where to begin.
 pub fn seed_next_runtime(seed: u64) {
     RUNTIME_SEED.set(Some(seed));
 }
 
-/// Returns the seed that [`seed_next_runtime`] has set, and forgets the seed.
+/// Returns the seed of [`seed_next_runtime`], and forgets the seed.
 #[must_use]
 pub fn take_runtime_seed() -> Option<u64> {
     RUNTIME_SEED.take()

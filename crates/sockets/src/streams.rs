@@ -1,4 +1,4 @@
-//! TCP: streams, listeners, and sockets that are neither.
+//! TCP: streams, listeners, and sockets before the choice between stream and listener.
 
 use std::fmt;
 use std::future::Future;
@@ -26,37 +26,37 @@ pub struct Ready {
     pub write_closed: bool,
 }
 
-/// TCP connection. Dropping the connection closes it, as dropping a stream of tokio does.
+/// TCP connection. Dropping the value closes the connection, as dropping a stream of tokio does.
 ///
-/// Methods named `poll_…` register the waker of the context if they return [`Poll::Pending`]. Methods named `try_…` return [`io::ErrorKind::WouldBlock`]
-/// instead. All methods fail after the host of the connection has crashed, after the run of the test bed, and on other threads than the one of the run.
+/// Methods named `poll_…` register the waker of the context with [`Poll::Pending`]. Methods named `try_…` return [`io::ErrorKind::WouldBlock`] instead. All
+/// methods fail after the host of the connection has crashed, after the run of the test bed, and on every thread but the thread of the run.
 #[expect(clippy::missing_errors_doc, reason = "the documentation of the trait names the errors of all methods")]
 pub trait Stream: Configured + fmt::Debug + Send + Sync {
     /// Waits until bytes can be read, or the connection is over.
     fn poll_readable(&self, cx: &mut Context<'_>) -> Poll<io::Result<()>>;
     /// Waits until bytes can be written, or the connection is over.
     fn poll_writable(&self, cx: &mut Context<'_>) -> Poll<io::Result<()>>;
-    /// Returns what would not block now.
+    /// Returns the operations that would not block now.
     fn ready(&self) -> io::Result<Ready>;
-    /// Reads received bytes, and returns their number; 0 is the end of the stream.
+    /// Reads received bytes, and returns the number of bytes; 0 is the end of the stream.
     fn poll_read(&self, cx: &mut Context<'_>, buffer: &mut [u8]) -> Poll<io::Result<usize>>;
     /// Like [`Stream::poll_read`], but leaves the bytes in the stream.
     fn poll_peek(&self, cx: &mut Context<'_>, buffer: &mut [u8]) -> Poll<io::Result<usize>>;
-    /// Writes bytes, and returns how many the send buffer has taken.
+    /// Writes bytes, and returns the number of bytes taken by the send buffer.
     fn poll_write(&self, cx: &mut Context<'_>, buffers: &[IoSlice<'_>]) -> Poll<io::Result<usize>>;
-    /// Reads received bytes into one buffer after the other.
+    /// Reads received bytes into the buffers, first to last.
     fn try_read(&self, buffers: &mut [IoSliceMut<'_>]) -> io::Result<usize>;
-    /// Writes one buffer after the other.
+    /// Writes the buffers, first to last.
     fn try_write(&self, buffers: &[IoSlice<'_>]) -> io::Result<usize>;
     /// Sends FIN after the bytes written so far.
     fn shut_down(&self) -> io::Result<()>;
-    /// Sends FIN for a half that is dropped. Also works on another thread.
+    /// Sends FIN for a dropped half. Also works on another thread.
     fn let_write_half_go(&self);
     /// Returns the address of this end.
     fn local_addr(&self) -> io::Result<SocketAddr>;
     /// Returns the address of the other end.
     fn peer_addr(&self) -> io::Result<SocketAddr>;
-    /// Takes the error that the next call would otherwise return.
+    /// Takes the error of the next call.
     fn take_error(&self) -> io::Result<Option<io::Error>>;
     /// Returns whether small segments leave while earlier segments are not acknowledged.
     fn nodelay(&self) -> io::Result<bool>;
@@ -76,7 +76,7 @@ pub trait Stream: Configured + fmt::Debug + Send + Sync {
     fn set_ttl(&self, ttl: u32) -> io::Result<()>;
 }
 
-/// TCP listener. All methods fail as those of [`Stream`] do.
+/// TCP listener. All methods fail as the methods of [`Stream`] do.
 #[expect(clippy::missing_errors_doc, reason = "the documentation of the trait names the errors of all methods")]
 pub trait Listener: Configured + fmt::Debug + Send + Sync {
     /// Accepts a connection, and returns the address of its other end.
@@ -89,7 +89,7 @@ pub trait Listener: Configured + fmt::Debug + Send + Sync {
     fn set_ttl(&self, ttl: u32) -> io::Result<()>;
 }
 
-/// Option of a [`Socket`] that is on or off.
+/// Option of a [`Socket`] with the values on and off.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Flag {
     /// `SO_KEEPALIVE`.
@@ -102,7 +102,7 @@ pub enum Flag {
     NoDelay,
 }
 
-/// Option of a [`Socket`] that is a number.
+/// Option of a [`Socket`] with a number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Number {
     /// Size of the send buffer \[byte\].
@@ -113,7 +113,7 @@ pub enum Number {
     TypeOfService,
 }
 
-/// TCP socket that is neither connected nor listening. All methods fail as those of [`Stream`] do.
+/// TCP socket, neither connected nor listening. All methods fail as the methods of [`Stream`] do.
 #[expect(clippy::missing_errors_doc, reason = "the documentation of the trait names the errors of all methods")]
 pub trait Socket: Configured + fmt::Debug + Send + Sync {
     /// Binds the socket.
@@ -122,15 +122,15 @@ pub trait Socket: Configured + fmt::Debug + Send + Sync {
     fn connect(self: Box<Self>, to: SocketAddr) -> Connecting;
     /// Listens. `backlog` + 1 connections may wait to be accepted.
     fn listen(self: Box<Self>, backlog: u32) -> io::Result<Box<dyn Listener>>;
-    /// Returns the address to which the socket is bound.
+    /// Returns the socket's local address.
     fn local_addr(&self) -> io::Result<SocketAddr>;
-    /// Returns an option that is on or off.
+    /// Returns an option with the values on and off.
     fn flag(&self, flag: Flag) -> io::Result<bool>;
     /// Sets an option on or off.
     fn set_flag(&self, flag: Flag, on: bool) -> io::Result<()>;
-    /// Returns an option that is a number.
+    /// Returns an option with a number.
     fn number(&self, number: Number) -> io::Result<u32>;
-    /// Sets an option that is a number.
+    /// Sets an option with a number.
     fn set_number(&self, number: Number, value: u32) -> io::Result<()>;
     /// Returns the time to linger.
     fn linger(&self) -> io::Result<Option<Duration>>;

@@ -1,4 +1,4 @@
-//! Tasks of other executors that live on hosts of a test bed.
+//! Tasks of foreign executors on hosts of a test bed.
 
 use std::cell::RefCell;
 use std::fmt;
@@ -6,13 +6,13 @@ use std::sync::Arc;
 use std::task::{Context, Poll};
 
 thread_local! {
-    /// Host for which this thread works outside of the run, as a thread of `spawn_blocking` does.
+    /// Host of this thread outside of the run, as for a thread of `spawn_blocking`.
     static HOST: RefCell<Option<Arc<dyn Host>>> = const { RefCell::new(None) };
 }
 
 /// A host of a test bed, for tasks that the test bed does not poll itself.
 pub trait Host: Send + Sync {
-    /// Calls `act` as a task of this host: sockets that `act` makes belong to this host.
+    /// Calls `act` as a task of this host: sockets made by `act` belong to this host.
     fn within(&self, act: &mut dyn FnMut());
 
     /// Keeps `stop`, and calls it when the program of the host ends: by a crash, or because the program is killed.
@@ -36,20 +36,22 @@ pub trait Signals: fmt::Debug + Send + Sync {
 
 /// The way to stop a task.
 pub trait Stop: Send {
-    /// Stops the task: its future is dropped.
+    /// Stops the task by dropping the task's future.
     fn stop(&self);
 
     /// Returns whether the task is over, so that `stop` need not be kept any more.
     fn is_over(&self) -> bool;
 }
 
-/// Guard that holds the virtual time of a test bed.
+/// Guard: the virtual time of a test bed stands still until the guard is dropped.
 pub trait Hold: Send {}
 
-/// Returns the host of the present task: that of the task which the test bed polls, or the host for which this thread works.
+/// Returns the host of the present task: the host of the task under the test bed's poll, or this thread's host.
 #[must_use]
 pub fn host() -> Option<Arc<dyn Host>> {
     match crate::bed() {
+        // Inside a run the test bed knows the polled task. The thread's own host counts only on threads without a test bed, such as threads of
+        // `spawn_blocking`.
         Some(bed) => bed.host(),
         None => HOST.try_with(|host| host.borrow().clone()).ok().flatten(),
     }
@@ -62,15 +64,16 @@ pub struct OnHost {
     before: Option<Arc<dyn Host>>,
 }
 
-/// Declares that this thread, which runs no test bed, works for `host` until the returned guard is dropped. Tasks that the thread starts live on that host.
+/// Declares that this thread, without a test bed of its own, works for `host` until the returned guard is dropped. Tasks started by the thread live on `host`.
 pub fn on_host(host: Arc<dyn Host>) -> OnHost {
     OnHost { before: HOST.with_borrow_mut(|here| here.replace(host)) }
 }
 
 impl Drop for OnHost {
     fn drop(&mut self) {
+        // Guards nest: the host before this guard is in force again.
         let before = self.before.take();
-        // The value is dropped after the borrow has ended, because its destructor is foreign.
+        // The value is dropped after the borrow has ended, because the host's destructor is foreign.
         let left = HOST.try_with(|host| host.replace(before));
         drop(left);
     }
