@@ -1,4 +1,4 @@
-//! The shapes of an animation, where they stand in its last frame.
+//! The shapes of an animation, at the places of the last frame.
 
 use std::fmt::Write as _;
 
@@ -35,7 +35,7 @@ impl Motion {
         xml
     }
 
-    /// One run: its title, frame, paths, copies, hands and legend. `corner` is the upper left one.
+    /// One run: title, frame, paths, copies, hands and legend. `corner` is the upper left corner.
     fn write_run(&self, xml: &mut String, number: usize, [left, top]: [f64; 2], view: &View) {
         let run = &self.runs[number];
         write_text(xml, &run.title, [left, top + 1.4 * FONT], FONT, "");
@@ -52,10 +52,12 @@ impl Motion {
             let shift = view.shift(place);
             [middle[0] + shift[0], middle[1] + shift[1]]
         };
+        // All paths come before all copies: no path may hide a copy.
         for copy in 0..run.names.len() {
             write_path(xml, run, copy, at);
         }
         for copy in 0..run.names.len() {
+            // Without animations the reader sees the last frame, so the shapes stand there in the document itself.
             let shift = run.frames.last().and_then(|frame| frame.get(copy)).map_or([0.0; 2], |place| view.shift(*place));
             let edge = edge_of(copy, run.names.len());
             let [x, y] = middle.map(|middle| coordinate(middle - edge / 2.0));
@@ -81,7 +83,7 @@ impl Motion {
         xml.push_str("</g>\n");
         write_legend(xml, run, [left, below + HEIGHT + 2.0 * FONT]);
         let seconds = format!("{:.1} s", self.seconds());
-        // Aligned to the right edge of the frame by the width of its digits.
+        // Aligned to the right edge of the frame by the width of the digits.
         let wide = u32::try_from(seconds.len()).map_or(0.0, f64::from) * 0.6 * FONT;
         write_text(xml, &seconds, [left + width - wide, below + HEIGHT + 2.0 * FONT], FONT, "");
     }
@@ -101,7 +103,7 @@ impl Motion {
     }
 }
 
-/// The path of one copy, in pieces that appear one after the other.
+/// The path of a copy, in pieces that appear one after the other.
 fn write_path(xml: &mut String, run: &MotionRun, copy: usize, at: impl Fn([f64; 2]) -> [f64; 2]) {
     let places: Vec<[f64; 2]> = run.frames.iter().filter_map(|places| places.get(copy)).map(|place| at(*place)).collect();
     let colour = copy % COUNT;
@@ -109,6 +111,7 @@ fn write_path(xml: &mut String, run: &MotionRun, copy: usize, at: impl Fn([f64; 
     let width = coordinate(edge_of(copy, run.names.len()) / 12.0);
     let mut begin = 0;
     while begin + 1 < places.len() {
+        // A piece ends where the next piece begins, so the path has no gap.
         let end = (begin + PIECE).min(places.len() - 1);
         let points = places[begin..=end].iter().map(|point| point.map(coordinate).join(","));
         let _ =
@@ -117,10 +120,10 @@ fn write_path(xml: &mut String, run: &MotionRun, copy: usize, at: impl Fn([f64; 
     }
 }
 
-/// The names of the copies, each with its colour and size, and what a ring is.
+/// The names of the copies, each with colour and size, and the meaning of a ring.
 fn write_legend(xml: &mut String, run: &MotionRun, [mut x, y]: [f64; 2]) {
     for (copy, name) in run.names.iter().enumerate() {
-        // Sizes in the legend have the proportions of those in the frame.
+        // Sizes in the legend have the proportions of the sizes in the frame.
         let edge = FONT * edge_of(copy, run.names.len()) / EDGE;
         let [at, top, size] = [x + (FONT - edge) / 2.0, y - 0.35 * FONT - edge / 2.0, edge].map(coordinate);
         let _ = writeln!(xml, "<rect class=\"f{}\" x=\"{at}\" y=\"{top}\" width=\"{size}\" height=\"{size}\" rx=\"2\"/>", copy % COUNT);
@@ -134,7 +137,7 @@ fn write_legend(xml: &mut String, run: &MotionRun, [mut x, y]: [f64; 2]) {
     }
 }
 
-/// The width that no common font exceeds.
+/// The width of a text, not exceeded by any common font.
 fn width_of(text: &str) -> f64 {
     u32::try_from(text.chars().count()).map_or(0.0, f64::from) * 0.7 * FONT
 }

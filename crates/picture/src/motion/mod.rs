@@ -1,14 +1,14 @@
 //! Copies in motion: an animation of some runs beside each other, which a browser repeats.
 //!
-//! The animation needs styles alone, so that it also moves within an `<img>`, where no script runs. Each cycle ends with a still of [`STILL`] seconds: the final
-//! positions, with the path of each copy behind them.
+//! The animation needs styles alone, so that the animation also moves within an `<img>`, where no script runs. Each cycle ends with a still of [`STILL`]
+//! seconds: the final positions, with the path of each copy behind the copy.
 
 mod draw;
 mod style;
 #[cfg(test)]
 mod tests;
 
-/// An animation of some runs beside each other. All runs have the scale of the first run, so that copies of another run can leave its frame.
+/// An animation of some runs beside each other. All runs have the scale of the first run, so that copies of another run can leave the frame.
 ///
 /// ```
 /// use cohaptic_picture::{Motion, MotionRun};
@@ -28,24 +28,24 @@ pub struct Motion {
     runs: Vec<MotionRun>,
 }
 
-/// Positions of the copies in one run, and of the hands that move some of the copies.
+/// Positions of the copies in a run, and of the hands at some of the copies.
 #[derive(Clone, Debug)]
 pub struct MotionRun {
     /// Text above the frame of this run.
     pub title: String,
     /// Names of the copies.
     pub names: Vec<String>,
-    /// Positions of the copies along the first two axes \[m\], y upwards, indexed by frame and then by copy. A copy whose position is not finite is drawn outside
-    /// the frame; a copy without a position is drawn in the middle.
+    /// Positions of the copies along the first two axes \[m\], y upwards, indexed by frame and then by copy. A copy at a position that is not finite is drawn
+    /// outside the frame; a copy without a position is drawn in the middle.
     pub frames: Vec<Vec<[f64; 2]>>,
-    /// Hands, which are drawn as rings in the colour of their copy.
+    /// Hands, drawn as rings in the colour of the copy.
     pub hands: Vec<MotionHand>,
 }
 
 /// Positions of one hand.
 #[derive(Clone, Debug)]
 pub struct MotionHand {
-    /// Index of the copy that the hand moves.
+    /// Index of the hand's copy.
     pub copy: usize,
     /// Positions of the hand along the first two axes \[m\], y upwards, indexed by frame.
     pub frames: Vec<[f64; 2]>,
@@ -58,18 +58,18 @@ const FONT: f64 = 13.0;
 const HEIGHT: f64 = 220.0;
 /// Edge of the largest copy \[px\].
 const EDGE: f64 = 46.0;
-/// Edge of the smallest copy \[px\]. Copies differ in size, so that each one is seen where all copies are at one position.
+/// Edge of the smallest copy \[px\]. Copies differ in size, so that each copy is seen where all copies are at one position.
 const LEAST_EDGE: f64 = 20.0;
 /// Radius of a hand \[px\].
 const RING: f64 = 30.0;
-/// Greatest distance of a drawn copy from the middle of its frame \[px\]: far outside the frame.
+/// Greatest distance of a drawn copy from the middle of the frame \[px\]: far outside the frame.
 const GONE: f64 = 2.0 * WIDTH;
-/// Time for which the last frame is shown before the animation begins again \[s\].
+/// Time with the last frame before the animation begins again \[s\].
 const STILL: f64 = 2.5;
 
 impl Motion {
-    /// An animation with `step` seconds between two frames, above zero. It lasts as long as the run with the most frames, at least one step, and then shows the last
-    /// frame for 2.5 s. `note` stands below the title.
+    /// An animation with `step` seconds between two frames, above zero. The animation lasts as long as the run with the most frames, at least one step, and
+    /// then shows the last frame for 2.5 s. `note` stands below the title.
     #[must_use]
     pub fn new(title: impl Into<String>, note: impl Into<String>, step: f64, runs: Vec<MotionRun>) -> Self {
         Self { title: title.into(), note: note.into(), step, runs }
@@ -101,23 +101,26 @@ impl Motion {
         (WIDTH - MARGIN * (columns + 1.0)) / columns
     }
 
-    /// Maps positions to the frame: the first run fills it.
+    /// Maps positions to the frame: the first run fills the frame.
     fn view(&self) -> View {
         let first = self.runs.iter().take(1);
         let copies = first.clone().flat_map(|run| run.frames.iter().flatten());
         let hands = first.flat_map(|run| &run.hands).flat_map(|hand| &hand.frames);
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        // A position that is not finite would leave the range without a middle.
         for place in copies.chain(hands).filter(|place| place.iter().all(|x| x.is_finite())) {
             for axis in [0, 1] {
                 (low[axis], high[axis]) = (low[axis].min(place[axis]), high[axis].max(place[axis]));
             }
         }
         let half = [self.frame_width() / 2.0, HEIGHT / 2.0];
+        // No position of the first run is finite: any scale will do.
         if low[0] > high[0] {
             return View { middle: [0.0; 2], scale: 1.0, half };
         }
         // The largest shape stays within the frame.
         let room = half.map(|half| 2.0 * half - 2.2 * RING);
+        // Copies at rest span no length. A tenth of a millimetre keeps the scale finite.
         let scales = [0, 1].map(|axis| room[axis] / (high[axis] - low[axis]).max(1e-4));
         View { middle: [0, 1].map(|axis| (low[axis] + high[axis]) / 2.0), scale: scales[0].min(scales[1]), half }
     }
@@ -127,12 +130,13 @@ impl MotionRun {
     /// First frame from which on every copy is outside the frame of the picture, until the end of the run.
     fn left_at(&self, view: &View) -> Option<usize> {
         let is_out = |places: &Vec<[f64; 2]>| !places.is_empty() && places.iter().all(|place| view.is_outside(*place));
+        // The last frame with a copy inside decides, because copies may leave and come back before.
         let seen = self.frames.iter().rposition(|places| !is_out(places)).map_or(0, |last| last + 1);
         (seen < self.frames.len()).then_some(seen)
     }
 }
 
-/// Edge of a copy \[px\]: the first copy is the largest one.
+/// Edge of a copy \[px\]: the first copy is the largest.
 fn edge_of(copy: usize, copies: usize) -> f64 {
     let count = |number: usize| u32::try_from(number).map_or(f64::INFINITY, f64::from);
     EDGE - (EDGE - LEAST_EDGE) * count(copy) / count(copies.max(2) - 1)
@@ -151,11 +155,13 @@ impl View {
     /// Shift from the middle of the frame \[px\], y downwards as in a picture.
     fn shift(&self, place: [f64; 2]) -> [f64; 2] {
         let along = |axis: usize| (self.scale * (place[axis] - self.middle[axis])).clamp(-GONE, GONE);
+        // `clamp` keeps NaN, so NaN is moved out of the frame here.
         [along(0), -along(1)].map(|x| if x.is_nan() { GONE } else { x })
     }
 
     fn is_outside(&self, place: [f64; 2]) -> bool {
         let shift = self.shift(place);
+        // A copy is outside only if no part of the largest shape is seen.
         (0..2).any(|axis| shift[axis].abs() > self.half[axis] + EDGE / 2.0)
     }
 }

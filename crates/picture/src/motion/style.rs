@@ -1,17 +1,17 @@
-//! The style sheet of an animation: colours, and how each shape moves or appears.
+//! The style sheet of an animation: colours, and the way of each shape to move or appear.
 
 use std::fmt::Write as _;
 
 use super::{Motion, View};
 use crate::xml::coordinate;
 
-/// Colours that are told apart with any kind of colour vision (Okabe & Ito 2008), on light and on dark ground.
+/// Colours distinguishable with any kind of colour vision (Okabe & Ito 2008), on light and on dark ground.
 const COLOURS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#c0609a", "#b88700", "#3a9bd0", "#6b7280"];
 
 /// Number of colours: copy `n` has colour `n % COUNT`.
 pub(super) const COUNT: usize = COLOURS.len();
 
-/// Number of frames whose positions one piece of a path joins. A piece appears when the copy has passed it.
+/// Number of frames joined by a piece of a path. A piece appears when the copy has passed the end of the piece.
 pub(super) const PIECE: usize = 5;
 
 const STYLE: &str = "text{font-family:system-ui,sans-serif}.ink{fill:#1b1f24}.paper{fill:#fff}.frame{fill:none;stroke:#6e7781}
@@ -20,7 +20,7 @@ const STYLE: &str = "text{font-family:system-ui,sans-serif}.ink{fill:#1b1f24}.pa
 ";
 
 impl Motion {
-    /// The whole style sheet. Without animations, which a reader may have turned off, the last frame is shown.
+    /// The whole style sheet. Without animations (a reader may have turned animations off) the last frame is shown.
     pub(super) fn style(&self, view: &View) -> String {
         let mut text = STYLE.to_owned();
         for (number, colour) in COLOURS.iter().enumerate() {
@@ -40,6 +40,7 @@ impl Motion {
             }
         }
         let frames = self.runs.iter().map(|run| run.frames.len()).max().unwrap_or(0);
+        // Pieces end at multiples of [`PIECE`], as `write_path` cuts the paths, and at the last frame.
         for end in (1..frames).filter(|end| end % PIECE == 0 || end + 1 == frames) {
             self.write_appearance(&mut text, &format!("p{end}"), end);
         }
@@ -50,7 +51,7 @@ impl Motion {
         text
     }
 
-    /// The class `name`, whose shape goes from place to place and rests at the last one during the still.
+    /// The class `name`, with a shape that goes from place to place and rests at the last place during the still.
     fn write_way(&self, text: &mut String, name: &str, places: impl Iterator<Item = Option<[f64; 2]>>, view: &View) {
         let _ = write!(text, "@keyframes {name}{{");
         let mut last = String::new();
@@ -62,10 +63,10 @@ impl Motion {
         let _ = writeln!(text, "100%{last}}}\n.{name}{{animation:{name} {}s linear infinite}}", coordinate(self.cycle()));
     }
 
-    /// The class `name`, whose shape is shown from a frame on.
+    /// The class `name`, with a shape shown from a frame on.
     fn write_appearance(&self, text: &mut String, name: &str, frame: usize) {
         let (share, cycle) = (coordinate(self.share_of(frame)), coordinate(self.cycle()));
-        // The keyframes end without an opacity, so that the shape then has the one of its other class, at once (`step-start`).
+        // The keyframes end without an opacity, so that the shape then has the opacity of the shape's other class, at once (`step-start`).
         let hidden = format!("0%,{share}%{{opacity:0;animation-timing-function:step-start}}");
         let _ = writeln!(text, "@keyframes {name}{{{hidden}}}\n.{name}{{animation:{name} {cycle}s infinite}}");
     }
