@@ -143,6 +143,7 @@ impl Html {
     /// Makes a figure with a name for links, or without a name if `name` is empty.
     #[must_use]
     pub fn figure(name: &str, content: impl Into<Self>) -> Self {
+        // HTML forbids an empty `id`.
         let name = if name.is_empty() { String::new() } else { format!(" id=\"{}\"", escape(name)) };
         Self { text: format!("<figure{name}>\n{}</figure>\n", content.into().text) }
     }
@@ -170,6 +171,7 @@ impl Html {
     /// Makes a table, scrollable if wider than the page.
     #[must_use]
     pub fn table(table: &Table) -> Self {
+        // The `div` gets the scroll bar, so that a wide table does not widen the page.
         let mut text = "<div class=\"wide\">\n<table>\n".to_owned();
         if !table.title.is_empty() {
             let _ = writeln!(text, "<caption>{}</caption>", escape(&table.title));
@@ -194,7 +196,9 @@ impl Html {
         for row in &table.rows {
             text.push_str("<tr>");
             for (place, cell) in row.iter().enumerate() {
+                // A cell beyond the named columns counts as text.
                 let number = class(table.columns.get(place).is_some_and(|(_, number)| *number));
+                // The first cell is the row's heading, so that a screen reader can name the row at each cell.
                 let (open, close) = if place == 0 { ("<th scope=\"row\"", "</th>") } else { ("<td", "</td>") };
                 let _ = write!(text, "{open}{number}>{}{close}", cell.text);
             }

@@ -47,6 +47,7 @@ impl Page {
     pub fn html(&self) -> String {
         let title = escape(&self.title);
         let mut page = String::new();
+        // The `meta` element with the colour scheme lets a browser choose the background before reading the styles.
         let _ = write!(
             page,
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
