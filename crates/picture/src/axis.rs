@@ -78,6 +78,7 @@ impl Axis {
     /// vertical axes, where names stand above each other.
     #[must_use]
     pub fn categories<T: Into<Text>>(self, names: impl IntoIterator<Item = T>) -> Self {
+        // An axis without names has room for a single name, so that the range is never empty.
         let categories: Vec<Text> = names.into_iter().map(Into::into).collect();
         let axis = self.range(-0.5, count(categories.len().max(1)) - 0.5);
         Self { categories, ..axis }
@@ -112,6 +113,7 @@ impl Axis {
     pub(crate) fn title(&self, exponent: i32) -> Text {
         let mut title = self.name.clone();
         if !self.symbol.is_empty() {
+            // The hard space U+00A0 keeps name and symbol together where the title is wrapped.
             title = if title.is_empty() { self.symbol.clone() } else { title.then("\u{a0}").then(self.symbol.clone()) };
         }
         if exponent == 0 && self.unit.is_empty() {
@@ -133,10 +135,12 @@ impl Axis {
         // Larger values would overflow in the computation of places.
         let limit = |value: f64| value.clamp(-1e300, 1e300);
         let (low, high) = match self.range {
+            // A range without a place on the axis, such as zero on a logarithmic axis, gives way to the range of the content.
             Some((low, high)) if usable(&low) && usable(&high) => (limit(low), limit(high)),
             _ => {
                 let known = content.into_iter().flat_map(|(low, high)| [low, high]).chain(self.includes.iter().copied()).filter(usable);
                 let (low, high) = known.map(limit).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+                // Nothing has a place on the axis. Any range will do; a unit or a decade has simple ticks.
                 if low > high {
                     (if self.scale == Scale::Linear { 0.0 } else { 1.0 }, if self.scale == Scale::Linear { 1.0 } else { 10.0 })
                 } else {
@@ -144,6 +148,7 @@ impl Axis {
                 }
             }
         };
+        // A margin would move the ends of a range set by the caller.
         let margin = if self.tight || self.range.is_some() { 0.0 } else { 0.05 };
         // A value set by `include` is an intended end, such as 0, and gets no margin.
         let held = |end: f64| self.includes.iter().any(|value| value.to_bits() == end.to_bits());

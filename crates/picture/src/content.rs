@@ -27,10 +27,12 @@ impl Line {
     pub fn runs<P: IntoIterator<Item = (f64, f64)>>(runs: impl IntoIterator<Item = P>, look: Look) -> Self {
         let mut parted: Vec<Vec<(f64, f64)>> = Vec::new();
         for run in runs {
+            // Each run begins a part of its own, so that runs are never joined.
             parted.push(Vec::new());
             for (x, y) in run {
                 match parted.last_mut() {
                     Some(last) if x.is_finite() && y.is_finite() => last.push((x, y)),
+                    // A point that is not finite ends the part: no line may cross the gap.
                     _ => parted.push(Vec::new()),
                 }
             }
@@ -44,6 +46,7 @@ impl Line {
     pub fn steps(points: impl IntoIterator<Item = (f64, f64)>, look: Look) -> Self {
         let mut stairs: Vec<(f64, f64)> = Vec::new();
         for (x, y) in points {
+            // A step has two corners: the old value at the new x, then the new value.
             if let Some((_, before)) = stairs.last().copied() {
                 stairs.push((x, before));
             }
@@ -58,6 +61,7 @@ impl Line {
         let mut values: Vec<f64> = values.into_iter().filter(|value| value.is_finite()).collect();
         values.sort_by(f64::total_cmp);
         let all = count(values.len());
+        // The function begins at zero, so that the first value shows a step, too.
         let first = values.first().map(|value| (*value, 0.0));
         let shares = values.iter().enumerate().map(|(place, value)| (*value, count(place + 1) / all));
         Self::steps(first.into_iter().chain(shares), look)
@@ -66,6 +70,7 @@ impl Line {
     /// Creates a horizontal reference line over the whole panel.
     #[must_use]
     pub fn level(y: f64) -> Self {
+        // A line without ends: `extents` leaves out ±f64::MAX, so that the line does not widen an axis.
         Self::new([(f64::MIN, y), (f64::MAX, y)], Look::reference())
     }
 
@@ -120,6 +125,7 @@ impl Band {
                 _ => runs.push(Vec::new()),
             }
         }
+        // A single x spans no area.
         runs.retain(|run: &Vec<_>| run.len() > 1);
         Self { name: Text::default(), fill, runs }
     }
@@ -153,6 +159,7 @@ impl Region {
     /// Creates a region from outlines, closed automatically. Ignores outlines of fewer than three points, or with a point that is not finite.
     #[must_use]
     pub fn new(outlines: impl IntoIterator<Item = Vec<(f64, f64)>>, fill: Fill) -> Self {
+        // An outline of two points has no inside. An outline without one of its points would have another shape, so the whole outline is left out.
         let finite = |outline: &Vec<(f64, f64)>| outline.len() > 2 && outline.iter().all(|(x, y)| x.is_finite() && y.is_finite());
         Self { name: Text::default(), fill, outlines: outlines.into_iter().filter(finite).collect(), border: None }
     }
@@ -242,6 +249,7 @@ impl HeatMap {
     pub(crate) fn extent(&self) -> Extent {
         let logarithmic = self.axis.scale == Scale::Logarithmic;
         let finite = self.values.iter().flatten().copied().filter(|value| value.is_finite() && (!logarithmic || *value > 0.0));
+        // The colour bar ends at the values: a margin would give colours to absent values.
         self.axis.clone().tight().shown(span(finite))
     }
 }
@@ -345,9 +353,11 @@ pub(crate) fn edges(values: &[f64]) -> Vec<f64> {
 pub fn cell_edges(values: &[f64], logarithmic: bool) -> Vec<f64> {
     match values {
         [first, .., last] if logarithmic => {
+            // The middle on a logarithmic axis is the geometric mean. Two roots, because the product of two values could overflow.
             let between = values.windows(2).map(|pair| libm::sqrt(pair[0]) * libm::sqrt(pair[1]));
             std::iter::once(*first).chain(between).chain([*last]).collect()
         }
+        // Without a neighbour there is no border to share: a factor of two on each side makes the cell visible.
         [only] if logarithmic => vec![only / 2.0, only * 2.0],
         _ => edges(values),
     }

@@ -98,6 +98,7 @@ impl Sheet<'_> {
                 Content::Line(_) | Content::Rug(_) => {}
             }
         }
+        // Grid lines over a heat map would hide cells.
         if panel.heat_map().is_none() {
             self.grid();
         }
@@ -132,6 +133,7 @@ impl Sheet<'_> {
         let (frame, font) = (self.frame(), self.font);
         let (left, right, top, bottom) = (coordinate(frame.left), coordinate(frame.right), coordinate(frame.top), coordinate(frame.bottom));
         let mut path = format!("M{left},{top}L{left},{bottom}L{right},{bottom}");
+        // A heat map fills the plot, so a closed frame separates the cells from the paper.
         if self.placed.bar.is_some() {
             path.push_str(&format!("L{right},{top}Z"));
         }
@@ -188,6 +190,8 @@ impl Sheet<'_> {
             if let Some(marker) = line.marker {
                 let mut last: Option<(f64, f64)> = None;
                 for (x, y) in points.into_iter().filter(|point| frame.contains(*point)) {
+                    // A marker on top of a marker would only lengthen the document. The distance counts from the last drawn marker, so that many small steps
+                    // add up.
                     if last.is_none_or(|(a, b)| libm::hypot(x - a, y - b) > 0.3) {
                         draw_marker(self.xml, marker, line.look, x, y);
                         last = Some((x, y));
@@ -220,6 +224,7 @@ impl Sheet<'_> {
         if cut.is_empty() {
             return;
         }
+        // One path for all outlines, because the even-odd rule makes holes only within a path.
         let data = data(&cut, true);
         for class in fill.classes() {
             self.xml.element("path", &[("class", &class), ("fill-rule", "evenodd"), ("d", &data)]);
@@ -230,6 +235,7 @@ impl Sheet<'_> {
         for run in &band.runs {
             let high = reduced(&run.iter().map(|(x, _, high)| self.corner(*x, *high)).collect::<Vec<_>>());
             let low = reduced(&run.iter().map(|(x, low, _)| self.corner(*x, *low)).collect::<Vec<_>>());
+            // Along the upper curve and back along the lower curve: a closed outline.
             self.area(&[high.into_iter().chain(low.into_iter().rev()).collect()], band.fill);
         }
     }
@@ -251,6 +257,7 @@ impl Sheet<'_> {
             path.push_str(&format!("M{0},{1}L{0},{2}", coordinate(x), coordinate(frame.bottom), coordinate(frame.bottom - 0.8 * self.font)));
         }
         if !path.is_empty() {
+            // Dashes would break up marks as short as these.
             stroke(self.xml, rug.look.solid().thin(), &path);
         }
     }

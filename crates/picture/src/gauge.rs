@@ -31,6 +31,7 @@ impl Gauge {
     /// Returns the position of a value on the common axis; `None` for NaN.
     #[must_use]
     pub(crate) fn place(&self, value: f64) -> Option<f64> {
+        // A limit of zero has no size to divide by. The distance is then its own unit: every value but zero lies one unit away from the limit.
         let size = |limit: f64| if limit == 0.0 { (value - limit).abs() } else { limit.abs() };
         let share = |distance: f64, unit: f64| if distance == 0.0 { 0.0 } else { distance / unit };
         let place = match (self.low, self.high) {
@@ -75,6 +76,7 @@ impl Gauge {
         }
         xml.element("path", &[("class", "frame"), ("stroke-width", "1.2"), ("d", &path)]);
         if let Some(place) = self.measured.and_then(|value| self.place(value)) {
+            // Green and vermilion of the lines 2 and 1. The markers tell the outcome without colours.
             let look = Look::of(if self.passed { 2 } else { 1 });
             let shown = place.clamp(-BEYOND, 1.0 + BEYOND);
             if (place - shown).abs() > 0.0 {

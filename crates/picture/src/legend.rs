@@ -69,9 +69,11 @@ impl Legend {
         let mut legend = Self { font, ..Self::default() };
         let (mut x, mut y, mut row) = (0.0, 0.0, 0.0_f64);
         for (sample, name) in entries {
+            // A legend narrower than a sample still leaves two font sizes for a name.
             let lines = name.wrapped(font, (width - before).max(2.0 * font), 4);
             let own = before + lines.iter().map(|line| line.width(font)).fold(0.0, f64::max);
             let height = LEADING * font * count(lines.len());
+            // At the begin of a row `x` is zero: an entry too wide for any row stands alone, and no empty row comes before.
             if x > 0.0 && (narrow || x + own > width) {
                 (x, y, row) = (0.0, y + row, 0.0);
             }
@@ -87,6 +89,7 @@ impl Legend {
     pub(crate) fn draw(&self, xml: &mut Xml, (left, top): (f64, f64)) {
         for Placed { sample, x, y, lines } in &self.entries {
             let (x, y) = (left + x, top + y);
+            // A sample stands 0.36 font sizes above the base line, at about half of the height of a capital letter.
             let middle = y + (ASCENT - 0.36) * self.font;
             draw_sample(xml, *sample, x, middle, self.font);
             let mut base = y + ASCENT * self.font;
@@ -121,6 +124,7 @@ fn draw_sample(xml: &mut Xml, sample: Sample, x: f64, y: f64, font: f64) {
         Sample::Tick(look) => {
             let at = |share: f64| coordinate(x + share * (end - x));
             let (low, high) = (coordinate(y + 0.4 * font), coordinate(y - 0.4 * font));
+            // Uneven distances, as instants of losses have.
             let ticks: String = [0.25, 0.45, 0.8].iter().map(|share| format!("M{0},{low}L{0},{high}", at(*share))).collect();
             stroke(xml, look.solid().thin(), &ticks);
         }
@@ -143,6 +147,7 @@ const MARKER: f64 = 2.6;
 
 pub(crate) fn draw_marker(xml: &mut Xml, marker: Marker, look: Look, x: f64, y: f64) {
     let (strokes, filled) = marker.strokes();
+    // The disc is the only marker without outlines.
     if strokes.is_empty() {
         xml.element("circle", &[("class", &look.fill_class()), ("cx", &coordinate(x)), ("cy", &coordinate(y)), ("r", &coordinate(MARKER))]);
         return;
@@ -153,6 +158,7 @@ pub(crate) fn draw_marker(xml: &mut Xml, marker: Marker, look: Look, x: f64, y: 
     if filled {
         xml.element("path", &[("class", &look.fill_class()), ("d", &data)]);
     } else {
+        // Dashes would hide the shape of a small marker.
         stroke(xml, look.solid(), &data);
     }
 }

@@ -124,7 +124,9 @@ impl Marker {
     pub(crate) const fn strokes(self) -> (&'static [&'static [(f64, f64)]], bool) {
         match self {
             Self::Disc => (&[], true),
+            // Square and diamond have about the area of the disc, so that no line looks heavier by its markers.
             Self::Square => (&[&[(-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)]], true),
+            // y grows downwards on a page: the corner with negative y is the upper tip.
             Self::Triangle => (&[&[(-1.1, 0.85), (1.1, 0.85), (0.0, -1.1)]], true),
             Self::TriangleDown => (&[&[(-1.1, -0.85), (1.1, -0.85), (0.0, 1.1)]], true),
             Self::Diamond => (&[&[(-1.25, 0.0), (0.0, -1.25), (1.25, 0.0), (0.0, 1.25)]], true),
@@ -182,6 +184,7 @@ pub(crate) fn style() -> String {
         };
         SERIES.iter().map(rule).collect()
     };
+    // The dark rules come last, because the later of two rules with equal weight wins.
     format!("{LIGHT}{}@media (prefers-color-scheme: dark){{\n{DARK}{}}}\n", series(false), series(true))
 }
 

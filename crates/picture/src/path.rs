@@ -35,6 +35,7 @@ impl Frame {
     fn segment(&self, from: Point, to: Point) -> Option<(Point, Point)> {
         let (dx, dy) = (to.0 - from.0, to.1 - from.1);
         let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
+        // A point at the share t of the segment is inside a side as long as t·step ≤ room.
         for (step, room) in [(-dx, from.0 - self.left), (dx, self.right - from.0), (-dy, from.1 - self.top), (dy, self.bottom - from.1)] {
             if step == 0.0 {
                 if room < 0.0 {
@@ -77,6 +78,7 @@ impl Frame {
             for (place, to) in points.iter().copied().enumerate() {
                 // Adding the length keeps the index of the point before the first from falling below zero.
                 let from = points[(place + points.len() - 1) % points.len()];
+                // Neighbours on both sides of the edge: the crossing becomes a corner of the part inside.
                 if (room(from) < 0.0) != (room(to) < 0.0) {
                     let t = room(from) / (room(from) - room(to));
                     kept.push((from.0 + t * (to.0 - from.0), from.1 + t * (to.1 - from.1)));
@@ -144,6 +146,7 @@ fn between(from: Point, point: Point, to: Point) -> bool {
     let (ax, ay, bx, by) = (point.0 - from.0, point.1 - from.1, to.0 - from.0, to.1 - from.1);
     let length = libm::hypot(bx, by);
     let ahead = ax * bx + ay * by;
+    // Equal ends are no line: a point between them is the tip of a spike, and stays.
     length > 0.0 && (ax * by - ay * bx).abs() < 0.005 * length && (0.0..=length * length).contains(&ahead)
 }
 

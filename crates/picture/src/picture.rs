@@ -111,6 +111,7 @@ impl Picture {
     /// Sets the ratio of height to width of plots, for sizes without a given height. The default is 0.6; the ratio is limited to 0.1 to 3.
     #[must_use]
     pub fn aspect(self, aspect: f64) -> Self {
+        // `clamp` would keep NaN, and the height of the plots would become NaN.
         Self { aspect: if aspect.is_finite() { aspect.clamp(0.1, 3.0) } else { self.aspect }, ..self }
     }
 
@@ -149,6 +150,7 @@ impl Picture {
         sentences.extend((!self.description.is_empty()).then(|| self.description.clone()));
         for panel in &self.panels {
             let scale = |axis: &crate::Axis| if axis.scale == Scale::Logarithmic { " (logarithmic)" } else { "" };
+            // Without an exponent, because the power of ten belongs to the tick labels, and the labels are not read out.
             let (x, y) = (panel.x.title(0).plain(), panel.y.title(0).plain());
             let before = if panel.title.is_empty() { String::new() } else { format!("{}: ", panel.title.plain()) };
             sentences.push(format!("{before}{y}{} over {x}{}.", scale(&panel.y), scale(&panel.x)));

@@ -79,6 +79,7 @@ impl Size {
     }
 
     fn checked(self) -> Result<Self, SizeError> {
+        // NaN lies in no range, so NaN is refused, too.
         let fits = (160.0..=10_000.0).contains(&self.width) && self.height.is_none_or(|height| (100.0..=10_000.0).contains(&height));
         if fits { Ok(self) } else { Err(SizeError::OutOfRange) }
     }
@@ -101,6 +102,7 @@ impl FromStr for Size {
             "page" => return Ok(Self::PAGE),
             _ => {}
         }
+        // The word comes from a command line and may have any length and any character: an error must stay a readable line.
         let unknown = || SizeError::Unknown(word.chars().take(40).flat_map(char::escape_debug).collect());
         let (numbers, print) = word.strip_suffix("mm").map_or_else(|| (word.strip_suffix("px").unwrap_or(word), false), |numbers| (numbers, true));
         let (width, height) = numbers.split_once('x').ok_or_else(unknown)?;

@@ -74,12 +74,14 @@ impl Text {
                 '_' => Stand::Subscript,
                 '^' => Stand::Superscript,
                 _ => {
+                    // Digits and signs of a formula stay upright, as is usual in print.
                     let stand = if letter.is_alphabetic() { Stand::Symbol } else { Stand::Plain };
                     text.push(&letter.to_string(), stand);
                     continue;
                 }
             };
             let part: String = match letters.next() {
+                // Without the closing brace the part reaches to the end: a formula is never refused.
                 Some('{') => letters.by_ref().take_while(|letter| *letter != '}').collect(),
                 Some(one) => one.to_string(),
                 None => String::new(),
@@ -126,6 +128,7 @@ impl Text {
 
     fn push(&mut self, text: &str, stand: Stand) {
         let clean = text.chars().map(shown);
+        // Neighbouring letters of one style share a span, so that equal texts have equal spans.
         match self.spans.last_mut().filter(|span| span.stand == stand) {
             Some(span) => span.text.extend(clean),
             None => self.spans.push(Span { text: clean.collect(), stand }),
@@ -162,6 +165,7 @@ impl Text {
         let mut lines: Vec<Self> = lines.iter().map(Self::trimmed).filter(|line| !line.is_empty()).collect();
         if lines.len() > most {
             lines.truncate(most);
+            // The last line gives up letters for the ellipsis, which tells of the lines left out.
             if let Some(last) = lines.last_mut() {
                 *last = last.broken(size, width - size * advance('…')).0.then("…");
             }
@@ -196,6 +200,7 @@ impl Text {
     /// Removes white space at both ends.
     fn trimmed(&self) -> Self {
         let mut spans = self.spans.clone();
+        // A space at an end may fill whole spans, so spans are removed until a span begins with a letter.
         while let Some(first) = spans.first_mut() {
             first.text = first.text.trim_start_matches(' ').to_owned();
             if !first.text.is_empty() {
@@ -219,6 +224,7 @@ impl Text {
         for span in &self.spans {
             for letter in span.text.chars() {
                 so_far += size * width_of(letter, span.stand);
+                // After the first letter without room all letters go to the tail: no narrow letter may overtake.
                 let fits = tail.spans.is_empty() && (so_far <= width || head.spans.is_empty());
                 if fits { &mut head } else { &mut tail }.push(letter.encode_utf8(&mut [0; 4]), span.stand);
             }

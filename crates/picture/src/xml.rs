@@ -21,6 +21,7 @@ pub fn escape(text: &str) -> String {
             '<' => escaped.push_str("&lt;"),
             '>' => escaped.push_str("&gt;"),
             '"' => escaped.push_str("&quot;"),
+            // Both are allowed in XML, and preformatted text needs both.
             '\n' | '\t' => escaped.push(letter),
             _ => escaped.push(shown(letter)),
         }
