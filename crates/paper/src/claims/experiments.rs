@@ -12,6 +12,7 @@ pub(super) fn claims(tests: &[StabilityTest], travels: &[Travel]) -> Vec<Claim> 
 /// Returns whether a result agrees with the paper: PD unstable at 2100 N/m, everything else stable.
 fn is_seen(test: &StabilityTest) -> bool {
     let stable = test.radius.verdict() == cohaptic_stability::Verdict::Stable;
+    // The paper's sentence has two stiffnesses, 1000 and 2100 N/m. The limit lies between.
     stable != (test.strategy == Strategy::Pd && test.stiffness > 2000.0)
 }
 
@@ -19,8 +20,10 @@ fn outcomes(tests: &[StabilityTest]) -> Claim {
     let group = |arms: bool, delay_ms: u32| tests.iter().filter(move |test| test.arms == arms && test.delay_ms == delay_ms);
     let groups = [true, false].map(|arms| DELAYS_MS.map(|delay_ms| (arms, delay_ms))).concat();
     let words = |(arms, delay_ms): (bool, u32)| format!("{} arms, {delay_ms} ms one way", if arms { "with" } else { "without" });
+    // A reading counts only with all four outcomes, because the paper states the four together.
     let holds: Vec<String> = groups.iter().filter(|(arms, delay_ms)| group(*arms, *delay_ms).all(is_seen)).map(|group| words(*group)).collect();
     let fails = tests.iter().find(|test| !is_seen(test));
+    // A reading with all outcomes gives a claim with conditions. Without such a reading the first contradicting test is the counterexample.
     let verdict = match fails {
         None => Verdict::Holds,
         Some(_) if !holds.is_empty() => Verdict::HoldsWhere(holds.join("; ")),
@@ -28,6 +31,7 @@ fn outcomes(tests: &[StabilityTest]) -> Claim {
     };
     let row = |strategy: Strategy, stiffness: f64| {
         let of = |(arms, delay_ms): &(bool, u32)| {
+            // Stiffnesses are whole numbers of N/m.
             let found = group(*arms, *delay_ms).find(|test| test.strategy == strategy && (test.stiffness - stiffness).abs() < 0.5);
             found.map_or_else(String::new, |test| cell(format!("{:.4}", test.radius.value), !is_seen(test)))
         };
@@ -83,6 +87,7 @@ const fn printed(strategy: Strategy) -> f64 {
 fn less_time(travels: &[Travel]) -> Claim {
     let times = Strategy::BOTH.map(|strategy| of(travels, strategy, 24).and_then(|travel| travel.time));
     let [ap, pd] = times;
+    // A push that never moves 20 mm has no time, and makes the claim fail.
     let holds = ap.zip(pd).is_some_and(|(ap, pd)| ap < pd);
     let table = Table::new("Time for 20 mm, and the viscosity that a slow hand feels, 24 ms one way", &["", "paper", "here", "viscosity"]).all(
         Strategy::BOTH.iter().zip(times).map(|(strategy, time)| {
@@ -111,6 +116,7 @@ const NEAR: f64 = 0.1;
 
 fn times(travels: &[Travel]) -> Claim {
     let off = |travel: &Travel| travel.time.map(|time| time / printed(travel.strategy) - 1.0);
+    // The time of a diverging object is an accident, and never agrees.
     let agrees = |travel: &Travel| !travel.diverges() && off(travel).is_some_and(|off| off.abs() <= NEAR);
     let words = |travel: &Travel| format!("{} with {} ms one way", travel.strategy.word(), travel.delay_ms);
     let agree: Vec<String> = travels.iter().filter(|travel| agrees(travel)).map(words).collect();
@@ -149,6 +155,7 @@ fn times(travels: &[Travel]) -> Claim {
         verdict,
         ..Claim::blank("travel-times", Topic::Experiments)
     };
+    // The counterexample is shown. Without a counterexample any run shows the agreement.
     let shown = worst.or_else(|| travels.first());
     let Some(travel) = shown else { return claim };
     let how = format!("{}: 20 mm take {}.", words(travel), seconds(travel.time));

@@ -24,27 +24,27 @@ pub struct Claim {
     pub claim: &'static str,
     /// The claim for somebody who does not know the symbols, as a part of a sentence.
     pub short: &'static str,
-    /// Part of the paper that the claim belongs to.
+    /// Part of the paper with the claim.
     pub topic: Topic,
-    /// `true` for a statement of this program, which the paper does not make.
+    /// `true` for a statement of this program, not made by the paper.
     pub is_own: bool,
     /// Place in the paper: a figure, an equation or a section.
     pub paper: &'static str,
-    /// Sentence that the paper states at that place.
+    /// Sentence of the paper at `paper`.
     pub says: &'static str,
     /// Computed result in words.
     pub ours: String,
-    /// Computed numbers, beside those of the paper where it prints numbers.
+    /// Computed numbers, beside the paper's numbers where the paper prints numbers.
     pub tables: Vec<Table>,
-    /// Names of the figures that show the result.
+    /// Names of the figures with the result.
     pub figures: &'static [&'static str],
     /// Verdict on the claim.
     pub verdict: Verdict,
-    /// Why the result differs from the paper, as far as it is known; empty if the result does not differ.
+    /// Reason of a difference from the paper, as far as the reason is known; empty if the result does not differ.
     pub why: &'static str,
-    /// Scene file that shows the result: the smallest counterexample found, if the claim fails in a scene.
+    /// Scene file with the result: the smallest counterexample found, if the claim fails in a scene.
     pub scene: String,
-    /// Result that `commands` show, in words.
+    /// Result of `commands`, in words.
     pub how: String,
     /// Commands for the scene, each a line. The scene is in a file with the name of the claim, such as `any-number.toml`.
     pub commands: String,
@@ -122,7 +122,7 @@ impl Claim {
         }
     }
 
-    /// Adds the scene that shows the result. `commands` are the arguments of `cohaptic`, in which `FILE` stands for the scene's file.
+    /// Adds the scene with the result. `commands` are the arguments of `cohaptic`, in which `FILE` stands for the scene's file.
     fn shown_by(self, scene: String, how: impl Into<String>, commands: &[&str]) -> Self {
         let file = format!("{}.toml", self.id);
         let commands: Vec<String> = commands.iter().map(|command| format!("cohaptic {}", command.replace("FILE", &file))).collect();
@@ -139,6 +139,7 @@ pub(crate) fn all(
     options: Options,
     watch: &dyn Watch,
 ) -> Result<Vec<Claim>, PaperError> {
+    // The page begins a heading where the topic changes, so the claims of a topic stay together.
     let mut claims = stiffness::claims(watch)?;
     claims.extend(regions::claims(atlas, watch)?);
     claims.extend(performance::claims(responses, options, watch)?);
@@ -163,6 +164,7 @@ fn many_peers() -> Result<Vec<Claim>, PaperError> {
         for strategy in Strategy::BOTH {
             let mut sizes = Vec::new();
             for (row, peers) in rows.iter_mut().zip(PEERS) {
+                // With one peer touching, all untouched peers are alike, and the analysis can use the symmetry.
                 let case = Case { touching: 1, scaled, ..Case::paper(strategy, peers) };
                 let analysis = analyse(&case.scene()?, Method::Reduced)?;
                 // The cost is set by the largest block, and must be the same for all numbers of peers.
@@ -173,6 +175,7 @@ fn many_peers() -> Result<Vec<Claim>, PaperError> {
                     row.insert(1, analysis.dimension.to_string());
                 }
             }
+            // Blocks of AP and PD, and of plain and scaled gains, may differ in size. Only the number of peers must not matter.
             same &= sizes.iter().all(|size| *size == sizes[0]);
             largest.extend(sizes);
         }
@@ -203,5 +206,6 @@ fn many_peers() -> Result<Vec<Claim>, PaperError> {
 
 /// Writes a spectral radius in few characters.
 fn short(radius: f64) -> String {
+    // Four decimals tell nothing about a radius far above 1.
     if radius < 1000.0 { format!("{radius:.4}") } else { format!("{radius:.1e}") }
 }

@@ -53,6 +53,7 @@ fn less_viscous(responses: &Responses, watch: &dyn Watch) -> Result<Claim, Paper
     let less = all.iter().filter(|(ap, pd)| ap.viscosity < pd.viscosity).count();
     // A difference below a millionth counts as equal.
     let found = smallest(watch, |case| {
+        // With two peers the strategies are the same, and without a touch nobody feels the object.
         if case.peers < 3 || case.touching == 0 || case.mass == Mass::Whole && case.damping == 0.0 {
             return Ok(false);
         }
@@ -105,6 +106,7 @@ fn law(responses: &Responses) -> Claim {
     let rows = [("the law, N to 5", five), ("the law, N to 16", of(16, plain)), ("with the part of BT, N to 16", of(16, whole))];
     let table = Table::new("Largest error of the law in stable scenes", &["", "AP", "PD"])
         .all(rows.into_iter().map(|(name, [ap, pd])| vec![name.to_owned(), percent(ap), percent(pd)]));
+    // The bounds of the claim's sentence: 5 % for AP and 12 % for PD.
     let verdict = if five[0] < 0.05 && five[1] < 0.12 {
         Verdict::Holds
     } else {
@@ -136,6 +138,7 @@ fn grows(responses: &Responses) -> Claim {
             let same = Case { peers: fit.case.peers, touching: fit.case.touching, ..other.case } == fit.case;
             other.is_stable && other.case.peers > fit.case.peers && same && touches
         };
+        // The sweep lists numbers of peers in ascending order, so the first match is the next number.
         if let Some(next) = responses.fits.iter().find(like) {
             looked_at += 1;
             if next.viscosity <= fit.viscosity {
@@ -167,6 +170,7 @@ fn nearer(responses: &Responses) -> Claim {
             let Some((ap, pd)) = curve(Strategy::Ap).zip(curve(Strategy::Pd)) else { continue };
             let nearer: Vec<bool> = ap.distances.iter().zip(&pd.distances).map(|(ap, pd)| ap < pd).collect();
             let count = nearer.iter().filter(|nearer| **nearer).count();
+            // The claim holds up to the first frequency at which PD is nearer.
             let first = nearer.iter().position(|nearer| !nearer).and_then(|first| responses.frequencies.get(first)).copied();
             below = below.min(first.unwrap_or(f64::INFINITY));
             let unstable: Vec<&str> = [ap, pd].into_iter().filter(|curve| !curve.is_stable).map(|curve| curve.case.strategy.word()).collect();

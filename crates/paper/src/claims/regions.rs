@@ -53,6 +53,7 @@ fn by_reading(what: &str, number: impl Fn(Setting, usize) -> String) -> Vec<Tabl
             }),
         )
     };
+    // The damping changes slowest in the list of settings, so each half has a single damping.
     all.chunks(all.len() / 2).map(of_damping).collect()
 }
 
@@ -82,6 +83,7 @@ fn larger(atlas: &Atlas) -> Claim {
                 std::iter::once(peers.to_string()).chain(cells).collect::<Vec<_>>()
             }))
     };
+    // A map of a failing reading says more than a map of a further agreement.
     let shown = fails.first().or_else(|| holds.first()).copied();
     let claim = Claim {
         claim: "AP increases the stability region compared with PD",
@@ -93,6 +95,7 @@ fn larger(atlas: &Atlas) -> Claim {
             holds.len(),
             all.len()
         ),
+        // The settings of a pair differ in the delay alone.
         tables: all.chunks(2).map(table).collect(),
         figures: &FIGURES,
         why: "The paper prints no areas, and does not say which mass a copy has in the figures, nor whether 8 ms are one way. PD has N−1 springs and dampers per copy: it is the \
@@ -118,6 +121,7 @@ fn only_pd_is_stable(case: &Case) -> Result<bool, PaperError> {
 
 fn contains(atlas: &Atlas, watch: &dyn Watch) -> Result<Claim, PaperError> {
     let most = |setting: Setting| PEERS.map(|peers| atlas.only_pd(setting, peers)).into_iter().fold(0.0, f64::max);
+    // The claim is about every point, so a single cell outside is enough to contradict.
     let (inside, outside) = split(|setting| most(setting) == 0.0);
     let found = smallest(watch, only_pd_is_stable)?;
     // Section 5 without arms: two of three peers touching, and 48 ms read as a round trip.
@@ -139,6 +143,7 @@ fn contains(atlas: &Atlas, watch: &dyn Watch) -> Result<Claim, PaperError> {
     };
     let verdict = match &found {
         None if outside.is_empty() => Verdict::Holds,
+        // The maps may show cells outside even if the search finds nothing.
         None => Verdict::HoldsWhere(list(&inside)),
         Some(case) => Verdict::FailsAt(format!("{}: {radii}", without_strategy(case))),
     };
@@ -183,6 +188,7 @@ fn with_one_more(claim: Claim, found: Option<Case>, fallback: Case, becomes: &st
 fn unaffected(atlas: &Atlas, watch: &dyn Watch) -> Result<Claim, PaperError> {
     let change = |setting: Setting, place: usize| {
         let areas = atlas.areas(setting, Strategy::Ap);
+        // A missing area becomes NaN, and NaN never counts as unaffected.
         areas.get(place).zip(areas.first()).map_or(f64::NAN, |(area, two)| area / two - 1.0)
     };
     let is_unaffected = |setting: Setting, place: usize| change(setting, place).abs() <= UNAFFECTED;
@@ -211,6 +217,7 @@ fn unaffected(atlas: &Atlas, watch: &dyn Watch) -> Result<Claim, PaperError> {
         verdict: verdict(&holds, &fails),
         ..Claim::blank("ap-unaffected", Topic::Regions)
     };
+    // Clear verdicts only, so that rounding cannot make a counterexample.
     let found = smallest(watch, |case| Ok(is_stable(case)? && is_unstable(&one_more_peer(case))?))?;
     with_one_more(claim, found, Case::paper(Strategy::Ap, 3), "unstable")
 }

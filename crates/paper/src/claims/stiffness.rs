@@ -44,6 +44,7 @@ fn bounded(ap: &[Found], pd: &[Found]) -> Claim {
     // The bound must hold by the formula and in the simulated scenes.
     let falls = ap.windows(2).all(|pair| pair[1].matrix < pair[0].matrix && pair[1].scene < pair[0].scene);
     let rises = pd.windows(2).all(|pair| pair[1].matrix > pair[0].matrix && pair[1].scene > pair[0].scene);
+    // The tolerances are for rounding of the eigenvalue, and for the fit to the simulated scene.
     let is_bounded = ap.iter().all(|found| found.matrix <= 2.0 + 1e-9 && found.scene <= 2.0 + 1e-6);
     let apart = ap.iter().chain(pd).map(|found| (found.matrix - found.scene).abs() / found.matrix).fold(0.0, f64::max);
     let ends = |all: &[Found]| all.first().zip(all.last()).map_or((f64::NAN, f64::NAN), |(first, last)| (first.scene, last.scene));
