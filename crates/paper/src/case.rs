@@ -105,6 +105,7 @@ impl Case {
         let scaling = if scaled { "\nscaling = \"inverse-n\"" } else { "" };
         let coupling_scaling = if scaled { ", scaling = \"inverse-n\"" } else { "" };
         let split = mass == Mass::Split;
+        // `:?` keeps the decimal point of a whole number, because TOML tells integers and floats apart.
         let mut text = format!(
             "[scene]\ntitle = \"{}\"\nduration = \"7s\"\ncount = {peers}\n\n[object]\nmass = 0.45\nsplit-mass = {split}\n\n[coordination]\n\
              strategy = \"{}\"\nstiffness = {stiffness:?}\ndamping = {damping:?}\nupdate = \"8ms\"{scaling}\n\n[peer]\ncontact = \"none\"\n\

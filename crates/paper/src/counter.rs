@@ -66,6 +66,7 @@ pub(crate) fn smallest(watch: &dyn Watch, happens: impl Fn(&Case) -> Result<bool
         }
     });
     let Some(mut case) = found.transpose()? else { return Ok(None) };
+    // Shortened after the parallel search and one step at a time, because each step depends on the step before.
     while case.delay_us >= 1000 {
         let shorter = Case { delay_us: case.delay_us - 1000, ..case };
         if !happens(&shorter)? {

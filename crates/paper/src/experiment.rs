@@ -96,6 +96,7 @@ pub(crate) fn travel_text(strategy: Strategy) -> &'static str {
 
 /// Returns the scene file of Section 5.1 for a strategy, a stiffness \[N/m\], and users with or without arms.
 pub(crate) fn stability_text(strategy: Strategy, stiffness: f64, arms: bool) -> &'static str {
+    // Stiffnesses are whole numbers of N/m.
     let wanted = |scene: &&(Strategy, f64, bool, &str)| scene.0 == strategy && (scene.1 - stiffness).abs() < 0.5 && scene.2 == arms;
     STABILITY_SCENES.iter().find(wanted).map_or("", |(.., text)| text)
 }
@@ -105,11 +106,13 @@ pub(crate) fn stability_tests(watch: &dyn Watch) -> Result<Vec<StabilityTest>, P
     let mut tests = Vec::new();
     for delay_ms in DELAYS_MS {
         for (strategy, stiffness, arms, text) in STABILITY_SCENES {
+            // An arm follows the sine. Without arms the force of the hand is the sine.
             let hand = if arms { "hand.follows" } else { "hand" };
             // The shipped scenes move more slowly; the paper's Figure 7 shows about 1 Hz.
             let faster = ["left", "right"].map(|peer| format!("peers.{peer}.{hand}.sine.frequency=1.0"));
             let overrides: Vec<String> = faster.into_iter().chain([format!("link.delay={delay_ms}ms")]).collect();
             let scene = Scene::parse(text, Path::new("5-1.toml"), &overrides)?;
+            // An infinite distance is never reached: only the record is wanted.
             let (trace, _) = simulate(&scene, f64::INFINITY, watch)?;
             tests.push(StabilityTest { strategy, stiffness, arms, delay_ms, radius: away_from_walls(&scene)?.radius, trace });
         }
@@ -146,6 +149,7 @@ fn away_from_walls(scene: &Scene) -> Result<Analysis, PaperError> {
     let mut scene = scene.clone();
     scene.object.enclosure = None;
     for peer in &mut scene.peers {
+        // A one-sided contact that stays closed acts like a grasp.
         if peer.contact != Contact::None {
             peer.contact = Contact::Grasp;
         }
@@ -167,6 +171,7 @@ fn simulate(scene: &Scene, distance: f64, watch: &dyn Watch) -> Result<(Trace, O
         watch,
     };
     let Ok(_) = Simulation::new(scene, Model::Least).run(&mut recorder);
+    // The record of a stopped run is incomplete, and must not pass for a result.
     if watch.stops() { Err(PaperError::Stopped) } else { Ok((recorder.trace, recorder.reached)) }
 }
 
@@ -199,6 +204,7 @@ impl Observer for Recorder<'_> {
             }
             self.last = (t, gone);
         }
+        // Chosen by time and not by counting ticks, so that all peers are recorded at the same instants.
         if row.at.as_nanos().is_multiple_of(KEPT * 1_000_000) {
             if row.peer == 0 {
                 self.trace.times.push(t);

@@ -33,12 +33,12 @@ pub fn html(reproduction: &Reproduction) -> String {
         }
         page = page.with(claim_on_page(claim, &reproduction.figures, &mut shown));
     }
-    // Each figure belongs to a claim. A figure that no claim names is shown all the same.
+    // Each figure belongs to a claim. A figure without a claim is shown all the same.
     let rest = reproduction.figures.iter().filter(|figure| !shown.contains(&figure.id.as_str()));
     rest.fold(page, |page, figure| page.with(figure_on_page(figure))).html()
 }
 
-/// Returns the claims that the paper makes, of one kind of verdict.
+/// Returns the paper's claims with a verdict of one kind.
 fn of_kind(claims: &[Claim], kind: fn(&Verdict) -> bool) -> impl Iterator<Item = &Claim> {
     claims.iter().filter(move |claim| !claim.is_own && kind(&claim.verdict))
 }
@@ -73,7 +73,7 @@ fn answer(claims: &[Claim]) -> Html {
     said(&format!("{word}."), &numbers)
 }
 
-/// Returns a sentence per kind of verdict, which names the claims in plain words.
+/// Returns a sentence per kind of verdict, with the claims in plain words.
 fn by_verdict(claims: &[Claim]) -> Vec<Html> {
     let sentence = |mark: Mark, words: &str, kind: fn(&Verdict) -> bool| {
         let joined = of_kind(claims, kind).map(|claim| Html::link(claim.id, claim.short)).reduce(|text, next| text.and("; ").and(next))?;
@@ -89,7 +89,7 @@ fn by_verdict(claims: &[Claim]) -> Vec<Html> {
     .collect()
 }
 
-/// Returns what the answer means for somebody who chooses a strategy.
+/// Returns the meaning of the answer for somebody with a choice between the strategies.
 fn advice(claims: &[Claim]) -> &'static str {
     let is = |id: &str, kind: fn(&Verdict) -> bool| claims.iter().any(|claim| claim.id == id && kind(&claim.verdict));
     match (is("less-viscous", holds), is("region-contains", holds)) {
@@ -132,9 +132,10 @@ fn short(verdict: &Verdict) -> Html {
     }
 }
 
-/// Returns where a claim holds or fails; `None` if it holds everywhere.
+/// Returns the places where a claim holds or fails; `None` for a claim without exception.
 fn place(verdict: &Verdict) -> Option<Html> {
     let parts = |text: &str| {
+        // A verdict joins its conditions with semicolons.
         let parts: Vec<&str> = text.split("; ").collect();
         if parts.len() == 1 { Html::paragraph(text) } else { Html::list(parts.into_iter().map(Html::text)) }
     };
@@ -145,7 +146,7 @@ fn place(verdict: &Verdict) -> Option<Html> {
     }
 }
 
-/// Returns a paragraph that begins with a word.
+/// Returns a paragraph with a word at the begin.
 fn said(word: &str, text: &str) -> Html {
     Html::paragraph(Html::strong(word).and(" ").and(text))
 }
@@ -174,7 +175,7 @@ fn claim_on_page(claim: &Claim, figures: &[Figure], shown: &mut Vec<&str>) -> Ht
     content = content.and(text).and(wide);
     for id in claim.figures {
         let Some(figure) = figures.iter().find(|figure| figure.id == *id) else { continue };
-        // Several claims may share a figure, which is drawn once.
+        // Several claims may share a figure. The figure is drawn once.
         content = if shown.contains(id) {
             content.and(Html::paragraph(Html::text("See ").and(Html::link(id, figure.title.as_str())).and(".")))
         } else {
@@ -194,6 +195,7 @@ fn table_on_page(table: &Table) -> Html {
     let is_number = |place: usize| {
         // The first letter of a number is a digit or a sign.
         let cells = table.rows.iter().filter_map(|row| row.get(place));
+        // A column without cells is text: `all` is true of no cells.
         cells.clone().count() > 0 && cells.into_iter().all(|cell| cell.starts_with(|letter: char| letter.is_ascii_digit() || "+-−".contains(letter)))
     };
     let head = table.groups.iter().fold(HtmlTable::new().titled(table.title.as_str()), |html, (name, columns)| html.group(name.as_str(), *columns));

@@ -61,6 +61,7 @@ impl Setting {
     /// Returns the scene of a strategy and a number of peers, with the paper's gains.
     pub(crate) fn case(&self, strategy: Strategy, peers: usize) -> Case {
         let Self { damping, mass, delay_us } = *self;
+        // The figures have BT = BC.
         Case { damping, coupling_damping: damping, mass, delay_us, ..Case::paper(strategy, peers) }
     }
 }
@@ -131,6 +132,7 @@ impl Atlas {
     /// Returns the share of the square that is stable with PD and unstable with AP.
     pub(crate) fn only_pd(&self, setting: Setting, peers: usize) -> f64 {
         match (self.region(setting, Strategy::Ap, peers), self.region(setting, Strategy::Pd, peers)) {
+            // Both maps have the same grid, so equal positions are equal gains.
             (Some(ap), Some(pd)) => share(ap.cells().zip(pd.cells()).filter(|(ap, pd)| *pd && !ap).count(), ap.cells().count()),
             _ => 0.0,
         }

@@ -10,6 +10,7 @@ use crate::region::{Atlas, HIGHEST, PEERS, Setting};
 
 pub(super) fn figures(atlas: &Atlas, size: Size) -> Vec<Figure> {
     let of = |id: &str, number: &str, damping: f64| {
+        // The dampings are 0 and 5.
         let settings: Vec<Setting> = Setting::all().into_iter().filter(|setting| (setting.damping - damping).abs() < 0.5).collect();
         let title = format!("Figure {number}: stability regions, BT = BC = {damping} N·s/m");
         let panels: Vec<Panel> = settings.iter().flat_map(|setting| Strategy::BOTH.map(|strategy| panel(atlas, *setting, strategy))).collect();
@@ -29,6 +30,7 @@ const SHADES: &str =
     "Each region is filled on the stable side of its line. The stronger the tint of a place, the more of these numbers of users are stable there.";
 
 fn panel(atlas: &Atlas, setting: Setting, strategy: Strategy) -> Panel {
+    // The axes are in kN/m, the maps in N/m.
     let kilo = |points: Vec<(f64, f64)>| points.into_iter().map(|(x, y)| (x / 1000.0, y / 1000.0)).collect::<Vec<_>>();
     let areas = PEERS.iter().enumerate().filter_map(|(number, peers)| {
         let map = &atlas.region(setting, strategy, *peers)?.map;

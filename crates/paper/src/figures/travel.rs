@@ -64,6 +64,7 @@ fn panel(travel: &Travel, quantity: &Quantity) -> Panel {
         let goal = 100.0 * (travel.trace.peers[0].position.first().copied().unwrap_or(0.0) - DISTANCE);
         panel = panel.with(Line::level(goal).named("20 mm"));
         if let Some(time) = travel.time {
+            // The upright line ends at the goal, where the copy has moved 20 mm.
             panel = panel.with(Line::new([(time, low), (time, goal)], Look::reference()));
         }
     }
