@@ -23,13 +23,15 @@ pub(super) async fn one(State(app): State<Arc<App>>, path: Result<Path<String>, 
     let link = named(&app, path)?;
     let keys = keys(&app, body).await?;
     change(&app, vec![link], keys).await?;
+    // A run with fewer links may have replaced the run meanwhile. Then there is no link to show.
     Ok(answer(&with_keys(&app, &[link]).await.pop().unwrap_or_default()))
 }
 
-/// `PATCH /api/links`: sets keys of all links, or of none if a link refuses the keys.
+/// `PATCH /api/links`: sets keys of all links, or changes no link at all if a link refuses the keys.
 pub(super) async fn all(State(app): State<Arc<App>>, body: Body) -> Result<Response, Refusal> {
     let keys = keys(&app, body).await?;
     let links: Vec<usize> = (0..app.board.description().links.len()).collect();
+    // The editor may rely on at least one link.
     if links.is_empty() {
         return Err(unprocessable("there is no link to be changed"));
     }
@@ -37,7 +39,7 @@ pub(super) async fn all(State(app): State<Arc<App>>, body: Body) -> Result<Respo
     Ok(answer(&json!({ "links": with_keys(&app, &links).await })))
 }
 
-/// Passes keys to the editor on another thread, because the editor may read files. The lock on the editor is held until the end, which keeps changes in order.
+/// Passes keys to the editor on another thread, because the editor may read files. The lock on the editor is held until the end, so that changes stay in order.
 async fn change(app: &App, links: Vec<usize>, keys: Vec<(String, String)>) -> Result<(), Refusal> {
     let mut editor = app.editor().await;
     let changed = apart(move || editor.change(&links, &keys)).await;
@@ -57,6 +59,7 @@ async fn keys(app: &App, body: Body) -> Result<Vec<(String, String)>, Refusal> {
 
 /// Checks a key's name and converts its value.
 fn pair(key: String, value: &Value) -> Result<(String, String), Refusal> {
+    // The bare keys of TOML: other names cannot be link keys, and bare keys need no quotes.
     let bare = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_');
     if key.is_empty() || !key.chars().all(bare) {
         return Err(unprocessable(format!("{key:?} is not a name of a link key: expected letters, digits, \"-\" and \"_\"")));

@@ -42,8 +42,10 @@ impl Frames {
                     At::Second
                 }
                 At::Second => {
+                    // The mask bit is read and not required: the WebSocket library refuses frames without a mask.
                     let mask = if byte & 0x80 == 0 { 0 } else { 4 };
                     match byte & 0x7f {
+                        // 126 and 127 announce an extended length of 16 or 64 bits.
                         126 => At::Length(2, 0, mask),
                         127 => At::Length(8, 0, mask),
                         length => content(u64::from(length).saturating_add(mask)),
@@ -51,6 +53,7 @@ impl Frames {
                 }
                 At::Length(left, length, mask) => {
                     let length = length << 8 | u64::from(*byte);
+                    // The length of a frame does not contain the mask. A length near 2⁶⁴ saturates: nobody can send as many bytes.
                     if left > 1 { At::Length(left - 1, length, mask) } else { content(length.saturating_add(mask)) }
                 }
                 At::Content(left) => {
@@ -82,6 +85,7 @@ struct Rate {
 impl Rate {
     /// Counts `frames` more at `now`. Returns whether the second is within its limit.
     fn admits(&mut self, now: Instant, frames: u32) -> bool {
+        // Fixed seconds need no memory of single frames. Around a border, a second may see twice the limit, with little harm.
         if now.duration_since(self.began) >= Duration::from_secs(1) {
             *self = Self { began: now, count: 0 };
         }

@@ -58,6 +58,7 @@ pub(super) async fn connect(State(app): State<Arc<App>>, mut request: Request) -
         Wanted::Any => stage.take_hand(None).map(Some),
         Wanted::One(hand) => stage.take_hand(Some(hand)).map(Some),
     };
+    // The upgrade completes after the answer has been sent, so the conversation waits on a task of its own.
     tokio::spawn(talk(stage, hand, upgrade, seat));
     Ok(answer.into_response())
 }
@@ -67,6 +68,7 @@ pub(super) async fn connect(State(app): State<Arc<App>>, mut request: Request) -
 fn check_origin(headers: &HeaderMap) -> Result<(), Refusal> {
     let text = |name| headers.get(name).and_then(|value: &axum::http::HeaderValue| value.to_str().ok());
     let foreign = text(header::ORIGIN).is_some_and(|origin| origin.strip_prefix("http://") != text(header::HOST));
+    // An origin that is not text cannot be this site.
     if foreign || (text(header::ORIGIN).is_none() && headers.contains_key(header::ORIGIN)) {
         return Err(Refusal::new(StatusCode::FORBIDDEN, "the page that asks is of another site"));
     }
@@ -135,6 +137,7 @@ async fn listen(taken: &Option<Taken>, mut incoming: impl Incoming<Item = Result
     while let Some(Ok(message)) = incoming.next().await {
         let place = match message {
             Message::Text(text) => read(&text),
+            // The WebSocket library answers pings.
             Message::Ping(_) | Message::Pong(_) => continue,
             Message::Binary(_) | Message::Close(_) | Message::Frame(_) => None,
         };

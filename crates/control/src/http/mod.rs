@@ -116,6 +116,7 @@ impl IntoResponse for Refusal {
 
 /// Answers with JSON.
 fn json(value: &Value) -> Response {
+    // The final line feed is for people who ask from a shell.
     ([(header::CONTENT_TYPE, HeaderValue::from_static("application/json"))], format!("{value}\n")).into_response()
 }
 

@@ -18,12 +18,14 @@ pub(crate) struct Pace {
 impl Pace {
     /// Waits for the next free turn.
     pub(super) async fn turn(&self) {
+        // The turn is reserved first. The wait is without the lock, so that turns come in the order of arrival.
         sleep_until(self.reserve(Instant::now())).await;
     }
 
     /// Reserves a turn and returns its instant, `now` or later.
     fn reserve(&self, now: Instant) -> Instant {
         let mut next = self.next.lock().unwrap_or_else(PoisonError::into_inner);
+        // Unused turns are not saved up: after a pause the next turn is now.
         let turn = next.map_or(now, |next| next.max(now));
         *next = Some(turn + EVERY);
         turn

@@ -70,6 +70,7 @@ impl Document {
             hash(style)
         );
         Self {
+            // The script comes last, so that no text of the script is taken for a place.
             html: html.replace("{{style}}", style).replace("{{script}}", &script),
             policy: HeaderValue::try_from(policy).expect("base64 and ASCII words"),
         }

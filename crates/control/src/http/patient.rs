@@ -25,6 +25,7 @@ impl<S> Patient<S> {
 
     /// Passes on the result of a write, or fails if the write has waited for too long.
     fn timed<T>(&mut self, cx: &mut Context<'_>, written: Poll<io::Result<T>>) -> Poll<io::Result<T>> {
+        // A finished write, also a failed write, ends the wait.
         if written.is_ready() {
             self.is_waiting = false;
             return written;
@@ -60,6 +61,7 @@ impl<S: AsyncWrite + Unpin> AsyncWrite for Patient<S> {
         self.stream.is_write_vectored()
     }
 
+    // Without a limit: the bytes wait in `poll_write`, and a flush of a TCP stream does nothing.
     fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         Pin::new(&mut self.stream).poll_flush(cx)
     }

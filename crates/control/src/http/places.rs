@@ -11,7 +11,7 @@ use crate::Role;
 /// Limits of open connections. Connections share the process's limit of open files, often 1024, with the real-time side.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
-    /// Greatest number of connections that have not shown a token.
+    /// Greatest number of connections without a shown token.
     pub(super) strangers: usize,
     /// Greatest number of connections with the token of guests.
     pub(super) guests: usize,
@@ -62,7 +62,7 @@ impl Places {
         Arc::new(Self { limits, taken: Mutex::default() })
     }
 
-    /// Takes a stranger's place for a new connection. If all are taken, another stranger loses its place first, chosen as in
+    /// Takes a stranger's place for a new connection. If all places are taken, another stranger loses the place first, chosen as in
     /// [`send_one_away`](Self::send_one_away).
     pub(super) fn take(self: &Arc<Self>, address: IpAddr) -> Arc<Seat> {
         let mut taken = self.lock();
@@ -73,6 +73,7 @@ impl Places {
         let (number, network, sent_away) = (taken.arrived, network_of(address), Arc::new(Notify::new()));
         taken.strangers.push_back(Stranger { number, network, sent_away: Arc::clone(&sent_away) });
         *taken.networks.entry(network).or_default() += 1;
+        // The seat knows the number, so that `show` and `drop` can find the stranger among the others.
         Arc::new(Seat { places: Arc::clone(self), number, sent_away, role: Mutex::new(None) })
     }
 
@@ -102,6 +103,7 @@ impl Taken {
         // Numbers grow in order of arrival, so the queue is sorted by number.
         let at = self.strangers.binary_search_by_key(&number, |stranger| stranger.number).ok()?;
         let stranger = self.strangers.remove(at)?;
+        // Entries never stay at zero: otherwise old networks would fill the memory.
         if let Some(count) = self.networks.get_mut(&stranger.network) {
             *count -= 1;
             if *count == 0 {
@@ -122,6 +124,7 @@ impl Taken {
 /// Returns the network of an address, counted as a single client: the first 64 bits of an IPv6 address, since a machine can choose the other bits freely,
 /// and the whole of an IPv4 address.
 fn network_of(address: IpAddr) -> IpAddr {
+    // An IPv4 address may come mapped into IPv6. Without the canonical form, all IPv4 clients would share a network.
     match address.to_canonical() {
         IpAddr::V4(address) => address.into(),
         IpAddr::V6(address) => Ipv6Addr::from_bits(address.to_bits() & !u128::from(u64::MAX)).into(),
@@ -158,6 +161,7 @@ impl Seat {
         }
         *taken.count(role) += 1;
         match *shown {
+            // A guest that shows the host's token gives the guest's place back.
             Some(before) => *taken.count(before) -= 1,
             None => drop(taken.remove(self.number)),
         }
