@@ -62,10 +62,11 @@ impl Site {
         let shared = Arc::new(Mutex::new(Shared::default()));
         let bytes = Bytes { left: sent.to_vec(), place: 0, ends: false, shared: Arc::clone(&shared) };
         self.runtime.block_on(async {
+            // Whichever comes first: the end of the answer, or a connection without movement.
             select(pin!(http::answer_bytes(bytes, self.router.clone())), pin!(rest(&shared))).await;
         });
         let answers = core::mem::take(&mut lock(&shared).answers);
-        // Runs tasks that wait for an upgrade of the connection, until they learn that the connection is over.
+        // Runs tasks in wait of an upgrade of the connection, until the tasks learn that the connection is over.
         self.runtime.block_on(rest(&shared));
         answers
     }
@@ -118,6 +119,7 @@ impl AsyncRead for Bytes {
     fn poll_read(mut self: Pin<&mut Self>, _: &mut Context<'_>, to: &mut ReadBuf<'_>) -> Poll<io::Result<()>> {
         let left = &self.left[self.place..];
         if left.is_empty() && !self.ends {
+            // Without a waker nothing would end this wait, but `rest` ends the whole connection.
             return Poll::Pending;
         }
         let count = left.len().min(to.remaining());

@@ -20,6 +20,7 @@ impl Ticket {
     pub(crate) fn redeem(&self, offered: &[u8]) -> bool {
         let mut ticket = self.lock();
         let is_it = ticket.as_ref().is_some_and(|ticket| ticket.is(offered));
+        // Used up under the same lock as the comparison, so that two requests at once cannot both succeed.
         if is_it {
             *ticket = None;
         }

@@ -66,7 +66,9 @@ impl FromStr for Token {
     type Err = TokenError;
 
     fn from_str(text: &str) -> Result<Self, TokenError> {
+        // The unreserved characters of RFC 3986, section 2.3, which need no escapes in an address.
         let allowed = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '.' | '_' | '~');
+        // Checked before the length: afterwards each character is one byte.
         if let Some(found) = text.chars().find(|c| !allowed(*c)) {
             return Err(TokenError::Character { found });
         }

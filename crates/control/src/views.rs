@@ -34,6 +34,7 @@ pub(crate) fn state(latest: &Latest) -> Value {
 pub(crate) fn link(description: &Description, snapshot: &Snapshot, number: usize) -> Value {
     let none = LinkCounters::default();
     let name = &description.links[number];
+    // A snapshot shorter than the description counts as filled up with defaults.
     let counters = snapshot.links.get(number).unwrap_or(&none);
     json!({
         "link": number,
@@ -98,6 +99,7 @@ fn peers(description: &Description, snapshot: &Snapshot) -> Vec<Value> {
             "position": view.position,
             "force": view.force,
         });
+        // Without a body nothing rotates, and the entries would be `null` in every state.
         if let Some(body) = &description.body {
             shown["grasp"] = json!(body.grasps.get(number));
             shown["orientation"] = json!(view.turn.map(|turn| turn.orientation));

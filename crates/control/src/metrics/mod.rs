@@ -38,6 +38,7 @@ pub(crate) fn text(description: &Description, latest: &Latest) -> String {
 
 fn run(out: &mut Exposition, description: &Description, latest: &Latest) {
     out.family("cohaptic_run_info", Gauge, "What runs: always 1.");
+    // Prometheus keeps texts as labels of a metric with the constant value 1.
     out.count(&[("kind", description.kind.name()), ("title", &description.title)], 1);
     out.family("cohaptic_run_elapsed_seconds", Gauge, "Time since the run began.");
     out.number(&[], latest.snapshot.elapsed.as_secs_f64());
@@ -50,6 +51,7 @@ fn run(out: &mut Exposition, description: &Description, latest: &Latest) {
 fn clocks(out: &mut Exposition, description: &Description, snapshot: &Snapshot) {
     out.family("cohaptic_clock_lateness_seconds", Summary, "How late a clock was, since the run began; quantile 1 is the longest.");
     for (number, name) in description.clocks.iter().enumerate() {
+        // A snapshot may be shorter than the description: missing entries count as defaults.
         let lateness = snapshot.lateness.get(number).copied().unwrap_or_default();
         for (quantile, span) in spans(&lateness) {
             out.number(&[("clock", name), ("quantile", quantile)], span);
@@ -65,6 +67,7 @@ fn links(out: &mut Exposition, description: &Description, snapshot: &Snapshot) {
         let with = |(number, name)| (labels(name), snapshot.links.get(number).unwrap_or(&none));
         description.links.iter().enumerate().map(with)
     };
+    // Prometheus requires all samples of a family in one group, so the families are the outer loop.
     for (name, help, count) in LINK_COUNTERS {
         out.family(name, Counter, help);
         each().for_each(|(labels, link)| out.count(&labels, count(link)));
@@ -96,12 +99,14 @@ fn peers(out: &mut Exposition, description: &Description, snapshot: &Snapshot) {
     let each = || description.peers.iter().enumerate().map(|(number, peer)| (peer.name.as_str(), snapshot.peers.get(number).unwrap_or(&none)));
     out.family("cohaptic_peer_status", Gauge, "1 for the status that a peer has, 0 for the others.");
     for (name, view) in each() {
+        // A series for each status, 1 or 0: a single number could not tell the name of the status.
         for presence in Presence::ALL {
             out.count(&[("peer", name), ("status", presence.name())], (view.status == presence).into());
         }
     }
     out.family("cohaptic_peer_age_seconds", Gauge, "Time since a peer elsewhere was last heard.");
     for (name, view) in each() {
+        // A peer of this program has no age, and gets no sample.
         if let Some(age) = view.age {
             out.number(&[("peer", name)], age.as_secs_f64());
         }
