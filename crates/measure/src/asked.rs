@@ -110,18 +110,21 @@ impl Asked {
         let traced = config.trace.is_some();
         let listed = config.listed.extra_delay();
         let varied = config.delay.jitter().is_some();
+        // Any further stage would add a wait of its own to the delay of the law.
         let alone = config.token_bucket.is_none()
             && config.bottleneck.is_none()
             && config.slots.is_none()
             && config.reorder.is_none()
             && !traced
             && listed.is_none();
+        // Waiting for the order changes delays only if delays vary.
         let in_order = config.order == Order::InOrder && varied;
         let damaged = config.corruption.as_ref().map(|corruption| match corruption.bits {
             Flips::Bits { packets, .. } => packets.probability().get(),
             Flips::Rate(rate) => {
                 let end = corruption.within.as_ref().map_or_else(|| size.get(), |within| size.get().min(within.end));
                 let begin = corruption.within.as_ref().map_or(0, |within| within.start);
+                // 1 − (1 − rate)^bits, in a form without cancellation for small rates.
                 -libm::expm1(8.0 * count_u64(end.saturating_sub(begin)) * libm::log1p(-rate.get()))
             }
         });

@@ -94,6 +94,7 @@ impl Accumulator {
         }
         self.latest = record.at;
         self.count(record);
+        // Beyond the limit only the counts above matter, and the largest number, which tells how many packets were offered.
         if let Some(beyond) = self.most.and_then(|most| record.sequence.checked_sub(most)) {
             self.beyond = self.beyond.max(beyond + 1);
             return Ok(());
@@ -194,10 +195,10 @@ impl Packet {
 
 /// Jitter estimator of RFC 3550, in `f64` instead of the integers of the RFC.
 #[derive(Clone, Copy, Debug, Default)]
-/// Instants of sending and arrival of the packet that arrived last.
 struct Jitter {
-    /// Smoothed difference J \[ns\].
+    /// Instants of sending and arrival of the packet that arrived last.
     last: Option<(Instant, Instant)>,
+    /// Smoothed difference J \[ns\].
     nanos: f64,
     differences: u64,
 }

@@ -62,6 +62,7 @@ impl DelayFigures {
         let by_packet: Vec<Option<f64>> = outcomes.iter().map(|outcome| outcome.delay().map(seconds)).collect();
         let delays: Vec<f64> = by_packet.iter().filter_map(|delay| *delay).collect();
         let series: Vec<u64> = outcomes.iter().filter_map(|outcome| outcome.delay()).collect();
+        // Sorted as whole nanoseconds, so that order and equality are exact.
         let mut sorted = series.clone();
         sorted.sort_unstable();
         let (&least, &greatest) = (sorted.first()?, sorted.last()?);
