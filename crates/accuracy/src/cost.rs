@@ -8,6 +8,7 @@ use rustix::time::{ClockId, clock_gettime};
 pub(crate) fn median_time<T>(rounds: usize, mut work: impl FnMut() -> T) -> Duration {
     let times = (0..rounds.max(1)).map(|_| {
         let start = processor_time();
+        // Without `black_box` the compiler may leave out work with an unused result.
         std::hint::black_box(work());
         processor_time() - start
     });
@@ -66,6 +67,7 @@ impl Rounds {
         let start = processor_time();
         work();
         let once = (processor_time() - start).as_secs_f64();
+        // A clock too coarse for the work may read zero: the least time keeps the quotient finite.
         (self.span.as_secs_f64() / once.max(1e-7)).clamp(1.0, 1e6) as u32
     }
 }

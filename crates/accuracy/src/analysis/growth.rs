@@ -40,6 +40,7 @@ pub fn growth_over(scene: &Scene, frames: u32) -> Option<f64> {
     // The maximum over many frames hides the phase of an oscillation.
     let largest = |frames: std::ops::Range<usize>| seen.largest[frames].iter().copied().fold(0.0, f64::max);
     let all = frames as usize;
+    // Before three tenths of the time, faster modes may not have decayed.
     let (begin, end) = (all * 3 / 10, all / 2);
     let apart = all / 2;
     let (early, late) = (largest(begin..end), largest(begin + apart..end + apart));

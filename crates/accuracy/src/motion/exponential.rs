@@ -21,6 +21,7 @@ pub(crate) fn exact_map<T: Number>(plant: &Plant, nanos: f64) -> StepMap<T> {
         if row > h { row } else { h }
     };
     let mut halvings = 0;
+    // The bound ends the loop for an infinite coefficient.
     while norm(h) > T::of(0.5) && halvings < 1000 {
         h = h * T::of(0.5);
         halvings += 1;

@@ -16,10 +16,12 @@ pub(super) fn samplers(law: &str) -> Vec<(&'static str, Sampler)> {
     let mut words = Words(1);
     match law {
         "normal" => vec![("Box-Muller", Box::new(box_muller())), ("rand_distr", normal(words))],
+        // Shape 3 and scale 1 have the mean 3/2 and the variance 3/4. The result is moved and scaled to the mean and the deviation of all laws.
         "Pareto" => vec![("rand_distr", sampler(rand_distr::Pareto::new(1.0, 3.0), words, |x: f64| MEAN + SD * (x - 1.5) / 0.75_f64.sqrt()))],
         // A half-line from 20 with the mean 4 and the deviation 2 above it.
         "gamma" => vec![("rand_distr", sampler(rand_distr::Gamma::new(4.0, 1.0), words, |x: f64| 20.0 + x))],
         "lognormal" => {
+            // Above the floor the mean is 4 and the deviation 2, so the variance of the logarithm is ln(1 + (2/4)²).
             let variance = 1.25_f64.ln();
             let law = rand_distr::LogNormal::new(4.0_f64.ln() - 0.5 * variance, variance.sqrt());
             vec![("rand_distr", sampler(law, words, |x: f64| 20.0 + x))]
@@ -30,6 +32,7 @@ pub(super) fn samplers(law: &str) -> Vec<(&'static str, Sampler)> {
             vec![("rand_distr", sampler(law, words, |x: f64| 20.0 + x))]
         }
         "uniform" => {
+            // A uniform law with the deviation σ reaches √3·σ from the mean.
             let half = 3.0_f64.sqrt() * SD;
             vec![("one multiplication", Box::new(move || MEAN - half + 2.0 * half * unit(words.next())))]
         }

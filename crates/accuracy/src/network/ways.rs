@@ -59,6 +59,7 @@ pub fn next_word(state: &mut u64) -> u64 {
 #[inline]
 #[must_use]
 pub fn unit(word: u64) -> f64 {
+    // The half keeps out 0, where the quantile of some laws is infinite.
     ((word >> 11) as f64 + 0.5) * (1.0 / 9_007_199_254_740_992.0)
 }
 
@@ -78,6 +79,7 @@ impl Netem {
     #[inline]
     #[must_use]
     pub fn draw(&self, word: u64) -> f64 {
+        // The kernel takes the remainder of a division by the size of the table, 4096: the lowest 12 bits.
         MEAN + SD / 8192.0 * f64::from(self.0[(word & 4095) as usize])
     }
 
@@ -110,6 +112,7 @@ impl Fine {
     #[inline]
     #[must_use]
     pub fn interpolated(&self, word: u64) -> f64 {
+        // Each cell needs an upper neighbour, so the position is a share of 65535 cells and not of 65536 entries.
         let position = unit(word) * 65_535.0;
         let cell = position as usize;
         self.0[cell] + (position - cell as f64) * (self.0[cell + 1] - self.0[cell])

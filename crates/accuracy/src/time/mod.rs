@@ -128,8 +128,10 @@ impl Work {
         let mut failure = None;
         let cost = match way {
             Way::Events => {
+                // The errors come from a run of their own, so that the timed runs do no bookkeeping.
                 events::carry(traffic, |arrival| errors.add(traffic, arrival))?;
                 median_time(self.rounds, || {
+                    // Summing the delays keeps the compiler from leaving out the work.
                     let mut sum = Duration::ZERO;
                     failure = events::carry(traffic, |arrival| sum += arrival.delay).err();
                     sum
