@@ -13,7 +13,7 @@ use tokio::runtime::{Builder, Runtime};
 use tokio::sync::Semaphore;
 
 use crate::http::{self, App, Pace, Shown, hand};
-use crate::ticket::Ticket;
+use crate::token::Ticket;
 use crate::{Board, LinkEditor, Stage, Token};
 
 /// Number of polls in a row without a moved byte, after which a connection counts as over.

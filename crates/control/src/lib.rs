@@ -48,7 +48,6 @@ mod metrics;
 mod server;
 mod snapshot;
 mod stage;
-mod ticket;
 mod token;
 mod typed;
 mod views;

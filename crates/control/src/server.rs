@@ -10,7 +10,7 @@ use tokio::runtime::Builder;
 use tokio::sync::{Mutex, Semaphore, oneshot};
 
 use crate::http::{self, App, Pace, Shown};
-use crate::ticket::Ticket;
+use crate::token::Ticket;
 use crate::{Board, LinkEditor, Stage, Token, TokenError};
 
 /// Address and admission rules of a server.

@@ -28,7 +28,7 @@ use axum::routing::get;
 use serde_json::{Value, json};
 use tokio::sync::{Mutex, OwnedMutexGuard, Semaphore};
 
-use crate::ticket::Ticket;
+use crate::token::Ticket;
 use crate::{Board, LinkEditor, Stage, Token};
 
 #[cfg(fuzzing)]

@@ -13,7 +13,7 @@ use tokio::sync::Semaphore;
 use tower::ServiceExt as _;
 
 use super::{App, Pace, Shown, router};
-use crate::ticket::Ticket;
+use crate::token::Ticket;
 use crate::{Board, Body as ObjectBody, Description, Kind, LinkCounters, LinkEditor, LinkName, MeasureLabel, PeerName, PeerView, Snapshot, TurnView};
 
 pub(super) const TOKEN: &str = "a-token-of-more-than-22-characters";
