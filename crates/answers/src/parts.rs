@@ -1,4 +1,4 @@
-//! Parts shared by several documents: peers, links, access lines and measures.
+//! The macro of JSON documents, and parts shared by several documents: peers, links, access lines and measures.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,18 @@ use cohaptic_wan::{DropCause, LinkStats};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use crate::document;
+/// Makes a JSON document, or a part of a document: keys and values, in this order. Attributes are passed to serde; a part that may be absent is a flattened
+/// `Option`.
+#[macro_export]
+macro_rules! document {
+    ($($(#[$attribute:meta])* $key:ident: $value:expr),* $(,)?) => {{
+        #[derive(serde::Serialize)]
+        struct Document<$($key),*> {
+            $($(#[$attribute])* $key: $key),*
+        }
+        Document { $($key: $value),* }
+    }};
+}
 
 /// Components of a vector: a number in a scene with one axis, a list in a scene with more axes.
 #[derive(Serialize)]

@@ -1,4 +1,4 @@
-//! Tells whether a scene is stable, by analysis, if the analysis takes seconds only and leaves nothing out.
+//! Verdicts by analysis: whether a scene is stable, if the analysis takes seconds only and leaves nothing out, and the simplifications behind a verdict.
 
 use cohaptic_scene::Scene;
 use cohaptic_stability::{AnalysisError, Judgement, Limits, Method, NOMINAL, QUICK_UNKNOWNS, UNLOADED, Watch, has_chance, judge_watched};
@@ -40,4 +40,19 @@ pub fn quick_verdict(scene: &Scene, seconds: f64, watch: &dyn Watch) -> Quick {
     let is_left_out = judgement.analysis.notes.iter().any(|note| note != UNLOADED);
     let nominal = judgement.mean_square.is_none() && (has_chance(scene) || is_left_out);
     if judgement.analysis.combines_contacts() || nominal { Quick::Simulate(refused) } else { Quick::Known(Box::new(judgement)) }
+}
+
+/// Returns the simplifications of the analysis and of the mean square, each once. With both figures, each note names the figure it is about.
+#[must_use]
+pub fn notes(judgement: &Judgement) -> Vec<String> {
+    let Some(mean_square) = &judgement.mean_square else {
+        return judgement.analysis.notes.clone();
+    };
+    let nominal = &judgement.analysis.notes;
+    let of_nominal = nominal.iter().map(|note| match mean_square.notes.contains(note) {
+        true => format!("both radii: {note}"),
+        false => format!("the spectral radius, with delays at their mean and no losses: {note}"),
+    });
+    let of_mean_square = mean_square.notes.iter().filter(|note| !nominal.contains(note)).map(|note| format!("the mean-square radius: {note}"));
+    of_nominal.chain(of_mean_square).collect()
 }

@@ -7,7 +7,7 @@ use cohaptic_stability::{AnalysisError, Radius, Watch, analyse_watched};
 
 use super::runs::{Trajectory, unwatched};
 use super::{Kind, Method, Work};
-use crate::quick_verdict::OPERATIONS_A_SECOND;
+use crate::verdict::OPERATIONS_A_SECOND;
 
 /// Time spent on the cost of a method; the first round is always run.
 const BUDGET: Duration = Duration::from_millis(50);

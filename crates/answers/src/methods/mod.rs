@@ -3,7 +3,6 @@
 //! A [`Method`] is data: kind, option on the command line, and the work for measuring the cost. [`methods`] lists the methods, and [`measure`] does the work.
 //! The methods of a [`Kind`] do the same work, so that costs and errors are comparable. [`measure`] takes the clock as an argument.
 
-mod document;
 mod list;
 mod measurement;
 mod picture;
@@ -12,7 +11,6 @@ mod runs;
 #[cfg(test)]
 mod tests;
 
-pub use document::explanation_with_costs;
 pub use list::methods;
 pub use measurement::{Measured, MeasuredMethod, MeasurementWatch, measure};
 pub use picture::{cost_picture, error_in_words};

@@ -8,6 +8,7 @@ use cohaptic_picture::testing::faults;
 use cohaptic_scene::Scene;
 
 use super::*;
+use crate::explanation_with_costs;
 
 /// Two peers hold one object, and the first peer pushes it. No force depends on the distance between the copies.
 const PUSHED: &str = r#"
