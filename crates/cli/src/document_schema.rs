@@ -1,6 +1,10 @@
-//! Kinds of JSON documents, and the macro for documents. Each document begins with its kind and version.
+//! Kinds of JSON documents, the macro for documents, and parts shared by several documents. Each document begins with its kind and version.
+
+use std::time::Duration;
 
 pub(crate) use cohaptic_answers::document;
+#[cfg(target_os = "linux")]
+use cohaptic_realtime::LatenessSummary;
 use serde::Serialize;
 
 /// Kind of a JSON document. The name never changes. The version increases when a key vanishes or changes its meaning, but not for new keys.
@@ -53,4 +57,16 @@ pub(crate) struct Versioned<'a, D: Serialize> {
     version: u32,
     #[serde(flatten)]
     document: &'a D,
+}
+
+/// Returns the quantiles of a lateness \[µs\].
+#[cfg(target_os = "linux")]
+pub(crate) fn lateness(summary: &LatenessSummary) -> impl Serialize + use<> {
+    let LatenessSummary { count, p50, p99, p999, max, sum: _ } = *summary;
+    document! { count: count, p50: micros(p50), p99: micros(p99), p999: micros(p999), max: micros(max) }
+}
+
+/// Converts a span to microseconds.
+pub(crate) fn micros(span: Duration) -> f64 {
+    span.as_secs_f64() * 1e6
 }

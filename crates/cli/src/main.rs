@@ -14,7 +14,6 @@ mod check;
 mod compare;
 mod completions;
 mod document_schema;
-mod documents;
 #[cfg(not(target_os = "linux"))]
 mod elsewhere;
 mod expectations;

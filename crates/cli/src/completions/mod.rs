@@ -4,7 +4,6 @@
 //! bash, fish and zsh run the program with the words typed so far, and show the answer of the program.
 
 mod keys;
-mod paths;
 mod shells;
 #[cfg(test)]
 mod tests;
@@ -88,7 +87,7 @@ fn offers(asked: &Asked<'_>) -> Vec<Offer> {
     match Kind::of(asked.arg, asked.command) {
         None => Vec::new(),
         Some(Kind::Shipped) => shipped_names().map(|name| named(name.to_owned())).collect(),
-        Some(Kind::File) => paths::offers(&asked.typed),
+        Some(Kind::File) => paths(&asked.typed),
         Some(Kind::Peer) => keys::ends(&document(asked.file)).into_iter().map(named).collect(),
         Some(Kind::Keys { many }) => {
             // Only the text after the last comma is completed. The text before stands unchanged in each proposal.
@@ -103,6 +102,29 @@ fn offers(asked: &Asked<'_>) -> Vec<Offer> {
             offers.into_iter().map(|Offer { text, about }| Offer { text: format!("{done}{text}"), about }).collect()
         }
     }
+}
+
+/// Returns the possible scenes, relay files and router files at paths that begin with `typed`, sorted: files with names that end in `.toml`, and folders,
+/// which may hold such files. Folders end in a slash. Hidden files are left out unless the name typed so far begins with a dot.
+fn paths(typed: &str) -> Vec<Offer> {
+    let (folder, name) = typed.rfind('/').map_or(("", typed), |slash| typed.split_at(slash + 1));
+    let Ok(entries) = std::fs::read_dir(if folder.is_empty() { Path::new(".") } else { Path::new(folder) }) else { return Vec::new() };
+    let mut offers: Vec<Offer> = entries
+        .filter_map(|entry| {
+            let entry = entry.ok()?;
+            // A name that is not UTF-8 cannot be compared with the typed text, and a name with a line break would read as two names.
+            let own = entry.file_name().into_string().ok().filter(|own| !own.contains(char::is_control))?;
+            if !own.starts_with(name) || (own.starts_with('.') && !name.starts_with('.')) {
+                return None;
+            }
+            // `is_dir` follows symbolic links, so that a link to a folder counts as a folder.
+            let is_folder = entry.path().is_dir();
+            (is_folder || own.ends_with(".toml")).then(|| Offer { text: format!("{folder}{own}{}", if is_folder { "/" } else { "" }), about: "" })
+        })
+        .collect();
+    // The order in which a system lists files is not defined.
+    offers.sort_by(|a, b| a.text.cmp(&b.text));
+    offers
 }
 
 /// Returns the document of a file. An unreadable file, perhaps half written at this time, counts as empty: keys are known without a file.

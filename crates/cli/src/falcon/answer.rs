@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use super::bench::{Bench, End};
 use super::reach::{FirmwareState, Target};
-use crate::documents::micros;
+use crate::document_schema::micros;
 use crate::realtime::counts;
 
 /// Identity of the device in an answer. The optional fields are absent for a simulated device, and where the system does not give the string.

@@ -1,4 +1,4 @@
-//! `cohaptic falcon home`: waits until a user has homed the device, without any force on the grip.
+//! `cohaptic falcon home`: waits until a user has homed the device, without any force on the grip. The messages for the user are those of `watch`, too.
 
 use std::process::ExitCode;
 use std::time::Duration;
@@ -9,9 +9,8 @@ use cohaptic_units::print::Span;
 
 use super::answer::{self, Identity, Seen, Traffic};
 use super::bench::{Bench, End, Go, Task};
-use super::homing_guide::Guide;
 use super::probe::WITHOUT_FORCE;
-use super::reach::{self, FirmwareState};
+use super::reach::{self, FirmwareState, say};
 use crate::arguments::HomeArguments;
 use crate::document_schema::{DocumentSchema, document};
 use crate::failure::{Failure, INTERRUPTED};
@@ -100,5 +99,43 @@ impl Task for Homing {
             self.line.show(format!("{:.1} s: top {}, right {}, left {}", at.as_secs_f64(), homed[0], homed[1], homed[2]));
         }
         Ok(if status.phase == Phase::Active { Go::Enough } else { Go::On })
+    }
+}
+
+/// Prints the next step of homing whenever the driver's phase changes.
+#[derive(Debug)]
+pub(super) struct Guide {
+    /// Phase seen last. The message of the phase, if any, has been printed.
+    said: Option<Phase>,
+    /// `true` if the command asks the device for force. Without force the device never becomes active, and the last step of homing is left out.
+    pushes: bool,
+}
+
+impl Guide {
+    pub(super) const fn new(pushes: bool) -> Self {
+        Self { said: None, pushes }
+    }
+
+    /// Prints the message of the present phase to standard error, unless the phase is the same as at the last call.
+    pub(super) fn look(&mut self, status: &Status, line: &Progress) {
+        if self.said == Some(status.phase) {
+            return;
+        }
+        // Phases without a message are noted too: a return from such a phase prints the message of the earlier phase again.
+        self.said = Some(status.phase);
+        if let Some(what) = what_to_do(status.phase, self.pushes) {
+            line.aside(|| say(what));
+        }
+    }
+}
+
+/// Returns the message of a phase; `None` for phases in which the user has nothing to do.
+const fn what_to_do(phase: Phase, pushes: bool) -> Option<&'static str> {
+    match phase {
+        Phase::Silent | Phase::Stopped => None,
+        Phase::Homing => Some("red light, not homed: pull the grip fully out, then push it fully in, until the light is blue"),
+        Phase::Homed if pushes => Some("blue light, homed: pull the grip out once more, beyond 170 mm from the base, until the light is green"),
+        Phase::Homed => Some("blue light, homed; no force goes out"),
+        Phase::Active => Some("green light: active"),
     }
 }

@@ -13,7 +13,6 @@
 mod answer;
 mod bench;
 mod home;
-mod homing_guide;
 mod probe;
 mod reach;
 mod simulate;

@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use super::answer::{self, Forces, Identity, Seen, Traffic, buttons};
 use super::bench::{Bench, End, Go, Task};
-use super::homing_guide::Guide;
+use super::home::Guide;
 use super::reach;
 use crate::arguments::{Force, WatchArguments};
 use crate::document_schema::DocumentSchema;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use cohaptic_answers::measured_lines;
+use cohaptic_answers::{access_line, link_quantiles, link_totals, measured_lines, measures_of, peer, peer_links, rotation};
 use cohaptic_harness::Ending;
 use cohaptic_harness::live::SeatStats;
 use cohaptic_live::session::SocketCounts;
@@ -12,8 +12,7 @@ use cohaptic_scene::Scene;
 use cohaptic_units::print::{Counted, Span};
 use serde::Serialize;
 
-use crate::document_schema::document;
-use crate::documents::{access_line, lateness, link_quantiles, link_totals, measures_of, micros, peer, peer_links, rotation};
+use crate::document_schema::{document, lateness, micros};
 use crate::output;
 use crate::realtime::{late, notes};
 use crate::run::answer::{diverged, length, packets};

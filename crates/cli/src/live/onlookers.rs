@@ -15,7 +15,7 @@ use cohaptic_live::{Conductor, LinkChange, Refusal, Status};
 use cohaptic_scene::{LinkKeys, MeasureName, Scene};
 use cohaptic_units::Instant;
 
-use crate::documents::micros;
+use crate::document_schema::micros;
 use crate::interrupt;
 use crate::realtime::{Edit, KeyedLinks, Look, counters, quantiles, quantiles_of};
 

@@ -11,7 +11,7 @@ use cohaptic_scene::Scene;
 use cohaptic_units::print::{Counted, Span};
 
 use crate::arguments::LiveArguments;
-use crate::documents::micros;
+use crate::document_schema::micros;
 use crate::run::answer::{diverged, length, packets};
 use crate::run::page::{links, measures, peers};
 use crate::shell::CommandLine;

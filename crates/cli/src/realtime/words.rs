@@ -12,7 +12,7 @@ use cohaptic_units::visible_lines;
 use cohaptic_wan::{DropCause, LinkModel, LinkStats};
 
 use super::Look;
-use crate::documents::micros;
+use crate::document_schema::micros;
 use crate::failure::Failure;
 
 /// Formats a summary of lateness: `p50 31.2 µs, p99 76.0 µs, p99.9 120.0 µs, worst 1.20 ms`.

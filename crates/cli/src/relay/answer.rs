@@ -9,8 +9,7 @@ use cohaptic_units::print::Counted;
 use serde::Serialize;
 
 use super::setup::Setup;
-use crate::document_schema::document;
-use crate::documents::{self, lateness};
+use crate::document_schema::{document, lateness};
 use crate::realtime::{ConfiguredDelay, carried, counts, lasted, late, notes};
 
 /// Returns the answer of `cohaptic relay --json`. `asked` holds the configured delays, indexed as the links of the report.
@@ -43,7 +42,7 @@ pub(super) fn document(setup: &Setup, report: &Report, asked: &[ConfiguredDelay]
 fn link_document(link: &LinkReport, asked: &ConfiguredDelay) -> impl Serialize + use<> {
     document! {
         #[serde(flatten)]
-        link: documents::link(link.from.clone(), link.to.clone(), &link.stats),
+        link: cohaptic_answers::link(link.from.clone(), link.to.clone(), &link.stats),
         asked_mean_delay_s: asked.first.map(|delay| delay.as_secs_f64()),
         changes: asked.changes,
         delivered_bytes: link.counts.delivered_bytes,

@@ -9,8 +9,7 @@ use cohaptic_units::print::Counted;
 use serde::Serialize;
 
 use super::{Ending, RouterRun, attached, elapsed};
-use crate::document_schema::document;
-use crate::documents::{self, lateness};
+use crate::document_schema::{document, lateness};
 use crate::output;
 use crate::realtime::{ConfiguredDelay, carried, counts, lasted, late, notes};
 
@@ -64,7 +63,7 @@ fn of_lane(lane: &LaneSnapshot, asked: &ConfiguredDelay) -> impl Serialize + use
     document! {
         name: lane.link.clone(),
         #[serde(flatten)]
-        link: documents::link(from, to, &lane.stats),
+        link: cohaptic_answers::link(from, to, &lane.stats),
         delivered_bytes: lane.delivered_bytes,
         overload: lane.overload,
         asked_mean_delay_s: asked.first.map(|delay| delay.as_secs_f64()),

@@ -4,7 +4,6 @@
 
 mod files;
 mod filling;
-mod proof_page;
 mod prove;
 
 use std::process::ExitCode;

@@ -11,7 +11,7 @@ use cohaptic_proofs::{Guarantee, ProofError, ProvenBox, ProvenRegion, SharedProo
 use cohaptic_units::print::{Counted, csv_field};
 use serde::Serialize;
 
-use super::{Order, filling, proof_page};
+use super::{Order, files, filling};
 use crate::arguments::MapArguments;
 use crate::document_schema::{DocumentSchema, document};
 use crate::failure::Failure;
@@ -94,7 +94,7 @@ pub(super) fn prove(order: &Order, arguments: &MapArguments, halvings: u32, shar
             files.extend(certificates(order, arguments, &mut proofs, folder)?);
         }
         // The page comes after the certificates, because the page says how many boxes the certificates leave open.
-        files.push(write_into(folder, "proof.html", proof_page::html(order, arguments, &proofs, &pictures))?);
+        files.push(write_into(folder, "proof.html", files::proof_page(order, arguments, &proofs, &pictures))?);
         if proofs.iter().all(|proof| proof.region.is_whole) {
             proof_blocks::remove(folder, ROWS)?;
         }
