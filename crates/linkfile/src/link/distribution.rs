@@ -47,6 +47,7 @@ pub(super) fn dist_fault(text: &str, error: &DistTableError) -> Fault {
 /// nanoseconds.
 fn empirical(text: &str) -> Result<Arc<Empirical>, Fault> {
     const DELAY: &str = "expected a delay in seconds from 0 to 9e9";
+    // Lines are numbered before blank lines and comments are left out, so that a fault names the line of the file.
     let mut lines = (1..).zip(text.lines()).filter(|(_, line)| !line.trim().is_empty() && !line.trim_start().starts_with('#'));
     match lines.next() {
         Some((_, header)) if header.trim() == "delay" => {}
@@ -68,6 +69,7 @@ fn empirical(text: &str) -> Result<Arc<Empirical>, Fault> {
             EmpiricalError::Constant { value } => format!("all delays are {} s: expected two different ones", value / 1e9),
             EmpiricalError::Count { .. } | EmpiricalError::NotANumber { .. } => error.to_string(),
         };
+        // No single line is at fault.
         Fault { span: 0..0, message }
     })
 }

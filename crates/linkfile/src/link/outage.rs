@@ -17,6 +17,7 @@ pub(super) fn read_outages(node: &Node, context: Context<'_>) -> Option<Outages>
     let random = table.maybe("random", read_random);
     let idle = table.maybe("idle", read_idle);
     table.finish();
+    // Refusals count only after `finish`, so that every key is checked.
     let mut outages = scheduled?;
     if let Some(random) = random? {
         outages = outages.with_random(random).map_err(|error| values::refuse(context, &[random_node], node, &error)).ok()?;
@@ -46,6 +47,7 @@ fn read_idle(node: &Node, context: Context<'_>) -> Option<IdleOutages> {
 /// Reads a list of spans in which the link is down.
 fn read_scheduled(node: &Node, context: Context<'_>) -> Option<Outages> {
     let elements = values::list(node, context, "a list such as [ { from = \"1s\", to = \"2s\" } ]")?;
+    // Collected as options first, so that each span is read also after a refused span.
     let read: Vec<Option<Outage>> = elements.iter().map(|element| read_span(element, context)).collect();
     let mut outages = Vec::with_capacity(read.len());
     for outage in read {

@@ -37,6 +37,7 @@ pub(super) fn read_trace(node: &Node, context: Context<'_>) -> Option<Option<Tra
     let mut table =
         TableReader::new(node, context, declaration, "the name of a recording, or a table such as { file = \"path.csv\", repeat = true }")?;
     let (bytes_entry, of_path) = (table.entry("bytes"), [table.entry("between"), table.entry("repeat"), table.entry("start")]);
+    // The form of a size allows zero, and a line without bytes would never deliver.
     let bytes = table.read("bytes", |node, context| {
         let bytes = values::size(node, context)?;
         if bytes == Bytes::ZERO {
@@ -106,6 +107,7 @@ fn load(node: &Node, context: Context<'_>, form: Form) -> Option<Trace> {
     // The end of the run belongs to the form, because the end decides whether the recording is refused.
     let read_as = format!("trace {bytes} {between:?} {repeat} {start:?} {ends:?}");
     read_file(node, context, &path, &read_as, |text| match parse(text, bytes, between, repeat)? {
+        // From the first row on, any recording begins at the start of the run, so the end of the run does not matter.
         Trace::Path(path) if start == Start::First => path.from_first().map(Trace::Path).map_err(|error| Fault::in_line(text, None, &error)),
         Trace::Path(path) => match outside(&path, ends) {
             Some(message) => Err(Fault { span: first_row_span(text), message }),
@@ -132,6 +134,7 @@ fn outside(path: &PathTrace, ends: Option<Duration>) -> Option<String> {
 fn parse(text: &str, bytes: Bytes, between: Between, repeat: bool) -> Result<Trace, Fault> {
     // Some programs put a byte order mark before the text.
     let content = text.strip_prefix('\u{feff}').unwrap_or(text);
+    // The first line tells the kind of the recording: a CSV begins with a header or a comment.
     let first = content.lines().map(str::trim).find(|line| !line.is_empty()).unwrap_or_default();
     if first.parse::<f64>().is_ok() {
         return DeliveryTrace::parse(content, bytes).map(Trace::Delivery).map_err(|error| {
@@ -159,6 +162,7 @@ fn parse(text: &str, bytes: Bytes, between: Between, repeat: bool) -> Result<Tra
 /// Returns the bytes of the first row of a CSV: the second line that is neither blank nor a comment.
 fn first_row_span(text: &str) -> core::ops::Range<usize> {
     let content = |line: &&str| !line.trim().is_empty() && !line.trim_start().starts_with('#');
+    // Without a row the first line is at fault.
     let line = text.lines().enumerate().filter(|(_, line)| content(line)).nth(1).map_or(1, |(place, _)| place + 1);
     line_span(text, line)
 }

@@ -53,6 +53,7 @@ fn read_overrides(
     check: fn(&Node, Context<'_>),
 ) -> Result<LinkModel, FileError> {
     let parsed = parse_with(Sources { file, text: "", overrides }, reader, |document, context| {
+        // A link with the key `modulated` refers to the modulators of the file, and the overrides have none.
         let context = context.with_modulators(Some(modulators));
         // Without an override the document has no table `link`, and every key has the default.
         let nothing = Node::empty_table(BEGINNING, "link".to_owned());
@@ -126,6 +127,7 @@ impl LinkKeys {
     /// are checked only by [`LinkKeys::model`].
     #[must_use]
     pub fn read(&self, table: &str) -> Option<Self> {
+        // The parser reads documents, and a bare inline table is no document.
         let text = format!("link = {table}");
         let document = Node::document(DeTable::parse(&text).ok()?.get_ref()).ok()?;
         // A text such as "{}\nscene = 3" would add a second key to the document.

@@ -35,6 +35,7 @@ impl Faults {
     }
 
     fn report_kind(&self, order: (Kind, Place), error: impl FnOnce() -> FileError) {
+        // The error is made only for a kept fault, because messages can be long.
         let mut first = self.0.borrow_mut();
         // `<` keeps the first of several faults at the same place.
         if first.as_ref().is_none_or(|(earlier, _)| order < *earlier) {
@@ -121,6 +122,7 @@ impl<'a> Context<'a> {
 
     /// Reports a missing key in the table at a place.
     pub(super) fn missing(&self, place: Place, key: &str, message: String) {
+        // A kind of its own: a wrong key often explains a missing key.
         let error = || FileError::Invalid(Box::new(self.sources.diagnostic(place, key.to_owned(), message)));
         self.faults.report_kind((Kind::Missing, place), error);
     }

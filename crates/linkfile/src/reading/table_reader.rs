@@ -115,8 +115,10 @@ impl<'a> TableReader<'a> {
     fn read_key<T>(&mut self, key: &'static Key, expected: &str, read: impl FnOnce(&Node, Context<'a>) -> Option<T>) -> Option<T> {
         match (self.entry_of(key), key.need) {
             (Some(entry), _) => read(&entry.node, self.context),
+            // A default goes through the same reader as a value of the file, and so through the same checks.
             (None, Need::Default(default)) => read(&values::default_of(default), self.context),
             (None, Need::Required | Need::RequiredSomewhere | Need::Optional) => {
+                // Reported by `finish`, because an unknown key may explain the missing key.
                 self.missing.push((key.name, if expected.is_empty() { key.expected() } else { expected.to_owned() }));
                 None
             }
@@ -137,6 +139,7 @@ impl<'a> TableReader<'a> {
     pub fn table<T>(&mut self, name: &'static str, read: impl FnOnce(&Node, Context<'a>) -> Option<T>) -> Option<T> {
         match self.get(name) {
             Some(node) => read(node, self.context),
+            // The empty table has no place in the text, but the path of the key, for messages about keys in the table.
             None => read(&Node::empty_table(BEGINNING, join(&self.node.path, name)), self.context),
         }
     }
