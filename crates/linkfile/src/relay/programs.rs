@@ -37,6 +37,7 @@ pub(super) fn read_programs(node: &Node, allow_remote: Option<bool>, context: Co
         return None;
     }
     let mut names = Names::of("program");
+    // Collected as options first, so that each entry is read also after a refused entry.
     let written: Vec<Option<Written<'_>>> = entries.iter().map(|entry| read_program(entry, allow_remote, &mut names, context)).collect();
     let written: Vec<Written<'_>> = written.into_iter().collect::<Option<_>>()?;
     // Both checks run, so that the first fault of the text is found.
@@ -70,6 +71,7 @@ fn read_program<'a>(entry: &'a Node, allow_remote: Option<bool>, names: &mut Nam
         }
         Some(address)
     });
+    // Refusals count only after `finish`, so that every key is checked.
     table.finish();
     Some(Written { program: RelayProgram { name: name?, port: port?, address: address? }, port: port_node?, address: address_node })
 }
@@ -78,6 +80,7 @@ fn read_program<'a>(entry: &'a Node, allow_remote: Option<bool>, names: &mut Nam
 fn read_name(node: &Node, names: &mut Names, context: Context<'_>) -> Option<String> {
     const EXPECTED: &str = "a name, without space and none of . > / , \" and not \"all\"";
     let text = values::text(node, context, EXPECTED)?;
+    // Dot and `>` have a meaning in keys and in the names of links.
     let unfit = |c: char| c.is_whitespace() || c.is_control() || matches!(c, '.' | '>' | '/' | ',' | '"');
     if text.is_empty() || text == "all" || text.contains(unfit) {
         context.fault_at(node, format!("{} cannot be the name of a program: expected {EXPECTED}", quote(text)));
@@ -100,6 +103,7 @@ fn read_address(node: &Node, expected: &str, allow_remote: Option<bool>, context
             return None;
         }
     };
+    // Without a value the key `allow-remote` was refused, and the fault is reported already.
     if !allow_remote? && !address.ip().is_loopback() {
         let message =
             format!("{address} is not on this machine: expected a loopback address such as 127.0.0.1 or [::1], or allow-remote = true under [relay]");
@@ -111,6 +115,7 @@ fn read_address(node: &Node, expected: &str, allow_remote: Option<bool>, context
 
 /// Checks that all ports differ and all addresses differ. Port 0 differs from every port, because the system chooses a free port for each.
 fn check_distinct(written: &[Written<'_>], context: Context<'_>) -> bool {
+    // All pairs, because the programs are few. The later entry is at fault, in the order of the text.
     let mut distinct = true;
     for (place, one) in written.iter().enumerate() {
         for other in &written[..place] {

@@ -87,10 +87,12 @@ fn read_document(document: &Node, context: Context<'_>) -> Option<RouterFile> {
     let links = root.maybe("links", |node, _| read_links(node, context)).map(Option::unwrap_or_default);
     let router = root.read("router", |node, _| read_router(node, links.as_deref(), context));
     let left = root.read("left", read_side);
+    // The node is kept for faults about both sides together.
     let right_node = root.get("right");
     let right = root.read("right", read_side);
     let rules = root.maybe("rules", |node, _| read_rules(node, links.as_deref(), context)).map(Option::unwrap_or_default);
     root.finish();
+    // Refusals count only now, after every part was read.
     let (left, right) = (left?, right?);
     check_sides(&left, &right, right_node?, context)?;
     let (seed, memory, default) = router?;
@@ -112,6 +114,7 @@ fn read_links(node: &Node, context: Context<'_>) -> Option<Vec<NamedLink>> {
         }
         // A link with a wrong name is read too, so that the first fault of the text is found.
         let model = read_link(&entry.node, context);
+        // Without modulators the list was refused, so the fault is reported already.
         let keys = LinkKeys::of_table(entry.node.as_table()?, context.modulators?);
         Some(NamedLink { name: is_name.then(|| entry.name.clone())?, keys, model: model? })
     });
@@ -139,6 +142,7 @@ fn read_router(node: &Node, links: Option<&[NamedLink]>, context: Context<'_>) -
 
 /// Reads `default`: a target for both directions, or a table with a target per direction. The answer is indexed by the side of arrival.
 fn read_default(node: &Node, links: Option<&[NamedLink]>, context: Context<'_>) -> Option<[Target; 2]> {
+    // A target for both directions is the short form.
     if !matches!(node.value, Value::Table(_)) {
         return read_target(node, links, context).map(|target| [target; 2]);
     }
@@ -154,6 +158,7 @@ fn read_memory(node: &Node, context: Context<'_>) -> Option<Memory> {
     let packets = table.value("packets");
     let bytes = table.read("bytes", |node, context| {
         let bytes = values::size(node, context)?;
+        // The form of a size allows zero, and a router without memory would drop every packet.
         if bytes == Bytes::new(0) {
             context.fault_at(node, "zero is out of range: expected a size above zero such as \"64MB\"");
             return None;

@@ -53,6 +53,8 @@ fn property(key: &Key, is_laid_over: bool) -> Value {
     }
     if let Some(members) = schema.as_object_mut() {
         members.insert("description".to_owned(), json!(about));
+        // A table laid over another table has no default: a missing key keeps the value of the other table. Numbers, booleans and texts in quotes read the same
+        // in TOML and in JSON; any other default stays in the description only.
         if let Need::Default(default) = key.need
             && !is_laid_over
             && let Ok(default) = serde_json::from_str::<Value>(default)
@@ -77,6 +79,7 @@ fn form(form_of: &Form) -> Value {
         Form::Duration | Form::PositiveDuration => with_unit(&["8ms", "1.5s", "250us"]),
         Form::Rate => with_unit(&["10Mbit", "64kbit"]),
         Form::Size => with_unit(&["1500B", "64kB"]),
+        // A number is from 0 to 1, and a percentage is a text.
         Form::Probability => json!({ "anyOf": [
             { "type": "number", "minimum": 0, "maximum": 1 },
             { "type": "string", "pattern": r"^\s*[0-9.]+\s*%\s*$", "examples": ["1%", "1.5%"] },
