@@ -51,6 +51,7 @@ impl AnswerPage {
     pub fn html(self, origin: &Origin<'_>) -> String {
         let Self { title, warnings, sentences, asked, tables, notes } = self;
         let mut page = Page::new(title);
+        // Warnings come before the answer, because a warning can turn the answer around.
         for warning in &warnings {
             page = page.with(Html::warning(sentence(warning)));
         }
@@ -58,6 +59,7 @@ impl AnswerPage {
             page = page.with(Html::paragraph(sentence(answer)));
         }
         let scene = [("Scene", Html::code(origin.file))].into_iter().chain(overrides(origin.overrides));
+        // The question stands below the answer: a reader first wants the result.
         page = page.with(Html::heading(2, "Asked")).with(Html::facts(scene.chain(asked))).with(made_by(origin.command));
         if !origin.pictures.is_empty() {
             page = page.with(Html::heading(2, "Pictures"));
@@ -82,6 +84,7 @@ pub fn made_by(command: &str) -> Html {
 /// Returns the section of a page with the text of the scene.
 #[must_use]
 pub fn scene_text(text: &str) -> Html {
+    // The overrides stand with the question, so that the text of the scene remains the text of the file.
     let said = Html::paragraph("The file as it was read; overrides are not in it.");
     Html::heading(2, "Scene").and(Html::details("The text of the scene", said.and(Html::preformatted(text))))
 }
@@ -115,6 +118,7 @@ pub(crate) fn headed(heading: &str, table: &Table) -> Html {
 /// Returns clauses as the beginning of a sentence, with semicolons between them. Beyond a limit, the sentence says how many clauses are left out.
 pub(crate) fn clauses(clauses: &[String]) -> String {
     let more = clauses.len().saturating_sub(MOST_SENTENCES);
+    // The number of left out clauses counts as a clause of its own.
     let shown = clauses.iter().take(MOST_SENTENCES).cloned();
     let more = (more > 0).then(|| format!("and so on, {more} more"));
     shown.chain(more).collect::<Vec<String>>().join("; ")
@@ -124,6 +128,7 @@ pub(crate) fn clauses(clauses: &[String]) -> String {
 fn sentence(words: &str) -> String {
     // A first word with such a character is a key of the scene or the name of a file, and stays as written.
     let is_name = words.split_whitespace().next().is_some_and(|first| first.contains(['.', '_', '=']));
+    // Only the first letter changes: capitals inside may be units or names.
     let mut letters = words.chars();
     let first: String = letters.next().map_or_else(String::new, |first| if is_name { first.to_string() } else { first.to_uppercase().collect() });
     let end = if words.ends_with(['.', ':', '?', '!']) { "" } else { "." };

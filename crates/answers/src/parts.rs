@@ -15,6 +15,7 @@ use serde_json::{Map, Value};
 #[macro_export]
 macro_rules! document {
     ($($(#[$attribute:meta])* $key:ident: $value:expr),* $(,)?) => {{
+        // A type of its own for each document, because serde writes the fields of a struct in the order of the declaration.
         #[derive(serde::Serialize)]
         struct Document<$($key),*> {
             $($(#[$attribute])* $key: $key),*
@@ -112,6 +113,7 @@ fn counters(stats: &LinkStats) -> impl Serialize + use<> {
         offered: stats.offered(),
         duplicated: stats.duplicated(),
         delivered: stats.delivered(),
+        // All causes are listed, also with a count of zero, so that every document has the same keys.
         dropped: DropCause::ALL.into_iter().map(|cause| (cause.name(), stats.dropped(cause))).collect::<BTreeMap<_, _>>(),
         in_flight: stats.in_flight(),
         marked: stats.marked(),
@@ -122,6 +124,7 @@ fn counters(stats: &LinkStats) -> impl Serialize + use<> {
 
 /// Returns the measures of a run by name; `None` if the scene has no measures.
 pub fn measures_of(scene: &Scene, measured: &[MeasuredValue]) -> Option<impl Serialize + use<>> {
+    // The names come from the scene, so the keys are not known before the run.
     let named: Map<String, Value> = measured.iter().map(|measured| (measured.name.text(scene), Value::from(measured.value))).collect();
     (!named.is_empty()).then(|| document! { measures: named })
 }

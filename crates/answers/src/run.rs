@@ -20,6 +20,7 @@ pub fn run(scene: &Scene, summary: &Summary, measured: &[MeasuredValue], wall_s:
         ticks: summary.ticks,
         ending: summary.ending_name(),
         #[serde(flatten)]
+        // Without a clock there is no speed: equal runs then give equal documents.
         speed: wall_s.map(|wall_s| document! { wall_s: wall_s, realtime_factor: duration_s / wall_s }),
         peers: summary.peers.iter().map(peer).collect::<Vec<_>>(),
         link_totals: link_totals(summary),
@@ -41,6 +42,7 @@ pub fn run_words(scene: &Scene, summary: &Summary, measured: &[MeasuredValue], w
     let mut text = String::new();
     let mut line = |line: String| text.push_str(&format!("{line}\n"));
     if let Some(positions) = positions {
+        // The text plot draws the first axis alone.
         line(format!("position of each copy of the object{}", if scene.axes.count() > 1 { ", along x" } else { "" }));
         let names: Vec<&str> = scene.peers.iter().map(|peer| peer.name.as_str()).collect();
         line(text_plot(positions, &names).trim_end().to_owned());
@@ -50,6 +52,7 @@ pub fn run_words(scene: &Scene, summary: &Summary, measured: &[MeasuredValue], w
         Ending::Complete | Ending::Diverged(_) => diverged(summary).into_iter().for_each(|why| line(format!("  DIVERGED: {why}"))),
         Ending::Interrupted(_) => line(format!("  INTERRUPTED after {simulated} of {}", Span(scene.duration))),
     }
+    // Measured over the simulated span, so that an interrupted run shows the speed until then.
     let factor = summary.duration.as_secs_f64() / wall_s;
     line(format!("  {simulated} simulated, {}, in {wall_s:.3} s: {factor:.0} times real time", Counted(summary.ticks, "tick")));
     line(format!("  largest discrepancy between two copies: {}", length(summary.max_discrepancy)));
@@ -114,6 +117,7 @@ pub fn packets(summary: &Summary) -> String {
         }
         let mut has_line = vec![false; summary.peers.len()];
         lines().for_each(|line| has_line[line.peer] = true);
+        // A link counts only for peers without an access line, so that no packet counts twice.
         let links = summary.links.iter().filter(|link| !has_line[if uplink { link.from } else { link.to }]);
         lines().map(|line| count(&line.stats)).sum::<u64>() + links.map(|link| count(&link.stats)).sum::<u64>()
     };

@@ -15,6 +15,7 @@ pub fn length(metres: f64) -> String {
 pub(crate) const fn length_unit(metres: f64) -> (f64, &'static str) {
     if metres.abs() < 1e4 { (1e3, "mm") } else { (1.0, "m") }
 }
+// From 10 km on, millimetres would be a long row of digits.
 
 /// Returns the note about `count` nominal verdicts, which leave random parts out because their second moment cannot be followed; `None` if `count` is 0. `one`
 /// and `several` follow the number: "cell is", "cells are".

@@ -19,6 +19,7 @@ pub fn words(peer: &str, curves: &[Curve]) -> String {
         }
         let _ = writeln!(text, "\n  {}", subject(peer, curve));
         table(&mut text, curve);
+        // Only force and motion along the same axis make a spring, a viscosity and an inertia.
         let [axis, seen] = curve.admittance.axes();
         if axis == seen {
             let _ = writeln!(text, "\n  moved slowly, {peer} feels");
@@ -51,6 +52,7 @@ fn table(text: &mut String, curve: &Curve) {
 
 /// Returns a frequency with five significant digits, without trailing zeros.
 pub(super) fn significant(hz: f64) -> String {
+    // Outside of this range plain decimals would show too many zeros.
     if !(1e-4..1e6).contains(&hz) {
         return format!("{hz:.4e}");
     }

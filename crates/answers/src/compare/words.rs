@@ -51,6 +51,7 @@ fn head(finished: &Finished, wall_s: f64) -> Vec<String> {
     let Finished { plan, report, comparison, .. } = finished;
     let keys: Vec<&str> = finished.keys().iter().map(cohaptic_campaign::Variation::key).collect();
     let over = if keys.is_empty() { String::new() } else { format!(" at {} of {}", Counted(comparison.others(), "combination"), keys.join(" and ")) };
+    // The number of runs is the same for each strategy: every combination has the same seeds.
     let each = plan.runs_of_each();
     let mut lines = vec![format!("  {} of {}{over}, {each} of each", Counted(report.runs, "run"), Counted(comparison.strategies.len(), "strategy"))];
     lines.push(if report.computed == 0 {
@@ -104,6 +105,7 @@ impl Sum {
             sum.runs += cell.diverged.map_or(0, |share| share.of);
             sum.diverged += cell.diverged.map_or(0, |share| share.count);
             sum.refused += usize::from(cell.refused.is_some());
+            // A refused combination and a judgement without a verdict count neither as stable nor as judged.
             if let Some(verdict) = finished.judgement(strategy, other).and_then(Judgement::verdict) {
                 sum.judged += 1;
                 sum.stable += usize::from(&*verdict.word == cohaptic_stability::Verdict::Stable.word());

@@ -116,6 +116,7 @@ impl VariantMap {
 
 #[expect(clippy::cast_precision_loss, reason = "far fewer cells than 2^52")]
 fn share(part: usize, whole: usize) -> f64 {
+    // A map without cells has no share: the least divisor keeps NaN out of documents.
     part as f64 / whole.max(1) as f64
 }
 
@@ -125,10 +126,12 @@ pub fn csv([x, y]: [&KeyRange; 2], VariantMap { map, criterion, verdicts, .. }: 
     let keys = format!("{},{}", csv_field(&x.key), csv_field(&y.key));
     let mut text = match criterion {
         Criterion::SpectralRadius => format!("{keys},spectral_radius,verdict\n"),
+        // Under the mean square cells are of two kinds, so the column `judged` tells the kind.
         Criterion::MeanSquare => format!("{keys},mean_square_radius,verdict,judged\n"),
     };
     for (((y, row), verdicts), nominal) in map.y.iter().zip(&map.radius).zip(verdicts).zip(&map.nominal) {
         for (((x, radius), verdict), nominal) in map.x.iter().zip(row).zip(verdicts).zip(nominal) {
+            // `:?` writes the fewest digits that read back as the same number.
             text.push_str(&format!("{x:?},{y:?},{radius:?},{}", verdict.word()));
             if *criterion == Criterion::MeanSquare {
                 text.push_str(&format!(",{}", criterion.kind(*nominal).word()));

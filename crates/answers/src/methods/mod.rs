@@ -67,6 +67,7 @@ impl Kind {
     #[must_use]
     pub const fn cost_unit(self) -> &'static str {
         match self {
+            // All methods of runs do the same work: a simulated second.
             Self::Engine | Self::Axes | Self::Integrator | Self::Sampling => "ms a simulated second",
             Self::Analysis => "ms an analysis",
         }
@@ -120,6 +121,7 @@ pub struct Method {
 impl Method {
     /// Returns `true` if the object turns in the run of the method.
     fn turns(&self) -> bool {
+        // A method without work does not apply, and an analysis has no run.
         matches!(&self.work, Ok(Work::Run(run)) if run.scene.rotation.is_some())
     }
 }

@@ -23,6 +23,7 @@ pub struct NamedMap<'a> {
 pub fn map_picture(title: &str, [x, y]: [&KeyRange; 2], maps: &[NamedMap<'_>]) -> Option<cohaptic_picture::Picture> {
     // All maps have the keys of the first map, so that the first map gives the axes.
     let first = maps.first()?;
+    // Nominal cells change the meaning of the radius, and so the words of title and legend.
     let kinds = |named: &NamedMap<'_>| Kinds::of(named.criterion, named.map.nominal.iter().flatten().copied());
     let title = format!("{title}: {} below 1", kinds(first).radius_name());
     let hatched = nominal_head(first.left_out);
@@ -88,6 +89,7 @@ impl Picture<'_> {
         };
         let panel = Panel::new(self.x.between_values(), self.y.between_values()).with_all(self.areas.iter().enumerate().map(content));
         let is_nominal = |column: usize, row: usize| self.nominal.get(row).and_then(|row| row.get(column)).copied().unwrap_or(false);
+        // A hatch over nothing would still have an entry in the legend.
         let panel = if self.nominal.iter().flatten().any(|nominal| *nominal) {
             panel.with(Region::cells(self.x.values, self.y.values, Fill::Hatch, is_nominal).named(self.hatched))
         } else {
@@ -101,6 +103,7 @@ impl Axis<'_> {
     /// Returns the axis from the first to the last value.
     fn between_values(&self) -> Shown {
         let (first, last) = (self.values.first().copied().unwrap_or_default(), self.values.last().copied().unwrap_or_default());
+        // Values at the edges are the centres of the outermost cells; no value was judged beyond.
         self.shown.clone().range(first, last)
     }
 }

@@ -16,6 +16,7 @@ const MOST_MODES: usize = 16;
 pub fn words(scene: &Scene, judgement: &Judgement, worst: Option<&SceneWorstCase>) -> String {
     let Judgement { verdict, analysis, mean_square, left_out } = judgement;
     let sentence = sentence(*verdict, mean_square.is_some());
+    // A nominal verdict must not stand alone: the head tells the parts of the links left out.
     let mut text = match judgement.kind() {
         VerdictKind::Nominal => format!("{}\n\n{}: {sentence}\n", scene.title, nominal_head(left_out).replacen('n', "N", 1)),
         VerdictKind::Certain | VerdictKind::MeanSquare => format!("{}\n\n{sentence}\n", scene.title),
@@ -23,6 +24,7 @@ pub fn words(scene: &Scene, judgement: &Judgement, worst: Option<&SceneWorstCase
     let mut line = |line: String| text.push_str(&format!("  {line}\n"));
     if let Some(mean_square) = mean_square {
         line(format!("mean-square radius {} over a frame of {}", number(mean_square.radius), Span(mean_square.frame)));
+        // Both verdicts are given, because a scene may be stable at the mean of the delays and unstable in the mean square.
         line(format!("with delays at their mean and no losses: {}", analysis.verdict().word()));
     }
     line(format!("spectral radius {} over a frame of {}", number(analysis.radius), Span(analysis.frame)));

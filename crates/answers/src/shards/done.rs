@@ -44,6 +44,7 @@ pub fn done_document(done: &Done) -> impl Serialize {
 #[must_use]
 pub fn done_words(done: &Done) -> String {
     let Done { shard, folder, names, pieces, units, computed, wall_s } = done;
+    // With fewer pieces than shards, some shards are empty, and a speed would have no meaning.
     if *pieces == 0 {
         return format!("shard {shard} in {folder}: there are fewer {}s than shards, so this shard has nothing to do\n", names.piece);
     }

@@ -54,6 +54,7 @@ impl Status<'_> {
 
     /// Returns the unfinished pieces without a worker at work.
     fn unassigned(&self) -> Vec<u64> {
+        // A piece belongs to a shard by number alone, so workers of different splits may share a piece.
         let undone = |place: &u64, piece: &Piece| !piece.is_done && !self.at_work().any(|worker| worker.shard.has(*place));
         (0..).zip(self.pieces).filter(|(place, piece)| undone(place, piece)).map(|(place, _)| place).collect()
     }
@@ -109,6 +110,7 @@ pub fn status_words(status: &Status<'_>) -> String {
         let [done, left] = [worker.units, status.left(worker)].map(|units| units.to_string());
         [worker.shard.to_string(), worker.state.word().to_owned(), worker.process.to_string(), worker.host.clone(), done, left, speed, end]
     }));
+    // The widths fit the longest cell of each column, in characters and not in bytes.
     let widths: Vec<usize> = (0..rows[0].len()).map(|column| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0)).collect();
     if !workers.is_empty() {
         for row in rows {

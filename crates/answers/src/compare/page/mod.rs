@@ -80,7 +80,9 @@ fn sum(finished: &Finished) -> String {
 /// Returns the section of stability: verdicts as a picture, and diverged runs.
 fn stability(sheet: &Sheet<'_>) -> Html {
     let drawn = sheet.layout.undrawn(sheet.finished.keys()).is_none();
+    // Without drawn panels the tables stand alone: too many keys vary for a picture.
     let picture = sheet.stability().filter(|_| drawn).map_or_else(Html::default, |picture| figure("stability", &picture, ""));
+    // A single panel would show no more than the table.
     let diverged = if !sheet.any_diverged() {
         Html::paragraph("No run diverged.")
     } else if drawn && sheet.layout.panels() > 1 {
@@ -96,6 +98,7 @@ fn measures(sheet: &Sheet<'_>) -> Html {
     let Finished { comparison, .. } = sheet.finished;
     let scales: Vec<Scale> = (0..comparison.measures.len()).map(|measure| Scale::of(comparison, measure)).collect();
     let undrawn = sheet.layout.undrawn(sheet.finished.keys());
+    // The reason for missing pictures stands once, at the head of the section.
     let mut content = Html::heading(2, "Measures");
     if let Some(why) = &undrawn {
         content = content.and(Html::paragraph(why.as_str()));

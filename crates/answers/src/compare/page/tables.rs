@@ -15,6 +15,7 @@ pub(super) fn strategies(finished: &Finished, words: &[(&'static str, String)]) 
     let table = comparison.strategies.iter().zip(words).enumerate().fold(head, |table, (place, (name, (about, parameters)))| {
         let sum = Sum::of(finished, place);
         let baseline = if place == 0 { " (baseline)" } else { "" };
+        // Without a run there is no share, and a dash tells more than "0 of 0".
         let diverged = Share::of(sum.diverged, sum.runs).map_or_else(|| NOTHING.to_owned(), |share| figures::share(&share));
         let cells = [
             Html::code(name).and(baseline),
@@ -38,6 +39,7 @@ pub(super) fn overview(finished: &Finished) -> Html {
     let head = comparison.strategies.iter().skip(1).fold(Table::new().column("measure"), |table, name| table.number(name.as_str()));
     let table = comparison.measures.iter().enumerate().fold(head, |table, (place, measure)| {
         let counts = (1..comparison.strategies.len()).map(|strategy| match words::sides(finished, place, strategy) {
+            // Zeros are left out, so that each cell shows only the sides with a difference.
             [0, 0] => Html::text(NOTHING),
             [lower, 0] => down(&lower.to_string()),
             [0, higher] => up(&higher.to_string()),
@@ -80,6 +82,7 @@ pub(super) fn stability(finished: &Finished) -> Html {
             return "refused".into();
         }
         let verdict = finished.judgement(strategy, other).map_or_else(String::new, words::verdict);
+        // Most cells have no diverged run, and the verdict then stands alone.
         let diverged = cell.diverged.filter(|share| share.count > 0).map(|share| Html::text(&format!("diverged {}", figures::share(&share))));
         Html::lines(std::iter::once(verdict.into()).chain(diverged))
     })
