@@ -41,6 +41,7 @@ impl Instant {
     #[must_use]
     #[inline]
     pub fn checked_add(self, span: Duration) -> Option<Self> {
+        // A span may be longer than 584 years, and no instant is so late.
         let nanos = u64::try_from(span.as_nanos()).ok()?;
         self.0.checked_add(nanos).map(Self)
     }

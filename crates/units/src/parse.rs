@@ -95,6 +95,7 @@ pub fn duration(text: &str) -> Result<Duration, ParseError> {
 pub fn rate(text: &str) -> Result<Rate, ParseError> {
     const EXPECTED: &str = "a rate above zero such as \"10Mbit\" or \"64kbit\" (bits per second)";
     let units = [("bit", 1), ("kbit", 1_000), ("Mbit", 1_000_000), ("Gbit", 1_000_000_000)];
+    // Rounded to whole bits per second before the check for zero, so that 0.1bit is refused, too.
     let bits = quantity(text, &units, EXPECTED, "bit, kbit, Mbit, Gbit")?;
     Rate::bits_per_sec(bits).ok_or_else(|| ParseError::Range { text: text.to_string(), expected: EXPECTED })
 }
@@ -118,10 +119,12 @@ pub fn size(text: &str) -> Result<Bytes, ParseError> {
 pub fn probability(text: &str) -> Result<Probability, ParseError> {
     const EXPECTED: &str = "a probability such as 0.015 or \"1.5%\"";
     let (number, unit) = split(text, EXPECTED)?;
+    // A bare number could mean a share or a percentage, so the sign is required.
     if unit != "%" {
         let (text, unit) = (text.to_string(), unit.to_string());
         return Err(ParseError::Unit { text, unit, expected: EXPECTED, units: "%" });
     }
+    // Read as a double and not by `quantity`: a probability is a double, and needs no whole number of units.
     let percent: f64 = number.parse().map_err(|_| ParseError::Number { text: text.to_string(), expected: EXPECTED })?;
     Probability::new(percent / 100.0).map_err(|_| ParseError::Range { text: text.to_string(), expected: EXPECTED })
 }
@@ -129,6 +132,7 @@ pub fn probability(text: &str) -> Result<Probability, ParseError> {
 /// Splits `"24.5ms"` into `"24.5"` and `"ms"`. Spaces between the two are allowed.
 fn split<'a>(text: &'a str, expected: &'static str) -> Result<(&'a str, &'a str), ParseError> {
     let trimmed = text.trim();
+    // A sign or an exponent ends the number here, and is refused as a number or as a unit.
     let end = trimmed.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(trimmed.len());
     let (number, unit) = trimmed.split_at(end);
     // A number has at least one digit and at most one point, the only other character in `number`.
@@ -148,6 +152,7 @@ fn quantity(text: &str, scales: &[(&str, u64)], expected: &'static str, units: &
     let (whole, fraction) = number.split_once('.').unwrap_or((number, ""));
     let mut value: u128 = 0;
     for digit in whole.bytes() {
+        // Checked arithmetic, because a text may have any number of digits.
         value = value.checked_mul(10).and_then(|v| v.checked_add(u128::from(digit - b'0'))).ok_or_else(out_of_range)?;
     }
     let mut value = value.checked_mul(u128::from(scale)).ok_or_else(out_of_range)?;

@@ -35,6 +35,7 @@ impl fmt::Display for Span {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let nanos = self.0.as_nanos();
         let (scale, digits, unit) = match nanos {
+            // No unit is short enough for zero. Seconds are the base unit.
             0 => (1_000_000_000, 9, "s"),
             1..1_000 => (1, 0, "ns"),
             1_000..1_000_000 => (1_000, 3, "us"),
@@ -59,6 +60,7 @@ impl<N: Copy + fmt::Display + PartialEq + From<u8>> fmt::Display for Counted<'_,
             return write!(f, "{number} {one}");
         }
         match (one.strip_suffix('y'), one.strip_suffix("is")) {
+            // After a vowel the y stays: delays, keys.
             (Some(stem), _) if !stem.ends_with(['a', 'e', 'o', 'u']) => write!(f, "{number} {stem}ies"),
             (_, Some(stem)) => write!(f, "{number} {stem}es"),
             _ => write!(f, "{number} {one}s"),
@@ -83,6 +85,7 @@ impl fmt::Display for Number {
 /// Rounds a number to six significant decimal digits.
 #[must_use]
 pub fn six_digits(number: f64) -> f64 {
+    // Printing rounds the decimal digits exactly. Arithmetic with powers of ten would round a second time.
     format!("{number:.5e}").parse().unwrap_or(number)
 }
 
@@ -118,6 +121,7 @@ fn decimal(f: &mut fmt::Formatter<'_>, whole: u64, mut rest: u64, mut digits: us
     if rest == 0 {
         return Ok(());
     }
+    // Trailing zeros are removed together with their digits, so that the remaining width keeps the zeros after the point.
     while rest.is_multiple_of(10) {
         rest /= 10;
         digits -= 1;

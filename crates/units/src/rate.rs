@@ -37,6 +37,7 @@ impl Rate {
     /// [`Rate::bits_sent`], so that a change of the rate in the middle of a packet rounds nothing. Saturates at 584 years.
     #[must_use]
     pub fn transmission_time(self, giga_bits: u128) -> Duration {
+        // Rounded up: a packet that ends within a nanosecond occupies the whole nanosecond.
         let nanos = giga_bits.div_ceil(u128::from(self.0.get()));
         Duration::from_nanos(u64::try_from(nanos).unwrap_or(u64::MAX))
     }
@@ -55,6 +56,7 @@ impl fmt::Display for Rate {
         let bits = self.0.get();
         let (value, unit) = [(1_000_000_000, "Gbit"), (1_000_000, "Mbit"), (1_000, "kbit")]
             .into_iter()
+            // Only exact units: 1500 bit/s stays 1500bit, and does not become 1.5kbit.
             .find(|(scale, _)| bits.is_multiple_of(*scale))
             .map_or((bits, "bit"), |(scale, unit)| (bits / scale, unit));
         write!(f, "{value}{unit}")

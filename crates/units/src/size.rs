@@ -27,6 +27,7 @@ impl Bytes {
 impl Add for Bytes {
     type Output = Self;
     fn add(self, other: Self) -> Self {
+        // A counter at its limit stays there: a wrap would make a large sum small.
         Self(self.0.saturating_add(other.0))
     }
 }
@@ -40,6 +41,7 @@ impl AddAssign for Bytes {
 impl Sub for Bytes {
     type Output = Self;
     fn sub(self, other: Self) -> Self {
+        // Zero instead of an error, because a byte count below zero has no meaning.
         Self(self.0.saturating_sub(other.0))
     }
 }

@@ -30,6 +30,7 @@ pub fn visible_lines(text: &str) -> String {
 /// Returns whether a character acts on a terminal instead of showing a glyph: general categories Cc, Cf, Zl and Zp of Unicode 16.
 #[must_use]
 pub(crate) fn is_hidden(c: char) -> bool {
+    // `is_control` covers Cc. The list covers Cf, Zl and Zp, for which the standard library has no function.
     c.is_control()
         || matches!(c,
             '\u{ad}' | '\u{600}'..='\u{605}' | '\u{61c}' | '\u{6dd}' | '\u{70f}' | '\u{890}'..='\u{891}' | '\u{8e2}' | '\u{180e}' | '\u{200b}'..='\u{200f}'
