@@ -26,6 +26,7 @@ pub(super) struct Identity {
 
 impl Identity {
     pub(super) fn of(target: &Target) -> Self {
+        // Only a listed device has a serial number and a place on a bus.
         let listed = target.listed().cloned();
         let (serial, product) = listed.as_ref().map_or((None, None), |listed| (listed.serial.clone(), listed.product.clone()));
         let (bus, address) = listed.map_or((None, None), |listed| (Some(listed.bus), Some(listed.address)));
@@ -57,6 +58,7 @@ impl Traffic {
         let statistics = bench.statistics();
         let (late_turns, worst) = bench.lateness();
         let seconds = spent.as_secs_f64();
+        // An interruption before the first exchange leaves no time for a rate.
         #[expect(clippy::cast_precision_loss, reason = "a rate is shown to some digits")]
         let reports_per_s = if seconds > 0.0 { statistics.reports as f64 / seconds } else { 0.0 };
         Self {

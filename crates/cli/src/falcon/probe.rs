@@ -57,6 +57,7 @@ pub(super) fn probe(arguments: &ProbeArguments) -> Result<ExitCode, Failure> {
     let targets = reach::targets(&arguments.which)?;
     let mut falcons = Vec::new();
     for target in &targets {
+        // During an exchange the bench itself looks for an interruption.
         if !interrupt::requested() {
             falcons.push(Entry::of(target, firmware.as_ref(), arguments.length)?);
         }
@@ -102,6 +103,7 @@ impl Entry {
         if let End::Failed(error) = end {
             entry.error = Some(error.to_string());
         }
+        // Without a single exchange there is no state to show.
         entry.answered = looking.seen.map(|seen| Answered { traffic: Traffic::of(&bench, looking.until), seen });
         Ok(entry)
     }

@@ -42,6 +42,7 @@ pub(super) enum FirmwareState {
 /// Returns the selected devices, at least one. No connected device, or no device with the serial number, is a failure.
 pub(super) fn targets(which: &WhichFalcon) -> Result<Vec<Target>, Failure> {
     if which.simulated {
+        // With a firmware file the simulated device begins without firmware, so that the command loads the file.
         return Ok(vec![Target::Simulated { in_virtual_time: which.virtual_time, switched_on: which.firmware.is_some() }]);
     }
     let all = usb::list().map_err(|error| of_usb(&error))?;
@@ -60,6 +61,7 @@ fn meant(all: Vec<Listed>, serial: Option<&str>) -> Result<Vec<Listed>, UsbError
 pub(super) fn target(which: &WhichFalcon) -> Result<Target, Failure> {
     let mut all = targets(which)?;
     if all.len() > 1 {
+        // Several devices are USB devices: there is at most one simulated device.
         let listed = all.into_iter().filter_map(|target| if let Target::Usb(listed) = target { Some(listed) } else { None }).collect();
         return Err(of_usb(&UsbError::Several(listed)));
     }
@@ -114,6 +116,7 @@ impl Target {
 pub(super) fn read_firmware(path: Option<&Path>) -> Result<Option<Firmware>, Failure> {
     let Some(path) = path else { return Ok(None) };
     Firmware::read(path).map(Some).map_err(|error| match error {
+        // An unreadable file and a wrong file have different exit statuses.
         FirmwareError::Read { path, error } => Failure::File { verb: "read", path, error },
         error @ FirmwareError::Length { .. } => Failure::Input(format!("{}: {error}", path.display())),
     })

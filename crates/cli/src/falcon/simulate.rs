@@ -166,6 +166,7 @@ struct Simulating {
 impl Simulating {
     /// Notes the phase at `at`, if the phase differs from the phase noted last.
     fn change(&mut self, at: Duration, phase: Phase) {
+        // The bench looks after each exchange, and a phase lasts for many exchanges.
         if self.phase == phase {
             return;
         }
@@ -184,6 +185,7 @@ impl Simulating {
         (self.truth.motor_force, self.truth.observed) = motors;
         let Truth { position, motor_force, largest_motor_force, largest_error, observed } = self.truth;
         SimulateDocument {
+            // The name on the command line, so that a reader can repeat the option.
             hand: arguments.hand.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned()),
             seed: arguments.seed,
             asked_n: self.force,

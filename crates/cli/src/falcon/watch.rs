@@ -74,6 +74,7 @@ pub(super) fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
         forces: Forces::of(&bench, arguments.limit, watching.largest_force),
         files,
     };
+    // Rows on standard output leave no room for the answer: a reader of rows would stumble over words.
     if which.json {
         output::json(DocumentSchema::FALCON_WATCH, &document)?;
     } else if !watching.prints_rows {

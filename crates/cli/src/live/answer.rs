@@ -50,6 +50,7 @@ pub(super) fn of(scene: &Scene, report: &Report) -> impl Serialize {
         #[serde(flatten)]
         measures: measures_of(scene, &report.measures),
         #[serde(flatten)]
+        // A session without peers in other programs has no door.
         admission: report.admission.as_ref().map(|(stats, socket)| document! { door: of_admission(stats, socket) }),
         granted: report.prepared.granted.iter().copied().map(Wish::name).collect::<Vec<_>>(),
         refused_wishes: report.prepared.refused.iter().map(ToString::to_string).collect::<Vec<_>>(),
@@ -91,6 +92,7 @@ pub(super) fn describe(scene: &Scene, report: &Report) -> String {
     diverged(summary).into_iter().for_each(|why| line(format!("DIVERGED: {why}")));
     line(format!("the run is {}", report.validity));
     line(format!("lateness of ticks: {}", late(&report.ticks)));
+    // Without peers in other programs nothing was sent, and zeros would look like measurements.
     if report.releases.count > 0 {
         line(format!("lateness of {} to other programs: {}", Counted(report.releases.count, "datagram"), late(&report.releases)));
     }

@@ -96,6 +96,7 @@ pub(crate) fn snapshot(status: &Status, axes: usize) -> Snapshot {
     Snapshot {
         elapsed: status.elapsed,
         invalid: status.validity.reason(),
+        // In the order of the clocks of `description`.
         lateness: vec![quantiles(&status.ticks), quantiles(&status.releases)],
         links: status.links.iter().map(link).collect(),
         peers: status.peers.iter().map(|peer| view(peer, axes, now)).collect(),
@@ -110,6 +111,7 @@ pub(crate) fn snapshot(status: &Status, axes: usize) -> Snapshot {
 /// Formats the text after the progress bar: the lateness of ticks, and the peers that are absent or stale.
 pub(super) fn note(scene: &Scene, snapshot: &Snapshot) -> String {
     let late = snapshot.lateness.first().map_or_else(String::new, |ticks| format!("  ticks p99 {:.0} µs late", micros(ticks.p99)));
+    // The line names only missing peers, because a terminal line is short.
     let missing = snapshot.peers.iter().zip(&scene.peers).filter(|(peer, _)| matches!(peer.status, Shown::Absent | Shown::Stale));
     missing.fold(late, |text, (peer, spec)| format!("{text}  {} {}", spec.name, peer.status.name()))
 }

@@ -91,6 +91,7 @@ fn lateness(report: &Report) -> Table {
     let head = Table::new().column("of").number("count");
     let head = ["half within [ms]", "99 % within [ms]", "99.9 % within [ms]", "worst [ms]"].into_iter().fold(head, Table::number);
     let rows = [("ticks", &report.ticks), ("datagrams to other programs", &report.releases)];
+    // Without peers in other programs there are no releases, and no row.
     rows.into_iter().filter(|(_, summary)| summary.count > 0).fold(head, |table, (name, summary)| {
         let LatenessSummary { count, p50, p99, p999, max, .. } = *summary;
         let spans = [p50, p99, p999, max].map(|span| format!("{:.3}", micros(span) / 1e3));
@@ -102,6 +103,7 @@ fn lateness(report: &Report) -> Table {
 fn attached(scene: &Scene, report: &Report) -> Html {
     let head =
         Table::new().column("peer").column("kind").number("joined").number("samples taken").number("late").number("out of order").number("refused");
+    // Only peers attached from outside have a seat.
     let peers = scene.peers.iter().zip(&report.seats).filter_map(|(peer, seat)| seat.as_ref().map(|seat| (peer, seat)));
     let table = peers.take(page::MOST_ROWS).fold(head, |table, (peer, seat)| {
         let counts = [seat.joined, seat.taken, seat.late, seat.out_of_order, seat.refused].map(|count| Html::text(&count.to_string()));

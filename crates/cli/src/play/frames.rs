@@ -47,6 +47,7 @@ impl Frames {
     pub(super) fn text(&self) -> (u64, Arc<str>) {
         let (number, part, axes, motion) = {
             let newest = self.newest();
+            // Several pages ask for the same motion, and the text is written once.
             if let Some((number, text)) = &newest.text
                 && *number == newest.number
             {

@@ -114,6 +114,7 @@ impl PlayedScene {
     pub(super) fn without_network(mut self) -> Self {
         self.table.remove("links");
         self.table.insert("link".to_owned(), Value::Table(Table::new()));
+        // Access lines stand in the entries of the peers, and in the table `peer` for all.
         for peer in self.peers.iter_mut().chain([section(&mut self.table, "peer")]) {
             peer.remove("uplink");
             peer.remove("downlink");
@@ -153,6 +154,7 @@ impl PlayedScene {
     pub(super) fn standing(mut self, peers: &[PeerStatus], scene: &Scene) -> Self {
         let axes = scene.axes.count();
         let numbers = |values: &[f64]| Value::Array(values.iter().copied().map(Value::Float).collect());
+        // A peer without a state keeps the initial state of the document.
         for ((table, status), spec) in self.peers.iter_mut().zip(peers).zip(&scene.peers) {
             let state = &status.state;
             let mut set = |key: &str, value: Value| table.insert(key.to_owned(), value);
@@ -186,6 +188,7 @@ impl PlayedScene {
         self.peers.truncate(number);
         while self.peers.len() < number {
             let mut other = self.peers.last().cloned().unwrap_or_default();
+            // A peer of the file may have such a name.
             let free = (self.peers.len() + 1..).map(|place| format!("peer-{place}")).find(|name| !names.contains(name));
             // The new peer begins without a hand and at rest, unlike the copied peer.
             for key in ["hand", "velocity", "device-position", "device-velocity", "angular-velocity"] {
@@ -202,6 +205,7 @@ impl PlayedScene {
             self.peers.push(other);
         }
         let names = self.names();
+        // Links of removed peers would name unknown peers, and the scene would be refused.
         if let Some(Value::Array(links)) = self.table.get_mut("links") {
             let is_there = |end: Option<&Value>| end.and_then(Value::as_str).is_some_and(|end| names.iter().any(|name| name == end));
             links.retain(|link| is_there(link.get("from")) && is_there(link.get("to")));

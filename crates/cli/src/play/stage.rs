@@ -195,6 +195,7 @@ impl Stage for PlayStage {
     fn take_hand(&self, wanted: Option<usize>) -> Result<usize, String> {
         let part = self.running()?;
         let mut taken = lock(&self.taken);
+        // Only pointers can be moved from a page.
         let is_free = |place: usize, peer: &cohaptic_scene::PeerSpec| matches!(peer.kind, PeerKind::Pointer(..)) && !taken[place];
         let free = part.scene.peers.iter().enumerate().find(|(place, peer)| wanted.is_none_or(|wanted| wanted == *place) && is_free(*place, peer));
         let (place, _) = free.ok_or_else(|| match wanted {
