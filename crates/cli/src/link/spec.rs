@@ -63,6 +63,7 @@ fn with_profile(spec: &[String], bare: Option<Direction>) -> Cow<'_, [String]> {
 ///
 /// [`Failure::Input`] if `spec` mixes keys and words.
 fn is_keys(spec: &[String]) -> Result<bool, Failure> {
+    // The equals sign tells the kinds apart: no word of tc-netem has one.
     let (keys, words): (Vec<&str>, Vec<&str>) = spec.iter().map(String::as_str).partition(|word| word.contains('='));
     if keys.is_empty() || words.is_empty() {
         return Ok(words.is_empty());
@@ -91,6 +92,7 @@ pub(crate) fn link_and_keys(spec: &[String]) -> Result<(LinkModel, LinkKeys), Fa
     let spec = spec.as_ref();
     if is_keys(spec)? {
         let model = link_from_keys(spec).map_err(Failure::LinkKeys)?;
+        // Each text has an equals sign here: `is_keys` has looked.
         let keys = spec.iter().filter_map(|text| text.split_once('='));
         return Ok((model, keys.fold(nothing, |keys, (key, value)| keys.with(key.trim(), value))));
     }

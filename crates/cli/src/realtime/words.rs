@@ -20,6 +20,7 @@ pub(crate) fn late(summary: &LatenessSummary) -> String {
     let LatenessSummary { p50, p99, p999, max, .. } = *summary;
     let [p50, p99, p999, max] = [p50, p99, p999, max].map(|span| {
         let micros = micros(span);
+        // From a millisecond on, digits of microseconds tell nothing.
         if micros < 1000.0 { format!("{micros:.1} µs") } else { format!("{:.2} ms", micros / 1e3) }
     });
     format!("p50 {p50}, p99 {p99}, p99.9 {p999}, worst {max}")
@@ -55,6 +56,7 @@ pub(crate) fn loading(progress: Progress) -> Option<String> {
     match progress {
         Progress::Attempt(attempt) => Some(format!("loading the firmware, attempt {attempt}")),
         Progress::Greeted(_) => Some("the boot loader answers".to_owned()),
+        // Each block of bytes is an event, and only the last block gets a line.
         Progress::Loaded { done, of } => (done == of).then(|| format!("all {of} bytes are sent")),
         Progress::Failed(error) => Some(error.to_string()),
         Progress::Running => Some("its firmware runs".to_owned()),
@@ -116,6 +118,7 @@ pub(crate) fn status(snapshot: &Snapshot) -> String {
 pub(crate) fn carried(stats: &LinkStats, asked: &ConfiguredDelay, beside: &[(&str, u64)]) -> String {
     let mut text = format!("{} offered, {} delivered", stats.offered(), stats.delivered());
     let in_link = DropCause::ALL.into_iter().map(|cause| (cause.name(), stats.dropped(cause)));
+    // Causes without a drop are left out, so that the line stays short.
     for (cause, count) in in_link.chain(beside.iter().copied()).filter(|(_, count)| *count > 0) {
         let _ = write!(text, ", {count} dropped ({cause})");
     }
@@ -133,6 +136,7 @@ pub(crate) fn carried(stats: &LinkStats, asked: &ConfiguredDelay, beside: &[(&st
 
 /// Cuts the length of a run to whole milliseconds.
 pub(crate) fn lasted(span: Duration) -> Span {
+    // Finer digits would differ from run to run without a meaning.
     Span(Duration::from_millis(u64::try_from(span.as_millis()).unwrap_or(u64::MAX)))
 }
 

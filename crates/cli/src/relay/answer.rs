@@ -91,6 +91,7 @@ impl Totals {
         let (sent, failed) = (over_ports(|port| port.counts.sent), over_ports(|port| port.counts.failures.in_all()));
         let delivered = over_links(|link| link.stats.delivered());
         Self {
+            // Refused datagrams arrived, too, but were never offered.
             packets: intake.offered + at_the_door,
             dropped: at_the_door + over_links(|link| link.stats.dropped_in_all()) + undeliverable + failed,
             sent,
@@ -146,6 +147,7 @@ pub(super) fn describe(setup: &Setup, report: &Report, asked: &[ConfiguredDelay]
 
 fn links(links: &[LinkReport], asked: &[ConfiguredDelay], line: &mut impl FnMut(String)) {
     let was_used = |link: &LinkReport| link.stats.offered() + link.counts.overload > 0;
+    // In a large mesh most links are idle, so the used links come first.
     let (used, idle): (Vec<_>, Vec<_>) = links.iter().zip(asked).partition(|(link, _)| was_used(link));
     for (LinkReport { from, to, stats, counts }, asked) in used.iter().take(MOST_LINKS) {
         let beside = [("overload", counts.overload), ("undeliverable", counts.undeliverable)];
@@ -154,6 +156,7 @@ fn links(links: &[LinkReport], asked: &[ConfiguredDelay], line: &mut impl FnMut(
     if used.len() > MOST_LINKS {
         line(format!("... and {}: --json has all", Counted(used.len() - MOST_LINKS, "more link")));
     }
+    // Few idle links are named, because an idle link may be a mistake in the setup. Many are only counted.
     if used.is_empty() {
         line("nothing went over any link".to_owned());
     } else if idle.len() <= MOST_IDLE {

@@ -83,6 +83,7 @@ pub(super) fn describe(file: &RouterFile, ran: &RouterRun) -> String {
         let _ = writeln!(text, "  {line}");
     };
     let (span, held) = (lasted(elapsed(report)), report.counters.held.packets);
+    // The failure comes first: everything below is a result only until then.
     if let Ending::Failed(error) = ending {
         line(format!("FAILED after {span}: {error}"));
     }
@@ -91,6 +92,7 @@ pub(super) fn describe(file: &RouterFile, ran: &RouterRun) -> String {
     if report.release.count > 0 {
         line(format!("release error: {}", late(&report.release)));
     }
+    // Both sides are listed, also without a packet, because a silent side may tell of a mistake in the setup.
     for side in Side::BOTH {
         let (received, written) = (&report.counters.received[side.index()], &report.written[side.index()]);
         line(format!("{}: {}", attached(file, side), side_in_words(received, written)));

@@ -103,6 +103,7 @@ fn conduct(
             .name("router".to_owned())
             .spawn_scoped(scope, || route(router, file, arguments, until, &stop, wanted, publisher))
             .map_err(|error| Failure::System(format!("the system gives the router no thread: {error}")))?;
+        // The calling thread has nothing with a deadline, so a glance now and then is enough.
         while !running.is_finished() {
             thread::sleep(GLANCE);
             stop.store(interrupt::requested(), Ordering::Relaxed);
@@ -147,6 +148,7 @@ fn route(
         Ok(()) if interrupt::requested() => Ending::Interrupted,
         Ok(()) => Ending::Complete,
     };
+    // Judged again after the end: the last packets may have been late.
     RouterRun { report: router.report(), prepared, validity: judged(router), asked, ending }
 }
 

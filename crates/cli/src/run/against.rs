@@ -97,6 +97,7 @@ fn compared_measures(runs: &[Shown<'_>; 2]) -> Html {
         let found = by_name.each_ref().map(|values| values.get(name));
         let value = |measured: Option<&MeasuredValue>| measured.and_then(|measured| measured.value);
         let values = found.map(|measured| Html::text(&value(measured).map_or_else(|| NOTHING.to_owned(), |value| SixDigits(value).to_string())));
+        // Unit and meaning are the same in both runs, so the first run with the measure tells both.
         let words = found.into_iter().flatten().take(1).flat_map(|measured| [measured.name.measure.unit(), measured.name.measure.about()]);
         table.row(std::iter::once(Html::code(name)).chain(values).chain(words.map(Html::text)))
     });
@@ -107,6 +108,7 @@ fn compared_measures(runs: &[Shown<'_>; 2]) -> Html {
 fn pictures(runs: &[Shown<'_>; 2]) -> Html {
     let mut all = Html::default();
     for file in each_once(runs.iter().flat_map(|shown| shown.pictures).map(|(file, _)| *file)) {
+        // The files of the variant lie in the folder `against`.
         for (shown, folder) in runs.iter().zip(["", "against/"]) {
             for (_, svg) in shown.pictures.iter().filter(|(known, _)| *known == file) {
                 all = all.and(Html::figure(&format!("{folder}{file}"), Html::picture(svg)));

@@ -74,6 +74,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
         _ => None,
     };
     let (mut second, _own_against) = second.unzip();
+    // The variant has the overrides of the scene, too, and its own on top.
     let both: Vec<String> = overrides.iter().chain(&arguments.against).cloned().collect();
     let of_variant = variant.as_ref().zip(second.as_ref()).and_then(|(variant, run)| run.shown(variant, &both));
     let page = first.shown(&scene, overrides).map(|shown| match of_variant {
@@ -81,6 +82,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
         Some(variant) => against::html(arguments, [shown, variant]),
     });
     let (page, page_of_variant) = (page.transpose()?, of_variant.map(|shown| shown.page(arguments)).transpose()?);
+    // The pages come after both runs, because the page of a comparison shows both.
     first.write_page(out, page)?;
     if let Some(second) = &mut second {
         second.write_page(out_against.as_deref(), page_of_variant)?;

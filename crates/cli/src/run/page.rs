@@ -29,6 +29,7 @@ pub(super) fn html(
     pictures: &[(&'static str, String)],
 ) -> Result<String, Failure> {
     let path = &arguments.scene.scene;
+    // The page shows the file as written, and names the overrides apart.
     let text = input::text(path)?;
     let content = input::with(path, |text, file| scene_content_of_text(text, file, overrides))?;
     let mut page = Page::new(scene.title.as_str()).with(ending(scene, summary)).with(Html::facts(facts(arguments, scene, overrides, summary)));
@@ -69,6 +70,7 @@ pub(super) fn facts<'a>(arguments: &RunArguments, scene: &Scene, overrides: &[St
         ("Fingerprint of the scene", Html::code(&scene.clone().fingerprint().to_string())),
     ];
     if let Some(angle) = summary.max_rotation_discrepancy {
+        // Beside the largest discrepancy, the other distance between copies.
         facts.insert(2, ("Largest angle between two copies", angle_text(angle).into()));
     }
     facts.extend(page::overrides(overrides));
@@ -129,6 +131,7 @@ pub(crate) fn links(summary: &Summary) -> Html {
     });
     let between = summary.links.iter().map(|link| (LinkName::between(name(link.from), name(link.to)), link.stats));
     let shown: Vec<(LinkName, LinkStats)> = access.chain(between).take(MOST_ROWS).collect();
+    // Only for the choice of the columns: a packet over an access line counts twice.
     let mut total = summary.links.total();
     summary.access_lines.iter().for_each(|line| total.add(&line.stats, 1));
     // Causes without a drop are left out, because their columns would make the table wide.
@@ -152,6 +155,7 @@ fn number(value: f64) -> String {
 
 /// Returns the table of the changes during the run, taken from keys of the scene such as `timeline.0.set.loss`.
 pub(crate) fn edits(keys: &BTreeMap<String, String>) -> Table {
+    // Sorted by number, because as texts 10 comes before 2.
     let mut changes: BTreeMap<usize, (String, Vec<String>)> = BTreeMap::new();
     for (key, value) in keys {
         let Some((number, key)) = key.strip_prefix("timeline.").and_then(|rest| rest.split_once('.')) else { continue };
@@ -161,5 +165,6 @@ pub(crate) fn edits(keys: &BTreeMap<String, String>) -> Table {
         if key == "at" { at.clone_from(value) } else { effects.push(format!("{key} = {value}")) }
     }
     let head = Table::new().column("at").column("change");
+    // Values are TOML, and a text has quotes there.
     changes.into_values().fold(head, |table, (at, effects)| table.row([Html::text(at.trim_matches('"')), Html::text(&effects.join(", "))]))
 }
