@@ -57,6 +57,7 @@ impl Kept<'_> {
             Ok(entries) => {
                 for entry in entries {
                     let name = entry.map_err(unreadable)?.file_name().to_string_lossy().into_owned();
+                    // The name must end at the dot: `rows2.partial` belongs to another computation than `rows`.
                     if name.strip_prefix(self.name).is_some_and(|rest| rest.starts_with('.') && rest.ends_with(PARTIAL)) {
                         paths.push(self.folder.join(name));
                     }
@@ -117,6 +118,7 @@ impl RowsFile {
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder)?;
         }
+        // A torn last line is cut off, so that the next row begins on a line of its own.
         let mut file = open_continued(path, whole as u64)?;
         if whole == 0 {
             let lines: String = header.iter().map(|line| format!("{line}\n")).collect();
@@ -142,6 +144,7 @@ impl RowsFile {
     pub(crate) fn remove(self) -> Result<(), Failure> {
         let remove = |path: PathBuf| match fs::remove_file(&path) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => Err(Failure::File { verb: "remove", path, error }),
+            // Another worker may have removed the file before.
             Ok(()) | Err(_) => Ok(()),
         };
         let logs = self.path.parent().map_or_else(Vec::new, crate::shard::logs_in);
@@ -168,6 +171,7 @@ struct Begun {
 impl Begun {
     /// Reads a file's text. The error is the first line that differs from `header`.
     fn read(text: &str, header: &[String]) -> Result<Self, Difference> {
+        // A last line without a line feed is torn, and drops out here.
         let mut lines = text.split_inclusive('\n').filter_map(|line| line.strip_suffix('\n'));
         let mut whole = 0;
         for expected in header {

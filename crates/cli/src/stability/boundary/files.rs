@@ -39,6 +39,7 @@ pub(super) fn with_origin(
         .flag("--prove", arguments.prove)
         .flag("--certificate", arguments.certificate)
         .option("--samples", arguments.samples)
+        // A value at its default is left out of the command.
         .option("--values", (arguments.values != BoundaryArguments::VALUES).then_some(arguments.values))
         .out()
         .option("--size", arguments.pictures.word())

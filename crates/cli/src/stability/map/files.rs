@@ -21,6 +21,7 @@ use crate::stability::guarantee::UNFINISHED;
 pub(super) fn write(folder: &Path, order: &Order, arguments: &MapArguments, maps: &mut [VariantMap]) -> Result<Vec<String>, Failure> {
     let mut files = Vec::new();
     for (number, map) in maps.iter_mut().enumerate() {
+        // The scene as it stands has the plain name, and variants have numbers from 2 on.
         let name = if number == 0 { "map.csv".to_owned() } else { format!("map-{}.csv", number + 1) };
         let path = write_into(folder, &name, csv(order.axes(), map))?;
         map.file = Some(path.clone());
@@ -29,6 +30,7 @@ pub(super) fn write(folder: &Path, order: &Order, arguments: &MapArguments, maps
     let names: Vec<String> = maps.iter().map(VariantMap::legend).collect();
     let named = maps.iter().zip(&names).map(|(map, name)| NamedMap { name, map: &map.map, criterion: map.criterion, left_out: &map.left_out });
     let named: Vec<NamedMap<'_>> = named.collect();
+    // There is a picture, because the list of maps is never empty.
     let picture = map_picture(&order.title, order.axes(), &named);
     let svg = picture.map(|picture| picture.size(arguments.pictures.size()).svg()).unwrap_or_default();
     files.push(write_into(folder, "map.svg", &svg)?);
@@ -41,6 +43,7 @@ pub(super) fn write(folder: &Path, order: &Order, arguments: &MapArguments, maps
 /// Returns the command that makes the files, as a line for a shell.
 pub(super) fn command_line(arguments: &MapArguments) -> String {
     let line = CommandLine::new("stability map", &arguments.scene.scene, &arguments.scene.overrides.set).option("--x", [&arguments.x]);
+    // An open upper end has no number.
     let every = arguments.every_number.map(|(from, to)| format!("{from}..{}", to.map_or_else(String::new, |to| to.to_string())));
     line.option("--y", [&arguments.y])
         .option("--grid", arguments.grid)

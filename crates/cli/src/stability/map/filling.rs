@@ -55,6 +55,7 @@ pub(super) fn fill(order: &Order, arguments: &MapArguments, sharing: Sharing<'_>
         None => (None, Vec::new()),
         Some(kept) => kept.open(None).map(|(file, known)| (Some(file), known))?,
     };
+    // Rows of earlier calls must survive a failure of this call.
     let begun_before = !known.is_empty();
     let keeper = Keeper { file: Mutex::new((file, None)), broken: AtomicBool::new(false), worker: None };
     let work = || in_turn(order, sorted(known, order), &keeper);
@@ -210,6 +211,7 @@ fn in_turn(order: &Order, known: Vec<Vec<MapRow>>, keeper: &Keeper<'_>) -> Resul
     }
     progress.clear();
     let finished = maps.iter().flat_map(|map| &map.radius).filter(|row| !row.is_empty()).count();
+    // Only whole rows count: a stop leaves the row at work empty.
     Ok((maps, (finished.saturating_sub(there)) * columns))
 }
 

@@ -63,6 +63,7 @@ pub(crate) fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
     let mut files = Vec::new();
     if let Some(folder) = sharing.folder() {
         files = files::write(folder, &order, arguments, &mut maps)?;
+        // The rows go only after the files are written: until then the rows are the only result.
         rows.map_or(Ok(()), super::rows_file::RowsFile::remove)?;
     }
     let filled = cohaptic_answers::map::Filled { title: &order.title, axes: order.axes(), maps: &maps };
@@ -70,6 +71,7 @@ pub(crate) fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
         arguments.scene.json,
         DocumentSchema::STABILITY_MAP,
         &cohaptic_answers::map::document(&filled, speed, &files),
+        // Small pictures in the text stand in for the picture of a folder.
         || cohaptic_answers::map::words(&filled, speed, sharing.folder().is_none()),
         &files,
     )?;
@@ -82,6 +84,7 @@ impl Order {
         let variants = Variant::all(&arguments.curve, &arguments.against)?;
         // A proof has no grid; the single cell is never computed.
         let size = arguments.grid.unwrap_or(crate::arguments::GridSize { width: 1, height: 1 });
+        // Saturates, because the sides come from the command line.
         if size.width.saturating_mul(size.height).saturating_mul(variants.len()) > crate::arguments::GridSize::MOST_CELLS {
             let most = crate::arguments::GridSize::MOST_CELLS;
             return Err(Failure::Input(format!("{} maps of {size} cells: expected at most {most} cells in all", variants.len())));
