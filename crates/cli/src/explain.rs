@@ -21,6 +21,7 @@ use crate::{input, interrupt, output};
 /// Prints the models of a scene, and with `--cost` the measured cost of the methods.
 pub(crate) fn explain(arguments: &ExplainArguments) -> Result<ExitCode, Failure> {
     let scene = read(arguments, &[])?;
+    // The folder is taken before the long measurement, so that a refused folder costs no time.
     let _own = arguments.out.as_deref().map(own_folder).transpose()?;
     let explanation = harness::explain(&scene);
     let measured = arguments.cost.then(|| measured(arguments, &scene, &explanation));

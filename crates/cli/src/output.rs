@@ -70,7 +70,7 @@ pub(crate) fn answer(
     Ok(())
 }
 
-/// Files of an answer without files.
+/// Empty list, for an answer without written files.
 pub(crate) const NO_FILES: [&str; 0] = [];
 
 /// Prints bytes unchanged, such as a scene, a schema or a manual page.

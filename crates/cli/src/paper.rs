@@ -127,6 +127,7 @@ fn describe(reproduction: &Reproduction) -> String {
 
 /// Appends a table to `text`, with columns as wide as their cells.
 fn draw(text: &mut String, table: &Table) {
+    // A group spans several columns. The name stands in each of these columns, because the text has no wide cells.
     let groups: Vec<String> = table.groups.iter().flat_map(|(name, columns)| std::iter::repeat_n(name.clone(), *columns)).collect();
     let rows = [&groups, &table.head].into_iter().filter(|row| !row.is_empty()).chain(&table.rows);
     let width = |place: usize| rows.clone().filter_map(|row| row.get(place)).map(|cell| cell.chars().count()).max().unwrap_or(0);

@@ -13,12 +13,15 @@ pub(crate) struct Progress(ProgressBar);
 impl Progress {
     /// Creates a bar with `length` steps, in the format of an indicatif template. A length of 0 stands for an unknown length.
     pub(crate) fn new(length: u64, template: &str) -> Self {
+        // In a file or a pipe the control characters of a bar would be garbage.
         let target = if std::io::stderr().is_terminal() && !output::is_quiet() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        // A wrong template must not end the work, so the default bar stands in.
         let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
         Self(ProgressBar::with_draw_target(Some(length), target).with_style(style))
     }
 
     fn titled(self, title: &str) -> Self {
+        // A title comes from a file and may contain control characters.
         Self(self.0.with_prefix(Visible(title).to_string()))
     }
 
