@@ -13,9 +13,9 @@ pub fn length(metres: f64) -> String {
 
 /// Returns the unit of a length in texts, and the factor from metres to this unit.
 pub(crate) const fn length_unit(metres: f64) -> (f64, &'static str) {
+    // From 10 km on, millimetres would be a long row of digits.
     if metres.abs() < 1e4 { (1e3, "mm") } else { (1.0, "m") }
 }
-// From 10 km on, millimetres would be a long row of digits.
 
 /// Returns the note about `count` nominal verdicts, which leave random parts out because their second moment cannot be followed; `None` if `count` is 0. `one`
 /// and `several` follow the number: "cell is", "cells are".
