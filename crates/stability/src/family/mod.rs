@@ -4,7 +4,6 @@
 //! keys. A key that does nothing but set certain numbers of the scene is *learned*: further values of the key are written straight to those numbers. A key
 //! that is not learned, such as a delay, makes the scene be read again for each new value.
 
-mod cell;
 mod error;
 mod leaves;
 mod prepared;
@@ -18,8 +17,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use cohaptic_scene::Scene;
 
-pub use cell::Cell;
 pub use error::FamilyError;
+pub use prepared::Cell;
 pub use range::{KeyRange, KeyRangeError};
 
 use crate::scene_radius::RadiusScratch;

@@ -2,12 +2,28 @@
 
 use cohaptic_scene::Scene;
 
-use super::cell::Cell;
 use super::leaves::{Leaf, Probe, learn};
 use crate::mean_square::Followed;
 use crate::radius::worse;
 use crate::scene_radius::{RadiusScratch, SceneRadius, scene_radii};
 use crate::{AnalysisError, Limits, Radius, Watch, has_chance, mean_square_watched};
+
+/// The radius of a family of scenes for one set of key values.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Cell<R = Radius> {
+    /// Radius by the criterion of the family; below 1 the scene is stable.
+    pub radius: R,
+    /// `true` if the radius leaves out random parts of the links, because the second moment of this scene cannot be followed. A nominal radius is the square
+    /// of the spectral radius of the scene in which every delay is its mean and no packet is lost.
+    pub is_nominal: bool,
+}
+
+impl<R> Cell<R> {
+    /// Returns a cell whose radius leaves out no random part of the links.
+    pub const fn certain(radius: R) -> Self {
+        Self { radius, is_nominal: false }
+    }
+}
 
 /// A scene with the places of its learned keys and the prepared radii of its combinations of contacts.
 #[derive(Debug)]

@@ -3,8 +3,8 @@
 use cohaptic_peer::Motion;
 
 use super::algebra::apply;
-use super::displacement::Displacement;
 use super::node::Node;
+use super::rigid::Displacement;
 use crate::cost::{PartCost, pushed_operations};
 use crate::rounding::real;
 

@@ -17,8 +17,7 @@ use cohaptic_scene::Scene;
 
 use super::algebra::{IDENTITY, add, apply, cross, product, skew, sum, trace_less, transposed, twice_axial, unit};
 use super::levenberg::zero;
-use super::node::Node;
-use super::stress::{Stress, Twist};
+use super::node::{Node, Stress, Twist};
 use crate::AnalysisError;
 use crate::rounding::real;
 

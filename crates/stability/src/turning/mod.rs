@@ -11,7 +11,6 @@
 //! the step map of one axis. Angles are multiplied by √(tr J/3m), so that all states are lengths. Peers that are equal, their grasps included, form a class.
 
 mod algebra;
-mod displacement;
 mod frame;
 mod levenberg;
 mod load;
@@ -19,7 +18,6 @@ mod node;
 mod peers;
 mod rigid;
 mod spin;
-mod stress;
 #[cfg(test)]
 mod tests;
 mod together;

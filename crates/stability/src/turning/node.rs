@@ -1,10 +1,9 @@
 //! Linear equations of a peer whose copy turns: six components of the copy, three or six of the device.
 
-use cohaptic_peer::rotation::{Spin, Triple};
+use cohaptic_peer::rotation::{Matrix3, Spin, Triple};
 use cohaptic_peer::{Contact, Gains, Integrator, Plant, StepMap};
 use cohaptic_scene::Scene;
 
-use super::stress::Stress;
 use crate::lifted::Body;
 use crate::structure::linear_law;
 
@@ -41,6 +40,28 @@ pub(crate) struct Node {
     pub(crate) length: f64,
     /// Span of a tick divided by the mass of the copy [m/(N·s)]: the change of the copy's velocity in a tick per force.
     pub(crate) mobility: f64,
+}
+
+/// Changes of a node's equations by a load, in the units of the node's states.
+#[derive(Clone, Debug)]
+pub(super) struct Stress {
+    /// Torque on the copy per turn of the copy, without the coupling torque of the device.
+    pub(super) own: Matrix3,
+    /// Torque on the copy per turn and per angular velocity of a held sample, indexed by the peer that sent the sample.
+    pub(super) heard: Vec<[Matrix3; 2]>,
+    /// Coupling torque; `None` if the device has no attitude or touches nothing.
+    pub(super) twist: Option<Twist>,
+}
+
+/// Coupling torque τC between copy and device, and its reaction on a device that turns.
+#[derive(Clone, Debug)]
+pub(super) struct Twist {
+    /// Change of τC per turn of the copy, turn of the device, angular velocity of the copy, and angular velocity of the device.
+    pub(super) by: [Matrix3; 4],
+    /// Torque on the device per change of τC, turn of the copy, and turn of the device.
+    pub(super) back: [Matrix3; 3],
+    /// Torque of the hand on the device per turn of the device.
+    pub(super) hand: Matrix3,
 }
 
 impl Node {

@@ -3,10 +3,9 @@
 use cohaptic_peer::Contact;
 use cohaptic_scene::Scene;
 
-use super::displacement::Displacement;
 use super::frame::{SAMPLE, Turning};
 use super::node::Node;
-use super::rigid;
+use super::rigid::{self, Displacement};
 use crate::cost::PartCost;
 use crate::network::NominalNetwork;
 use crate::structure::{Contacts, Structure, common_time, linear_law};
