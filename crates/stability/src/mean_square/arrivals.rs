@@ -9,14 +9,14 @@
 //!
 //! Taking in sample n at each tick with its hazard, independently of everything else, gives n the right law: the probability that n has not been taken in
 //! by t is Π(1 − hazard) = 1 − G. In this model n may be taken in twice, but the second time changes nothing. A sample older than the held sample, however,
-//! must not be taken in. If the last possible tick of every sample is not after the first possible tick of the next sample, an older sample never arrives
+//! must not be taken in. If the last possible tick of every sample is not after the first possible tick of the next sample, no older sample arrives
 //! later, and the hazards suffice. Otherwise the model must know *which* sample is held, as far as the held sample decides whether a sample that may still
-//! arrive is newer. If a is the newest sample that has arrived, then no sample after a has arrived, so the hazards of the samples after a hold given a.
+//! arrive is newer. If a is the newest arrived sample, then no sample after a has arrived, so the hazards of the samples after a hold given a.
 //! Hence the *place* r = max(a − lo, 0), with lo the oldest sample that may still arrive, is a Markov chain.
 
 /// Law of the time from the sending of a sample to its arrival \[ns\].
 pub(crate) trait Arrival {
-    /// Returns the probability that a sample has arrived `nanos` nanoseconds after its sending. Zero below the least time, and not decreasing. The limit is
+    /// Returns the probability of arrival within `nanos` nanoseconds after the sending of a sample. Zero below the least time, and not decreasing. The limit is
     /// below 1 if samples can be lost.
     fn within(&self, nanos: i128) -> f64;
     /// Returns a lower bound of the time from sending to arrival \[ns\].
@@ -26,44 +26,44 @@ pub(crate) trait Arrival {
 /// Ticks at which the samples of a link may be taken in, with their hazards, in a periodic frame.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Hazards {
-    /// Samples that may be taken in, with their hazards, oldest sample first. Indexed by the receiver's tick. Sample 0 is the first one sent in this frame.
+    /// Samples and hazards, oldest sample first. Indexed by the receiver's tick. Sample 0 is the first sample sent in this frame.
     pub at: Vec<Vec<Hazard>>,
     /// Largest number of places at any tick; 1 if no sample overtakes another.
     pub(crate) places: usize,
     /// True if any sample has several possible ticks of arrival.
     pub(crate) spread: bool,
-    /// Oldest sample that may arrive at or after a tick. Indexed by tick; the last entry belongs to the first tick of the next frame.
+    /// Oldest sample with a possible arrival at or after a tick. Indexed by tick; the last entry belongs to the first tick of the next frame.
     oldest: Vec<i64>,
-    /// Newest sample that may have arrived before a tick. Indexed by tick; the last entry belongs to the first tick of the next frame.
+    /// Newest sample with a possible arrival before a tick. Indexed by tick; the last entry belongs to the first tick of the next frame.
     newest: Vec<i64>,
     /// For each sample of the frame, the number of the first tick at which the sample may arrive, counted from the first tick of the frame, and the
-    /// probabilities that the sample has arrived by that tick and by each later tick, up to the last possible one.
+    /// probabilities of an arrival by that tick and by each later tick, up to the last possible tick.
     arrived: Vec<(i64, Vec<f64>)>,
 }
 
 /// Sample that may be taken in at a tick.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hazard {
-    /// Number of the sample. Sample 0 is the first one sent in the frame; samples of earlier frames are negative.
+    /// Number of the sample. Sample 0 is the first sample sent in the frame; samples of earlier frames are negative.
     pub sample: i64,
-    /// Probability that the sample is taken in at the tick, given that the sample has not arrived at an earlier tick.
+    /// Probability of an arrival at the tick, given no arrival at an earlier tick.
     pub hazard: f64,
 }
 
-/// Range of the samples that may arrive, or may be held, around a tick.
+/// Range of the samples under way or held around a tick.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Window {
-    /// Number of the oldest sample that may arrive at the tick or later. This sample has place 0 at the beginning of the tick.
+    /// Number of the oldest sample with a possible arrival at the tick or later. This sample has place 0 at the beginning of the tick.
     pub(crate) before: i64,
-    /// Number of the oldest sample that may arrive after the tick. This sample has place 0 at the end of the tick.
+    /// Number of the oldest sample with a possible arrival after the tick. This sample has place 0 at the end of the tick.
     pub(crate) after: i64,
-    /// Number of the newest sample that may have arrived by the end of the tick.
+    /// Number of the newest sample with a possible arrival by the end of the tick.
     pub(crate) newest: i64,
     /// Number of places at the beginning of the tick.
     pub(crate) places: usize,
 }
 
-/// Possible transition of a link's chain at a tick: from one state to another, with the sample that is taken in, if any. Without a chain of losses the
+/// Possible transition of a link's chain at a tick: from state `from` to state `to`, with the sample taken in, if any. Without a chain of losses the
 /// states are the places.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Outcome {
@@ -87,7 +87,7 @@ impl Hazards {
             let place = usize::try_from(number.rem_euclid(count)).ok()?;
             Some(i128::from(*ticks.get(place)?) + frame * number.div_euclid(count))
         };
-        // Below 1 if samples can be lost. A sample that has reached this probability does not arrive later.
+        // Below 1 if samples can be lost. A sample at this probability does not arrive later.
         let final_probability = arrival.within(i128::MAX);
         let mut at: Vec<Vec<Hazard>> = vec![Vec::new(); ticks.len()];
         // First and last possible tick of each sample of the frame. The numbers count on over frames.
@@ -96,6 +96,7 @@ impl Hazards {
         for (sample, sent) in sends.iter().enumerate() {
             let sent = i128::from(*sent);
             let earliest = sent + arrival.least();
+            // The search begins at the first tick not before `earliest`. Earlier ticks have hazard 0, so skipping the ticks changes no result.
             let frames = earliest.div_euclid(frame);
             let in_frame = ticks.partition_point(|tick| i128::from(*tick) < earliest - frames * frame);
             let mut number = frames * count + i128::try_from(in_frame).ok()?;
@@ -103,6 +104,7 @@ impl Hazards {
             let mut reached = Vec::new();
             let last = loop {
                 let now = arrival.within(tick(number)? - sent);
+                // A sample with G = 1 before this tick has surely arrived. The quotient would be 0/0.
                 let hazard = if before < 1.0 { (now - before) / (1.0 - before) } else { 0.0 };
                 if hazard > 0.0 {
                     // The frame repeats: a sample that arrives some frames after its sending is, at that tick of this frame, a sample of an earlier frame.
@@ -131,8 +133,8 @@ impl Hazards {
         for hazards in &mut at {
             hazards.sort_unstable_by_key(|hazard| hazard.sample);
         }
-        // Each sample recurs in every frame with its number raised by `shift`. The oldest recurrence that may still arrive at tick `number` is the first one
-        // whose last tick is not before `number`, and the newest that may have arrived is the last one whose first tick is before `number`.
+        // Each sample recurs in every frame with its number raised by `shift`. The oldest recurrence still under way at tick `number` is the first recurrence
+        // whose last tick is not before `number`, and the newest possible arrival is the last recurrence whose first tick is before `number`.
         let shift = i128::try_from(sends.len()).ok()?;
         let numbered = || spans.iter().zip(0_i128..);
         let (mut oldest, mut newest) = (Vec::new(), Vec::new());
@@ -147,50 +149,53 @@ impl Hazards {
         Some(Self { at, places, spread, oldest, newest, arrived })
     }
 
-    /// Returns the number of samples of earlier frames that the sender's state must keep, because they may be taken in during this frame.
+    /// Returns the number of samples of earlier frames in the sender's state. All of these samples may be taken in during this frame.
     pub fn depth(&self) -> usize {
         self.at.iter().flatten().map(|hazard| usize::try_from(-hazard.sample).unwrap_or(0)).max().unwrap_or(0)
     }
 
-    /// Returns the range of the samples that may arrive, or may be held, around a tick of the frame.
+    /// Returns the range of the samples under way or held around a tick of the frame.
     pub(crate) fn window(&self, tick: usize) -> Window {
         let (before, after) = (self.oldest[tick], self.oldest[tick + 1]);
         Window { before, after, newest: self.newest[tick + 1], places: reach(before, self.newest[tick]) + 1 }
     }
 
-    /// Returns two probabilities: that the sample has arrived by the tick before `tick`, and that the sample has arrived by `tick`.
+    /// Returns two probabilities: of an arrival of the sample by the tick before `tick`, and of an arrival by `tick`.
     pub(crate) fn arrived(&self, sample: i64, tick: usize) -> (f64, f64) {
         let (sends, ticks) = (i64::try_from(self.arrived.len()).unwrap_or(1), i64::try_from(self.at.len()).unwrap_or(1));
         let (first, reached) = &self.arrived[usize::try_from(sample.rem_euclid(sends)).unwrap_or(0)];
         // `arrived` lists samples of the frame only. The recurrence of this sample within the frame sees the tick shifted by as many frames.
         let tick = i64::try_from(tick).unwrap_or(i64::MAX) - sample.div_euclid(sends) * ticks;
+        // Before the first possible tick the probability is 0. After the last listed tick the last probability stays.
         let by = |tick: i64| usize::try_from(tick - first).map_or(0.0, |place| reached.get(place).or_else(|| reached.last()).copied().unwrap_or(0.0));
         (by(tick - 1), by(tick))
     }
 
-    /// Returns the outcomes of a tick from every place that can be reached, for a link without a chain of losses.
+    /// Returns the outcomes of a tick from every reachable place, for a link without a chain of losses.
     pub(crate) fn outcomes(&self, tick: usize) -> Vec<Outcome> {
         let (before, after) = (self.oldest[tick], self.oldest[tick + 1]);
         let place = |sample: i64| usize::try_from(sample - after).unwrap_or(0);
         let mut outcomes = Vec::new();
         for from in 0..=reach(before, self.newest[tick]) {
             let held = before + i64::try_from(from).unwrap_or(i64::MAX);
+            // Newest sample first: a sample is taken in if the sample arrives and no newer sample does. `left` is the probability of no newer arrival.
             let mut left = 1.0;
             for Hazard { sample, hazard, .. } in self.at[tick].iter().rev().copied() {
-                // Place 0 stands for all samples up to the oldest that may arrive. That oldest sample itself may therefore still arrive, and only from place 0.
+                // Place 0 stands for all samples up to the oldest sample under way. The oldest sample itself may therefore still arrive, and only from place 0.
                 if sample < held || (sample == held && from > 0) {
                     break;
                 }
                 outcomes.push(Outcome { from, to: place(sample), take: Some(sample), probability: left * hazard });
                 left *= 1.0 - hazard;
             }
+            // No hazard came true: the held sample stays, and only the count of places moves to the oldest sample after the tick.
             outcomes.push(Outcome { from, to: place(held), take: None, probability: left });
         }
         outcomes
     }
 }
 
-/// Returns the largest place if `oldest` may still arrive and `newest` may have arrived; 0 if `newest` is not after `oldest`.
+/// Returns the largest place if `oldest` is the oldest sample under way and `newest` the newest possible arrival; 0 if `newest` is not after `oldest`.
 fn reach(oldest: i64, newest: i64) -> usize {
     usize::try_from(newest - oldest).unwrap_or(0)
 }

@@ -37,6 +37,7 @@ pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Ins
     let scale = Scale { time: lifted.time, compliance: lifted.nodes[0].compliance(lifted.time) };
     let frame = nanoseconds(lifted.timetable.frame);
     let mut depth = lifted.timetable.depth.clone();
+    // The timetable knows only the samples of deliveries that are certain. A random link may take in older samples, so the sender keeps more of them.
     for line in lines {
         if let Some((hazards, _)) = &line.chance {
             depth[line.from] = depth[line.from].max(hazards.depth());
@@ -60,7 +61,7 @@ pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Ins
     }
     let mut first_sample = Vec::with_capacity(nodes);
     for (depth, sent) in depth.iter().zip(&lifted.timetable.sent) {
-        // At the end of the frame its samples become samples of an earlier frame: the rows move by the number of samples sent per frame.
+        // At the end of the frame the samples of this frame become samples of an earlier frame: the rows move by the number of samples sent per frame.
         for place in 0..depth * numbers {
             made.kept.push((count + place + sent * numbers, count + place));
             moved.push(translation(place % numbers));
@@ -75,8 +76,8 @@ pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Ins
     }
     made.rows = count + lines.len() * numbers;
     made.chains = lines.iter().map(chain_states).collect();
-    // Without a tie to the ground a common translation grows or stays for ever. Positions relative to the first copy remove that direction, and with it the
-    // state of that copy's position, which is always zero.
+    // Without a tie to the ground a common translation grows or stays for ever. Positions relative to the first copy remove this direction, and with the
+    // direction the state of the first copy's position: the relative position is always zero.
     if !lifted.tied {
         let reference = lifted.nodes[0].rows(0).object;
         let place = made.kept.iter().position(|(row, _)| *row == reference).unwrap_or(0);
@@ -84,6 +85,7 @@ pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Ins
         moved.remove(place);
         made.reference = Some((reference, moved));
     }
+    // Samples of earlier frames have negative numbers and lie before `first_sample`. `depth` rows are reserved there, so the index is never negative.
     let row_of = |node: usize, sample: i64| {
         let signed = |number: usize| i64::try_from(number).unwrap_or(i64::MAX);
         usize::try_from(signed(first_sample[node]) + signed(numbers) * sample).unwrap_or(0)
@@ -101,8 +103,8 @@ pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Ins
         let of = || lines.iter().enumerate().filter(|(_, line)| line.to == node);
         (0..numbers).map(|number| of().map(|(place, line)| (held_row(place) + number, lifted.weights[(node, line.from)])).collect()).collect()
     };
-    // Ticks of a node between two other events that concern the node are multiplied into one map. The map must be flushed before a sample reads the node's
-    // states, and before a delivery changes the samples that the node holds.
+    // Ticks of a node between two other events of the node are multiplied into one map. The map must be flushed before a sample reads the node's
+    // states, and before a delivery changes the samples held by the node.
     let flush = |pending: &mut Vec<Option<Tracked>>, made: &mut Events, node: usize| {
         if let Some(map) = pending[node].take() {
             made.roundings += map.roundings();
@@ -115,6 +117,7 @@ pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Ins
         }
         match *event {
             Event::Sample { node } => {
+                // The sample reads the node's position and velocity, so the ticks before the sample must have been applied.
                 flush(&mut pending, &mut made, node);
                 let object = lifted.nodes[node].rows(first[node]).object;
                 for number in 0..numbers {
@@ -124,6 +127,7 @@ pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Ins
                 }
                 sample[node] += 1;
             }
+            // Certain deliveries stand in the timetable. A pair without a line exchanges no samples, so the delivery is left out.
             Event::Deliver { from, to, sample } => {
                 if let Some(link) = lines.iter().position(|line| (line.from, line.to) == (from, to)) {
                     flush(&mut pending, &mut made, to);
@@ -132,11 +136,13 @@ pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Ins
                 }
             }
             Event::Tick { node, span, .. } => {
+                // Arrivals come before the tick of the same instant, as in the simulator: the tick already uses the sample that arrived at the tick.
                 for (link, line) in lines.iter().enumerate().filter(|(_, line)| line.to == node) {
                     for outcomes in outcomes(line, tick[node], &instants.sends[line.from], frame) {
                         flush(&mut pending, &mut made, node);
                         let arrive = |outcome| Arrive::new(outcome, |sample| row_of(line.from, sample));
                         let mut outcomes: Vec<Arrive> = outcomes.into_iter().map(arrive).collect();
+                        // Outcomes are grouped by target state, so that the operator adds up one target at a time.
                         outcomes.sort_by_key(|outcome| (outcome.to, outcome.from));
                         made.steps.push(Step::Deliver { link, row: held_row(link), numbers, outcomes });
                     }
@@ -154,6 +160,7 @@ pub(crate) fn events_watched(lifted: &Lifted<'_>, lines: &[Line], instants: &Ins
             }
         }
     }
+    // The next frame begins with the states, so ticks still pending at the end of the frame belong to this frame.
     for node in 0..nodes {
         flush(&mut pending, &mut made, node);
     }
@@ -193,11 +200,11 @@ fn outcomes(line: &Line, tick: usize, sends: &[u64], frame: u64) -> Vec<Vec<Outc
     }]
 }
 
-/// Returns the span between the sending of the sample before `sample` and of `sample` itself \[s\]. `sends` are the instants of the frame \[ns\].
+/// Returns the span from the sending of the sample before `sample` to the sending of `sample` \[s\]. `sends` are the instants of the frame \[ns\].
 fn gap(sample: i64, sends: &[u64], frame: u64) -> f64 {
     let count = i64::try_from(sends.len()).unwrap_or(1);
     let place = usize::try_from(sample.rem_euclid(count)).unwrap_or(0);
-    // The sample before the first one of a frame is the last one of the previous frame, at a negative instant. Both wraps cancel in the difference.
+    // The sample before the first sample of a frame is the last sample of the previous frame, at a negative instant. Both wraps cancel in the difference.
     let before = if place == 0 { sends[sends.len() - 1].wrapping_sub(frame) } else { sends[place - 1] };
     Duration::from_nanos(sends[place].wrapping_sub(before)).as_secs_f64()
 }

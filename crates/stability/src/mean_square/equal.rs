@@ -1,13 +1,13 @@
 //! Mean-square radius of equal peers over equal links with independent losses, from two small matrices and without a bound of the error.
 //!
 //! A delivery with the probability p = 1 − q turns the held sample h into h + p·(u − h) + ξ. Here u is the delivered sample and ξ a noise of mean 0 and
-//! variance p·q·E(u − h)², which is independent of all earlier events and of the other links. So the scene is its *mean* motion, in which every link passes on
-//! the share p of each sample, driven by noise whose variance follows from the motion. For such multiplicative noise, stability in the mean square is a gain
+//! variance p·q·E(u − h)², independent of all earlier events and of the other links. So the scene moves in its *mean* motion, with every link passing on
+//! the share p of each sample, driven by noise with a variance from the motion. For such multiplicative noise, stability in the mean square is a gain
 //! condition (Willems & Blankenship 1971; Elia 2005, Theorem 6.4; Lu & Skelton 2002).
 //!
-//! The mean motion of equal peers splits into the common motion and the differences, as in [`Structure`](crate::structure::Structure). Each is a node that
-//! hears itself, with the weight w = 1 for the common motion and w = −1/(N−1) for the differences. Let a be the states of the peer and of its samples on the
-//! way, n the held sample if losses are replaced by their average, and ζ the mean over the senders of the noise that is still held. Each node has the states
+//! The mean motion of equal peers splits into the common motion and the differences, as in [`Structure`](crate::structure::Structure). Each is a node
+//! hearing itself, with the weight w = 1 for the common motion and w = −1/(N−1) for the differences. Let a be the states of the peer and of its samples on the
+//! way, n the held sample with losses replaced by their average, and ζ the mean over the senders of the noise still held. Each node has the states
 //! y = (a, n):
 //!
 //! ```text
@@ -16,9 +16,9 @@
 //! E ξ² = p·q·σ/(N − 1),    σ = E(u_j − h_ij)² = E(u − n)² − 2·E(u − n)·ζ_ij + E ζ_ij²
 //! ```
 //!
-//! Let γ be the factor by which the second moment grows in a frame, X the solution of γX = M·X·Mᵀ + Σ b_e·b_eᵀ for the frame's matrix M of (y, ζ) and the
-//! unit noise b_e of each delivery. Then σ at each delivery is linear in the variances of the noise, with coefficients ≥ 0 that fall as γ rises. The radius
-//! is the γ at which the spectral radius of that relation is 1, or the square of the spectral radius of M if the square is larger.
+//! Let γ be the growth factor of the second moment over a frame, X the solution of γX = M·X·Mᵀ + Σ b_e·b_eᵀ for the frame's matrix M of (y, ζ) and the
+//! unit noise b_e of each delivery. Then σ at each delivery is linear in the variances of the noise, with coefficients ≥ 0, falling as γ rises. The radius
+//! is the γ with a spectral radius 1 of this relation, or the square of the spectral radius of M if the square is larger.
 //!
 //! [`Symmetric`](super::symmetric::Symmetric) computes the same radius from the second moment itself, more slowly and with a bound of the error. The tests
 //! compare both.
@@ -35,7 +35,7 @@ use crate::spectrum::{Schur, Workspace};
 
 use crate::timetable::{Event, Timetable};
 
-/// Relative distance from the zero at which the search for γ ends.
+/// Relative distance from the zero at the end of the search for γ.
 const TOLERANCE: f64 = 1e-13;
 /// Largest number of steps of the search for γ.
 const STEPS: usize = 200;
@@ -47,11 +47,11 @@ pub(crate) struct Equal {
     peers: f64,
     /// Events of one node, without deliveries.
     timetable: Timetable,
-    /// Deliveries on a link within the frame, in the order in which they happen.
+    /// Deliveries on a link within the frame, in the order of time.
     deliveries: Vec<Delivery>,
-    /// Number of samples of earlier frames that may be taken in.
+    /// Number of samples of earlier frames still under way.
     depth: usize,
-    /// Factor by which a frame multiplies the held noise: the probability that nothing arrives.
+    /// Factor of the held noise per frame: the probability of no arrival.
     kept: f64,
 }
 
@@ -64,10 +64,10 @@ struct Delivery {
     sample: i64,
     /// Probability of the delivery.
     arrives: f64,
-    /// Share still held just before this delivery of the noise that was held at the beginning of the frame, followed by the shares of the noise of each
+    /// Share still held just before this delivery of the noise held at the beginning of the frame, followed by the shares of the noise of each
     /// earlier delivery.
     left: Vec<f64>,
-    /// Share of this delivery's noise that is still held at the end of the frame.
+    /// Share of this delivery's noise still held at the end of the frame.
     at_end: f64,
 }
 
@@ -105,6 +105,7 @@ impl Equal {
         for (tick, hazard) in listed {
             let missed = 1.0 - hazard.hazard;
             deliveries.push(Delivery { tick, sample: hazard.sample, arrives: hazard.hazard, left: left.clone(), at_end: 1.0 });
+            // Each later delivery overwrites the held sample with its noise in the mean: the share 1 − p of earlier noise remains.
             left.iter_mut().for_each(|left| *left *= missed);
             left.push(1.0);
         }
@@ -114,14 +115,15 @@ impl Equal {
         Self { peers: real(peers), timetable, deliveries, depth: hazards.depth(), kept: left[0] }
     }
 
-    /// Returns the radius over a frame of the second moment of the states that exert forces; `None` if numbers overflow.
+    /// Returns the radius over a frame of the second moment of the states with forces; `None` if numbers overflow.
     ///
-    /// `lifted` has one node. Its timetable and weights are ignored.
+    /// `lifted` has one node. The timetable and the weights of `lifted` are ignored.
     pub(crate) fn radius(&self, lifted: &Lifted<'_>, scratch: &mut EqualScratch) -> Option<f64> {
         let EqualScratch { rows, node, seen, heard, common, apart, relation, workspace } = scratch;
         let n1 = self.peers - 1.0;
         self.block(lifted, 1.0, lifted.tied, (rows, node, seen, heard), common)?;
         self.block(lifted, -1.0 / n1, true, (rows, node, seen, heard), apart)?;
+        // No γ below this bound qualifies: the noise-free motion and the held noise alone already grow by it.
         let lowest = common.modulus().max(apart.modulus()).max(self.kept).powi(2);
         // The coefficients of the relation fall as γ rises, so the inverse of its spectral radius rises and crosses 1 once.
         let mut rise = |gamma: f64| {
@@ -132,7 +134,7 @@ impl Equal {
         found.is_finite().then_some(found)
     }
 
-    /// Computes the frame of the mean motion of a node that hears itself with the weight `weight`, in triangular form; `None` if numbers overflow.
+    /// Computes the frame of the mean motion of a node hearing itself with the weight `weight`, in triangular form; `None` if numbers overflow.
     fn block(
         &self,
         lifted: &Lifted<'_>,
@@ -176,11 +178,13 @@ impl Equal {
                 }
                 Event::Deliver { .. } => {}
                 Event::Tick { span, .. } => {
+                    // Deliveries of a tick come before the motion of the tick, so that the force already uses the new sample.
                     while let Some(delivery) = self.deliveries.get(next).filter(|delivery| delivery.tick == tick) {
                         let place = i64::try_from(states + depth).ok()? + delivery.sample;
                         let row = usize::try_from(place).ok()?;
                         let (arrives, missed) = (delivery.arrives, 1.0 - delivery.arrives);
                         for column in 0..columns {
+                            // n ← q·n + p·u in the mean, and the old noise keeps the share q. The noise of this delivery enters with size 1.
                             let (fresh, held) = (rows[(row, column)], rows[(mean, column)]);
                             if column < size {
                                 outputs[(next, column)] = fresh - held;
@@ -217,7 +221,7 @@ impl Equal {
         block.schur.triangularise().then_some(())
     }
 
-    /// Computes the matrix by which the variances at the deliveries (rows) follow from the variances at the deliveries (columns), if the second moment grows by
+    /// Computes the matrix from the variances at the deliveries (columns) to the variances at the deliveries (rows), for a second moment growing by
     /// γ in a frame.
     fn relation(&self, gamma: f64, common: &mut Block, apart: &mut Block, relation: &mut Matrix) {
         let (n, n1, size) = (self.peers, self.peers - 1.0, self.deliveries.len());
@@ -234,6 +238,7 @@ impl Equal {
             for (to, delivery) in self.deliveries.iter().enumerate() {
                 let within = if from < to { delivery.left[from + 1] } else { 0.0 };
                 let [one, other] = [&*common, &*apart].map(|block| block.seen(to, from, (delivery.left[0], within)));
+                // σ of the module head, written with the two kinds of motion: the N·(N−1) links see one common motion and N−1 independent differences.
                 let square = (one.square + n1 * other.square) / n - 2.0 / n * (one.product - other.product);
                 let noise = n1 * (delivery.left[0].powi(2) * held + within * within);
                 // The sum is a variance, so a negative result is rounding.
@@ -270,7 +275,7 @@ impl Block {
         variance.solve(gamma, size + 1, matrix, input);
     }
 
-    /// Returns the moments at delivery `to` for unit noise at delivery `from`: the part of earlier frames, plus the part within this frame if `from` is earlier
+    /// Returns the moments at delivery `to` for unit noise at delivery `from`: the part of earlier frames, and the part within this frame if `from` is earlier
     /// than `to`. `left` and `within` are the shares still held of ζ at the beginning of the frame and of the noise of `from`.
     fn seen(&self, to: usize, from: usize, (left, within): (f64, f64)) -> Seen {
         let direct = &self.direct[to];
@@ -282,14 +287,14 @@ impl Block {
     }
 }
 
-/// Returns the γ above `lowest` at which a rising function is zero; `lowest` if the function is not negative within 10⁻⁹ above `lowest`. NaN if the function
+/// Returns the zero γ above `lowest` of a rising function; `lowest` if the function is not negative within 10⁻⁹ above `lowest`. NaN if the function
 /// is NaN.
 ///
 /// The inverse of the relation's radius is nearly a straight line above the pole at `lowest`, so secants converge quickly. Bisection follows if a secant
 /// leaves the bounds.
 fn root(lowest: f64, rise: &mut impl FnMut(f64) -> f64) -> f64 {
     let mut before = (lowest, 0.0);
-    // Close to the pole rounding can cancel a variance, so that the function seems positive although its zero is above. Hence several distances.
+    // Close to the pole rounding can cancel a variance. The function then seems positive below its zero. Hence several distances.
     for away in [1e-12, 1e-11, 1e-10, 1e-9] {
         let gamma = lowest * (1.0 + away);
         before = (gamma, rise(gamma));
@@ -315,6 +320,7 @@ fn root(lowest: f64, rise: &mut impl FnMut(f64) -> f64) -> f64 {
         }
         let secant = gamma - value * (gamma - before.0) / (value - before.1);
         let inside = secant > low && secant < high && secant.is_finite();
+        // A secant inside the bounds is best. Otherwise the middle of the bounds is next, or, without an upper bound yet, twice the distance from the pole.
         let next = match (inside, high.is_finite()) {
             (true, _) => secant,
             (false, true) => 0.5 * (low + high),

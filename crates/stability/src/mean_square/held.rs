@@ -1,16 +1,16 @@
-//! The part of a held sample that exerts no force on the receiver.
+//! Part of a held sample without a force on the receiver.
 //!
 //! A held sample is a position and a velocity, and only KT·x + BT·v exerts a force. The other combination, w, changes no other state, and only the next
-//! sample changes w. So the operator on the second moment is block triangular: one block for the moments without w, one for the moments that contain w. E w²
-//! is multiplied by the probability that nothing arrives. In the long run that is a factor q per frame, the spectral radius of those moves of the link's
-//! chain on which no sample is taken in. By the inequality of Cauchy and Schwarz the moment of w with another w, or with a state that exerts a force, grows no
+//! sample changes w. So the operator on the second moment is block triangular: a block for the moments without w, and a block for the moments with w. E w²
+//! is multiplied by the probability of no arrival. In the long run this probability is a factor q per frame, the spectral radius of the moves of the link's
+//! chain without an arrival. By the inequality of Cauchy and Schwarz the moment of w with another w, or with a state with a force, grows no
 //! faster than the faster of the two. So the radius of the whole is the largest of the radius without w and of all q. A link of constant delay overwrites
-//! the held sample in every frame, so that its q is 0.
+//! the held sample in every frame, so for such a link q = 0.
 
 use super::arrivals::Outcome;
 use crate::{Matrix, Radius, spectrum};
 
-/// Returns the probability per frame, in the long run, that nothing arrives on a link. `states` is the number of states of the link's chain, and `frame`
+/// Returns the probability per frame, in the long run, of no arrival on a link. `states` is the number of states of the link's chain, and `frame`
 /// lists the outcomes of each tick of a frame at which a sample may arrive or the state may change.
 pub(crate) fn staying(states: usize, frame: &[Vec<Outcome>]) -> Radius {
     let mut stay = Matrix::identity(states);
@@ -20,8 +20,9 @@ pub(crate) fn staying(states: usize, frame: &[Vec<Outcome>]) -> Radius {
         for outcome in outcomes.iter().filter(|outcome| outcome.take.is_none()) {
             step[(outcome.to, outcome.from)] += outcome.probability;
         }
-        // A state without outcomes at a tick has a zero column here. That state cannot be reached at the tick, so nothing is lost from the product.
+        // A state without outcomes at a tick has a zero column here. Such a state is unreachable at the tick, so nothing is lost from the product.
         stay = step.times(&stay);
+        // A product of the steps adds up `states` terms per entry, and an entry of a step adds up at most as many outcomes as the tick has.
         roundings += states + outcomes.len() + 1;
     }
     let rounding = f64::EPSILON * crate::rounding::real(roundings);

@@ -43,7 +43,7 @@ pub(crate) struct LinkLaw {
     pub(crate) cut: bool,
 }
 
-/// Markov chain of losses that depend on earlier losses. The chain gives each sample a state, from which the probability of the sample's loss follows.
+/// Markov chain of losses. The chain gives each sample a state, and the state gives the probability of the sample's loss.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum LossChain {
     GilbertElliott(GilbertElliott),
@@ -78,7 +78,7 @@ impl LossChain {
         (0..self.states()).all(|state| self.lost(state) >= 1.0)
     }
 
-    /// Returns the probability that a sample with that state is lost. Of two states the second one is bad.
+    /// Returns the probability of a loss of a sample in `state`. Of two states the second one is bad.
     pub(crate) fn lost(&self, state: usize) -> f64 {
         let state = self.live()[state];
         match self {
@@ -91,7 +91,7 @@ impl LossChain {
         }
     }
 
-    /// Returns the probability of each state of a sample (columns) for each state of the sample before (rows), which was sent `gap` seconds earlier.
+    /// Returns the probability of each state of a sample (columns) for each state of the sample before (rows), sent `gap` seconds earlier.
     pub(crate) fn moves(&self, gap: f64) -> Vec<Vec<f64>> {
         let live = self.live();
         live.iter().map(|from| live.iter().map(|to| self.way(*from, *to, gap)).collect()).collect()
@@ -105,11 +105,13 @@ impl LossChain {
             Self::InTime(chain) => {
                 let (good, bad) = chain.mean_times();
                 let (rate, share) = (1.0 / good.as_secs_f64() + 1.0 / bad.as_secs_f64(), chain.bad_fraction());
-                // Share of the initial state that is forgotten after `gap`: 1 − e^(−rate·gap), without cancellation for a short gap.
+                // Forgotten share of the initial state after `gap`: 1 − e^(−rate·gap), without cancellation for a short gap.
                 let forgotten = -libm::expm1(-rate * gap);
                 pick([share * forgotten, 1.0 - (1.0 - share) * forgotten][from])
             }
             Self::Correlated(chance) => {
+                // The next packet repeats the fate of the packet before with probability rho, and is drawn anew otherwise. Rounding may leave [0, 1], hence the
+                // clamp.
                 let (p, rho) = (chance.probability().get(), chance.correlation());
                 pick([p * (1.0 - rho), p + rho * (1.0 - p)][from].clamp(0.0, 1.0))
             }
@@ -123,7 +125,7 @@ impl LinkLaw {
     ///
     /// # Errors
     ///
-    /// A sentence about the part of the link that this law does not describe.
+    /// A sentence about the part of the link without a law here.
     pub(crate) fn of(model: &LinkModel, nominal: Duration) -> Result<Self, &'static str> {
         let Some(config) = model.as_fixed() else {
             return Err("it is modulated, or a kernel's netem");
@@ -148,6 +150,7 @@ impl LinkLaw {
                 _ => return Err("its packets are corrupted by rate, or are not discarded then"),
             },
         };
+        // A copy of netem passes the loss again and would move the chain a second time. The other layouts copy packets after the losses.
         let netem = config.layout == Layout::Netem;
         if config.duplication.correlation() != 0.0 || (netem && chain.is_some() && !config.duplication.is_never()) {
             return Err("its duplicates depend on each other");
@@ -164,7 +167,7 @@ impl LinkLaw {
         };
         let law = config.delay.law().cloned();
         let correlated = config.delay.jitter().is_some_and(|jitter| jitter.correlation != cohaptic_wan::Correlation::None);
-        // A law with values so far from its mean has a tail, of which TAIL cuts a part.
+        // A law with values so far from the mean has a tail, and TAIL cuts a part of the tail.
         let cut = law.as_ref().is_some_and(|law| law.survival(law.mean() + 100.0 * law.sd()) > 0.0 || law.cdf(law.mean() - 7.0 * law.sd()) > 0.0);
         Ok(Self {
             chain,
@@ -187,7 +190,7 @@ impl LinkLaw {
         self.within(i128::MAX) <= 0.0 || self.chain.is_some_and(|chain| chain.loses_all())
     }
 
-    /// Returns the probability that the configured delay of a packet is at most `nanos` nanoseconds.
+    /// Returns the probability of a configured delay of at most `nanos` nanoseconds.
     fn delay(&self, nanos: i128) -> f64 {
         let Some(law) = &self.law else {
             return if nanos >= self.mean { 1.0 } else { 0.0 };
@@ -195,7 +198,7 @@ impl LinkLaw {
         if nanos < 0 {
             return 0.0;
         }
-        // The link rounds delays to nanoseconds, so that every delay below `nanos + 0.5` counts.
+        // The link rounds delays to nanoseconds, so every delay below `nanos + 0.5` counts.
         let at = real(nanos) + 0.5;
         let (below, above) = (law.cdf(at), law.survival(at));
         if above < TAIL {
@@ -210,16 +213,19 @@ impl LinkLaw {
 
 impl Arrival for LinkLaw {
     fn within(&self, nanos: i128) -> f64 {
+        // The nominal delay is the mean of the law plus parts without chance, such as a queue. Only the rest of the time is the law's.
         let nanos = nanos.saturating_sub(self.extra);
         if nanos < 0 {
             return 0.0;
         }
         let way = match self.displaced {
             None => self.delay(nanos),
+            // A jumping packet takes no configured delay: with probability p it arrives at once.
             Some((p, None)) => p + (1.0 - p) * self.delay(nanos),
             Some((p, Some(by))) => p * self.delay(nanos.saturating_sub(by)) + (1.0 - p) * self.delay(nanos),
         };
         let one = (1.0 - self.discarded) * way;
+        // The earlier of two independent arrivals is in time with probability 1 − (1 − one)² = one·(2 − one).
         let copied = |one: f64| (1.0 - self.duplicated) * one + self.duplicated * one * (2.0 - one);
         // netem loses original and duplicate independently. In the other layouts a lost packet has no duplicate.
         if self.netem { copied((1.0 - self.loss) * one) } else { (1.0 - self.loss) * copied(one) }
@@ -229,13 +235,14 @@ impl Arrival for LinkLaw {
         let delay = match (&self.law, self.displaced) {
             (_, Some((_, None))) => 0,
             (None, _) => self.mean,
+            // One nanosecond less than the quantile, for the rounding of delays to whole nanoseconds.
             (Some(law), _) => whole(law.quantile(TAIL * 0.5)) - 1,
         };
         self.extra + delay.max(0)
     }
 }
 
-/// Refuses a configuration with a part that [`LinkLaw`] does not describe.
+/// Refuses a configuration with a part without a description in [`LinkLaw`].
 fn refuse(config: &LinkConfig) -> Result<(), &'static str> {
     let queues = config.bottleneck.is_some() || config.token_bucket.is_some() || config.limit.is_some();
     let spread = config.delay.jitter().is_some() || config.reorder.is_some() || !config.duplication.is_never();

@@ -1,13 +1,13 @@
 //! Stability in the mean square under random loss and random delay.
 //!
-//! With chance in the network the state of a frame is multiplied by a random matrix, z ← A·z. It is *stable in the mean square* if E z·zᵀ dies out whatever
-//! z is at the beginning, which is so if and only if the operator X ↦ E A·X·Aᵀ, or with a Markov chain V_j ↦ Σ p_ij·A_i·V_i·A_iᵀ, has a spectral radius below
-//! 1 (Costa, Fragoso & Marques 2005, Theorem 3.9). A packet carries all axes of a sample, and every axis obeys the same equations, so the operator on the
-//! moments of two axes is that of one, and the radius is that of a scene of one axis.
+//! With chance in the network the state of a frame is multiplied by a random matrix, z ← A·z. The scene is *stable in the mean square* if E z·zᵀ dies out for
+//! every initial z. This holds if and only if the operator X ↦ E A·X·Aᵀ, or with a Markov chain V_j ↦ Σ p_ij·A_i·V_i·A_iᵀ, has a spectral radius below
+//! 1 (Costa, Fragoso & Marques 2005, Theorem 3.9). A packet carries all axes of a sample, and every axis obeys the same equations, so the moments of
+//! two axes have the operator of a single axis, and the radius equals the radius of a scene of one axis.
 //!
-//! Every sample enters a receiver's force as one number only, KT·x + BT·v, so each link adds one state: that number of the sample held by the receiver. The
-//! other combination of the held position and velocity exerts no force, but is part of the state. The probability per frame that nothing arrives is its
-//! eigenvalue (`held`).
+//! Every sample enters a receiver's force only as the number KT·x + BT·v, so each link adds one state: this number of the sample held by the receiver. The
+//! other combination of the held position and velocity exerts no force, but is part of the state. Its eigenvalue is the probability per frame of no
+//! arrival (`held`).
 //!
 //! # How sure the radii are
 //!
@@ -86,10 +86,11 @@ impl MeanSquareMethod {
 /// The result of the analysis of the second moment of a scene.
 #[derive(Clone, PartialEq, Debug)]
 pub struct MeanSquare {
-    /// Factor by which a frame multiplies the second moment of the relative motion in the long run. The scene is stable in the mean square if it is below 1.
+    /// Factor by which a frame multiplies the second moment of the relative motion in the long run. The scene is stable in the mean square if the factor is
+    /// below 1.
     pub radius: Radius,
-    /// Probability per frame, in the long run, that nothing arrives on a random link: the largest such probability over all random links. Only KT·x + BT·v of
-    /// a held sample exerts a force. The other combination stays until a sample arrives, so `radius` is at least this probability.
+    /// Probability per frame, in the long run, of no arrival on a random link: the largest such probability over all random links. Only KT·x + BT·v of
+    /// a held sample exerts a force. The rest stays until a sample arrives, so `radius` is at least this probability.
     pub held: Radius,
     /// Square of the spectral radius over a frame of the same scene without randomness: every delay is its mean and no packet is lost.
     pub nominal_squared: Radius,
@@ -99,12 +100,12 @@ pub struct MeanSquare {
     pub frame: Duration,
     /// Number of unknowns that describe the second moment; 0 with [`MeanSquareMethod::Nominal`].
     pub unknowns: usize,
-    /// Sentences about the limits of the analysis, such as a timeline that is left out.
+    /// Sentences about the limits of the analysis, such as an ignored timeline.
     pub notes: Vec<String>,
 }
 
 impl MeanSquare {
-    /// Returns whether the scene is stable in the mean square, as far as `radius` and its error decide that.
+    /// Returns the verdict on stability in the mean square, as far as `radius` and its error decide.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
         self.radius.verdict()
@@ -124,7 +125,7 @@ pub fn mean_square(scene: &Scene) -> Result<MeanSquare, AnalysisError> {
     mean_square_watched(scene, &Limits::of_unknowns(MOST_UNKNOWNS))
 }
 
-/// Like [`mean_square`], but within `limits`, whose watcher sees the progress and can end the analysis.
+/// Like [`mean_square`], but within `limits`. The watcher of `limits` sees the progress and can end the analysis.
 ///
 /// # Errors
 ///
@@ -137,6 +138,7 @@ pub fn mean_square_watched(scene: &Scene, limits: &Limits<'_>) -> Result<MeanSqu
     let mut notes = Vec::new();
     let mut combines = false;
     let mut found: Option<MeanSquare> = None;
+    // Pieces move independently and contacts last in each combination, so the scene is as unstable as the worst pair.
     for (piece, combination) in pairs(&pieces, &mut combines)? {
         let one = of_contacts(&piece.scene, &network, &combination, limits, &mut notes)?;
         found = Some(match found {
@@ -199,11 +201,13 @@ fn of_contacts(
     let mut found = if random.is_empty() {
         nothing
     } else {
+        // The cheap method first: symmetry describes all equal peers with a fixed number of unknowns, while `one_by_one` needs states for each link.
         match alike(scene, &structure).then(|| symmetric(scene, network, &structure, limits, notes)).transpose()?.flatten() {
             Some(found) => found,
             None => one_by_one(scene, network, &structure, &combination.contacts, &random, limits, notes)?,
         }
     };
+    // No peer hears another then. Only the held samples are random, and the motion is as without chance.
     if structure.is_silent(scene) {
         found = Found { held: found.held, ..nothing };
     }
@@ -218,7 +222,7 @@ fn of_contacts(
     Ok(MeanSquare { radius, held, nominal_squared, method, frame, unknowns, notes: Vec::new() })
 }
 
-/// Returns the random links as pairs (sender, receiver). If all links have the same model, the link from peer 0 to peer 1 stands for all.
+/// Returns the random links as pairs (sender, receiver). Among links of one model, the link from peer 0 to peer 1 stands for all.
 fn random_links(scene: &Scene) -> Result<Vec<(usize, usize)>, AnalysisError> {
     let random = if only_model(scene) {
         if is_random(scene.links.between(0, 1)) { vec![(0, 1)] } else { Vec::new() }
@@ -230,7 +234,7 @@ fn random_links(scene: &Scene) -> Result<Vec<(usize, usize)>, AnalysisError> {
         let pairs = (0..peers).flat_map(|to| (0..peers).filter(move |from| *from != to).map(move |from| (from, to)));
         pairs.filter(|(from, to)| is_random(scene.links.between(*from, *to))).collect()
     };
-    // An access line is shared by all links of its peer, so chance on it correlates these links, whose chains are taken as independent.
+    // All links of a peer share the peer's access line. Chance on the line correlates these links, but the operator takes their chains as independent.
     let access = |model: Option<&cohaptic_wan::LinkModel>| model.is_some_and(is_random);
     let queues = |model: Option<&cohaptic_wan::LinkModel>| model.is_some_and(|model| !model.is_constant_delay());
     if let Some(peer) = scene
@@ -246,7 +250,7 @@ fn random_links(scene: &Scene) -> Result<Vec<(usize, usize)>, AnalysisError> {
     Ok(random)
 }
 
-/// Returns the law of a random link, and the ticks at which its samples may arrive; `None` if nothing ever arrives.
+/// Returns the law of a random link, and the possible ticks of arrival; `None` if nothing ever arrives.
 fn hazards(
     scene: &Scene,
     network: &NominalNetwork,
@@ -270,7 +274,7 @@ fn hazards(
     if hazards.spread && law.correlated_delays {
         return Err(refuse("its delays depend on each other"));
     }
-    // Several places mean that a sample can overtake another one. A link in order delays the overtaking sample, which `Arrival` does not describe.
+    // With several places a sample can overtake an earlier sample. A link in order delays the overtaking sample, and `Arrival` does not describe this delay.
     if hazards.places > 1 && law.in_order {
         return Err(refuse("its samples wait for each other (order = \"in-order\")"));
     }
@@ -280,7 +284,7 @@ fn hazards(
     Ok(Some((hazards, law)))
 }
 
-/// Radii of one combination of contacts: of the moments that exert forces, and of the held moments that exert none.
+/// Radii of one combination of contacts: of the moments with forces, and of the forceless held moments.
 #[derive(Clone, Copy, Debug)]
 struct Found {
     radius: Radius,
@@ -291,7 +295,7 @@ struct Found {
 }
 
 impl Found {
-    /// Computes the radius of `operator`. One image of the operator takes `operations` operations, of which the watcher hears.
+    /// Computes the radius of `operator`. The watcher hears of `operations` operations per image of the operator.
     fn of(
         operator: &impl Positive,
         operations: f64,
@@ -306,10 +310,10 @@ impl Found {
     }
 }
 
-/// Probability per frame that a held sample stays, on a link on which nothing ever arrives.
+/// Probability per frame of no arrival on a link without any arrivals.
 const SILENT: Radius = Radius { value: 1.0, error: 0.0 };
 
-/// Instants at which equal peers over equal links send samples, and at which these samples may arrive.
+/// Instants of sending, and of possible arrivals, of equal peers over equal links.
 struct Alike {
     /// Events of one peer, without deliveries.
     timetable: Timetable,
@@ -326,13 +330,13 @@ impl Alike {
         Ok(Self { timetable, instants, hazards })
     }
 
-    /// Returns the hazards if losses are independent, no sample overtakes another, and the frame of one peer is that of the scene.
+    /// Returns the hazards if losses are independent, no sample overtakes another, and the frame of one peer equals the frame of the scene.
     fn independent(&self, structure: &Structure) -> Option<&Hazards> {
         let (hazards, law) = self.hazards.as_ref()?;
         (hazards.places == 1 && law.chain.is_none() && self.timetable.frame == structure.timetable.frame).then_some(hazards)
     }
 
-    /// Returns the probability per frame that nothing arrives on a link.
+    /// Returns the probability per frame of no arrival on a link.
     fn held(&self, hazards: &Hazards) -> Radius {
         let line = Line { from: 0, to: 0, chance: Some((hazards.clone(), None)) };
         line.staying(&self.instants, self.timetable.frame).unwrap_or(NOTHING)
@@ -358,7 +362,8 @@ fn symmetric(
     let node = structure.node(scene, 0);
     let lifted = Lifted { timetable, ..structure.quotient(scene, std::slice::from_ref(&node)) };
     if alike.hazards.is_none() {
-        // No peer hears another, so each peer moves alone, pulled towards the constant initial positions of the others. That pull ties the peer to the ground.
+        // No peer hears another peer, so each peer moves alone, pulled towards the constant initial positions of all other peers. The pull ties the peer to the
+        // ground.
         let alone = Lifted { tied: true, ..lifted };
         let operator = events_watched(&alone, &[], instants, limits.watch).ok_or(AnalysisError::Stopped)?;
         let cost = frame_cost(scene, timetable, 0);
@@ -374,19 +379,19 @@ fn symmetric(
     Found::of(&operator, operator.operations(), alike.held(hazards), (MeanSquareMethod::Symmetric, frame), limits.watch).map(Some)
 }
 
-/// Method for the second moments of many scenes that differ in numbers only, in one combination of contacts.
+/// Method for the second moments of many scenes with different numbers, in one combination of contacts.
 #[derive(Clone, Debug)]
 pub(crate) enum Followed {
     /// No link is random: the radius is the square of the spectral radius of the motion.
     Certain,
-    /// Equal peers over equal links with independent losses. `held` is the probability per frame that nothing arrives on a link.
+    /// Equal peers over equal links with independent losses. `held` is the probability per frame of no arrival on a link.
     Equal { frame: Equal, held: f64 },
     /// [`mean_square`] for each scene, because no part of the computation is common to all scenes.
     Anew,
 }
 
 impl Followed {
-    /// Chooses the method for all scenes that differ from `scene` in numbers only. `structure` holds the classes of peers, which all these scenes share.
+    /// Chooses the method for all scenes with the same structure as `scene` and different numbers. `structure` holds the common classes of peers.
     ///
     /// # Errors
     ///

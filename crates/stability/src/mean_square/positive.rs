@@ -1,27 +1,29 @@
 //! Spectral radius of a positive operator, enclosed by two checked bounds.
 //!
 //! L maps positive semidefinite matrices to positive semidefinite matrices. By the theorem of Krein & Rutman (1948) its spectral radius ρ is an
-//! eigenvalue. Let Y be such that γY − L(Y) is positive definite.
+//! eigenvalue. Let Y be a matrix with γY − L(Y) positive definite.
 //!
 //! - If Y is positive definite, then L(Y) < γY, and L maps the interval −Y ≤ X ≤ Y into γ' times itself for a γ' < γ: **ρ < γ**.
-//! - If γ > ρ, then Y = Σ L^k(γY − L(Y))/γ^(k+1), which is positive definite. So if Y is not, **γ ≤ ρ**.
+//! - If γ > ρ, then Y = Σ L^k(γY − L(Y))/γ^(k+1) is positive definite. So if Y is not positive definite, **γ ≤ ρ**.
 //!
-//! Both bounds are decided by signs alone, whatever the origin of Y and the condition of the eigenvectors of L. The chosen Y is the element of the Krylov
-//! space of a fixed positive definite E for which γY − L(Y) is nearest to E. That space is the same for every γ, so one Arnoldi factorisation serves all γ.
+//! Both bounds are decided by signs alone, whatever the origin of Y and the condition of the eigenvectors of L. In the Krylov
+//! space of a fixed positive definite E, Y is the element with γY − L(Y) nearest to E. The space is the same for every γ, so one Arnoldi factorisation serves
+//! all γ.
 //!
 //! # Rounding
 //!
-//! A computation of sums, products and constants changes each of its terms by at most as many roundings as the term goes through. If these are at most K
-//! (`roundings`) and S are the sizes of the terms of each entry, added up (`sizes`), then the computed image is within γ_K·S of the exact image (Higham 2002,
-//! Section 3.1). Cholesky's factorisation with Rump's criterion (`definite`) shows that γY − L(Y) is positive definite whatever these errors are. A diagonal
-//! entry of Y below zero shows, without any rounding, that Y is not positive definite. So the bounds hold for the operator with the coefficients as stored.
-//! The bounds hold for the exact operator as far as the errors of the coefficients are counted among the roundings. Numbers that underflow are not counted.
+//! A computation of sums, products and constants changes each of its terms by at most as many roundings as the term goes through. If at most K
+//! (`roundings`) roundings change a term, and S are the sizes of the terms of each entry, added up (`sizes`), then the computed image is within γ_K·S of the
+//! exact image (Higham 2002, Section 3.1). Cholesky's factorisation with Rump's criterion (`definite`) shows that γY − L(Y) is positive definite despite these
+//! errors. A diagonal entry of Y below zero shows, without any rounding, that Y is not positive definite. So the bounds hold for the operator with the
+//! coefficients as stored. The bounds hold for the exact operator as far as the errors of the coefficients are counted among the roundings. Numbers that
+//! underflow are not counted.
 
 use crate::definite::is_positive;
 use crate::rounding::{gamma, outward};
 use crate::{Matrix, Radius, Watch};
 
-/// Linear operator on symmetric matrices, or on tuples of symmetric matrices, that maps positive semidefinite elements to positive semidefinite elements.
+/// Linear operator on symmetric matrices, or on tuples of symmetric matrices, with positive semidefinite images of positive semidefinite elements.
 /// An element is given by its vector of coordinates.
 pub trait Positive: Sync {
     /// Returns the number of coordinates of an element.
@@ -30,11 +32,11 @@ pub trait Positive: Sync {
     fn base(&self) -> Vec<f64>;
     /// Returns the image of an element.
     fn apply(&self, element: &[f64]) -> Vec<f64>;
-    /// Returns, for each coordinate, the sum of the absolute values of the terms that [`apply`](Self::apply) adds up. `element` has no negative coordinate.
+    /// Returns, for each coordinate, the sum of the absolute values of the terms of [`apply`](Self::apply). `element` has no negative coordinate.
     fn sizes(&self, element: &[f64]) -> Vec<f64>;
     /// Returns an upper bound of the number of roundings of a term of `apply`, the roundings of the coefficients included.
     fn roundings(&self) -> usize;
-    /// Returns the symmetric matrices that are all positive definite if and only if the element is positive definite.
+    /// Returns symmetric matrices. All are positive definite if and only if the element is positive definite.
     fn matrices(&self, element: &[f64]) -> Vec<Matrix>;
 }
 
@@ -55,7 +57,7 @@ const BREAKDOWN: f64 = 1e-14;
 
 /// Returns the spectral radius with its error; `None` if the watcher ends the computation. One image takes `operations` operations.
 ///
-/// If no lower bound is found, the error covers the whole interval from zero. If numbers overflow, the operator is divided by a power of two, which is exact.
+/// If no lower bound is found, the error covers the whole interval from zero. If numbers overflow, the operator is divided by a power of two, without rounding.
 /// If numbers overflow even then, the result has an infinite error.
 pub fn radius_watched(operator: &impl Positive, operations: f64, watch: &dyn Watch) -> Option<Radius> {
     let watched = Images { operator, factor: 1.0, operations, watch };
@@ -75,7 +77,7 @@ pub fn radius_watched(operator: &impl Positive, operations: f64, watch: &dyn Wat
     }
 }
 
-/// Returns γ and a Y for which γY − L(Y) is nearly the base. The function `gamma` chooses γ for an estimate of the spectral radius. The result is not proven:
+/// Returns γ and a Y with γY − L(Y) near the base. The function `gamma` chooses γ for an estimate of the spectral radius. The result is not proven:
 /// the caller must check that γY − L(Y) is positive definite. `None` if numbers overflow.
 pub fn solution(operator: &impl Positive, gamma: impl Fn(f64) -> f64) -> Option<(f64, Vec<f64>)> {
     let mut krylov = Krylov::new(operator.base());
@@ -86,6 +88,7 @@ pub fn solution(operator: &impl Positive, gamma: impl Fn(f64) -> f64) -> Option<
         if going && krylov.steps() < next {
             continue;
         }
+        // An estimate of the radius costs the eigenvalues of the Hessenberg matrix. The distances between estimates grow with the space.
         next = krylov.steps() + krylov.steps() / 4 + 2;
         let gamma = gamma(krylov.largest_real()?);
         let (solution, left) = krylov.solve(gamma)?;
@@ -97,6 +100,7 @@ pub fn solution(operator: &impl Positive, gamma: impl Fn(f64) -> f64) -> Option<
 
 /// Returns whether γY − L(Y) is shown to be positive definite despite all rounding errors, with γ = `factor` and Y = `solution`.
 pub fn leaves_less(operator: &impl Positive, factor: f64, solution: &[f64]) -> bool {
+    // γY − L(Y) is computed with rounding. A bound of the error of each entry goes with the difference, and the criterion takes the error into account.
     let image = operator.apply(solution);
     let left: Vec<f64> = solution.iter().zip(&image).map(|(solution, image)| factor * solution - image).collect();
     let absolute: Vec<f64> = solution.iter().map(|entry| entry.abs()).collect();
@@ -108,7 +112,7 @@ pub fn leaves_less(operator: &impl Positive, factor: f64, solution: &[f64]) -> b
     left.iter().zip(&error).all(|(left, error)| is_positive(left, error))
 }
 
-/// Distance of γY − L(Y) from the base, relative to the base, at which [`solution`] ends. Near enough for a Y that is then checked over a box of operators.
+/// Distance of γY − L(Y) from the base, relative to the base, at which [`solution`] ends. Near enough, because Y is then checked over a box of operators.
 const NEARLY: f64 = 1e-6;
 
 /// Reason for the absence of a radius.
@@ -184,6 +188,7 @@ fn within_range(operator: &impl Positive, watch: &dyn Watch) -> Result<Radius, E
         if steps < next && !last {
             continue;
         }
+        // The distance to the next look grows with the space: eigenvalues of the Hessenberg matrix cost the third power of its size.
         next = steps + steps / 4 + 2;
         let guess = krylov.largest_real().ok_or(Ended::Overflow)?;
         let settled = (guess - before).abs() <= SETTLED * guess;
@@ -205,10 +210,11 @@ fn within_range(operator: &impl Positive, watch: &dyn Watch) -> Result<Radius, E
     }
     let value = 0.5 * (low + high);
     // The middle of the two bounds is rounded too, which the last term covers.
+    // The radius lies between `low` and `high`, so the larger half is the error of the middle.
     Ok(Radius { value, error: outward((high - value).max(value - low)) + f64::EPSILON * value })
 }
 
-/// Krylov space of E, L(E), L²(E), …, with an orthonormal basis in which L is an upper Hessenberg matrix.
+/// Krylov space of E, L(E), L²(E), …, with an orthonormal basis. In the basis L is an upper Hessenberg matrix.
 struct Krylov {
     /// Coordinates of E.
     base: Vec<f64>,
@@ -216,7 +222,7 @@ struct Krylov {
     norm: f64,
     /// Orthonormal basis; the first vector is E divided by its norm.
     basis: Vec<Vec<f64>>,
-    /// Columns of the Hessenberg matrix. Each column has one entry more than the column before.
+    /// Columns of the Hessenberg matrix. Each column is longer by one entry than the column before.
     columns: Vec<Vec<f64>>,
 }
 
@@ -248,6 +254,7 @@ impl Krylov {
         }
         let left = dot(&image, &image).sqrt();
         let last = self.basis.len();
+        // An image inside the space leaves only rounding outside. The space is then invariant, and its eigenvalues are eigenvalues of L.
         let going = left > BREAKDOWN * size;
         if going {
             column[last] = left;
@@ -276,11 +283,12 @@ impl Krylov {
         Some(if real > 0.0 { real } else { scale })
     }
 
-    /// Returns the tightest bounds around a guess that can be proven in this space; `None` if the watcher ends the search. Without a proof the lower bound is 0
+    /// Returns the tightest provable bounds around a guess in this space; `None` if the watcher ends the search. Without a proof the lower bound is 0
     /// and the upper bound infinite.
     fn bounds(&self, operator: &impl Positive, guess: f64, watch: &dyn Watch) -> Option<(f64, f64)> {
         let mut low = 0.0;
         let mut apart = NEAREST;
+        // Candidates leave the guess in steps that double. The first proven candidate is the tightest of the steps.
         while apart < 1.0 && low == 0.0 {
             if watch.stops() {
                 return None;
@@ -307,7 +315,7 @@ impl Krylov {
         Some((low, high))
     }
 
-    /// Returns whether the Y of this space for γ = `candidate` is of the wanted `kind`, and γY − L(Y) is shown to be positive definite.
+    /// Returns true if the Y of this space for γ = `candidate` is of the wanted `kind`, and γY − L(Y) is shown to be positive definite.
     fn check(&self, operator: &impl Positive, candidate: f64, kind: &dyn Fn(&[Matrix]) -> bool) -> bool {
         let Some((solution, _)) = self.solve(candidate) else {
             return false;
@@ -315,9 +323,9 @@ impl Krylov {
         kind(&operator.matrices(&solution)) && leaves_less(operator, candidate, &solution)
     }
 
-    /// Returns the combination Y of the basis for which the norm of γY − L(Y) − E is least, and that norm. `None` if the problem is singular or overflows.
+    /// Returns the combination Y of the basis with the least norm of γY − L(Y) − E, and this norm. `None` if the problem is singular or overflows.
     ///
-    /// The least-squares problem has a Hessenberg matrix, which Givens rotations make triangular.
+    /// The least-squares problem has a Hessenberg matrix. Givens rotations make this matrix triangular.
     fn solve(&self, candidate: f64) -> Option<(Vec<f64>, f64)> {
         let size = self.columns.len();
         let mut matrix = Matrix::from_fn(size + 1, size, |row, column| {
@@ -333,6 +341,7 @@ impl Krylov {
                 return None;
             }
             let (cosine, sine) = (above / length, below / length);
+            // The rotation makes the entry below the diagonal zero. Entries left of `place` are zero already.
             for column in place..size {
                 let (one, two) = (matrix[(place, column)], matrix[(place + 1, column)]);
                 matrix[(place, column)] = cosine * one + sine * two;
@@ -343,10 +352,12 @@ impl Krylov {
             right[place + 1] = cosine * two - sine * one;
         }
         let mut weights = vec![0.0; size];
+        // Back substitution. No diagonal entry is zero, since each is a `length` that was checked above.
         for row in (0..size).rev() {
             let known: f64 = (row + 1..size).map(|column| matrix[(row, column)] * weights[column]).sum();
             weights[row] = (right[row] - known) / matrix[(row, row)];
         }
+        // The last entry of the rotated right side lies outside the range of the matrix, so its size is the norm of the rest.
         let left = right[size].abs();
         let mut solution = vec![0.0; self.base.len()];
         for (weight, direction) in weights.iter().zip(&self.basis) {
@@ -368,7 +379,8 @@ pub fn is_definite(matrices: &[Matrix]) -> bool {
     matrices.iter().all(|matrix| is_positive(matrix, &Matrix::zeros(matrix.rows(), matrix.columns())))
 }
 
-/// Returns whether the diagonal of any of the matrices has an entry below zero. With e the unit vector of that entry, eᵀYe < 0, so Y is not positive definite.
+/// Returns whether the diagonal of any of the matrices has an entry below zero. With e the unit vector of the negative entry, eᵀYe < 0, so Y is not positive
+/// definite.
 pub fn is_indefinite(matrices: &[Matrix]) -> bool {
     matrices.iter().any(|matrix| (0..matrix.rows()).any(|place| matrix[(place, place)] < 0.0))
 }
@@ -380,7 +392,7 @@ pub(crate) fn pack(matrix: &Matrix, into: &mut Vec<f64>) {
     }
 }
 
-/// Returns the symmetric matrix of `size` rows whose lower half begins `from`, and the rest of `from` after that half.
+/// Returns the symmetric matrix of `size` rows with its lower half at the beginning of `from`, and the rest of `from` after that half.
 pub(crate) fn unpack(size: usize, from: &[f64]) -> (Matrix, &[f64]) {
     let mut matrix = Matrix::zeros(size, size);
     let mut rest = from;
