@@ -1,7 +1,7 @@
-//! The general path of the analysis: unit vectors of the state are pushed through the code that also simulates.
+//! The general path of the analysis: unit vectors of the state are pushed through the code of the simulator.
 //!
-//! Real [`Peer`]s with real strategies are set to a state, stepped through one frame of the timetable, and read again. Any strategy can be analysed in this
-//! way as long as the strategy is linear. A strategy that is not linear, or that depends on more than the state it shows, is detected and refused.
+//! Real [`Peer`]s with real strategies are set to a state, stepped through one frame of the timetable, and read again. Any linear strategy can be analysed in
+//! this way. A strategy with a nonlinear force, or with more memory than the shown state, is detected and refused.
 
 mod layout;
 mod rigid;
@@ -37,14 +37,14 @@ pub struct FullMap {
     pub(crate) states: Vec<StateName>,
     /// Common time by which velocities are multiplied \[s\], so that all states are lengths.
     pub(crate) time: f64,
-    /// Peer to whose copy positions are relative, indexed by peer and axis. `None` for absolute positions.
+    /// Peer with the reference copy of relative positions, indexed by peer and axis. `None` for absolute positions.
     pub(crate) relative: Vec<Vec<Option<usize>>>,
-    /// Contribution of each state (column) to the forces that strategies command in the frame, one row per force. `None` if samples carry no waves.
+    /// Contribution of each state (column) to the commanded forces of strategies in the frame, one row per force. `None` if samples carry no waves.
     pub(crate) forces: Option<Matrix>,
 }
 
 impl FullMap {
-    /// Returns the part of the matrix that bodies can feel, and a bound of its error. Without waves that is the whole matrix.
+    /// Returns the part of the matrix with an effect on bodies, and a bound of its error: without waves the whole matrix.
     pub fn felt(self) -> (Matrix, f64) {
         let Some(forces) = &self.forces else { return (self.monodromy, self.error) };
         let (felt, rounded) = felt(&self.monodromy, forces, &self.states);
@@ -55,9 +55,9 @@ impl FullMap {
 /// The knowledge about a strategy before any vector is pushed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Trust {
-    /// A strategy of this workspace, whose tests show that the strategy is linear. The check is left out.
+    /// A strategy of this workspace, linear by the tests of the workspace. The check is left out.
     Linear,
-    /// A strategy about which nothing is known. Linearity is checked before the matrix is built.
+    /// An unknown strategy. Linearity is checked before the matrix is built.
     Nothing,
 }
 
@@ -105,13 +105,13 @@ fn full<const A: usize, S: Strategy<A>>(
     Ok(map)
 }
 
-/// Returns a bound of the matrix's error for a strategy whose law is known. Each real peer computes the same as its node of the lifted system, so the bound
+/// Returns a bound of the matrix's error for a strategy with a known law. Each real peer computes the same as its node of the lifted system, so the bound
 /// of the lifted system holds.
 fn error_of_known(scene: &Scene, structure: &Structure, time: f64) -> f64 {
     let node = |peer: usize| {
         let mut node = structure.node(scene, peer);
         if node.device.is_none() {
-            // The structure leaves out a device that touches nothing, but the general path pushes its states too. The node gets the device without a coupling.
+            // The structure leaves out a loose device, but the general path pushes its states too. The node gets the device without a coupling.
             let spec = &scene.peers[peer];
             node.device = Some(Body::new(scene.device_plant(peer), scene.integrator, &spec.clock));
             node.coupling = Gains { stiffness: 0.0, damping: 0.0 };
@@ -123,7 +123,7 @@ fn error_of_known(scene: &Scene, structure: &Structure, time: f64) -> f64 {
     error_of(&lifted, |peer| compliance(scene, peer, time))
 }
 
-/// Returns the factor that turns forces of a peer into lengths [m/N].
+/// Returns the factor from forces of a peer to lengths [m/N].
 fn compliance(scene: &Scene, peer: usize, time: f64) -> f64 {
     time * scene.peers[peer].clock.tick.as_secs_f64() / scene.copy_mass()
 }
@@ -151,7 +151,7 @@ struct Pusher<const A: usize, S> {
     /// Extra numbers of the samples, indexed by sending peer, then by sample and receiver. Empty if samples carry states only.
     extras: Vec<Vec<[f64; A]>>,
     kind: SampleKind,
-    /// Forces that strategies commanded in the frame pushed last, by tick and axis. Empty unless samples carry waves.
+    /// Forces commanded by strategies in the frame pushed last, by tick and axis. Empty unless samples carry waves.
     commanded: Vec<f64>,
     /// Largest position plus scaled velocity of a body in any frame so far, for the bound of errors.
     growth: f64,
@@ -178,7 +178,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             let mut config = scene.peer_config(place);
             config.contact = if contacts.touching[place] { Contact::Grasp } else { Contact::None };
             config.enclosure = None;
-            // Stability does not depend on the force that a hand applies from outside, so that force is zero here. The arm's impedance remains.
+            // Stability does not depend on the outer force of a hand, so this force is zero here. The arm's impedance remains.
             let hand = spec.hand.as_ref().and_then(Hand::arm).map(|arm| Hand::Arm { arm, follows: Signal::Constant([0.0; 3]) });
             let device = SimulatedDevice::new(spec.device, hand.as_ref(), State::REST, scene.integrator, &spec.clock);
             let object = ObjectCopy::new(scene.copy_config(place), State::REST, scene.integrator, &spec.clock);
@@ -194,14 +194,14 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         }
         let silent = links.iter().any(|(_, _, timing)| matches!(timing, LinkTiming::Pattern(pattern) if pattern.iter().all(Option::is_none)));
         let arm = |place: usize| contacts.touching[place] && scene.device_plant(place).stiffness > 0.0;
-        // Waves carry no position, so only a peer's own arm ties its copy. With other samples one arm ties all copies.
+        // Waves carry no position, so only the arm of the same peer ties a copy. With other samples one arm ties all copies.
         let tied = |place: usize| if kind == SampleKind::Wave { arm(place) } else { silent || (0..peers).any(arm) };
         let tied = (0..peers).map(tied).collect();
         let layout = Layout::new(scene, contacts, &members, &timetable, tied);
         let touching = contacts.touching.iter().copied().enumerate();
         let time = common_time(scene, timetable.frame, linear_law(scene, 0).map_or(scene.coordination.gains, |law| law.held_by()), touching, false);
         let compliance: Vec<f64> = (0..peers).map(|peer| compliance(scene, peer, time)).collect();
-        // Length for a wave of 1 √W, which against a line of 1 N·s/m gives √2 N: the motion of a copy from one sample to the next under such a wave.
+        // Length for a wave of 1 √W, equal to √2 N on a line of 1 N·s/m: the motion of a copy from one sample to the next under this wave.
         let wave = scene.coordination.update.as_secs_f64() * (time / scene.copy_mass()).sqrt();
         let (extra, remembered) = if kind == SampleKind::Wave { (vec![wave; peers], wave) } else { (compliance.clone(), 1.0) };
         let names = scene.peers.iter().map(|peer| peer.name.clone()).collect();
@@ -224,18 +224,19 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         })
     }
 
-    /// Builds the matrix of a frame column by column, by pushing one unit vector for each kept state.
+    /// Builds the matrix of a frame column by column, by pushing a unit vector for each kept state.
     fn map(mut self, watch: &dyn Watch) -> Result<FullMap, AnalysisError> {
         let size = self.layout.size;
         let events = self.timetable.events.len();
         PartCost::of_full(size, events, A).begin(watch)?;
         let rest = self.pushed(&vec![0.0; size], Instant::ZERO);
         let free = self.free_translations(&rest);
-        // Positions are relative to the reference copies, whose own positions are therefore dropped; so are loose positions, on which nothing depends.
+        // Positions are relative to the reference copies, so the reference copies' own positions are dropped. Loose positions are dropped too, since nothing
+        // depends on a loose position.
         let kept: Vec<usize> =
             (0..size).filter(|state| free.iter().all(|free| free.reference != *state) && !self.layout.loose.contains(state)).collect();
         let mut monodromy = Matrix::zeros(kept.len(), kept.len());
-        // The pushes before were of rest and displacements. Only the growth of unit vectors enters the bound of the error.
+        // Rest and displacements were pushed before. Only the growth of unit vectors enters the bound of the error.
         self.growth = 1.0;
         let mut commanded = Vec::new();
         let (mut unit, mut reached) = (vec![0.0; size], vec![0.0; size]);
@@ -282,7 +283,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         order.into_iter().map(|(.., place)| place).collect()
     }
 
-    /// Refuses a strategy that is not linear, or that depends on more than the state it shows.
+    /// Refuses a strategy with a nonlinear force, or with a dependence on more than the shown state.
     fn check(&mut self) -> Result<(), AnalysisError> {
         let size = self.layout.size;
         let rest = self.pushed(&vec![0.0; size], Instant::ZERO);
@@ -293,9 +294,10 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         let mut small: Option<Vec<f64>> = None;
         for amplitude in [1e-6, 1e-2, 10.0] {
             let (one, other) = (noise(size, 1, amplitude), noise(size, 2, amplitude));
+            // A linear f has f(one − 2·other) = f(one) − 2·f(other), with the motion from rest taken off on both sides.
             let both: Vec<f64> = one.iter().zip(&other).map(|(one, other)| one - 2.0 * other).collect();
             let reached_one = self.pushed(&one, Instant::ZERO);
-            // The same state must lead to the same result at a later time. Otherwise the strategy remembers more than it shows, or uses the time.
+            // The same state must lead to the same result at a later time. Otherwise the strategy remembers more than the shown state, or uses the time.
             if self.pushed(&one, later) != reached_one {
                 return Err(AnalysisError::Remembers);
             }
@@ -315,7 +317,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         Ok(())
     }
 
-    /// Returns the state after one frame that begins at `begin` with the state `z`.
+    /// Returns the state after one frame from the state `z` at the instant `begin`.
     fn pushed(&mut self, z: &[f64], begin: Instant) -> Vec<f64> {
         let mut reached = vec![0.0; z.len()];
         self.push(z, begin, &mut reached);
@@ -337,6 +339,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
                 Event::Tick { node, at, span } => {
                     let now = begin.saturating_add_nanos(at);
                     let member = &mut self.members[node];
+                    // Forces first, motion after: the forces belong to the state at the tick.
                     let forces = member.compute(now);
                     member.advance(now, span);
                     if self.layout.has_waves {
@@ -374,6 +377,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         let state = *self.sample(from, sample);
         let after = self.instants.local(from, self.instants.sent_at(from, sample, self.timetable.frame));
         let sent = Instant::from_nanos(begin_local.as_nanos().saturating_add_signed(after));
+        // Peers number their senders without themselves, so indices above the own index move down by one.
         let among_others = |one: usize, other: usize| if one < other { one } else { one - 1 };
         self.members[to].hold(among_others(from, to), sent, state);
         if self.layout.receivers > 0 && accepts {
@@ -409,7 +413,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             }
             let memory: Vec<f64> = z[next..next + layout.memory[place]].iter().map(|number| number / self.remembered).collect();
             member.strategy_mut().set_memory(&memory);
-            // The vector has the newest sample first, `samples` the oldest, so that a sample's index there grows with its number.
+            // The vector has the newest sample first, `samples` the oldest, so the index in `samples` grows with the sample's number.
             let depth = self.timetable.depth[place];
             let begin = |age: usize| layout.samples[place] + age * layout.sample_len::<A>();
             let samples = (0..depth).rev().map(|age| state(&z[begin(age)..], self.time));
@@ -422,7 +426,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         }
         for held in 0..self.timetable.held.len() {
             let (to, from, sample) = self.timetable.held[held];
-            // A strategy with memory got the effect of earlier samples back with that memory, and must not accept their extra numbers again.
+            // The memory of a strategy contains the effect of earlier samples, so a strategy with memory must not accept the samples' extra numbers again.
             self.hold((to, from, sample), begin_local, self.layout.memory[to] == 0);
         }
     }
@@ -445,6 +449,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             *entry = number * self.remembered;
         }
         let receivers = layout.receivers;
+        // Only the newest `depth` samples pass into the next frame, newest first as in `restore`.
         for (age, (number, sample)) in self.samples[place].iter().enumerate().rev().take(self.timetable.depth[place]).enumerate() {
             let first = layout.samples[place] + age * layout.sample_len::<A>();
             write(sample, &mut z[first..], self.time);
@@ -456,7 +461,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
     }
 }
 
-/// Returns the matrix of commanded forces: one row per force in the given order, one column per state. Of equal consecutive rows only the first is kept.
+/// Returns the matrix of commanded forces: one row per force in the given order, one column per state. Equal consecutive rows are kept once.
 fn forces_of(commanded: &[Vec<f64>], order: &[usize]) -> Matrix {
     let mut rows: Vec<Vec<f64>> = order.iter().map(|place| commanded.iter().map(|forces| forces[*place]).collect()).collect();
     rows.dedup();

@@ -1,9 +1,9 @@
-//! Analysis of equal peers on a graph, whose edges tell which peer hears which.
+//! Analysis of equal peers on a graph. An edge leads from a heard peer to a hearing peer.
 //!
 //! In a scene without a topology every peer hears all other peers. If each of N equal peers hears only its neighbours, with mutual weights W and row sums D,
 //! then the averaging matrix D⁻¹W has a full set of eigenvectors and real eigenvalues λ from −1 to 1, because D^½·D⁻¹W·D^−½ is symmetric. Along an
-//! eigenvector all peers make the same motion, each scaled by its entry, and each hears λ times its own samples. The scene therefore splits into N systems of
-//! one node each. The eigenvalue 1 occurs once for each connected part of the graph, and each part can be displaced as a whole.
+//! eigenvector all peers make the same motion, scaled by the peer's entry, and each peer hears λ times its own samples. The scene therefore splits into N
+//! systems of a single node. The eigenvalue 1 occurs once for each connected part of the graph, and each part can be displaced as a whole.
 
 pub(crate) mod enclosed;
 
@@ -20,23 +20,23 @@ use crate::rounding::real;
 use crate::structure::Structure;
 use crate::{Analysis, AnalysisError, ContactMode, Matrix, Method, PartKind, Unwatched, Watch};
 
-/// A graph of equal peers, whose edges tell which peer hears which.
+/// A graph of equal peers. An edge leads from a heard peer to a hearing peer.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Graph {
-    /// Every peer hears all others, as in a scene without a topology. Eigenvalues: λ = 1 once and λ = −1/(N−1), N−1 times.
+    /// Every peer hears all other peers, as in a scene without a topology. Eigenvalues: λ = 1 once and λ = −1/(N−1), N−1 times.
     Complete,
-    /// Each peer hears n neighbours, n/2 before it and n/2 after it. Eigenvalues: λ = (2/n)·Σ cos(2πkm/N) over m from 1 to n/2, for k from 0 to N−1.
+    /// Each peer hears n neighbours, n/2 on either side. Eigenvalues: λ = (2/n)·Σ cos(2πkm/N) over m from 1 to n/2, for k from 0 to N−1.
     Ring {
-        /// Number n of neighbours that a peer hears: even, above 0 and below N. Ignored for two peers, who hear each other.
+        /// Number n of heard neighbours of a peer: even, above 0 and below N. Ignored for two peers, since two peers hear each other.
         neighbours: usize,
     },
-    /// The first peer hears all others, and each other peer hears only the first. Eigenvalues: λ = 1, λ = 0 (N−2 times), and λ = −1.
+    /// The first peer hears all other peers, and each further peer hears only the first. Eigenvalues: λ = 1, λ = 0 (N−2 times), and λ = −1.
     Star,
-    /// Each peer hears the others with mutual weights, given as a symmetric matrix of N rows with a zero diagonal.
+    /// Each peer hears further peers with mutual weights, given as a symmetric matrix of N rows with a zero diagonal.
     Weighted(Matrix),
 }
 
-/// Reason for which peers cannot be analysed on a graph.
+/// Reason against an analysis of peers on a graph.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GraphError {
@@ -46,7 +46,7 @@ pub enum GraphError {
     /// The peers or their links differ.
     #[error("peer {peer} or a link of it is not like the others: expected equal peers and equal links on a graph")]
     Unequal {
-        /// Name of the first peer that differs from peer 0 of the scene.
+        /// Name of the first peer unlike peer 0 of the scene.
         peer: String,
     },
     /// A weight is negative, not finite or not mutual, the diagonal is not zero, or the matrix has the wrong size.
@@ -75,7 +75,7 @@ pub enum GraphError {
         /// The number of neighbours of each peer.
         neighbours: usize,
     },
-    /// The strategy's force is a sum over the heard peers, and not all peers hear equally many, so that their stiffnesses differ.
+    /// The strategy's force is a sum over the heard peers, and not all peers hear equally many peers, so the stiffnesses differ.
     #[error(
         "proportional-derivative coordination is stiffer the more a peer hears, so these peers are not equal: expected average-position, or a graph in which all hear as much"
     )]
@@ -85,7 +85,7 @@ pub enum GraphError {
     NotLinear,
 }
 
-/// Turns the error of an analysis on a graph into the error for a scene whose topology is that graph.
+/// Turns the error of an analysis on a graph into the error for a scene with this graph as its topology.
 pub fn on_this_topology(error: GraphError) -> AnalysisError {
     match error {
         GraphError::Analysis(error) => error,
@@ -98,7 +98,7 @@ pub fn on_this_topology(error: GraphError) -> AnalysisError {
     }
 }
 
-/// Analyses the scene's equal peers as if each heard only its neighbours on `graph`.
+/// Analyses the scene's equal peers as if each peer heard only its neighbours on `graph`.
 ///
 /// # Errors
 ///
@@ -111,7 +111,7 @@ pub fn analyse_on(scene: &Scene, graph: &Graph) -> Result<Analysis, GraphError> 
 ///
 /// # Errors
 ///
-/// As for [`analyse_on`], and [`AnalysisError::Stopped`] if the watch ends it.
+/// As for [`analyse_on`], and [`AnalysisError::Stopped`] if the watch ends the analysis.
 pub fn analyse_on_watched(scene: &Scene, graph: &Graph, watch: &dyn Watch) -> Result<Analysis, GraphError> {
     let network = NominalNetwork::of(scene).map_err(GraphError::Analysis)?;
     let mut modes = Vec::new();
@@ -121,7 +121,7 @@ pub fn analyse_on_watched(scene: &Scene, graph: &Graph, watch: &dyn Watch) -> Re
     Ok(combine(modes, Method::Reduced, &network, scene))
 }
 
-/// Analyses one piece of the scene, whose motion is independent of all other pieces.
+/// Analyses one piece of the scene. The motion of a piece is independent of all other pieces.
 fn of_piece(piece: &Piece<'_>, graph: &Graph, network: &NominalNetwork, watch: &dyn Watch) -> Result<ContactMode, GraphError> {
     let scene = &*piece.scene;
     let combinations = combinations(piece).map_err(GraphError::Analysis)?;
@@ -129,7 +129,7 @@ fn of_piece(piece: &Piece<'_>, graph: &Graph, network: &NominalNetwork, watch: &
         return Err(GraphError::NotLinear);
     };
     let structure = Structure::of(&[scene], network, &combination.contacts)?;
-    // Equal peers over equal links form a single class, which has a timetable of its own if it has more than one member.
+    // Equal peers over equal links form a single class. A class of more than one member has a timetable of a node hearing itself.
     let (Some(timetable), None) = (&structure.apart[0], structure.classes.get(1)) else {
         let peer = structure.classes.get(1).map_or(0, |class| class[0]);
         return Err(GraphError::Unequal { peer: scene.peers[peer].name.clone() });
@@ -143,7 +143,7 @@ fn of_piece(piece: &Piece<'_>, graph: &Graph, network: &NominalNetwork, watch: &
     for (eigenvalue, copies) in spectrum {
         let together = eigenvalue == Eigenvalue::One;
         let weight = Matrix::from_fn(1, 1, |_, _| eigenvalue.value());
-        // Only a motion of a whole connected part, λ = 1, can be displaced without a force.
+        // Only a whole connected part, λ = 1, can be displaced without a force.
         let tied = structure.tied || !together;
         if !tied {
             rigid_modes += copies;
@@ -152,6 +152,7 @@ fn of_piece(piece: &Piece<'_>, graph: &Graph, network: &NominalNetwork, watch: &
         let lifted = Lifted { weights: &weight, timetable, tied, ..quotient };
         parts.push(lifted_part(&lifted, kind, copies * combination.axes, Method::Reduced, watch)?);
     }
+    // The size of the whole scene's matrix, for the report: two numbers per sample on the way, and two states of each loose device.
     let mut dimension = peers * (node[0].states() + 2 * structure.timetable.depth[0]);
     if let Some((part, rigid)) = alone(&structure, scene, 0, combination.axes) {
         parts.push(part);
@@ -163,12 +164,12 @@ fn of_piece(piece: &Piece<'_>, graph: &Graph, network: &NominalNetwork, watch: &
     Ok(ContactMode { motion: piece.motion.clone(), contacts: String::new(), radius, parts, rigid_modes, dimension, frame: timetable.frame })
 }
 
-/// Returns the node that stands for each of the equal peers. `degree` is the number or total weight of the peers that each peer hears, or `None` if not all
-/// peers hear equally much.
+/// Returns the node of each of the equal peers. `degree` is the number or total weight of the heard peers of each peer, or `None` if not all
+/// peers have the same degree.
 ///
 /// # Errors
 ///
-/// [`GraphError::Irregular`] for a law whose force is a sum over the heard peers, if `degree` is `None`.
+/// [`GraphError::Irregular`] for a law with a sum over the heard peers, if `degree` is `None`.
 pub fn node_on(scene: &Scene, structure: &Structure, degree: Option<f64>) -> Result<Node, GraphError> {
     let mut node = structure.node(scene, 0);
     let pulls = [scene.coordination.strategy.pull(), scene.coordination.pull];
@@ -180,7 +181,7 @@ pub fn node_on(scene: &Scene, structure: &Structure, degree: Option<f64>) -> Res
     Ok(node)
 }
 
-/// An eigenvalue of an averaging matrix. The eigenvalue 1 is known without rounding and is told apart, since only its motions may drift.
+/// An eigenvalue of an averaging matrix. The eigenvalue 1 is known without rounding and is a separate case, since only motions with λ = 1 may drift.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Eigenvalue {
     One,
@@ -216,8 +217,8 @@ pub fn weights_of(topology: &Topology) -> Matrix {
 }
 
 impl Graph {
-    /// Returns the eigenvalues of the averaging matrix with their multiplicities, and the number or total weight of the peers that each peer hears, or `None`
-    /// if not all peers hear equally much. An eigenvalue of weights may be listed more than once.
+    /// Returns the eigenvalues of the averaging matrix with their multiplicities, and the number or total weight of the heard peers of each peer, or `None`
+    /// if not all peers have the same number or weight. An eigenvalue of weights may be listed more than once.
     #[expect(clippy::type_complexity, reason = "used once, above")]
     fn spectrum(&self, scene: &Scene) -> Result<(Vec<(Eigenvalue, usize)>, Option<f64>), GraphError> {
         let peers = scene.peers.len();
@@ -264,15 +265,16 @@ fn weighted(weights: &Matrix, scene: &Scene) -> Result<(Vec<(Eigenvalue, usize)>
     if let Some(peer) = degrees.iter().position(|degree| *degree <= 0.0) {
         return Err(GraphError::Alone { peer: scene.peers[peer].name.clone() });
     }
-    // If a sum of weights overflows, the eigenvalues are unknown, and NaN stands for each of them.
+    // If a sum of weights overflows, the eigenvalues are unknown and become NaN.
     let found = symmetric(weights).map(|(symmetric, _)| crate::eigenvalues(&symmetric));
     let mut eigenvalues = found.map_or_else(|| vec![f64::NAN; peers], |found| found.iter().map(|value| value.re).collect());
     eigenvalues.sort_by(f64::total_cmp);
-    // Each connected part has the eigenvalue 1 once. These are the largest eigenvalues, so the end of the sorted list is cut off.
+    // Each connected part has the eigenvalue 1 once. No eigenvalue is larger, so the end of the sorted list is cut off.
     let ones = components(weights);
     eigenvalues.truncate(peers - ones);
     let mut spectrum = vec![(Eigenvalue::One, ones)];
     spectrum.extend(eigenvalues.into_iter().map(|value| (Eigenvalue::Other(value), 1)));
+    // Row sums are rounded, so equal degrees may differ in the last digits. A larger difference changes the force of a law that sums over the heard peers.
     let regular = degrees.iter().all(|degree| (degree - degrees[0]).abs() <= 1e-12 * degrees[0]);
     Ok((spectrum, regular.then_some(degrees[0])))
 }
@@ -298,6 +300,7 @@ fn components(weights: &Matrix) -> usize {
             continue;
         }
         parts += 1;
+        // Depth-first search. A peer may be pushed by several neighbours, hence the check of `seen` when the peer is taken out.
         let mut reached = vec![start];
         while let Some(peer) = reached.pop() {
             if !std::mem::replace(&mut seen[peer], true) {

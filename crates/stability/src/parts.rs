@@ -1,4 +1,4 @@
-//! Splits a linear scene into parts that move independently of one another, and computes the spectral radius of each part.
+//! Splits a linear scene into independent parts, and computes the spectral radius of each part.
 
 use std::time::Duration;
 
@@ -11,10 +11,10 @@ use crate::spectrum::bounded_radius;
 use crate::structure::Structure;
 use crate::{AnalysisError, Matrix, Method, Radius, Watch};
 
-/// A part of a scene that moves independently of the other parts.
+/// A part of a scene with a motion independent of the other parts.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Part {
-    /// Motion that the part describes.
+    /// Described motion.
     pub kind: PartKind,
     /// Number of states of the part.
     pub size: usize,
@@ -26,7 +26,7 @@ pub struct Part {
     pub method: Method,
 }
 
-/// Motion that a part of a scene describes.
+/// Motion described by a part of a scene.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum PartKind {
     /// The whole scene, by the general path.
@@ -63,7 +63,7 @@ impl PartKind {
         }
     }
 
-    /// Returns the first peer that the part is about, as an index of [`Scene::peers`], or `None` if the part is about all peers.
+    /// Returns the first peer of the part, as an index of [`Scene::peers`], or `None` if the part is about all peers.
     #[must_use]
     pub const fn peer(self) -> Option<usize> {
         match self {
@@ -94,7 +94,7 @@ pub(crate) fn radius_of(parts: &[Part]) -> Radius {
     parts.iter().map(|part| part.radius).reduce(Radius::or).unwrap_or(Radius { value: 0.0, error: 0.0 })
 }
 
-/// Splits a scene, which stands for `axes` equal axes, into parts and computes their radii. The watch is asked before and within each part.
+/// Splits a scene, the representative of `axes` equal axes, into parts and computes their radii. The watch is asked before and within each part.
 pub(crate) fn reduced(structure: &Structure, scene: &Scene, axes: usize, method: Method, watch: &dyn Watch) -> Result<Reduced, AnalysisError> {
     let nodes = structure.nodes(scene);
     let quotient = structure.quotient(scene, &nodes);
@@ -111,6 +111,7 @@ pub(crate) fn reduced(structure: &Structure, scene: &Scene, axes: usize, method:
             let apart = Lifted { nodes: &nodes[class..=class], weights: &weight, timetable, tied: true, ..quotient };
             let part = lifted_part(&apart, PartKind::Apart { peer: members[0] }, (members.len() - 1) * axes, method, watch)?;
             // A class on its own may repeat more often than the whole scene.
+            // Radii of all parts must count over the same span, or the largest radius would not be the scene's.
             let frames = structure.timetable.frame.as_nanos() / timetable.frame.as_nanos().max(1);
             parts.push(Part { radius: part.radius.over(u32::try_from(frames).unwrap_or(u32::MAX)), ..part });
         }
@@ -124,16 +125,16 @@ pub(crate) fn reduced(structure: &Structure, scene: &Scene, axes: usize, method:
 }
 
 /// Number of rows above which a matrix is replaced by the determinant. The cost of the determinant grows with the number of signals and little with their
-/// delay. The number at which both cost the same is between 300 and 1000, by docs/measured-stability.md.
+/// delay. The number where both cost the same is between 300 and 1000, by docs/measured-stability.md.
 const LARGE: usize = 500;
-/// Largest number of signals for which the determinant is small enough to be chosen without being asked for.
+/// Largest number of signals for an unrequested determinant. With few signals the determinant is small.
 const FEW: usize = 32;
 
-/// Largest number of signals for which the determinant is used even if it is asked for. The determinant's matrix has a row and a column per signal. Clocks
-/// that drift can have a frame of minutes with 50,000 signals, whose matrix would take 40 GB.
+/// Largest number of signals for a requested determinant. The determinant's matrix has a row and a column per signal.
+/// With drifting clocks a frame can last minutes and have 50,000 signals. The matrix would then take 40 GB.
 const MOST_SIGNALS: usize = 1024;
 
-/// Computes the radius of a lifted system and returns the part of the scene that the system describes.
+/// Computes the radius of a lifted system and returns the part of the scene described by the system.
 ///
 /// # Errors
 ///
@@ -142,7 +143,7 @@ pub fn lifted_part(lifted: &Lifted<'_>, kind: PartKind, copies: usize, method: M
     let Sizes { states: size, history, signals } = lifted.sizes();
     let asked = method == Method::Determinant && history > 0 && signals <= MOST_SIGNALS;
     let long = asked || size > LARGE && signals <= FEW;
-    // The watch cannot stop the computation of eigenvalues, and the frame itself may be too large a matrix, so the cost is checked before.
+    // The watch cannot stop the computation of eigenvalues, and the frame itself may be too large a matrix, so the cost is checked first.
     let cost = PartCost::of_eigenvalues(size);
     if !long {
         cost.begin(watch)?;
@@ -165,8 +166,8 @@ pub fn lifted_part(lifted: &Lifted<'_>, kind: PartKind, copies: usize, method: M
     Ok(Part { kind, size, copies, radius, method: Method::Reduced })
 }
 
-/// Returns the part of the devices of a class that touch nothing, and the number of their rigid-body modes along one axis. `None` if the class has no such
-/// devices.
+/// Returns the part of the loose devices of a class, and the number of the devices' rigid-body modes along one axis. A loose device touches nothing. `None` if
+/// the class has no such devices.
 pub fn alone(structure: &Structure, scene: &Scene, class: usize, axes: usize) -> Option<(Part, usize)> {
     let members = &structure.classes[class];
     structure.has_loose_devices(class).then(|| {
@@ -178,19 +179,20 @@ pub fn alone(structure: &Structure, scene: &Scene, class: usize, axes: usize) ->
     })
 }
 
-/// Returns the radius and the number of states of a device that touches nothing. The states are the velocity and, if an arm ties the device to ground, the
+/// Returns the radius and the number of states of a loose device. The states are the velocity and, if an arm ties the device to ground, the
 /// position.
 pub(crate) fn loose_device(structure: &Structure, scene: &Scene, class: usize) -> (Radius, usize) {
     let place = structure.classes[class][0];
     let (short, long) = scene.peers[place].clock.spans();
     let plant = scene.device_plant(place);
     // A frame is a whole number of ticks. If the clock drifts, some ticks are longer by a nanosecond; the steps of both lengths have the same eigenvectors,
-    // so that the radii are multiplied.
+    // so the radii are multiplied.
     let frame = structure.timetable.frame.as_nanos();
     let ticks = frame / short.as_nanos().max(1);
     let longer = if long == short { 0 } else { frame - ticks * short.as_nanos() };
     let over = |span, ticks: u128| step_radius(&plant.step(span, scene.integrator), &plant, span).over(u32::try_from(ticks).unwrap_or(u32::MAX));
     let (some, others) = (over(short, ticks - longer), over(long, longer));
+    // The relative errors of the factors add up: |(a + α)(b + β) − ab| ≤ α·(b + β) + a·β, and the product rounds once.
     let value = some.value * others.value;
     let error = some.error * (others.value + others.error) + some.value * others.error + f64::EPSILON * value;
     // A bound that overflowed over the frame says nothing.
@@ -203,9 +205,10 @@ fn step_radius(map: &StepMap, plant: &Plant, span: Duration) -> Radius {
     let ([[e00, e01], [e10, e11]], _) = map.coefficients();
     let rounding = 32.0 * f64::EPSILON * plant.rounding_factor(span);
     if map.is_free() {
+        // A free body has the eigenvalue 1 for its position, a displacement without a force, and 1 + e11 for its velocity.
         return Radius { value: (1.0 + e11).abs(), error: 2.0 * f64::EPSILON + rounding * e11.abs() };
     }
-    // The eigenvalues are 1 + middle ± √discriminant; nearly equal ones, of a body next to critical damping, are only as sure as the square root.
+    // The eigenvalues are 1 + middle ± √discriminant; nearly equal eigenvalues, of a body next to critical damping, are only as sure as the square root.
     let (middle, half, product) = (1.0 + 0.5 * (e00 + e11), 0.5 * (e00 - e11), e01 * e10);
     let modulus = |discriminant: f64| {
         if discriminant < 0.0 { (middle * middle - discriminant).sqrt() } else { middle.abs() + discriminant.sqrt() }
@@ -214,6 +217,7 @@ fn step_radius(map: &StepMap, plant: &Plant, span: Duration) -> Radius {
     let doubt = rounding * ((e00.abs() + e11.abs()).powi(2) + product.abs());
     let (below, above) = (modulus(discriminant - doubt), modulus(discriminant + doubt));
     let value = modulus(discriminant);
+    // With a discriminant of uncertain sign the eigenvalues may be equal, so the modulus may be as small as |middle|.
     let lowest = if discriminant.abs() <= doubt { middle.abs() } else { below.min(above) };
     let error = (below.max(above) - value).max(value - lowest) + rounding * (e00.abs() + e11.abs()) + 4.0 * f64::EPSILON * value;
     Radius { value, error }

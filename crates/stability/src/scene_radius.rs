@@ -1,4 +1,4 @@
-//! Repeated computation of the radius of one scene while its numbers change. The parts that do not depend on the numbers are prepared once.
+//! Repeated computation of the radius of one scene while its numbers change. All parts without the numbers are prepared once.
 
 use std::borrow::Cow;
 
@@ -22,21 +22,21 @@ use crate::structure::{Contacts, Structure, linear_law};
 use crate::turning::{self, Together, mode_of};
 use crate::{AnalysisError, Matrix, Method, Radius, Unwatched};
 
-/// The parts of a linear scene that do not change with the scene's numbers, prepared for computing radii.
+/// The parts of a linear scene common to all values of the scene's numbers, prepared for computing radii.
 #[derive(Debug)]
 pub(crate) struct SceneRadius {
-    /// Name of the first component of motion, for a piece of a turning object's motion. `None` if the object does not turn or its motion does not split.
+    /// Name of the first component of motion, for a piece of a turning object's motion. `None` without such a piece.
     component: Option<String>,
     kind: Kind,
 }
 
 #[derive(Debug)]
 enum Kind {
-    /// A scene whose strategy is a linear law.
+    /// A scene with a linear law as its strategy.
     Parts(Box<PartsRadius>),
-    /// A scene that only the general path can analyse.
+    /// A scene for the general path only.
     Whole(Box<WholeRadius>),
-    /// A scene with a turning object whose motion does not split.
+    /// A scene with a turning object of unsplit motion.
     Turning(Box<TurningRadius>),
     /// A scene with a topology.
     Graph(Box<GraphRadius>),
@@ -52,7 +52,7 @@ struct GraphRadius {
 
 impl GraphRadius {
     fn new(scene: &Scene) -> Result<Self, AnalysisError> {
-        // A scene that is refused is refused for all its numbers.
+        // A refused scene is refused for all values of its numbers.
         analyse(scene, Method::Reduced)?;
         let classes = (0..scene.peers.len()).map(|peer| vec![peer]).collect();
         Ok(Self { classes, unfollowed: AnalysisError::Topology { what: "the mean square" } })
@@ -64,10 +64,10 @@ fn radius_on_topology(scene: &Scene) -> Radius {
     analyse(scene, Method::Reduced).map_or(Radius::UNKNOWN, |analysis| analysis.radius)
 }
 
-/// A scene with a turning object whose motion does not split.
+/// A scene with a turning object of unsplit motion.
 #[derive(Debug)]
 struct TurningRadius {
-    /// Classes of peers that are equal for all numbers.
+    /// Classes of peers equal for all numbers.
     structure: Structure,
     /// Every peer by itself.
     classes: Vec<Vec<usize>>,
@@ -93,9 +93,10 @@ impl TurningRadius {
 }
 
 impl SceneRadius {
-    /// Prepares the radius for scenes that differ only in numbers, and possibly in whether an arm ties the object to ground.
+    /// Prepares the radius for scenes with different numbers. An arm may tie the object to ground in some of the scenes only.
     fn new(scenes: &[&Scene], network: &NominalNetwork, combination: &Combination) -> Result<Self, AnalysisError> {
         let component = combination.motion.split(", ").next().filter(|name| !name.is_empty()).map(str::to_owned);
+        // A number may change how the motion splits. Scenes without the component are left out here and have an unknown radius later.
         let views: Vec<Cow<'_, Scene>> = scenes.iter().filter_map(|scene| view(scene, component.as_deref())).collect();
         let scenes: Vec<&Scene> = views.iter().map(AsRef::as_ref).collect();
         let kind = if linear_law(scenes[0], 0).is_some() {
@@ -106,7 +107,7 @@ impl SceneRadius {
         Ok(Self { component, kind })
     }
 
-    /// Returns the way in which the second moment is followed, or an error that says why the second moment is not followed.
+    /// Returns the method for the second moment, or an error with the reason for the absence of a method.
     pub(crate) const fn followed(&self) -> Result<&Followed, &AnalysisError> {
         match &self.kind {
             Kind::Parts(parts) => parts.followed.as_ref(),
@@ -150,7 +151,7 @@ impl SceneRadius {
     }
 }
 
-/// Returns the scene itself, or with a component the part of a turning object's motion that has the component. `None` if no part has it.
+/// Returns the scene itself, or for a component the part of a turning object's motion with this component. `None` if no part has the component.
 fn view<'a>(scene: &'a Scene, component: Option<&str>) -> Option<Cow<'a, Scene>> {
     let Some(component) = component else { return Some(Cow::Borrowed(scene)) };
     let parts = scene.rotation_parts()?.ok()?.parts;
@@ -158,7 +159,7 @@ fn view<'a>(scene: &'a Scene, component: Option<&str>) -> Option<Cow<'a, Scene>>
     Some(Cow::Owned(part.scene))
 }
 
-/// A scene that the general path analyses again for each set of numbers.
+/// A scene analysed again by the general path for each set of numbers.
 #[derive(Debug)]
 pub(crate) struct WholeRadius {
     network: NominalNetwork,
@@ -178,7 +179,7 @@ impl WholeRadius {
             classes: (0..scene.peers.len()).map(|peer| vec![peer]).collect(),
             unfollowed: AnalysisError::OtherStrategy { strategy: scene.coordination.strategy.name() },
         };
-        // A scene that is refused is refused for all its numbers.
+        // A refused scene is refused for all values of its numbers.
         whole.map(scene)?;
         Ok(whole)
     }
@@ -194,7 +195,7 @@ impl WholeRadius {
     }
 }
 
-/// The parts of a scene with a linear law that do not change with the scene's numbers.
+/// The parts of a scene with a linear law common to all values of the scene's numbers.
 #[derive(Clone, Debug)]
 pub(crate) struct PartsRadius {
     structure: Structure,
@@ -205,7 +206,7 @@ pub(crate) struct PartsRadius {
     apart: Vec<Option<Apart>>,
     /// −1/(N−1).
     difference: Matrix,
-    /// Way in which the second moment is followed, or the error that says why it is not followed.
+    /// Method for the second moment, or the error with the reason for the absence of a method.
     followed: Result<Followed, AnalysisError>,
 }
 
@@ -228,7 +229,7 @@ pub(crate) struct RadiusScratch {
     equal: EqualScratch,
 }
 
-/// Inputs from which the step maps and the linear law of a class were computed, for detecting a change.
+/// Inputs of the step maps and of the linear law of a class, for detecting a change.
 #[derive(Clone, Debug)]
 struct Bodies {
     object: Plant,
@@ -239,7 +240,7 @@ struct Bodies {
 }
 
 impl RadiusScratch {
-    /// Returns the matrix of the averages that was computed last.
+    /// Returns the last computed matrix of the averages.
     #[cfg(test)]
     pub(crate) fn together(&self) -> &Matrix {
         &self.together
@@ -248,7 +249,7 @@ impl RadiusScratch {
 
 impl PartsRadius {
     fn new(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts) -> Result<Self, AnalysisError> {
-        // A scene without arms is added, so that `structure.tied` tells whether something other than an arm ties the object.
+        // A scene without arms is added, so `structure.tied` is true only if something other than an arm ties the object.
         let mut armless = scenes[0].clone();
         for spec in &mut armless.peers {
             spec.hand = None;
@@ -264,7 +265,7 @@ impl PartsRadius {
         });
         let apart = apart.collect();
         let difference = Matrix::from_fn(1, 1, |_, _| structure.difference_weight());
-        // Each radius needs a matrix whose size is the same for all numbers, so the memory is checked once.
+        // The size of the matrix is the same for all numbers, so the memory is checked once.
         let nodes = structure.nodes(scenes[0]);
         PartCost::of_eigenvalues(structure.quotient(scenes[0], &nodes).sizes().states).allowed(&Unwatched)?;
         let followed = Followed::of(scenes[0], network, &structure);
@@ -280,6 +281,7 @@ impl PartsRadius {
         for (class, part_of) in self.apart.iter().enumerate() {
             if let (Some(Apart { stack, frames }), Some(timetable)) = (part_of, &structure.apart[class]) {
                 let lifted = Lifted { nodes: &nodes[class..=class], weights: &self.difference, timetable, tied: true, ..quotient };
+                // The differences have a shorter frame than the scene, so their radius is raised to the number of such frames per frame of the scene.
                 let radius = part::<BOUND>(stack.as_ref(), &lifted, apart, workspace).over(*frames);
                 worst = worse::<BOUND>(worst, radius);
             }
@@ -302,6 +304,7 @@ impl PartsRadius {
             // The laws use no arriving sample, so random links have no effect on the bodies.
             return Some(square(self, scratch).max(*held));
         }
+        // The second moment contains the moments of forceless held samples too, with the radius `held`, and of loose devices.
         let found = frame.radius(&quotient, equal)?.max(*held);
         Some(bodies.iter().filter_map(|bodies| bodies.loose).fold(found, |found, loose| found.max(loose.value.powi(2))))
     }
@@ -310,16 +313,17 @@ impl PartsRadius {
     fn quotient<'a>(&'a self, scene: &Scene, nodes: &'a [Node]) -> Lifted<'a> {
         let structure = &self.structure;
         let armed = |class: usize| structure.touching[class] && scene.device_plant(self.representative(class)).stiffness > 0.0;
+        // An arm's stiffness is a number of the scene, so the tie is decided anew for each set of numbers.
         let tied = self.tied || (0..nodes.len()).any(armed);
         Lifted { tied, ..structure.quotient(scene, nodes) }
     }
 
-    /// Returns the peer that stands for a class: its first member.
+    /// Returns the representative peer of a class: the first member.
     fn representative(&self, class: usize) -> usize {
         self.structure.classes[class][0]
     }
 
-    /// Updates the nodes in `scratch` to the numbers of `scene`. Step maps are computed again only for bodies that changed.
+    /// Updates the nodes in `scratch` to the numbers of `scene`. Step maps are computed again only for changed bodies.
     fn refresh(&self, scene: &Scene, scratch: &mut RadiusScratch) {
         let classes = self.structure.classes.len();
         let loose = |class: usize| self.structure.has_loose_devices(class).then(|| loose_device(&self.structure, scene, class).0);
@@ -355,12 +359,13 @@ impl PartsRadius {
                 bodies.law = law;
                 node.law = self.structure.law(scene, class);
             }
+            // `and` keeps the absence of a wall: a combination away from the walls has none, whatever the enclosure.
             node.wall = node.wall.and(scene.object.enclosure).map(|wall| Gains { stiffness: wall.stiffness, damping: wall.damping });
         }
     }
 }
 
-/// Returns the radius of a lifted system, whose monodromy matrix is written to `matrix`.
+/// Returns the radius of a lifted system, and writes the monodromy matrix to `matrix`.
 fn part<const BOUND: bool>(stack: Option<&StackFrame>, lifted: &Lifted<'_>, matrix: &mut Matrix, workspace: &mut Workspace) -> Radius {
     let error = match (stack, StackNode::of(lifted)) {
         (Some(stack), Some(node)) => stack.monodromy::<BOUND>(node, matrix, || lifted.error()),

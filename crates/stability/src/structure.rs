@@ -1,6 +1,6 @@
 //! Sorts the peers of a linear scene on one axis into classes of equal peers.
 //!
-//! The motion of equal peers over equal links has two parts that do not mix: the average of the class, and the differences of the members from the average.
+//! The motion of equal peers over equal links has two independent parts: the average of the class, and the differences of the members from the average.
 //! The averages of all classes form one system with one node per class, the *quotient*. The differences of a class add up to zero, so member i hears the
 //! differences of the other members as −d_i/(N−1). Each class of n > 1 members therefore has n − 1 copies of one system of a single node with the weight
 //! −1/(N−1). The spectrum of the scene is exactly the union of the spectra of these blocks.
@@ -18,7 +18,7 @@ use crate::rounding::real;
 use crate::timetable::{NodeClock, Timetable};
 use crate::{AnalysisError, Matrix};
 
-/// The contacts of a scene that are closed, which make a scene with one-sided contacts linear.
+/// Closed contacts of a scene. With given closed contacts, a scene with one-sided contacts is linear.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Contacts {
     /// `true` if the device and the copy of each peer are coupled, indexed by peer.
@@ -29,7 +29,7 @@ pub struct Contacts {
     pub absent: Vec<bool>,
 }
 
-/// The classes of equal peers of a scene, with the events and the weights between classes in a frame.
+/// Classes of equal peers of a scene, with the events and the weights between classes in a frame.
 #[derive(Clone, Debug)]
 pub struct Structure {
     /// Members of each class in rising order, as indices of [`Scene::peers`]. The classes are in the order of their first members.
@@ -41,11 +41,11 @@ pub struct Structure {
     pub(crate) at_wall: bool,
     /// Timetable of a frame of the classes' averages, with one node per class.
     pub timetable: Timetable,
-    /// Timetable of a frame of a single node that hears itself, indexed by class. `None` for a class of one member.
+    /// Timetable of a frame of a single node hearing itself, indexed by class. `None` for a class of one member.
     pub apart: Vec<Option<Timetable>>,
     /// The weight of each class's average (column) in the target of each class (row).
     pub weights: Matrix,
-    /// `true` if something ties the object to ground: an arm's stiffness, a wall, or a peer that holds its initial samples forever.
+    /// `true` if something ties the object to ground: an arm's stiffness, a wall, or a peer with only its initial samples, held forever.
     pub tied: bool,
     /// `true` if some peer never receives a sample over a link and holds its initial sample forever.
     pub silent: bool,
@@ -54,7 +54,7 @@ pub struct Structure {
 }
 
 impl Structure {
-    /// Sorts the peers into classes whose members are equal in each of the scenes. The scenes may differ in numbers only.
+    /// Sorts the peers into classes of members equal in each of the scenes. The scenes may differ in numbers only.
     ///
     /// # Errors
     ///
@@ -63,13 +63,12 @@ impl Structure {
         Self::with_apart(scenes, network, contacts, |_, _| false)
     }
 
-    /// Like [`of`](Self::of), but puts the peer `alone` into a class of its own even if other peers equal it: a peer that is pushed does not move like its
-    /// equals.
+    /// Like [`of`](Self::of), but puts the peer `alone` into a class of its own even if other peers equal it: a pushed peer does not move like its equals.
     pub(crate) fn with_alone(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts, alone: Option<usize>) -> Result<Self, AnalysisError> {
         Self::with_apart(scenes, network, contacts, |one, other| Some(one) == alone || Some(other) == alone)
     }
 
-    /// Like [`Structure::of`], but a pair of peers for which `apart` returns true is never in one class.
+    /// Like [`Structure::of`], but never puts a pair of peers into one class if `apart` returns true for the pair.
     ///
     /// # Errors
     ///
@@ -90,7 +89,7 @@ impl Structure {
     ///
     /// # Errors
     ///
-    /// As for [`Structure::of`], but for those of laws.
+    /// As for [`Structure::of`], without the errors of laws.
     pub fn of_any_law(
         scenes: &[&Scene],
         network: &NominalNetwork,
@@ -100,7 +99,7 @@ impl Structure {
         Self::of_classes(scenes[0], classes(scenes, network, contacts, apart), network, contacts)
     }
 
-    /// Puts each peer into a class of its own, even if peers are equal.
+    /// Puts each peer into a separate class, even if peers are equal.
     ///
     /// # Errors
     ///
@@ -115,16 +114,19 @@ impl Structure {
         let clocks = clocks(&classes, scene);
         let links = links(&classes, network);
         let timetable = Timetable::new(&clocks, &links)?;
+        // Members of a class hear each other over the class's link to itself. A class of one member has no such link and no differences.
         let apart = classes.iter().enumerate().map(|(class, members)| {
             let own = links.iter().find(|(from, to, _)| (*from, *to) == (class, class)).filter(|_| members.len() > 1);
             own.map(|(_, _, timing)| Timetable::new(&clocks[class..=class], &[(0, 0, timing.clone())])).transpose()
         });
         let apart = apart.collect::<Result<Vec<_>, _>>()?;
+        // Every peer averages over all others with weight 1/(N−1). A peer does not hear itself, so the own class counts one sender less.
         let others = real(peers - 1);
         let weights = Matrix::from_fn(classes.len(), classes.len(), |row, column| {
             let heard = classes[column].len() - usize::from(row == column);
             real(heard) / others
         });
+        // A held initial sample acts like a spring to a fixed point, so silence ties the object as an arm does.
         let silent = links.iter().any(|(_, _, timing)| matches!(timing, LinkTiming::Pattern(pattern) if pattern.iter().all(Option::is_none)));
         let arm = |class: &Vec<usize>| contacts.touching[class[0]] && scene.device_plant(class[0]).stiffness > 0.0;
         let tied = contacts.at_wall || silent || classes.iter().any(arm);
@@ -143,7 +145,7 @@ impl Structure {
         (0..self.classes.len()).map(|class| self.node(scene, class)).collect()
     }
 
-    /// Returns the numbers of a sample that the laws of the classes use.
+    /// Returns the numbers of a sample used by the laws of the classes.
     pub(crate) fn sampling(&self, scene: &Scene) -> Sampling {
         Sampling::of(&self.nodes(scene))
     }
@@ -154,12 +156,12 @@ impl Structure {
         Sampling::of(&nodes).is_silent(self.time(scene, &nodes))
     }
 
-    /// Returns the node that stands for a class.
+    /// Returns the node of a class, with the equations of any member.
     pub fn node(&self, scene: &Scene, class: usize) -> Node {
         self.node_with(scene, class, self.law(scene, class))
     }
 
-    /// Returns the node that stands for a class, with `law` in place of the class's own law.
+    /// Returns the node of a class, with `law` in place of the class's own law.
     pub fn node_with(&self, scene: &Scene, class: usize, law: LinearLaw) -> Node {
         let place = self.classes[class][0];
         let spec = &scene.peers[place];
@@ -179,17 +181,17 @@ impl Structure {
         (0..self.classes.len()).filter(|class| self.apart[*class].is_some()).max_by_key(|class| self.classes[*class].len())
     }
 
-    /// Tells whether the members of a class have devices that touch nothing.
+    /// Tells whether the members of a class have devices without a contact.
     pub(crate) fn has_loose_devices(&self, class: usize) -> bool {
         !self.touching[class] && !self.absent[class]
     }
 
-    /// Returns the weight −1/(N−1) with which a member hears its own difference from the average through the other members.
+    /// Returns the weight −1/(N−1) of a member's own difference from the average in the average that the member hears.
     pub fn difference_weight(&self) -> f64 {
         -1.0 / real(self.peers - 1)
     }
 
-    /// Returns the common time of the classes, whose nodes are `nodes` \[s\]. Velocities times the common time are lengths.
+    /// Returns the common time of the classes with the nodes `nodes` \[s\]. Velocities times the common time are lengths.
     pub fn time(&self, scene: &Scene, nodes: &[Node]) -> f64 {
         let peers = self.classes.iter().zip(&self.touching).map(|(class, touching)| (class[0], *touching));
         common_time(scene, self.timetable.frame, nodes[0].law.held_by(), peers, self.at_wall)
@@ -218,23 +220,23 @@ pub fn has_equal_clocks(scene: &Scene) -> bool {
     scene.peers.iter().all(|spec| spec.clock == scene.peers[0].clock)
 }
 
-/// Returns whether all peers have the same drift: then their clocks are as far apart in every frame.
+/// Tells whether all peers have the same drift. The distances of the clocks are then equal in every frame.
 pub(crate) fn has_one_drift(scene: &Scene) -> bool {
     scene.peers.iter().all(|spec| spec.clock.drift == scene.peers[0].clock.drift)
 }
 
-/// Refuses laws that have no linear form, and laws that use the ages of samples between clocks that drift apart: ages then do not repeat from frame to frame.
+/// Refuses laws without a linear form, and laws with ages of samples between clocks of different drift: ages then do not repeat from frame to frame.
 ///
 /// # Errors
 ///
-/// [`AnalysisError`] that names the law.
+/// [`AnalysisError`] with the name of the law.
 pub fn check_laws(scene: &Scene) -> Result<(), AnalysisError> {
     let strategy = scene.coordination.strategy.name();
     let (first, peers) = (&scene.peers[0], scene.peers.len());
-    // Laws differ between peers only through the tick, so only peers with another tick need a check of their own.
+    // Laws differ between peers only through the tick, so only peers with another tick need a separate check.
     let other = (1..peers).filter(|peer| scene.peers[*peer].clock.tick != first.clock.tick);
     for peer in std::iter::once(0).chain(other) {
-        // Strategies whose samples carry energies are not linear, so that no analysis follows them.
+        // Strategies with samples of energies are not linear, so no analysis follows these strategies.
         let none = || {
             if scene.sample_kind() == SampleKind::Energy { AnalysisError::NoAnalysis { strategy } } else { AnalysisError::OtherStrategy { strategy } }
         };
@@ -246,8 +248,8 @@ pub fn check_laws(scene: &Scene) -> Result<(), AnalysisError> {
     Ok(())
 }
 
-/// Returns the common time that turns velocities into lengths \[s\]: the time in which the stiffest body swings by a radian, at least a tick and at most a
-/// frame. Positions and velocities then change into each other with factors of about 1, so that errors of both have the same weight.
+/// Returns the common time \[s\], by which velocities are multiplied to become lengths: the time of a swing by a radian of the stiffest body, at least a tick
+/// and at most a frame. Positions and velocities then change into each other with factors of about 1, so that errors of both have the same weight.
 pub(crate) fn common_time(scene: &Scene, frame: Duration, coordination: Gains, peers: impl Iterator<Item = (usize, bool)>, at_wall: bool) -> f64 {
     let wall = scene.object.enclosure.filter(|_| at_wall).map_or(0.0, |wall| wall.stiffness);
     let (mut fastest, mut tick) = (0.0_f64, frame);
@@ -260,13 +262,15 @@ pub(crate) fn common_time(scene: &Scene, frame: Duration, coordination: Gains, p
         }
         tick = tick.min(scene.peers[place].clock.tick);
     }
+    // The natural frequency is √(k/m). A body without springs has frequency zero, and the bounds keep the time finite.
     (1.0 / fastest.sqrt()).clamp(tick.as_secs_f64(), frame.as_secs_f64())
 }
 
-/// Returns the classes of peers that are equal in each of the scenes. A pair of peers for which `apart` returns true is never in one class.
+/// Returns the classes of peers equal in each of the scenes. A pair of peers is never in one class if `apart` returns true for the pair.
 pub fn classes(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts, apart: impl Fn(usize, usize) -> bool) -> Vec<Vec<usize>> {
     let mut classes: Vec<Vec<usize>> = Vec::new();
     for place in 0..scenes[0].peers.len() {
+        // Equality of parameters is transitive, so comparing with the first member of a class is enough.
         let found = classes.iter().position(|class| {
             !apart(class[0], place)
                 && contacts.touching[class[0]] == contacts.touching[place]
@@ -287,7 +291,7 @@ pub fn classes(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts,
     classes
 }
 
-/// Returns the clock of each class, which all members share.
+/// Returns the common clock of the members of each class.
 pub fn clocks(classes: &[Vec<usize>], scene: &Scene) -> Vec<NodeClock> {
     classes.iter().map(|class| NodeClock::of(scene, class[0])).collect()
 }
@@ -297,6 +301,7 @@ pub fn links(classes: &[Vec<usize>], network: &NominalNetwork) -> Vec<(usize, us
     let mut links = Vec::new();
     for (to, receivers) in classes.iter().enumerate() {
         for (from, senders) in classes.iter().enumerate() {
+            // Any pair of members represents the links between two classes: `split_by_links` has made their timings equal.
             let pair = if from == to { senders.get(1).map(|second| (*second, receivers[0])) } else { Some((senders[0], receivers[0])) };
             if let Some((sender, receiver)) = pair {
                 links.push((from, to, network.timing(sender, receiver).clone()));
@@ -308,6 +313,7 @@ pub fn links(classes: &[Vec<usize>], network: &NominalNetwork) -> Vec<(usize, us
 
 /// Tells whether two peers move by the same equations. The coupling is compared only if the peers touch the object.
 fn alike(one: &PeerSpec, other: &PeerSpec, touching: bool) -> bool {
+    // Bodies integrate per tick of their clock, so peers with different clocks or phases move differently even with equal parameters.
     let same_clock = (one.clock, one.phase, one.compute_delay) == (other.clock, other.phase, other.compute_delay);
     let plant = |spec: &PeerSpec| spec.device.plant(spec.hand.as_ref());
     let same_device = || (one.device, plant(one)) == (other.device, plant(other));
@@ -328,6 +334,7 @@ fn turn_alike(scene: &Scene, one: usize, other: usize, touching: bool) -> bool {
 fn split_by_links(mut classes: Vec<Vec<usize>>, network: &NominalNetwork) -> Vec<Vec<usize>> {
     loop {
         let uneven =
+            // Each pass splits at least one class of several members, so the loop ends. A split may make further links uneven, hence another pass.
             (0..classes.len()).find_map(|from| (0..classes.len()).find(|to| !even(&classes[from], &classes[*to], network)).map(|to| (from, to)));
         let Some((from, to)) = uneven else {
             return classes;

@@ -1,7 +1,7 @@
 //! The events of one frame in their order: samplings, deliveries and ticks of all nodes.
 //!
-//! A frame is the span after which all events repeat: the least common multiple of all periods of sending, of drifting clocks and of the patterns of links.
-//! The order of events within a frame is that of a simulation: at one instant first samplings, then deliveries, then ticks, each in the order of nodes. The
+//! A frame is the period of all events: the least common multiple of all periods of sending, of drifting clocks and of the patterns of links.
+//! Events within a frame have the order of a simulation: at one instant first samplings, then deliveries, then ticks, each in the order of nodes. The
 //! frame begins so late that all peers have started and all samples in flight belong to the pattern.
 
 use std::time::Duration;
@@ -15,7 +15,7 @@ use crate::network::LinkTiming;
 /// Largest number of ticks in a frame; a longer frame is refused.
 const MOST_EVENTS: u128 = 20_000_000;
 
-/// Clock of a node, with the ticks at which the node samples.
+/// Clock of a node, with the ticks of its samplings.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct NodeClock {
     /// Clock of the node's ticks.
@@ -27,7 +27,7 @@ pub struct NodeClock {
 }
 
 impl NodeClock {
-    /// Returns the clock of a peer, whose index in the scene's peers is `place`.
+    /// Returns the clock of the peer with the index `place`.
     #[must_use]
     pub fn of(scene: &Scene, place: usize) -> Self {
         let spec = &scene.peers[place];
@@ -35,8 +35,8 @@ impl NodeClock {
         Self { clock: spec.clock, phase: spec.phase, every: u64::try_from(every).unwrap_or(u64::MAX) }
     }
 
-    /// Returns the tick of `to`, counted from its first tick in the frame, at which the first sample of the frame is there after `delay`. Also returns the
-    /// longest delay with which the sample is there at the same tick.
+    /// Returns the tick of `to`, counted from its first tick in the frame, at the arrival of the first sample of the frame after `delay`. Also returns the
+    /// longest delay with an arrival at the same tick.
     pub fn arrival(&self, to: &Self, delay: Duration) -> (usize, Duration) {
         let (phase, every) = (i128::from(self.phase), i128::from(self.every));
         let sent = self.instant(phase + self.first_number() * every);
@@ -56,7 +56,7 @@ impl NodeClock {
         u128::from(1_000_000_000_u64.saturating_add_signed(self.clock.drift.parts_per_billion()))
     }
 
-    /// Returns the smallest number of periods of sending that takes a whole number of nanoseconds, as (span \[ns\], number). `None` if the numbers overflow.
+    /// Returns the smallest number of periods of sending with a total of whole nanoseconds, as (span \[ns\], number). `None` if the numbers overflow.
     fn repeats(&self) -> Option<(u128, u128)> {
         let sending = self.clock.tick.as_nanos().checked_mul(u128::from(self.every))?.checked_mul(1_000_000_000)?;
         let common = gcd(sending, self.speed());
@@ -65,17 +65,18 @@ impl NodeClock {
 
     /// Returns the instant of tick k \[ns\]. Negative k are allowed, as if the clock had always run.
     fn instant(&self, tick: i128) -> i128 {
+        // True time is offset + local·10⁹/(10⁹ + drift), rounded down as the clock of a simulated peer does.
         let local = i128::try_from(self.clock.tick.as_nanos()).unwrap_or(i128::MAX) * tick;
         let offset = i128::try_from(self.clock.offset.as_nanos()).unwrap_or(i128::MAX);
         offset + (local * 1_000_000_000).div_euclid(i128::try_from(self.speed()).unwrap_or(i128::MAX))
     }
 
-    /// Returns the time that the clock shows at one of its ticks \[ns\]. `at` is the instant to which [`instant`](Self::instant) rounds the tick.
+    /// Returns the time shown by the clock at one of its ticks \[ns\]. `at` is the tick's instant as rounded by [`instant`](Self::instant).
     fn local(&self, at: i128) -> i64 {
         let tick = i128::try_from(self.clock.tick.as_nanos()).unwrap_or(i128::MAX);
         let offset = i128::try_from(self.clock.offset.as_nanos()).unwrap_or(i128::MAX);
         let speed = i128::try_from(self.speed()).unwrap_or(i128::MAX);
-        // Ticks are much further apart than the nanosecond by which an instant is rounded.
+        // Rounding an instant moves the instant by at most a nanosecond, far less than half a tick, so the nearest tick is the right tick.
         let number = (2 * (at - offset) * speed / 1_000_000_000 + tick).div_euclid(2 * tick);
         i64::try_from(number * tick).unwrap_or(i64::MAX)
     }
@@ -85,7 +86,7 @@ impl NodeClock {
         let span = i128::try_from(self.clock.tick.as_nanos()).unwrap_or(i128::MAX) * 1_000_000_000;
         let speed = i128::try_from(self.speed()).unwrap_or(i128::MAX);
         let offset = i128::try_from(self.clock.offset.as_nanos()).unwrap_or(i128::MAX);
-        // The quotient is within one tick of the answer. The loop decides by instants, which are rounded to nanoseconds.
+        // The quotient is within one tick of the answer. The loop decides by instants rounded to nanoseconds.
         let mut tick = ((at - offset) * speed).div_euclid(span) - 1;
         while self.instant(tick) < at {
             tick += 1;
@@ -122,16 +123,16 @@ pub enum Event {
     },
 }
 
-/// The events of one frame, with the samples of earlier frames that the frame needs.
+/// Events of one frame, with the samples of earlier frames needed in the frame.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Timetable {
     /// Length of the frame.
     pub frame: Duration,
     /// Events of the frame, in order.
     pub events: Vec<Event>,
-    /// Number of samples that each node sends in a frame, indexed by node.
+    /// Number of samples sent in a frame, indexed by node.
     pub sent: Vec<usize>,
-    /// Number of samples of earlier frames that are still needed, indexed by sending node.
+    /// Number of samples of earlier frames still needed, indexed by sending node.
     pub depth: Vec<usize>,
     /// Samples held at the beginning of the frame and used before the first delivery, as (receiver, sender, number of the sample).
     pub held: Vec<(usize, usize, i64)>,
@@ -139,23 +140,24 @@ pub struct Timetable {
     pub clocks: Vec<NodeClock>,
 }
 
-/// Events at which nodes use the samples that they hold.
+/// Events at which nodes use held samples.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum UseOfHeld {
-    /// Nodes use held samples when they compute forces.
+    /// Nodes use held samples at ticks, to compute forces.
     Ticks,
-    /// Nodes use held samples also when they sample, before the deliveries of the same instant.
+    /// Nodes use held samples at ticks and at samplings. A sampling precedes the deliveries of the same instant.
     SamplesAndTicks,
 }
 
 impl Timetable {
     /// Returns an upper bound of the age of the samples used in the frame \[s\].
     pub(crate) fn oldest(&self) -> f64 {
+        // `depth` samples span `depth / sent` frames, rounded up. One more frame passes until the sample's last use in this frame.
         let frames = self.depth.iter().zip(&self.sent).map(|(depth, sent)| depth.div_ceil((*sent).max(1)) + 1).max().unwrap_or(1);
         self.frame.as_secs_f64() * crate::rounding::real(frames)
     }
 
-    /// Returns the frame of nodes that send to each other over `links`. Each link is (sending node, receiving node, timing).
+    /// Returns the frame of nodes with the links `links`. Each link is (sending node, receiving node, timing).
     ///
     /// # Errors
     ///
@@ -181,6 +183,7 @@ impl Timetable {
             let (phase, every) = (i128::from(clock.phase), i128::from(clock.every));
             let mut count = 0;
             let mut tick = first;
+            // The second entry of a key, the step, orders events of one instant: 0 samplings, 1 deliveries, 2 ticks.
             loop {
                 let at = clock.instant(tick);
                 if at >= end {
@@ -203,7 +206,7 @@ impl Timetable {
             let (from, to) = (*from, *to);
             let arrivals = arrivals(&clocks[from], &clocks[to], timing, first_sample[from], end);
             let mut need = |sample: i64| depth[from] = depth[from].max(usize::try_from(-sample).unwrap_or(0));
-            // The sample held when the frame begins is used if the node ticks before the first arrival. A node samples right before it ticks.
+            // The sample held at the beginning of the frame is used if the node ticks before the first arrival. A node samples right before its tick.
             let is_used_before = |at: i128| match uses {
                 UseOfHeld::Ticks => at > first_tick_at[to],
                 UseOfHeld::SamplesAndTicks => at >= first_tick_at[to],
@@ -219,6 +222,7 @@ impl Timetable {
                 events.push((at, 1, from, to, sample, Event::Deliver { from, to, sample }));
             }
         }
+        // All keys differ, so an unstable sort gives one order only.
         events.sort_unstable_by_key(|(at, step, node, to, sample, _)| (*at, *step, *node, *to, *sample));
         let events = events.into_iter().map(|(.., event)| event).collect();
         Ok(Self {
@@ -232,7 +236,7 @@ impl Timetable {
     }
 }
 
-/// Instants of the samplings and ticks of each node in a frame \[ns\].
+/// Instants of the samplings and ticks in a frame \[ns\], indexed by node.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Instants {
     pub(crate) sends: Vec<Vec<u64>>,
@@ -252,7 +256,7 @@ impl Instants {
                 Event::Sample { node } => sampled[node] = true,
                 Event::Deliver { .. } => {}
                 Event::Tick { node, at, .. } => {
-                    // A node samples at a tick of its own.
+                    // A node samples only at its own ticks.
                     if std::mem::take(&mut sampled[node]) {
                         sends[node].push(at);
                     }
@@ -263,41 +267,42 @@ impl Instants {
         Self { sends, ticks, clocks: timetable.clocks.clone() }
     }
 
-    /// Returns the age of a sample of `from` at the instant `at` of the frame, at which the holder `to` ticks \[s\]: the time on the clock of the holder minus
-    /// the time on the clock of the sender when the sample was sent, and at least zero. Clocks of equal drift show the same ages in every frame.
+    /// Returns the age of a sample of `from` at a tick of the holder `to`, at the instant `at` of the frame \[s\]: the time on the clock of the holder minus
+    /// the time on the clock of the sender at the sending, and at least zero. Clocks of equal drift show the same ages in every frame.
     #[expect(clippy::cast_precision_loss, reason = "a span of at most some frames is far below 2^53 ns")]
     pub fn age(&self, (to, from): (usize, usize), sample: i64, at: u64, frame: Duration) -> f64 {
         let now = self.local(to, i64::try_from(at).unwrap_or(i64::MAX));
         now.saturating_sub(self.local(from, self.sent_at(from, sample, frame))).max(0) as f64 * 1e-9
     }
 
-    /// Returns the time that the clock of a node shows at the instant `at` of one of its ticks \[ns\]. Times are counted from the beginning of the frame, so
-    /// that the clock shows less than zero before.
+    /// Returns the time shown by the clock of a node at the instant `at` of one of its ticks \[ns\]. Times are counted from the beginning of the frame, so
+    /// the clock shows less than zero before the frame.
     pub(crate) fn local(&self, node: usize, at: i64) -> i64 {
         self.clocks[node].local(i128::from(at))
     }
 
-    /// Returns the instant at which a sample of a node was sent, since the beginning of the frame \[ns\]; negative for samples of earlier frames. `sample` is
+    /// Returns the instant of sending of a sample of a node, since the beginning of the frame \[ns\]; negative for samples of earlier frames. `sample` is
     /// the number of the sample: samples of this frame count from 0, and −1 is the last sample of the frame before.
     pub(crate) fn sent_at(&self, node: usize, sample: i64, frame: Duration) -> i64 {
         let whole = |number: u128| i64::try_from(number).unwrap_or(i64::MAX);
         let sends = &self.sends[node];
         let count = i64::try_from(sends.len()).unwrap_or(1).max(1);
         let place = usize::try_from(sample.rem_euclid(count)).unwrap_or(0);
+        // The frame repeats: sample n + count is sent one frame after sample n.
         sends.get(place).map_or(0, |at| whole(u128::from(*at))) + sample.div_euclid(count) * whole(frame.as_nanos())
     }
 }
 
-/// Samples that arrive on one link in a frame.
+/// Samples arriving on one link in a frame.
 struct Arrivals {
-    /// Newest sample that arrived before the frame, or `None` if no sample arrived before.
+    /// Newest sample arrived before the frame, or `None` without an arrival before.
     before: Option<i64>,
     /// Newer samples as (instant \[ns\], number), each at the receiver's first tick at or after its arrival.
     new: Vec<(i128, i64)>,
 }
 
-/// Returns the samples that arrive in the frame from 0 to `end` \[ns\]. Samples are numbered from the first sample of the frame, which has the number `first`
-/// in the sender's own count.
+/// Returns the samples arriving in the frame from 0 to `end` \[ns\]. Samples are numbered from the first sample of the frame. The sender's own count gives
+/// this sample the number `first`.
 fn arrivals(from: &NodeClock, to: &NodeClock, timing: &LinkTiming, first: i128, end: i128) -> Arrivals {
     let sent_at = |number: i128| from.instant(i128::from(from.phase) + number * i128::from(from.every));
     let delay = |number: i128| match timing {
@@ -315,12 +320,12 @@ fn arrivals(from: &NodeClock, to: &NodeClock, timing: &LinkTiming, first: i128, 
             (delays().min().unwrap_or(0), delays().max().unwrap_or(0), pattern.len())
         }
     };
-    // The search begins so early that all older samples have been replaced when the frame begins.
+    // The search begins early enough: at the beginning of the frame all older samples have been replaced.
     let period = sent_at(1) - sent_at(0);
     let back = i128::try_from(longest).unwrap_or(0) / period.max(1) + 2 * i128::try_from(pattern).unwrap_or(1) + 3;
     let mut arriving: Vec<(i128, i128)> = Vec::new();
     let mut number = first - back;
-    // Samples that are still on the way at the end of the frame are not looked at: a delay of an hour has half a million of them.
+    // Samples still on the way at the end of the frame are not looked at: a delay of an hour has half a million of them.
     let latest = end - i128::try_from(shortest).unwrap_or(0);
     while sent_at(number) < latest {
         if let Some(delay) = delay(number) {
@@ -328,6 +333,7 @@ fn arrivals(from: &NodeClock, to: &NodeClock, timing: &LinkTiming, first: i128, 
         }
         number += 1;
     }
+    // Arrivals in the order of time. A sample older than an earlier arrival is never held, since a peer holds the newest sample.
     arriving.sort_unstable();
     let relative = |number: i128| i64::try_from(number - first).unwrap_or(i64::MIN);
     let (mut newest, mut before, mut new) = (None, None, Vec::new());
@@ -363,7 +369,7 @@ fn frame(clocks: &[NodeClock], links: &[(usize, usize, LinkTiming)]) -> Result<u
     for (from, _, timing) in links {
         if let LinkTiming::Pattern(pattern) = timing {
             let clock = &clocks[*from];
-            // The samples in one repetition of the clock, taken as often as the pattern needs.
+            // The pattern repeats after a whole number of its length, the clock after `samples`. Both repeat together after their least common multiple.
             let (span, samples) = clock.repeats().ok_or(AnalysisError::NoFrame)?;
             let pattern = pattern.len() as u128;
             let times = pattern / gcd(pattern, samples);
@@ -381,6 +387,7 @@ fn gcd(a: u128, b: u128) -> u128 {
     if b == 0 { a } else { gcd(b, a % b) }
 }
 
+// Dividing first keeps the product in range whenever the result is in range.
 fn lcm(a: u128, b: u128) -> Option<u128> {
     (a / gcd(a, b)).checked_mul(b)
 }

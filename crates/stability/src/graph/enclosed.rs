@@ -1,4 +1,4 @@
-//! Intervals that enclose the eigenvalues of an averaging matrix with all rounding, for proofs.
+//! Intervals around the eigenvalues of an averaging matrix, rounding included, for proofs.
 
 use cohaptic_scene::Scene;
 
@@ -7,12 +7,12 @@ use crate::Matrix;
 use crate::factorisation::eigen;
 use crate::rounding::real;
 
-/// The eigenvalues of an averaging matrix, without the eigenvalue 1 that each connected part of the graph has once.
+/// The eigenvalues of an averaging matrix, without the single eigenvalue 1 of each connected part of the graph.
 #[derive(Clone, PartialEq, Debug)]
 pub struct EnclosedSpectrum {
-    /// Intervals in rising order that do not overlap, each with at least one eigenvalue.
+    /// Disjoint intervals in rising order, each with at least one eigenvalue.
     pub others: Vec<[f64; 2]>,
-    /// Number or total weight of the peers that each peer hears; `None` unless it is exactly the same for all peers.
+    /// Number or total weight of the heard peers of each peer; `None` unless exactly the same for all peers.
     pub degree: Option<f64>,
 }
 
@@ -31,12 +31,12 @@ impl Graph {
                 let degree = degree.filter(|_| has_equal_sums(weights));
                 return Ok(EnclosedSpectrum { others: merged(of_weights(weights, ones)), degree });
             }
-            // The other eigenvalues of a star are 0 and −1, which are exact numbers.
+            // The other eigenvalues of a star are 0 and −1, exact numbers.
             Self::Star => 0.0,
             Self::Ring { .. } if is_pair => 0.0,
             // −1/(N − 1) is rounded once.
             Self::Complete => f64::EPSILON,
-            // An angle below 2π is off by four roundings, a cosine by no more than its angle and one of its own, and a mean of them by one each and one more.
+            // An angle below 2π is off by four roundings, a cosine by at most its angle's error and one rounding, and a mean of cosines by a rounding per term and a final rounding.
             Self::Ring { neighbours } => (32.0 + real(*neighbours)) * f64::EPSILON,
         };
         let other = |(eigenvalue, _): &(Eigenvalue, usize)| if let Eigenvalue::Other(value) = eigenvalue { Some(*value) } else { None };
@@ -50,7 +50,7 @@ fn within_unit(value: f64, error: f64) -> [f64; 2] {
     [(value - error).max(-1.0), (value + error).min(1.0)]
 }
 
-/// Returns the union of intervals as intervals in rising order that do not overlap.
+/// Returns the union of intervals as disjoint intervals in rising order.
 fn merged(mut intervals: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     intervals.sort_by(|one, other| one[0].total_cmp(&other[0]));
     let mut apart: Vec<[f64; 2]> = Vec::new();
@@ -63,7 +63,7 @@ fn merged(mut intervals: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     apart
 }
 
-/// Returns an interval for each eigenvalue of D⁻¹W except the largest `ones` eigenvalues, which are 1. The matrix A = D^−½·W·D^−½ has the same eigenvalues,
+/// Returns an interval for each eigenvalue of D⁻¹W except the largest `ones` eigenvalues, known to be 1. The matrix A = D^−½·W·D^−½ has the same eigenvalues,
 /// is symmetric and has norm 1. If the computation fails, the single interval [−1, 1] stands for all eigenvalues.
 ///
 /// Let U and the diagonal Λ be the computed eigenvectors and eigenvalues of A, let ε = ‖UᵀU − 1‖ < 1, and let U = Q·H with Q orthogonal. Then
@@ -116,7 +116,7 @@ fn has_equal_sums(weights: &Matrix) -> bool {
     (1..weights.rows()).all(|row| is_zero(weights.row(0).iter().copied().chain(weights.row(row).iter().map(|weight| -weight))))
 }
 
-/// Tells whether the exact sum of numbers is zero. The sum is kept in parts that do not overlap (Shewchuk 1997, Grow-Expansion), so the sum is zero only if
+/// Tells whether the exact sum of numbers is zero. The sum is kept in disjoint parts (Shewchuk 1997, Grow-Expansion), so the sum is zero only if
 /// all parts are zero.
 fn is_zero(numbers: impl Iterator<Item = f64>) -> bool {
     let mut parts: Vec<f64> = Vec::new();
