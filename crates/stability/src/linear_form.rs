@@ -1,4 +1,4 @@
-//! The linear form of a coordination law. The law is computed once with linear forms in place of numbers, as a function of all that the law sees and
+//! The linear form of a coordination law. The law is computed once with linear forms in place of numbers, as a function of everything the law sees and
 //! remembers; the coefficients of the resulting forms are the gains of the law.
 
 use std::ops::{Add, Mul, Neg, Sub};
@@ -10,7 +10,7 @@ use cohaptic_peer::{Gains, Motion, Number};
 /// by which extrapolation moves the samples; and one number of the memory of the law.
 const UNKNOWNS: usize = 8;
 
-/// A constant plus a multiple of each unknown. `is_linear` is false if a value is no such sum; its coefficients then have no meaning.
+/// A constant plus a multiple of each unknown. `is_linear` is false if a value is no such sum; the coefficients then have no meaning.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Form {
     constant: f64,
@@ -42,7 +42,7 @@ impl Form {
     }
 
     fn times(self, factor: f64) -> Self {
-        // An unknown with coefficient zero keeps it, also if the factor has overflowed: 0·∞ would be NaN.
+        // A coefficient of zero stays zero, even if the factor has overflowed: 0·∞ would be NaN.
         let product = |by: f64| if by == 0.0 { 0.0 } else { by * factor };
         Self { constant: product(self.constant), by: self.by.map(product), ..self }
     }
@@ -92,7 +92,7 @@ impl Mul for Form {
     }
 }
 
-/// One result of a law in linear form: FT \[N\], or a number that the law remembers from this tick on.
+/// One result of a law in linear form: FT \[N\], or a number of the law's memory after this tick.
 ///
 /// The result is own·(x, v) + past·(x, v)(L ticks ago) − heard·(x̄, v̄) − ahead·lead + Σ memory·m, with x̄, v̄ and the lead of an [`Observation`].
 #[derive(Clone, PartialEq, Debug)]
@@ -105,7 +105,7 @@ pub struct LawRow {
     pub heard: Gains,
     /// Factor of the lead: the gain of a sample's velocity for each second of the sample's age \[N/m\].
     pub ahead: f64,
-    /// Factor of each number that the law remembers, indexed like the memory of the law.
+    /// Factor of each number of the law's memory, indexed like the memory.
     pub memory: Vec<f64>,
 }
 
@@ -114,20 +114,21 @@ pub struct LawRow {
 pub struct LinearLaw {
     /// The row of FT.
     pub force: LawRow,
-    /// Rows of the numbers that the law remembers, indexed like the memory of the law.
+    /// Rows of the numbers of the law's memory, indexed like the memory.
     pub memory: Vec<LawRow>,
     /// Age up to which samples are extrapolated \[s\]; `None` if samples are used without extrapolation.
     pub horizon: Option<f64>,
-    /// Number of ticks L that the law looks back. A law with L > 0 has no other memory.
+    /// Lag L of the law in ticks. A law with L > 0 has no other memory.
     pub lag: usize,
 }
 
 impl LawRow {
-    /// Returns the row of the parts of `form` that do not depend on the memory; `None` if `form` is not linear, has a constant, or changes when everything is
+    /// Returns the row of the parts of `form` without the memory; `None` if `form` is not linear, has a constant, or changes when everything is
     /// moved alike.
     #[expect(clippy::float_cmp, reason = "what moves with everything has equal gains for both ends to the bit")]
     fn of(form: &Form) -> Option<Self> {
         let Form { constant, by: [stiffness, damping, mean_position, mean_velocity, past_stiffness, past_damping, lead, _], is_linear } = *form;
+        // A displacement of everything alike moves own, past and heard positions together. The force stays if the three gains add up to zero.
         let fits = is_linear && constant == 0.0 && mean_position == -(stiffness + past_stiffness);
         let negative = |value: f64| if value == 0.0 { 0.0 } else { -value };
         fits.then(|| Self {
@@ -139,7 +140,7 @@ impl LawRow {
         })
     }
 
-    /// Returns the row with the gains of everything that the law sees multiplied by a factor. The factors of the memory stay.
+    /// Returns the row with the gains of all inputs of the law multiplied by a factor. The factors of the memory stay.
     fn scaled(&self, factor: f64) -> Self {
         let Self { own, past, heard, ahead, memory } = self;
         Self { own: own.scaled(factor), past: past.scaled(factor), heard: heard.scaled(factor), ahead: ahead * factor, memory: memory.clone() }
@@ -147,9 +148,9 @@ impl LawRow {
 }
 
 impl LinearLaw {
-    /// Returns the linear form of a law; `None` if the law has none, or if its forces change when everything is moved alike.
+    /// Returns the linear form of a law; `None` if the law has no linear form, or if its forces change when everything is moved alike.
     ///
-    /// The coefficients are to the bit the numbers that the law multiplies with, if every other factor in the law is 1 or 0.
+    /// The coefficients are to the bit the factors in the law, if every other factor in the law is 1 or 0.
     pub(crate) fn of(law: &BuiltIn) -> Option<Self> {
         let remembered = Law::<f64>::memory(law);
         let lag = Law::<f64>::lag(law);
@@ -159,7 +160,7 @@ impl LinearLaw {
         let past = Form::motion(if lag > 0 { 2 } else { 0 });
         let seen = Observation { own: Form::motion(0), past, mean: Form::motion(1), lead: Form::unknown(6) };
         let forms = law.map(|number| Form::of(*number));
-        // FT and the memory after the tick. At most one number of the memory before the tick is an unknown, the others are zero: so one unknown is enough for
+        // FT and the memory after the tick. At most one number of the memory before the tick is an unknown, the rest is zero. So one unknown is enough for
         // memories of any length, and the law is computed once for each number.
         let come_out = |unknown: Option<usize>| {
             let mut memory = vec![Form::of(0.0); remembered];
@@ -185,7 +186,7 @@ impl LinearLaw {
         Some(law)
     }
 
-    /// Returns the law that computes no force and has no memory.
+    /// Returns the law without a force and without a memory.
     pub const fn none() -> Self {
         let none = Gains { stiffness: 0.0, damping: 0.0 };
         Self { force: LawRow { own: none, past: none, heard: none, ahead: 0.0, memory: Vec::new() }, memory: Vec::new(), horizon: None, lag: 0 }
@@ -200,20 +201,20 @@ impl LinearLaw {
         std::iter::once(&mut self.force).chain(&mut self.memory)
     }
 
-    /// Returns stiffness and damping with which FT holds the own copy: the gains of the present and of the past own state together.
+    /// Returns stiffness and damping of FT against a motion of the own copy: the gains of the present and of the past own state together.
     pub fn held_by(&self) -> Gains {
         let LawRow { own, past, .. } = &self.force;
         Gains { stiffness: own.stiffness + past.stiffness, damping: own.damping + past.damping }
     }
 
-    /// Returns KT and BT of a law without memory that pulls the copy towards the mean of the samples held: FT = KT·(x − x̄) + BT·(v − v̄). `None` for any other
-    /// law.
+    /// Returns KT and BT of a law without memory and with a pull of the copy towards the mean of the held samples: FT = KT·(x − x̄) + BT·(v − v̄). `None` for
+    /// any other law.
     pub(crate) fn pull(&self) -> Option<Gains> {
         let LawRow { own, heard, ahead, .. } = &self.force;
         (self.memory.is_empty() && self.lag == 0 && own == heard && *ahead == 0.0).then_some(*own)
     }
 
-    /// Returns the law with everything that the law sees multiplied by a factor.
+    /// Returns the law with all inputs of the law multiplied by a factor.
     pub fn scaled(&self, factor: f64) -> Self {
         let memory = self.memory.iter().map(|row| row.scaled(factor)).collect();
         Self { force: self.force.scaled(factor), memory, ..self.clone() }

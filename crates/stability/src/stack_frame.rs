@@ -1,7 +1,8 @@
-//! The frame of a single node, computed in arrays on the stack. When all peers of a scene are alike, each cell of a map costs little more than such frames.
+//! The frame of a single node, computed in arrays on the stack. When all peers of a scene are alike, each cell of a map costs little more than a few frames on
+//! the stack.
 //!
-//! The operations and their order are those of [`Lifted::frame`](crate::lifted::Lifted::frame), and the resulting matrix is the same to the bit. Only the
-//! bookkeeping is done once for each timetable: which samples of earlier frames are used, and in which order samples, deliveries and ticks follow.
+//! The operations and their order equal the operations of [`Lifted::frame`](crate::lifted::Lifted::frame), and the resulting matrix is the same to the bit.
+//! Only the bookkeeping is done once for each timetable: the used samples of earlier frames, and the order of samples, deliveries and ticks.
 
 use std::time::Duration;
 
@@ -17,29 +18,29 @@ const MOST_SAMPLES: usize = 4;
 /// The largest number of states: positions and velocities of a device and a copy.
 const MOST_STATES: usize = 4;
 
-/// The steps of a frame of one node that hears its own samples.
+/// The steps of a frame of one node hearing its own samples.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct StackFrame {
     steps: Vec<Step>,
     /// Ages of the used samples of earlier frames, ascending; the newest sample of the previous frame has age 1.
     used: Vec<usize>,
-    /// Index of the sample held when the frame begins, among the samples: used ones of earlier frames first, then those sent in the frame.
+    /// Index of the sample held at the beginning of the frame, among the samples: used samples of earlier frames first, then the samples of the frame.
     held: Option<usize>,
     /// Number of samples sent in the frame.
     sent: usize,
-    /// Number of samples of earlier frames that are states of the monodromy matrix.
+    /// Number of samples of earlier frames among the states of the monodromy matrix.
     depth: usize,
 }
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Step {
     Sample,
-    /// The node holds this sample from here on. Samples are indexed with the used ones of earlier frames first, then those sent in this frame.
+    /// The node holds this sample from here on. Samples are indexed with the used samples of earlier frames first, then the samples of this frame.
     Deliver(usize),
     Tick(Duration),
 }
 
-/// The numbers that a frame is computed from, besides its steps.
+/// The numbers of a frame, besides the steps.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StackNode<'a> {
     pub(crate) node: &'a Node,
@@ -47,14 +48,14 @@ pub(crate) struct StackNode<'a> {
     pub(crate) weight: f64,
     /// Gains KT and BT of the law; not both zero.
     pub(crate) coordination: Gains,
-    /// Common time that velocities are multiplied by to be lengths \[s\].
+    /// Common time \[s\]. Velocities times the common time are lengths.
     pub(crate) time: f64,
     pub(crate) tied: bool,
 }
 
 impl<'a> StackNode<'a> {
     /// Returns the only node of a system, if the frame can be computed on the stack: forces act without a delay, and the law is a pull towards the mean with
-    /// gains that are not both zero. `None` for any other system.
+    /// gains not both zero. `None` for any other system.
     pub(crate) fn of(lifted: &Lifted<'a>) -> Option<Self> {
         let [node] = lifted.nodes else { return None };
         let coordination = node.law.pull().filter(|gains| !node.compute_delay && gains.stiffness + gains.damping > 0.0)?;
@@ -63,7 +64,7 @@ impl<'a> StackNode<'a> {
 }
 
 impl StackFrame {
-    /// Returns the steps of a timetable; `None` if the timetable is not of one node, or has more samples than fit on the stack.
+    /// Returns the steps of a timetable; `None` if the timetable is not of one node, or has more samples than the stack has room for.
     pub(crate) fn of(timetable: &Timetable) -> Option<Self> {
         let ([sent], [depth]) = (timetable.sent.as_slice(), timetable.depth.as_slice()) else { return None };
         let deliveries = timetable.events.iter().filter_map(|event| match event {
@@ -93,10 +94,10 @@ impl StackFrame {
     }
 
     /// Writes the monodromy matrix into `matrix` and returns a bound of the error of its entries, as the largest sum of absolute values of a row; zero without
-    /// `BOUND`. `closer` computes another bound and is called only where the quick bound is not below 1.
+    /// `BOUND`. `closer` computes another bound and is called only if the quick bound is not below 1.
     pub(crate) fn monodromy<const BOUND: bool>(&self, stack: StackNode<'_>, matrix: &mut Matrix, closer: impl FnOnce() -> f64) -> f64 {
         let states = stack.node.states() - usize::from(!stack.tied);
-        // The loop is compiled once for each small number of unknowns, so that the compiler can unroll the loops over columns.
+        // The loop is compiled once for each small number of unknowns, and the compiler can unroll the loops over columns.
         match states + self.used.len() {
             0..=2 => self.run::<2, BOUND>(stack, matrix, closer),
             3 => self.run::<3, BOUND>(stack, matrix, closer),
@@ -110,14 +111,14 @@ impl StackFrame {
     fn run<const C: usize, const BOUND: bool>(&self, stack: StackNode<'_>, matrix: &mut Matrix, closer: impl FnOnce() -> f64) -> f64 {
         let StackNode { node, weight, coordination, time, tied } = stack;
         let Gains { stiffness, damping } = coordination;
-        // A sample is the one combination of position and velocity that the law uses, scaled to be a length; `unit` [N/m] makes it a force again.
+        // A sample is the combination of position and velocity used by the law, scaled to be a length. Times `unit` [N/m] the sample is a force again.
         let unit = stiffness + damping / time;
         let (position_share, velocity_share) = (stiffness / unit, damping / time / unit);
         let count = node.states();
         let object = count - 2;
         let reference = (!tied).then_some(object);
         let states = count - usize::from(!tied);
-        // Every state is an unknown of its own but the reference position, relative to which all others are taken: its row begins as zero.
+        // Every state except the reference position is an unknown. All positions are relative to the reference, so the reference's row begins as zero.
         let mut z = [[0.0; C]; MOST_STATES];
         for row in (0..count).filter(|row| Some(*row) != reference) {
             z[row][row - usize::from(reference.is_some_and(|reference| row > reference))] = 1.0;
@@ -144,6 +145,7 @@ impl StackFrame {
                     next_sent += 1;
                 }
                 Step::Deliver(sample) => aim = aim_at(&store[sample]),
+                // Most ticks of a frame have the same span, so the step maps of the last span are kept.
                 Step::Tick(span) => {
                     let (on_copy, on_device) = match maps {
                         Some((of, on_copy, on_device)) if of == span => (on_copy, on_device),
@@ -209,6 +211,7 @@ impl StackFrame {
             let origin = reference.map_or(source, |(reference, _)| &z[reference]);
             let moved = if reference.is_some() { moved } else { 0.0 };
             for column in 0..states + used {
+                // Unused samples of earlier frames have a column too, which stays zero, so that the matrix maps the whole state.
                 let place = if column < states { column } else { states + self.used[column - states] - 1 };
                 row[place] = source[column] - moved * origin[column];
             }

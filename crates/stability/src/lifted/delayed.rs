@@ -1,29 +1,29 @@
-//! A frame whose samples are long under way, as a loop with delays instead of a large matrix.
+//! A frame with samples long under way, as a loop with delays instead of a large matrix.
 
 use super::frame::FrameMap;
 use crate::Matrix;
 use crate::determinant::{DelayedLoop, DelayedLoopError, Kernel};
 
 impl FrameMap {
-    /// Returns the loop whose characteristic roots are the eigenvalues of [`FrameMap::monodromy`], but for some that are zero. Fails if a delay has too many
-    /// steps or an entry is not finite.
+    /// Returns the loop with the eigenvalues of [`FrameMap::monodromy`], except some zero eigenvalues, as its characteristic roots. Fails if a delay has too
+    /// many steps or an entry is not finite.
     ///
-    /// The signals of the loop are the relative states x; for each sample that is sent in a frame, the value V of the sample when the next frame begins,
-    /// relative to the reference at that instant; and the distance d by which the reference moved in the previous frame. A sample that was sent L frames ago is
+    /// The signals of the loop are the relative states x; for each sample sent in a frame, the value V of the sample at the beginning of the next frame,
+    /// relative to the reference at that instant; and the distance d of the reference's motion in the previous frame. A sample sent L frames ago is
     ///
     /// ```text
     /// y(f) = V(f − L + 1) − t·(d(f) + d(f−1) + … + d(f − L + 2))
     /// ```
     ///
-    /// where t is the displacement of a sample under a displacement of everything by 1. The first term is a delay; the sum is what a delay adds in relative
-    /// coordinates.
+    /// where t is the displacement of a sample under a displacement of everything by 1. The first term is a delay; the sum comes from the motion of the
+    /// reference in relative coordinates.
     pub(crate) fn delayed_loop(&self) -> Result<DelayedLoop, DelayedLoopError> {
         let states = self.state_unknowns();
         let kept: Vec<usize> = (0..self.states.rows()).filter(|row| Some(*row) != self.reference()).collect();
         let sent = self.sent.rows();
         let size = states + sent + usize::from(self.reference().is_some());
         let moved = size - 1;
-        // One row of the frame for each signal, and the factor by which the motion of the reference is subtracted from the row.
+        // One row of the frame for each signal, and the factor of the subtracted motion of the reference.
         let mut rows: Vec<(&[f64], f64)> = kept.iter().map(|row| (self.states.row(*row), self.displacement(*row))).collect();
         rows.extend((0..sent).map(|row| (self.sent.row(row), self.translation(sent - row))));
         let reference = self.reference().map(|row| self.states.row(row));
@@ -34,6 +34,7 @@ impl FrameMap {
             let (entries, displaced) = rows[row];
             entries[column] - reference.map_or(0.0, |reference| displaced * reference[column])
         };
+        // States of the previous frame act without delay. Samples act through delays, which the loop below adds term by term.
         let mut now = Matrix::from_fn(size, size, |row, column| if column < states { coefficient(row, column) } else { 0.0 });
         let mut terms: Vec<(Kernel, Matrix)> = Vec::new();
         for (number, (node, age)) in self.used.iter().enumerate() {
@@ -61,6 +62,7 @@ impl FrameMap {
             }
             let steps = |frames: usize| u32::try_from(frames).unwrap_or(u32::MAX);
             add(Kernel::Delay(steps(frames - 1)), column, 1.0);
+            // A sample of the previous frame is already relative to the present reference. Older samples get the sum of the motions of the reference since.
             if reference.is_some() && frames >= 2 {
                 let translation = self.translation(*age);
                 add(Kernel::Delay(0), moved, -translation);

@@ -21,8 +21,8 @@ pub trait Instrument {
     /// Sees the velocity of the device of a node at a tick, multiplied by the common time, before the device moves.
     fn see(&mut self, _node: usize, _at: u64, _velocity: &[f64]) {}
 
-    /// Sees all rows at a tick of a node, whose own rows are `rows`, before the node moves. Sets the forces that replace that of the node's coupling (first)
-    /// and that of the wall on the copy, as functions of the inputs \[N\]. Returns which of the two are replaced.
+    /// Sees all rows at a tick of a node with the rows `rows`, before the node moves. Sets the replacements of the coupling's force (first) and of the wall's
+    /// force on the copy, as functions of the inputs \[N\]. Returns `true` for each replaced force.
     fn touch(&mut self, _node: usize, _z: &Matrix, _rows: Rows, _inputs: [&mut [f64]; 2]) -> [bool; 2] {
         [false; 2]
     }
@@ -34,26 +34,25 @@ pub struct Autonomous;
 
 impl Instrument for Autonomous {}
 
-/// The linear map of one frame, from the unknowns to the states at the end and the samples sent.
+/// Linear map of one frame, from the unknowns to the states at the end and the sent samples.
 ///
 /// The unknowns, one column each, are the states at the beginning without the reference, then the used samples of earlier frames, then the inputs. A sample
-/// has one number or two, as [`Sampling`](super::Sampling) says, each with a place of its own: with c numbers per sample, number i of sample s has the
-/// place c·s + i.
+/// has one number or two, by [`Sampling`](super::Sampling), each with a separate place: with c numbers per sample, number i of sample s has the place c·s + i.
 #[derive(Clone, PartialEq, Debug)]
 pub struct FrameMap {
     /// States at the end, one row each, the reference among them. Positions are absolute here, not relative to the reference.
     pub states: Matrix,
     /// Distance by which a translation of everything by 1 moves each row of `states`: 1 for positions, 0 for velocities.
     displacements: Vec<f64>,
-    /// Row of the position that all positions are relative to; `None` if the motion is tied to ground.
+    /// Row of the reference of all positions; `None` if the motion is tied to ground.
     reference: Option<usize>,
     /// Samples sent in the frame, one row for each number, ordered by node, then by time.
     pub sent: Matrix,
     /// First row of `sent` of each node.
     first_sent: Vec<usize>,
-    /// Numbers of samples of earlier frames that are used: the sending node, and the distance to the first number of this frame, at least 1.
+    /// Used numbers of samples of earlier frames: the sending node, and the distance to the first number of this frame, at least 1.
     pub used: Vec<(usize, usize)>,
-    /// Number of sample numbers of earlier frames that are states, for each node.
+    /// Number of sample numbers of earlier frames among the states, indexed by node.
     depth: Vec<usize>,
     /// Distance by which a translation of everything by 1 moves each number of a sample.
     translations: Vec<f64>,
@@ -61,7 +60,7 @@ pub struct FrameMap {
     pub error: f64,
 }
 
-/// The number of computed entries after which the watch is asked whether to stop; some ten milliseconds of work.
+/// Number of computed entries between two questions to the watch; some ten milliseconds of work.
 const LOOK: usize = 1_000_000;
 
 impl Lifted<'_> {
@@ -83,6 +82,7 @@ impl Lifted<'_> {
         let columns = inputs + instrument.inputs();
         let scale = Scale { time: self.time, compliance: self.nodes[0].compliance(self.time) };
 
+        // Each state is an unknown, so the states begin as unit vectors. The reference position is zero by definition and has no unknown.
         let mut z = Matrix::zeros(count, columns);
         for row in 0..count {
             match reference {
@@ -115,7 +115,7 @@ impl Lifted<'_> {
         for (to, from, sample) in &self.timetable.held {
             held[to * nodes + from] = row_of(*from, *sample).map(|row| (row, *sample));
         }
-        // The force that each row of each node's law hears [N].
+        // Heard force of each row of each node's law [N].
         let law_rows = 1 + self.nodes.iter().map(|node| node.law.memory.len()).max().unwrap_or(0);
         let mut heard = Matrix::zeros(nodes * law_rows, columns);
         let instants = self.ages_matter().then(|| Instants::of(self.timetable));
@@ -137,6 +137,7 @@ impl Lifted<'_> {
                 }
             }
             match *event {
+                // A sample holds the state before the tick of the same instant, since samplings precede ticks.
                 Event::Sample { node } => {
                     if !silent {
                         let (x, v) = (z.row(rows[node].object), z.row(rows[node].object + 1));
@@ -155,10 +156,11 @@ impl Lifted<'_> {
                     stale[to] = true;
                 }
                 Event::Tick { node, at, span } => {
-                    // The sums change only after a delivery, unless the laws use the ages of samples, which change from tick to tick.
+                    // The sums change only after a delivery, unless the laws use the ages of samples: ages change from tick to tick.
                     if std::mem::take(&mut stale[node]) || instants.is_some() {
                         (0..law_rows).for_each(|row| heard.row_mut(node * law_rows + row).fill(0.0));
                         for from in 0..nodes {
+                            // Without a held sample a pair has weight zero: the mean of a node without senders is not heard.
                             let Some((first, sample)) = held[node * nodes + from] else { continue };
                             let age = instants.as_ref().map_or(0.0, |instants| instants.age((node, from), sample, at, self.timetable.frame));
                             for channel in 0..channels {
@@ -213,12 +215,12 @@ impl Lifted<'_> {
         })
     }
 
-    /// Returns whether the law of a node uses the ages of samples. If so, the same sample is heard differently from tick to tick.
+    /// Tells whether the law of a node uses the ages of samples. The force of the same sample then changes from tick to tick.
     fn ages_matter(&self) -> bool {
         self.nodes.iter().any(|node| node.law.horizon.is_some())
     }
 
-    /// Returns the numbers of samples of earlier frames that are used in this frame, ordered by node and then by age: see [`FrameMap::used`].
+    /// Returns the numbers of samples of earlier frames used in this frame, ordered by node and then by age: see [`FrameMap::used`].
     fn used(&self) -> Vec<(usize, usize)> {
         let deliveries = self.timetable.events.iter().filter_map(|event| match event {
             Event::Deliver { from, to, sample } => Some((*to, *from, *sample)),
@@ -234,6 +236,7 @@ impl Lifted<'_> {
                 (0..channels).map(move |channel| (from, age * channels - channel))
             })
             .collect();
+        // Several receivers may use the same sample. The order by sender and age lets `dedup` find the repetitions.
         used.sort_unstable_by_key(|(from, age)| (*from, age.div_ceil(self.sampling.channels()), std::cmp::Reverse(*age)));
         used.dedup();
         used
@@ -241,8 +244,8 @@ impl Lifted<'_> {
 }
 
 impl FrameMap {
-    /// Returns the matrix by which one frame multiplies the relative state: the states without the reference, then for each node the samples of earlier frames,
-    /// the newest first.
+    /// Returns the matrix from the relative state at the beginning of a frame to the relative state at its end: the states without the reference, then for each
+    /// node the samples of earlier frames, the newest first.
     pub fn monodromy(&self) -> Matrix {
         self.driven(0)
     }
@@ -255,6 +258,7 @@ impl FrameMap {
         let (places, first) = self.places(inputs);
         let size = states + self.history();
         let mut matrix = Matrix::zeros(size, size + inputs);
+        // A row moved by a translation is taken relative to the reference at the end of the frame, so the reference's row is subtracted.
         let mut put = |row: usize, source: &[f64], moved: f64| {
             for (place, entry) in places.iter().zip(source) {
                 matrix[(row, *place)] += entry;
@@ -281,41 +285,42 @@ impl FrameMap {
                 }
             }
         }
-        // A sample that is older than all samples of the frame stays a state, and becomes older by the number of samples sent.
+        // A sample older than all samples of the frame stays a state, and becomes older by the number of sent samples.
         for (row, column) in shifted {
             matrix[(row, column)] += 1.0;
         }
         matrix
     }
 
-    /// Returns the distance by which a translation of everything by 1 moves the number of a sample that is `age` numbers before the first of the frame.
+    /// Returns the distance by which a translation of everything by 1 moves a number of a sample, `age` numbers before the first number of the frame.
     pub fn translation(&self, age: usize) -> f64 {
         let channels = self.translations.len();
+        // Numbers of a sample stand channel by channel, so the distance from the frame's first number gives the channel.
         self.translations[(channels - age % channels) % channels]
     }
 
-    /// Returns the count of numbers of samples of earlier frames that are states.
+    /// Returns the count of numbers of samples of earlier frames among the states.
     pub(crate) fn history(&self) -> usize {
         self.depth.iter().sum()
     }
 
-    /// Returns the rows of `sent` that a node sent, ordered by time and then by the numbers of a sample.
+    /// Returns the rows of `sent` of a node, ordered by time and then by the numbers of a sample.
     pub fn sent_by(&self, node: usize) -> std::ops::Range<usize> {
         let end = self.first_sent.get(node + 1).copied().unwrap_or_else(|| self.sent.rows());
         self.first_sent[node]..end
     }
 
-    /// Returns the number of unknowns that are states.
+    /// Returns the number of states among the unknowns.
     pub fn state_unknowns(&self) -> usize {
         self.states.rows() - usize::from(self.reference.is_some())
     }
 
-    /// Returns the row of the position that all positions are relative to; `None` if the motion is tied to ground.
+    /// Returns the row of the reference of all positions; `None` if the motion is tied to ground.
     pub const fn reference(&self) -> Option<usize> {
         self.reference
     }
 
-    /// Marks a row as one that a translation does not move: the row of a body that is tied to ground and not to the other bodies.
+    /// Marks a row as unmoved by a translation: the row of a body tied to ground and not to the other bodies.
     pub fn tie(&mut self, row: usize) {
         self.displacements[row] = 0.0;
     }

@@ -1,6 +1,6 @@
-//! A bound of the rounding errors of a frame that stays close however fast disturbances grow.
+//! Bound of the rounding errors of a frame, close even for fast growing disturbances.
 //!
-//! With T the matrix of a tick, the computed rows ẑ obey ẑ⁺ = T·ẑ + r. Each operation rounds the terms that it adds up, so that r is at most u·|T|·s row by
+//! With T the matrix of a tick, the computed rows ẑ obey ẑ⁺ = T·ẑ + r. Each operation rounds the added terms, so r is at most u·|T|·s row by
 //! row, where s holds the sums of absolute values of the computed rows and |T| the absolute values of the terms of a tick. Hence two recursions over the same
 //! events,
 //!
@@ -9,8 +9,8 @@
 //! ```
 //!
 //! bound the sums and their errors. The recursions use only the parameters of the nodes, no entry of the frame's matrix. For stiff gains |T| grows by a factor
-//! near that of T: with a = KT·h²/(2m), the copy alone grows by about a − 3 per tick and its majorant by a + 4. So e stays about u times the number of ticks
-//! times s, also if the square of the growth ([`Rounding`](super::Rounding)) says nothing.
+//! near the growth by T: with a = KT·h²/(2m), the copy alone grows by about a − 3 per tick and its majorant by a + 4. So e stays about u times the number of
+//! ticks times s, even if the square of the growth ([`Rounding`](super::Rounding)) is useless as a bound.
 
 use std::collections::VecDeque;
 
@@ -19,10 +19,10 @@ use super::system::Lifted;
 use crate::rounding::real;
 use crate::timetable::Event;
 
-/// Rounding error of the operations of a tick, relative to the terms that they add up: at most fifteen operations in a row, among them the rounding of the
+/// Rounding error of the operations of a tick, relative to the added terms: at most fifteen operations in a row, among them the rounding of the
 /// coefficients of step maps and of the units.
 const TICK: f64 = 16.0 * f64::EPSILON;
-/// Rounding error of a sample, and of the mean of samples; the mean has one rounding more for each number of each node.
+/// Rounding error of a sample, and of the mean of samples; the mean has a further rounding for each number of each node.
 const MEAN: f64 = 6.0 * f64::EPSILON;
 
 /// A bound of the sum of absolute values of a row, and a bound of the row's error.
@@ -40,7 +40,7 @@ impl Size {
         Self { sum: self.sum + factor.abs() * other.sum, error: self.error + factor.abs() * other.error }
     }
 
-    /// Returns the size with the error of one more rounding, of the share `by` of the sum.
+    /// Returns the size with the error of a further rounding, of the share `by` of the sum.
     fn rounded(self, by: f64) -> Self {
         Self { error: self.error + by * self.sum, ..self }
     }
@@ -51,11 +51,11 @@ impl Size {
 struct NodeSizes {
     device: [Size; 2],
     copy: [Size; 2],
-    /// Sizes of the forces that act at the next tick, on the copy and on the device \[N\].
+    /// Sizes of the forces at the next tick, on the copy and on the device \[N\].
     pending: [Size; 2],
-    /// Sizes of the numbers that the law remembers, in the law's own units.
+    /// Sizes of the numbers of the law's memory, in the law's own units.
     memory: Vec<Size>,
-    /// Sizes of the combinations of the own states of the latest ticks that the law uses, the newest first.
+    /// Sizes of the used combinations of the own states of the latest ticks, the newest first.
     past: VecDeque<Size>,
 }
 
@@ -68,7 +68,7 @@ impl Lifted<'_> {
 }
 
 /// Returns a bound of the errors of all rows of a frame as one matrix, in the 2-norm: of the states at the end and of the samples sent, as positions and
-/// velocities, relative to the reference or not. `compliance` returns the factor [m/N] that makes the waiting forces of a node lengths.
+/// velocities, relative to the reference or not. `compliance` returns the factor [m/N] by which the waiting forces of a node become lengths.
 pub(crate) fn error_of(lifted: &Lifted<'_>, compliance: impl Fn(usize) -> f64) -> f64 {
     let nodes = lifted.nodes.len();
     let unit = |node: usize, place: usize| lifted.nodes[node].memory_unit(place, Scale { time: lifted.time, compliance: compliance(node) });
@@ -97,7 +97,7 @@ pub(crate) fn error_of(lifted: &Lifted<'_>, compliance: impl Fn(usize) -> f64) -
     let mut sent: Vec<Vec<Vec<Size>>> = vec![Vec::new(); nodes];
     let mut squares = 0.0;
     let reference = |sizes: &[NodeSizes]| if lifted.tied { Size::ZERO } else { sizes[0].copy[0] };
-    // Samples are taken relative to the reference at the end of the frame, which is not known yet. Their own errors are noted now, and the error of the
+    // Samples are taken relative to the reference at the end of the frame, still unknown here. Their own errors are noted now, and the error of the
     // reference is added at the end.
     let mut positions: Vec<Size> = Vec::new();
     let of_sample = |sent: &[Vec<Vec<Size>>], node: usize, sample: i64| {
@@ -113,15 +113,17 @@ pub(crate) fn error_of(lifted: &Lifted<'_>, compliance: impl Fn(usize) -> f64) -
             Event::Sample { node } => {
                 let copy = sizes[node].copy;
                 positions.push(copy[0]);
-                // The velocity of a sample does not depend on the reference, so that its error is final.
+                // The velocity of a sample does not depend on the reference, so the error of the velocity is final.
                 squares += copy[1].error * copy[1].error;
                 sent[node].push(signal(copy).into_iter().map(|size| size.rounded(MEAN)).collect());
             }
+            // A held sample keeps its size until the next delivery. Its coefficients do not change in between.
             Event::Deliver { from, to, sample } => held[to * nodes + from] = Some(of_sample(&sent, from, sample)),
             Event::Tick { node, span, .. } => {
                 let mut heard = vec![Size::ZERO; 1 + lifted.nodes[node].law.memory.len()];
                 for from in 0..nodes {
                     for (channel, number) in held[node * nodes + from].iter().flatten().enumerate() {
+                        // Every sample counts with the age of the oldest sample, because the gains grow with the age: the bound then covers all ages.
                         for (heard, by) in heard.iter_mut().zip(lifted.nodes[node].heard(sampling, channel, oldest, time)) {
                             *heard = heard.plus(lifted.weights[(node, from)] * sampling.of_gains(by, time), *number);
                         }
@@ -148,11 +150,12 @@ pub(crate) fn error_of(lifted: &Lifted<'_>, compliance: impl Fn(usize) -> f64) -
         if lifted.nodes[node].compute_delay {
             size.pending.iter().for_each(|force| add(Size::ZERO.plus(compliance(node), *force).rounded(f64::EPSILON), Size::ZERO));
         }
-        // The reference counts in each number by the share of the position, which is at most 1.
+        // The reference counts in each number by the share of the position, a share of at most 1.
         size.past.iter().for_each(|number| add(*number, origin));
         let memory = size.memory.iter().enumerate();
         memory.for_each(|(place, number)| add(Size::ZERO.plus(unit(node, place), *number).rounded(2.0 * f64::EPSILON), Size::ZERO));
     }
+    // The square root of the sum of squared row errors is the Frobenius norm of a matrix of these errors, and bounds the 2-norm.
     squares.sqrt()
 }
 
@@ -184,6 +187,7 @@ fn tick(node: &Node, sizes: &mut NodeSizes, heard: &[Size], lifted: &Lifted<'_>,
     }
     sizes.memory = next;
     if node.compute_delay {
+        // The computed forces wait as lengths and act a tick later, so the forces now are those computed before.
         let computed = [on_copy.rounded(TICK), on_device.rounded(TICK)];
         [on_copy, on_device] = std::mem::replace(&mut sizes.pending, computed);
     }
@@ -193,6 +197,7 @@ fn tick(node: &Node, sizes: &mut NodeSizes, heard: &[Size], lifted: &Lifted<'_>,
     }
 }
 
+// A step map adds e·z and g·F to the state. The terms count with absolute values, and the exact maps round `factor` times as much.
 fn advance(body: &Body, [x, v]: &mut [Size; 2], force: Size, time: f64, span: std::time::Duration) {
     let (e, g, factor) = body.sizes(span);
     let position = x.plus(e[0][0], *x).plus(e[0][1] / time, *v).plus(g[0], force).rounded(TICK * factor);

@@ -1,7 +1,7 @@
 //! A node of the lifted system on one axis, its rows and its tick: a peer, or the common or relative motion of a class of equal peers.
 //!
-//! Positions are in metres. Velocities are multiplied by a common time and forces by a compliance, so that every state is a length. Without a common unit,
-//! norms of states and the error bounds that use norms would have no meaning.
+//! Positions are in metres. Velocities are multiplied by a common time and forces by a compliance, so every state is a length. Without a common unit,
+//! norms of states and error bounds from norms would have no meaning.
 
 use std::time::Duration;
 
@@ -20,17 +20,17 @@ pub struct Body {
     coarse: Option<Coarse>,
 }
 
-/// Rounding of step maps over which a body decays or turns by more than 1.
+/// Rounding of step maps of a body with a decay or turn by more than 1.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Coarse {
     /// Multiple of the rounding of a tick's own operations.
     factor: f64,
-    /// Least sizes of the coefficients that the rounding is relative to: a sine or a cosine near zero is not more exact than one near 1.
+    /// Least reference sizes of the coefficients for the rounding: a sine or a cosine near zero is not more exact than a sine near 1.
     least: ([[f64; 2]; 2], [f64; 2]),
 }
 
 impl Coarse {
-    /// Returns the rounding of the exact maps of a body over spans of up to `span`; `None` where a tick's own operations round more.
+    /// Returns the rounding of the exact maps of a body over spans of up to `span`; `None` if a tick's own operations round more.
     fn of(plant: &Plant, span: Duration) -> Option<Self> {
         let (factor, h) = (plant.rounding_factor(span) - 1.0, span.as_secs_f64());
         let omega = (plant.stiffness / plant.mass).sqrt();
@@ -47,7 +47,7 @@ impl Body {
         Self { coarse, ..Self::from_steps(clock, |span| plant.step(span, integrator)) }
     }
 
-    /// Returns a body whose step map over a span between ticks is `step(span)`.
+    /// Returns a body with the step map `step(span)` over a span between ticks.
     pub(crate) fn from_steps(clock: &Clock, step: impl Fn(Duration) -> StepMap) -> Self {
         let (short, long) = clock.spans();
         let first = step(short);
@@ -68,8 +68,8 @@ impl Body {
         if span == self.short.0 { &self.short.1 } else { &self.long }
     }
 
-    /// Returns the sizes of the coefficients over a span that rounding is relative to, in the order of [`StepMap::coefficients`], and the rounding in
-    /// multiples of that of a tick's own operations: 1 unless the body decays or turns by more than 1 within the span.
+    /// Returns the reference sizes of the coefficients over a span for the rounding, in the order of [`StepMap::coefficients`], and the rounding in
+    /// multiples of the rounding of a tick's own operations: 1 unless the body decays or turns by more than 1 within the span.
     pub(crate) fn sizes(&self, span: Duration) -> ([[f64; 2]; 2], [f64; 2], f64) {
         let map = self.map(span).map(|coefficient| coefficient.abs());
         let (e, g) = map.coefficients();
@@ -87,10 +87,10 @@ impl Body {
     }
 }
 
-/// A node: the parts of a peer that move linearly along one axis.
+/// A node: the linearly moving parts of a peer along one axis.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Node {
-    /// The device and the arm that holds it; `None` if the device does not touch the copy.
+    /// Device with the holding arm; `None` if the device does not touch the copy.
     pub device: Option<Body>,
     /// The copy of the object.
     pub object: Body,
@@ -98,11 +98,11 @@ pub struct Node {
     pub coupling: Gains,
     /// The coordination law.
     pub law: LinearLaw,
-    /// Spring and damper that tie the copy to ground, if any.
+    /// Spring and damper between copy and ground, if any.
     pub wall: Option<Gains>,
     /// `true` if forces act one tick after their computation.
     pub compute_delay: bool,
-    /// `true` if position and velocity of the own past are both states. If not, only the combination that the law uses is a state.
+    /// `true` if position and velocity of the own past are both states. Otherwise only the combination used by the law is a state.
     pub keeps_whole_past: bool,
 }
 
@@ -113,9 +113,9 @@ pub struct Rows {
     pub device: Option<usize>,
     /// Row of the position of the copy; the row of the velocity follows.
     pub object: usize,
-    /// Row of the force on the copy that acts at the next tick, if forces act one tick late; the row of the force of the device's coupling follows.
+    /// Row of the force on the copy at the next tick, if forces act one tick late; the row of the force of the device's coupling follows.
     pub pending: Option<usize>,
-    /// Row of the first number that the law remembers; the others follow.
+    /// Row of the first number of the law's memory; the rest of the memory follows.
     pub memory: usize,
     /// First row of the own states of the latest ticks, the newest first, if the law looks back: one combination per tick, or position and velocity.
     pub past: usize,
@@ -131,20 +131,20 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// Converts gains to gains of a velocity that is multiplied by the common time.
+    /// Converts gains to gains of a velocity multiplied by the common time.
     pub fn gains(self, gains: Gains) -> Gains {
         Gains { stiffness: gains.stiffness, damping: gains.damping / self.time }
     }
 }
 
-/// Forces of a tick that do not follow from the states, each a function of the unknowns: one entry per column \[N\].
+/// Forces of a tick from outside the states, each a function of the unknowns: one entry per column \[N\].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct External<'a> {
     /// The force of the hand on the device.
     pub hand: Option<&'a [f64]>,
-    /// The force that replaces that of the coupling.
+    /// Replacement of the coupling's force.
     pub coupling: Option<&'a [f64]>,
-    /// The force on the copy that replaces that of the wall.
+    /// Replacement of the wall's force on the copy.
     pub wall: Option<&'a [f64]>,
 }
 
@@ -176,7 +176,7 @@ impl Node {
         self.looks_back() * if self.keeps_whole_past { 2 } else { 1 }
     }
 
-    /// Returns the number of ticks that the law looks back; 0 if the gains of the past state are zero.
+    /// Returns the lag of the law in ticks; 0 if the gains of the past state are zero.
     pub fn looks_back(&self) -> usize {
         let Gains { stiffness, damping } = self.law.force.past;
         if stiffness + damping > 0.0 { self.law.lag } else { 0 }
@@ -188,7 +188,7 @@ impl Node {
         stiffness + damping / time
     }
 
-    /// Returns the distance by which a translation of everything by 1 moves the row `row` of the node, whose rows are `rows`.
+    /// Returns the distance by which a translation of everything by 1 moves the row `row` of the node with the rows `rows`.
     pub fn displacement(&self, rows: Rows, row: usize, time: f64) -> f64 {
         if row == rows.object || Some(row) == rows.device {
             1.0
@@ -201,7 +201,7 @@ impl Node {
         }
     }
 
-    /// Returns the places of the node's rows, which stand from `first` on.
+    /// Returns the places of the node's rows from `first` on.
     pub fn rows(&self, first: usize) -> Rows {
         let device = self.device.map(|_| first);
         let object = first + if self.device.is_some() { 2 } else { 0 };
@@ -209,18 +209,18 @@ impl Node {
         Rows { device, object, pending: self.compute_delay.then_some(object + 2), memory: past - self.law.memory.len(), past }
     }
 
-    /// Returns the compliance that makes the node's forces lengths: the distance that a force moves the copy within the common time [m/N].
+    /// Returns the compliance by which the node's forces become lengths: the motion of the copy by a unit force within the common time [m/N].
     pub fn compliance(&self, time: f64) -> f64 {
         self.object.short.1.coefficients().1[1] * time
     }
 
-    /// Returns the largest sum of absolute values of a row of one tick's matrix, in the units of `scale`. Rounding errors grow by at most that factor per tick.
+    /// Returns the largest sum of absolute values of a row of one tick's matrix, in the units of `scale`. Rounding errors grow by at most this factor per tick.
     pub(crate) fn step_norm(&self, scale: Scale) -> f64 {
-        // A sample that is extrapolated without end counts by the gains alone.
+        // A sample extrapolated without end counts by the gains alone.
         self.step_norm_up_to(scale, 0.0)
     }
 
-    /// Returns the norm of `step_norm` with `oldest` \[s\] as the age of the oldest sample, for laws that extrapolate samples without end.
+    /// Returns the norm of `step_norm` with `oldest` \[s\] as the age of the oldest sample, for laws with unlimited extrapolation of samples.
     pub fn step_norm_up_to(&self, scale: Scale, oldest: f64) -> f64 {
         let gain = |gains: Gains| gains.stiffness.abs() + gains.damping.abs() / scale.time;
         let wall = self.wall.map_or(0.0, gain);
@@ -228,6 +228,7 @@ impl Node {
         let oldest = self.law.horizon.map_or(0.0, |horizon| if horizon.is_finite() { horizon } else { oldest });
         let seen = |row: &LawRow| gain(row.own) + gain(row.past) + gain(row.heard) + row.ahead.abs() * oldest / scale.time;
         let remembered = |row: &LawRow| row.memory.iter().enumerate().map(|(place, by)| by.abs() / self.memory_unit(place, scale)).sum::<f64>();
+        // A pull towards the mean has the same gains for the own state and the heard samples, hence the factor 2.
         let coordination = match self.law.pull() {
             Some(gains) => 2.0 * gain(gains),
             None => seen(&self.law.force) + remembered(&self.law.force),
@@ -245,7 +246,7 @@ impl Node {
         row(&self.object, on_object).max(device).max(memory)
     }
 
-    /// Returns the factor that makes number `place` of the law's memory a length: the distance that the force of one unit of the number moves the copy within
+    /// Returns the factor by which number `place` of the law's memory becomes a length: the motion of the copy by the force of one unit of the number within
     /// the common time.
     pub fn memory_unit(&self, place: usize, scale: Scale) -> f64 {
         let by = self.law.force.memory[place].abs();
@@ -254,8 +255,8 @@ impl Node {
         scale.compliance * ticks * if by > 0.0 { by } else { 1.0 }
     }
 
-    /// Makes one tick: computes the forces from the rows `z` and moves device and copy by `span`. `heard` returns the force that each row of the law hears of
-    /// the samples held \[N\], the row of FT first. `external` has the forces that do not follow from the states. Every row is a linear function of the same
+    /// Makes one tick: computes the forces from the rows `z` and moves device and copy by `span`. `heard` returns the force on each row of the law from
+    /// the held samples \[N\], the row of FT first. `external` has the forces from outside the states. Every row is a linear function of the same
     /// unknowns, one column each.
     #[expect(clippy::too_many_arguments, reason = "what a tick needs, each of its own kind")]
     pub fn tick<'a>(
@@ -272,6 +273,7 @@ impl Node {
         let own = scale.gains(coordination_of(self.law.force.own, wall));
         let columns = z.columns();
         let Scratch { coupling, on_object, memory } = scratch;
+        // All forces are computed from the state at the tick, before any body moves.
         {
             let target = heard(0);
             let (x, v) = (z.row(rows.object), z.row(rows.object + 1));
@@ -293,7 +295,7 @@ impl Node {
                 *force += wall;
             }
         }
-        // Past states and memory change here, before the copy moves, because both take in the state that the forces of this tick have seen.
+        // Past states and memory change here, before the copy moves, because both take in the state used by the forces of this tick.
         if self.looks_back() > 0 {
             self.look_back(z, rows, scale, on_object);
         }
@@ -304,6 +306,7 @@ impl Node {
         if let Some(pending) = rows.pending {
             exchange(z.row_mut(pending), on_object, scale.compliance);
             if rows.device.is_some() {
+                // The device gets the same coupling force as the copy, with the opposite sign, and moves after the force on the copy is known.
                 exchange(z.row_mut(pending + 1), coupling, scale.compliance);
             }
         }
@@ -322,6 +325,8 @@ impl Node {
     fn look_back(&self, z: &mut Matrix, rows: Rows, scale: Scale, on_object: &mut [f64]) {
         let (count, unit, gains) = (self.looks_back(), self.past_unit(scale.time), scale.gains(self.law.force.past));
         if self.keeps_whole_past {
+            // Past states stand newest first. The oldest acts now and drops out, all further states become older by one place, and the present state goes
+            // first.
             let oldest = rows.past + 2 * (count - 1);
             let (x, v) = (z.row(oldest), z.row(oldest + 1));
             for (force, (x, v)) in on_object.iter_mut().zip(x.iter().zip(v)) {
@@ -360,6 +365,7 @@ impl Node {
                 *force -= share * remembered;
             }
         }
+        // A memory number is a length by its unit, so the force divides by the unit.
         // The next values are collected first, because every row may depend on all present values.
         next.reset(self.law.memory.len(), columns);
         for (row, law) in self.law.memory.iter().enumerate() {
@@ -381,7 +387,7 @@ impl Node {
         }
     }
 
-    /// Iterates over the forces that the rows of the law hear of a unit of number `channel` of a sample of age `age` \[s\], the row of FT first [N/m].
+    /// Iterates over the forces on the rows of the law from a unit of number `channel` of a sample of age `age` \[s\], the row of FT first [N/m].
     pub fn heard(&self, sampling: Sampling, channel: usize, age: f64, time: f64) -> impl Iterator<Item = f64> {
         let age = self.law.horizon.map_or(0.0, |horizon| age.min(horizon));
         self.law.rows().map(move |row| sampling.heard(row, channel, age, time))
@@ -389,12 +395,13 @@ impl Node {
 }
 
 impl Sampling {
-    /// Returns the numbers of a sample that the laws of the nodes use: one number if all rows use multiples of the same combination, or hear nothing.
+    /// Returns the numbers of a sample used by the laws of the nodes: one number if all rows use multiples of the same combination, or hear nothing.
     pub fn of(nodes: &[Node]) -> Self {
         let heard = |row: &LawRow| (row.heard.stiffness != 0.0 || row.heard.damping != 0.0).then_some(row.heard);
         let rows = || nodes.iter().flat_map(|node| node.law.rows());
         let gains = rows().find_map(heard).unwrap_or(Gains { stiffness: 0.0, damping: 0.0 });
         #[expect(clippy::float_cmp, reason = "multiples of one another to the bit")]
+        // Two pairs of gains are multiples if their cross product is zero. An extrapolated sample needs position and velocity separately.
         let is_multiple = |row: &LawRow| {
             row.ahead == 0.0
                 && (row.heard == gains
@@ -409,7 +416,7 @@ pub(crate) fn coordination_of(coordination: Gains, wall: Option<Gains>) -> Gains
     wall.map_or(coordination, |wall| Gains { stiffness: coordination.stiffness + wall.stiffness, damping: coordination.damping + wall.damping })
 }
 
-/// Exchanges forces: stores the new ones as lengths, and puts those stored a tick before into `force` \[N\].
+/// Exchanges forces: stores the new forces as lengths, and puts the forces stored a tick before into `force` \[N\].
 fn exchange(stored: &mut [f64], force: &mut [f64], compliance: f64) {
     for (stored, force) in stored.iter_mut().zip(force) {
         let before = *stored / compliance;

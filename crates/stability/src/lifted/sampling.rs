@@ -1,10 +1,10 @@
-//! The numbers of a sample that are unknowns of a frame: one number if all laws use the same combination of position and velocity, otherwise both.
+//! Numbers of a sample among the unknowns of a frame: one number if all laws use the same combination of position and velocity, otherwise both.
 
 use cohaptic_peer::Gains;
 
 use crate::linear_form::LawRow;
 
-/// The numbers of a sample that are unknowns of their own.
+/// Numbers of a sample among the unknowns.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Sampling {
     /// The combination (K·x + B·v)/(K + B/time), a length, for these gains K and B.
@@ -40,7 +40,7 @@ impl Sampling {
         }
     }
 
-    /// Returns the factors of position and velocity as [`Sampling::shares`], but those of a combined number before its division by K + B/time [N/m].
+    /// Returns the factors of position and velocity as [`Sampling::shares`], but for a combined number without the division by K + B/time [N/m].
     pub fn gains(self, channel: usize, time: f64) -> (f64, f64) {
         match self {
             Self::Combined(Gains { stiffness, damping }) => (stiffness, damping / time),
@@ -59,9 +59,10 @@ impl Sampling {
         self.shares(channel, time).0
     }
 
-    /// Returns the factor of number `channel` of a sample of age `age` \[s\] in the force that a row of a law hears [N/m].
+    /// Returns the factor of number `channel` of a sample of age `age` \[s\] in the heard force of a row of a law [N/m].
     pub fn heard(self, row: &LawRow, channel: usize, age: f64, time: f64) -> f64 {
         match (self, channel) {
+            // All rows hear multiples of one combination. The factor of the multiple comes from whichever of its gains is not zero.
             (Self::Combined(gains), _) if row.heard == gains => self.unit(time),
             (Self::Combined(gains), _) if gains.stiffness != 0.0 => self.unit(time) * (row.heard.stiffness / gains.stiffness),
             (Self::Combined(gains), _) if gains.damping != 0.0 => self.unit(time) * (row.heard.damping / gains.damping),
@@ -71,7 +72,7 @@ impl Sampling {
         }
     }
 
-    /// Returns the divisor that makes a combined number a length [N/m]; 1 for whole samples.
+    /// Returns the divisor by which a combined number becomes a length [N/m]; 1 for whole samples.
     fn unit(self, time: f64) -> f64 {
         match self {
             Self::Combined(Gains { stiffness, damping }) => stiffness + damping / time,

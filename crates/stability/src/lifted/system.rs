@@ -1,24 +1,24 @@
-//! The description of a lifted system: nodes, weights and timetable, and the sizes that follow.
+//! The description of a lifted system: nodes, weights and timetable, and the resulting sizes.
 
 use super::Sampling;
 use super::node::{Node, Rows};
 use crate::Matrix;
 use crate::timetable::{Event, Timetable};
 
-/// A system of nodes that are coupled through samples.
+/// A system of nodes coupled through samples.
 #[derive(Clone, Copy, Debug)]
 pub struct Lifted<'a> {
-    /// The nodes; the first node's copy is the reference of a system that nothing ties to ground. Not empty.
+    /// The nodes; the first node's copy is the reference of an untied system. Not empty.
     pub nodes: &'a [Node],
     /// Weight of each node's samples (column) in each node's target (row).
     pub weights: &'a Matrix,
     /// Samples, deliveries and ticks of the nodes in one frame.
     pub timetable: &'a Timetable,
-    /// The numbers of a sample that the laws of the nodes use.
+    /// The numbers of a sample used by the laws of the nodes.
     pub sampling: Sampling,
-    /// Common time that velocities are multiplied by to be lengths \[s\].
+    /// Common time \[s\]. Velocities times the common time are lengths.
     pub time: f64,
-    /// `true` if something ties the motion to ground. If not, everything can be moved together without a force, and positions are taken relative to the first
+    /// `true` if something ties the motion to ground. Otherwise everything can be moved together without a force, and positions are taken relative to the first
     /// node's copy.
     pub tied: bool,
 }
@@ -28,7 +28,7 @@ pub struct Lifted<'a> {
 pub(crate) struct Sizes {
     /// Number of rows of the matrix: see [`FrameMap::size`](super::FrameMap::size).
     pub(crate) states: usize,
-    /// Number of these rows that are numbers of samples of earlier frames: see [`FrameMap::history`](super::FrameMap::history).
+    /// Number of rows for numbers of samples of earlier frames: see [`FrameMap::history`](super::FrameMap::history).
     pub(crate) history: usize,
     /// Number of rows of the delayed loop: see [`FrameMap::signals`](super::FrameMap::signals).
     pub(crate) signals: usize,
