@@ -1,23 +1,23 @@
-//! A spectral radius with a bound of its error, and the verdict that follows from the radius.
+//! A spectral radius with a bound of its error, and the verdict from the radius.
 
 /// A spectral radius with a bound of its error: the true radius lies within `value ± error`.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Radius {
-    /// The largest modulus of an eigenvalue, as computed; infinite where the numbers overflowed.
+    /// The largest modulus of an eigenvalue, as computed; infinite if the numbers overflowed.
     pub value: f64,
     /// Largest distance of the true radius from the value, zero or more. Infinite if nothing is known of the radius. An infinite value with a finite error
     /// means that the radius is above 1 and has no known upper bound.
     pub error: f64,
 }
 
-/// Verdict that follows from a spectral radius.
+/// Verdict from a spectral radius.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Verdict {
     /// The radius is below 1: every disturbance of the relative motion dies out.
     Stable,
     /// The radius cannot be distinguished from 1 within its error.
     Marginal,
-    /// Nothing is known of the radius: numbers overflowed, or their errors grew so large that 1 is lost in them.
+    /// Nothing is known of the radius: numbers overflowed, or the errors grew far above 1.
     Overflow,
     /// The radius is above 1: some disturbance grows.
     Unstable,
@@ -27,12 +27,14 @@ impl Radius {
     /// A radius of which nothing is known.
     pub(crate) const UNKNOWN: Self = Self { value: f64::INFINITY, error: f64::INFINITY };
 
-    /// Returns a radius that is at least `low` and has no upper bound.
+    /// Returns a radius of at least `low` without an upper bound.
     pub(crate) fn at_least(low: f64) -> Self {
+        // An infinite value without error says only that the radius is above 1, which is enough for a verdict.
         if low > 1.0 { Self { value: f64::INFINITY, error: 0.0 } } else { Self::UNKNOWN }
     }
 
-    /// Returns the verdict: [`Verdict::Marginal`] if the interval includes 1, [`Verdict::Overflow`] if it also reaches 2^52, compared with which 1 is rounding.
+    /// Returns the verdict: [`Verdict::Marginal`] if the interval includes 1, [`Verdict::Overflow`] if the interval also reaches 2^52. Compared with 2^52, 1 is
+    /// rounding.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
         let (low, high) = self.bounds();
@@ -47,7 +49,7 @@ impl Radius {
         }
     }
 
-    /// Returns the interval in which the radius lies: from 0 to infinity if nothing is known of the radius.
+    /// Returns the interval around the radius: from 0 to infinity if nothing is known of the radius.
     #[must_use]
     pub fn bounds(&self) -> (f64, f64) {
         let (low, high) = (self.value - self.error, self.value + self.error);
@@ -61,13 +63,14 @@ impl Radius {
         if (factor * high).is_finite() { Self { value: factor * self.value, error: factor * self.error } } else { Self::at_least(factor * low) }
     }
 
-    /// Returns the radius over a number of frames: the power of this radius, with the error that follows from its interval.
+    /// Returns the radius over a number of frames: the power of this radius, with the error from its interval.
     #[must_use]
     pub fn over(self, frames: u32) -> Self {
         if frames == 1 {
             return self;
         }
         let power = |base: f64| libm::pow(base, f64::from(frames));
+        // The power rises with its base, so the powers of the bounds are bounds of the power.
         let (low, high) = self.bounds();
         let (value, low, high) = (power(self.value), power(low), power(high));
         let rounding = f64::EPSILON * f64::from(frames);
@@ -78,9 +81,10 @@ impl Radius {
         }
     }
 
-    /// Returns the radius of two independent systems together: the larger radius, with an error that covers both intervals.
+    /// Returns the radius of two independent systems together: the larger radius, with an error covering both intervals.
     #[must_use]
     pub fn or(self, other: Self) -> Self {
+        // The maximum of two numbers lies between the maximum of the lower bounds and the maximum of the upper bounds.
         let ((one_low, one_high), (other_low, other_high)) = (self.bounds(), other.bounds());
         let (low, high) = (one_low.max(other_low), one_high.max(other_high));
         if high.is_finite() {
@@ -92,7 +96,7 @@ impl Radius {
     }
 }
 
-/// Returns the larger of two radii, with `BOUND` with an error that covers both. Without `BOUND` the errors are ignored, and NaN counts as the largest.
+/// Returns the larger of two radii, with `BOUND` with an error covering both. Without `BOUND` the errors are ignored, and NaN counts as the largest.
 pub(crate) fn worse<const BOUND: bool>(one: Radius, other: Radius) -> Radius {
     if BOUND {
         one.or(other)

@@ -1,5 +1,5 @@
-//! Blocks of a search that several processes share. A block has some of the first samples and is searched as if there were no other samples. The search of
-//! the whole range comes afterwards: it finds almost all of its values known, and computes those that depend on samples of two blocks.
+//! Blocks of a search shared by several processes. A block has some of the first samples and is searched as if there were no other samples. The search of
+//! the whole range comes afterwards: almost all values are known by then, and the search computes the rest, near the ends of blocks.
 
 use rayon::prelude::*;
 
@@ -21,10 +21,11 @@ impl BoundaryBlock {
         &self.0
     }
 
-    /// Returns whether `known` has all values that a search of the block computes.
+    /// Returns whether `known` has all values of a search of the block.
     #[must_use]
     pub fn is_known(&self, range: &KeyRange, options: BoundaryOptions, known: &[(f64, Cell)]) -> bool {
         let known = by_value(known);
+        // A search without a radius function stops at the first unknown value, so a search that does not stop knows everything.
         let look = |value: f64| Ok::<_, std::convert::Infallible>(known.get(&value.to_bits()).map(|cell| (value, *cell)));
         let Ok((_, end)) = go_on(self.0.clone(), range, options, look);
         end != End::Stopped
@@ -36,12 +37,13 @@ impl Boundary {
     #[must_use]
     pub fn blocks(range: &KeyRange, options: BoundaryOptions) -> Vec<BoundaryBlock> {
         let values = nodes(range, options.samples);
+        // Neighbouring blocks share a value, so that no interval between first samples lies outside all blocks.
         let block = |place: usize| BoundaryBlock(values[place..values.len().min(place + INTERVALS + 1)].to_vec());
         (0..values.len().saturating_sub(1)).step_by(INTERVALS).map(block).collect()
     }
 
-    /// Searches blocks on all threads of the pool that calls this function. `found` is called with each value that was not known and its radius, and `done`
-    /// with the index of each block whose search ended by itself; the watch has stopped the other searches.
+    /// Searches blocks on all threads of the calling pool. `found` is called with each unknown value and its radius, and `done`
+    /// with the index of each completely searched block; the watch has stopped the other searches.
     ///
     /// # Errors
     ///

@@ -1,10 +1,10 @@
 //! Boundaries: the values of one key at which a scene turns stable or unstable.
 //!
 //! Stability regions are not convex and have islands, so the radius is first computed at many values. Then, pass after pass, intervals between neighbouring
-//! values are halved. An interval whose ends have different verdicts is halved down to the tolerance. An interval whose ends have the same verdict is halved
-//! as long as the radius may bend enough to reach 1 and come back in between. The bend of the radius within an interval is estimated from the second
-//! differences around the interval. So an island that is smooth on the scale of the samples, or a tangency, is found however narrow it is. An island that
-//! does not show in the samples around it is not found; the result tells the distances between neighbouring values.
+//! values are halved. An interval with different verdicts at its ends is halved down to the tolerance. An interval with equal verdicts at its ends is halved as
+//! long as the radius may bend enough to reach 1 and come back in between. The bend of the radius within an interval is estimated from the second differences
+//! around the interval. So an island smooth on the scale of the samples, or a tangency, is found at any width. An island without a trace in the samples around
+//! the island is not found; the result tells the distances between neighbouring values.
 
 pub(crate) mod blocks;
 mod intervals;
@@ -26,9 +26,9 @@ use intervals::{Samples, wanted};
 pub struct BoundaryOptions {
     /// Number of values of the first pass, both ends of the range among them; at least 2. Default: 400.
     pub samples: usize,
-    /// Largest width of the interval that contains a crossing, in the unit of the key; above zero.
+    /// Largest width of the interval around a crossing, in the unit of the key; above zero.
     pub tolerance: f64,
-    /// Largest number of values that a search computes; see [`Boundary::is_settled`]. Default: 100,000.
+    /// Largest number of computed values of a search; see [`Boundary::is_settled`]. Default: 100,000.
     pub most: usize,
 }
 
@@ -39,7 +39,7 @@ impl BoundaryOptions {
         Self { samples: 400, tolerance: 1e-9 * (range.high - range.low), most: 100_000 }
     }
 
-    /// Returns the default options for mean-square radii, whose bounds are wider: 400 samples, and a tolerance of 10⁻⁷ of the range.
+    /// Returns the default options for mean-square radii with their wider bounds: 400 samples, and a tolerance of 10⁻⁷ of the range.
     #[must_use]
     pub fn of_mean_square(range: &KeyRange) -> Self {
         Self { tolerance: 1e-7 * (range.high - range.low), ..Self::of(range) }
@@ -57,21 +57,21 @@ pub struct Crossing {
     pub to: Verdict,
 }
 
-/// A stretch of neighbouring values at which the radius cannot be told from 1.
+/// A stretch of neighbouring values with a radius too near to 1 for a verdict.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Stretch {
     /// Lowest computed value of the stretch.
     pub low: f64,
-    /// Highest computed value of the stretch; equal to `low` if the stretch has a single value, at which the radius touches 1 and turns back.
+    /// Highest computed value of the stretch; equal to `low` if the stretch has a single value. There the radius touches 1 and turns back.
     pub high: f64,
 }
 
-/// All crossings along a key, and the values at which they were looked for.
+/// All crossings along a key, and the values of the search.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Boundary {
     /// Crossings in ascending order. A marginal stretch no wider than the tolerance between different verdicts counts as one crossing.
     pub crossings: Vec<Crossing>,
-    /// Stretches where the radius is 1 as closely as can be told, in ascending order. Stretches that are part of a crossing are left out.
+    /// Stretches where the radius is 1 as closely as can be told, in ascending order. Stretches within a crossing are left out.
     pub marginal: Vec<Stretch>,
     /// Verdict at the lower end of the range.
     pub first: Verdict,
@@ -81,8 +81,8 @@ pub struct Boundary {
     pub finest: f64,
     /// Longest distance between two neighbouring values.
     pub coarsest: f64,
-    /// Every computed value and its radius by the criterion of the family, ascending by value. A later [`Boundary::find`] that gets these values computes none
-    /// of them again.
+    /// Every computed value and its radius by the criterion of the family, ascending by value. A later [`Boundary::find`] with these values computes none
+    /// of these values again.
     pub known: Vec<(f64, Cell)>,
     settled: bool,
 }
@@ -92,13 +92,13 @@ pub struct Boundary {
 enum End {
     /// Every interval is divided as finely as needed.
     Settled,
-    /// The search would need more values than it may compute.
+    /// The search would need more values than allowed.
     Most,
     /// The search was stopped.
     Stopped,
 }
 
-/// Computes the cells of the values `first`, and then, pass after pass, those of the middles of intervals that need to be halved. `look` returns `None` if
+/// Computes the cells of the values `first`, and then, pass after pass, of the middles of halved intervals. `look` returns `None` if
 /// the search is to stop.
 fn go_on<E: Send>(
     first: Vec<f64>,
@@ -109,11 +109,12 @@ fn go_on<E: Send>(
     let spacing = (range.high - range.low) / crate::rounding::real(options.samples - 1);
     let (mut seen, mut next) = (Samples::default(), first);
     while !next.is_empty() {
+        // The limit is checked before a pass, so a pass is computed whole or not at all.
         if seen.len() + next.len() > options.most {
             return Ok((seen, End::Most));
         }
         let found: Vec<Option<(f64, Cell)>> = next.par_iter().map(|value| look(*value)).collect::<Result<_, E>>()?;
-        // Cells that were computed before a stop are kept, so that a later search can begin with them.
+        // Cells computed before a stop are kept, and a later search can begin with these cells.
         let is_whole = found.iter().all(Option::is_some);
         seen.extend(found.into_iter().flatten());
         if !is_whole {
@@ -169,7 +170,7 @@ impl Boundary {
         Self::find_watched(family, options, known, progress, &Asks(stop))
     }
 
-    /// Runs [`Boundary::find`] with a watch, which sees the progress of values that take long and can stop the search within a value.
+    /// Runs [`Boundary::find`] with a watch. The watch sees the progress of slow values and can stop the search within a value.
     ///
     /// # Errors
     ///
@@ -192,10 +193,10 @@ impl Boundary {
         Self::searched(range, options, known, radius, progress, || watch.stops())
     }
 
-    /// Finds every crossing of any function `radius` over a range. Values are computed on all threads of the pool that calls this function; the result does not
+    /// Finds every crossing of any function `radius` over a range. Values are computed on all threads of the calling pool; the result does not
     /// depend on the number of threads.
     ///
-    /// `known` are values computed before, such as [`Boundary::known`] of a search that was stopped; values that this search does not need are left out of the
+    /// `known` are values computed before, such as [`Boundary::known`] of a stopped search; unneeded values are left out of the
     /// result. `progress` is called after each value with the number of values so far. `stop` is called before each value; if it returns `true` the search ends
     /// with the values so far.
     ///
@@ -213,7 +214,7 @@ impl Boundary {
         Self::searched(range, options, known, |value| radius(value).map(Some), progress, stop)
     }
 
-    /// Runs [`Boundary::search`] with a `radius` that returns `None` if the computation of a value was stopped.
+    /// Runs [`Boundary::search`] with a `radius`; a result `None` of `radius` means a stopped computation.
     fn searched<E: Send>(
         range: &KeyRange,
         options: BoundaryOptions,
@@ -244,7 +245,7 @@ impl Boundary {
         Ok(Self::of(&seen, tolerance, end == End::Settled))
     }
 
-    /// Returns the number of values whose cells are nominal: see [`Cell::is_nominal`].
+    /// Returns the number of values with nominal cells: see [`Cell::is_nominal`].
     #[must_use]
     pub fn nominal(&self) -> usize {
         self.known.iter().filter(|(_, cell)| cell.is_nominal).count()
@@ -275,13 +276,14 @@ impl Boundary {
             let after = known.get(place).map(|(value, cell)| (*value, cell.radius.verdict()));
             let narrow = high - low <= tolerance;
             match (verdict, before, after) {
+                // A narrow marginal run between two different verdicts is a crossing, between equal verdicts a tangency.
                 (Verdict::Marginal, Some((_, side)), Some((_, other))) if narrow => {
                     if side == other {
                         marginal.push(Stretch { low, high });
                     } else {
                         crossings.push(Crossing { value: 0.5 * (low + high), from: side, to: other });
                     }
-                    // The next run lies above this crossing, so that its own verdict is already the one below it.
+                    // The next run lies above this crossing, so `before` takes the verdict of the next run already.
                     before = Some((high, other));
                 }
                 _ => {

@@ -1,8 +1,8 @@
 //! The arrival times of samples over the links of a scene, with nothing left to chance.
 //!
-//! The timing of a link that only delays is its delay. In every other link each random part is replaced by a stated one. If the link still does more than
-//! delay, samples of the scene are sent through the emulator until their fates repeat. Links without shared access lines are probed once for each
-//! configuration and each way of sampling, so that very many equal peers cost as much as two.
+//! The timing of a purely delaying link is its delay. In every other link each random part is replaced by a stated part. If the link still does more than
+//! delay, samples of the scene are sent through the emulator until the fates repeat. Links without shared access lines are probed once for each
+//! configuration and each way of sampling, so very many equal peers cost as much as two.
 
 mod nominal;
 mod notes;
@@ -27,7 +27,7 @@ use self::sampling::Sampling;
 use crate::AnalysisError;
 use crate::pieces::refuse_topology;
 
-/// The largest number of peers whose shared lines are probed together.
+/// The largest number of peers with shared lines probed together.
 const MOST_SHARING: usize = 256;
 
 /// The timings of the links of a scene with nothing left to chance.
@@ -58,11 +58,11 @@ struct Lines {
 }
 
 impl NominalNetwork {
-    /// Returns the timings of all links of a scene as it is configured at its beginning.
+    /// Returns the timings of all links of a scene in the configuration of its beginning.
     ///
     /// # Errors
     ///
-    /// [`AnalysisError`] if the fates of samples never repeat, because a queue is offered more than it carries or because periods do not meet; if too many
+    /// [`AnalysisError`] if the fates of samples never repeat, because a queue is offered more than its rate or because periods do not meet; if too many
     /// peers share lines; if the scene has a topology; or if peers send only on changes (dead bands).
     pub fn of(scene: &Scene) -> Result<Self, AnalysisError> {
         refuse_topology(scene, "this analysis")?;
@@ -77,6 +77,7 @@ impl NominalNetwork {
             uplinks: scene.peers.iter().map(|peer| access(peer.uplink.as_deref())).collect(),
             downlinks: scene.peers.iter().map(|peer| access(peer.downlink.as_deref())).collect(),
         };
+        // Without queues on access lines the links do not affect each other, and one link of each kind is enough.
         let constant = |line: &Option<Nominal>| line.as_ref().map_or(Some(Duration::ZERO), Nominal::constant);
         let delays = |lines: &[Option<Nominal>]| lines.iter().map(constant).collect::<Option<Vec<Duration>>>();
         let mut known = Known::default();
@@ -89,7 +90,7 @@ impl NominalNetwork {
         Ok(Self { timings: known.timings, places, notes: notes::notes(scene, links, uplinks, downlinks) })
     }
 
-    /// Returns the network in which every link takes `delay` and does nothing else.
+    /// Returns the network with links of the constant delay `delay`.
     pub fn uniform(delay: Duration) -> Self {
         let places = Places::Each { peers: 0, places: Vec::new() };
         Self { timings: vec![LinkTiming::Constant(delay)], places, notes: Vec::new() }
@@ -115,7 +116,7 @@ impl NominalNetwork {
     }
 }
 
-/// Returns the names of the random parts of all links and access lines of a scene, each once, in the order in which links have them.
+/// Returns the names of the random parts of all links and access lines of a scene, each name once, in the order of the links.
 pub(crate) fn chance_of(scene: &Scene) -> Vec<&'static str> {
     let size = Bytes::new(scene.sample_kind().datagram_len(scene.axes.count()) as u64);
     let used = scene.used_links();
@@ -129,7 +130,7 @@ pub(crate) fn chance_of(scene: &Scene) -> Vec<&'static str> {
     names
 }
 
-/// The different timings found so far, each with a link that has the timing.
+/// The different timings found so far, each with an example link.
 #[derive(Default)]
 struct Known {
     timings: Vec<LinkTiming>,
@@ -163,15 +164,16 @@ const fn gcd(a: usize, b: usize) -> usize {
     if b == 0 { a } else { gcd(b, a % b) }
 }
 
-/// Finds the timings of a scene whose access lines only delay, so that links do not affect each other.
+/// Finds the timings of a scene with purely delaying access lines. Links then do not affect each other.
 fn by_class(scene: &Scene, lines: &Lines, uplinks: &[Duration], downlinks: &[Duration], known: &mut Known) -> Result<Places, AnalysisError> {
     let links = &scene.links;
+    // The instants of sampling matter only if some link does more than delay. Without such a link all peers of equal uplink delay are one class.
     let matters = lines.links.iter().any(|link| link.constant().is_none());
     let (mut ways, mut spans) = (BTreeMap::new(), BTreeMap::new());
     let sampling = |peer: usize| matters.then(|| Sampling::of(scene, peer, uplinks[peer]));
     let senders: Vec<usize> = (0..uplinks.len()).map(|peer| class(&mut ways, (uplinks[peer], sampling(peer)))).collect();
     let receivers: Vec<usize> = downlinks.iter().map(|delay| class(&mut spans, *delay)).collect();
-    // Finds one link for each combination of configuration and classes that occurs.
+    // Finds one link for each occurring combination of configuration and classes.
     let mut members = (vec![Vec::new(); ways.len()], vec![Vec::new(); spans.len()]);
     for peer in 0..senders.len() {
         members.0[senders[peer]].push(peer);
@@ -194,7 +196,7 @@ fn by_class(scene: &Scene, lines: &Lines, uplinks: &[Duration], downlinks: &[Dur
     for ((config, sender, receiver), (from, to)) in used {
         let link = &lines.links[config];
         let way = Sampling::of(scene, from, uplinks[from]);
-        // A link that does not depend on the time treats senders alike that differ only by a shift in time.
+        // A timeless link treats two senders alike if they differ only by a shift in time.
         let way = if link.is_timeless() { way.timeless() } else { way };
         let key = (config, link.constant().is_none().then_some(way));
         let timing = match (alone.get(&key), link.constant()) {
@@ -225,7 +227,7 @@ fn probed(scene: &Scene, lines: &Lines, link: &Nominal, way: Sampling, (from, to
     Ok(found[1].clone())
 }
 
-/// Finds the timings of a scene with access lines that do more than delay, by a probe of all links together.
+/// Finds the timings of a scene with queues on access lines, by a probe of all links together.
 fn shared(scene: &Scene, lines: &Lines, known: &mut Known) -> Result<Places, AnalysisError> {
     let peers = scene.peers.len();
     if peers > MOST_SHARING {
@@ -264,7 +266,7 @@ fn shared(scene: &Scene, lines: &Lines, known: &mut Known) -> Result<Places, Ana
     let all = lines.links.iter().chain(lines.uplinks.iter().flatten()).chain(lines.downlinks.iter().flatten());
     let found = probe.patterns(cycle(all, scene, peers), &rates).map_err(|error| explained(scene, error, |from, to| (from, to)))?;
     let timings = found.into_iter().enumerate();
-    // The diagonal has no meaning and must not count as a timing of its own.
+    // The diagonal has no meaning and must not count as a further timing.
     let places = timings.map(|(place, timing)| if place / peers == place % peers { 0 } else { known.place(timing, (place / peers, place % peers)) });
     Ok(Places::Each { peers, places: places.collect() })
 }
@@ -278,10 +280,10 @@ fn rated(line: Option<&Nominal>, size: Bytes, name: String, paths: Vec<(usize, u
     line?.rate(size).map(|(rate, bits)| RatedLine { name, rate, bits, paths })
 }
 
-/// Returns the largest number of samples until every part that depends on the time or on the number of packets begins anew.
+/// Returns the largest number of samples until every time-dependent or packet-counting part begins anew.
 fn cycle<'a>(lines: impl IntoIterator<Item = &'a Nominal>, scene: &Scene, senders: usize) -> u64 {
     let update = scene.coordination.update.as_nanos();
-    // A clock may be a tenth fast, so that it sends more samples in the same time.
+    // A clock may be a tenth fast and then sends more samples in the same time.
     let in_time =
         |line: &Nominal| line.cycle().map_or(0, |cycle| u64::try_from(cycle.as_nanos() * 10 / 9 / update).unwrap_or(u64::MAX).saturating_add(1));
     lines.into_iter().map(|line| in_time(line).max(line.packet_cycle())).max().unwrap_or(0).max(senders as u64)

@@ -1,4 +1,4 @@
-//! A link with delays at their mean and no losses: each random part is replaced by a stated part.
+//! A link with mean delays and no losses: each random part is replaced by a stated part.
 
 use std::time::Duration;
 
@@ -9,12 +9,12 @@ use cohaptic_wan::{
     Slots, Sojourn,
 };
 
-/// A link without chance, and sentences that say what was replaced.
+/// A link without chance, and sentences about the replaced parts.
 #[derive(Clone, Debug)]
 pub(crate) struct Nominal {
     pub(crate) config: LinkConfig,
     pub(crate) replaced: Vec<String>,
-    /// Names of the replaced parts that are random.
+    /// Names of the random ones among the replaced parts.
     pub(crate) chance: Vec<&'static str>,
 }
 
@@ -26,7 +26,7 @@ struct Replaced {
 }
 
 impl Replaced {
-    /// Notes a part that is not random but ends.
+    /// Notes a part with an end and without chance.
     fn end(&mut self, words: &str) {
         self.words.push(words.to_owned());
     }
@@ -39,7 +39,7 @@ impl Replaced {
 }
 
 impl Nominal {
-    /// Returns the nominal link for samples of that size, which understand congestion marks.
+    /// Returns the nominal link for samples of the size `size`. Samples understand congestion marks.
     pub(crate) fn of(model: &LinkModel, size: Bytes) -> Self {
         let only = |delay, words: String, chance: &[&'static str]| Self {
             config: LinkConfig { delay: Delay::constant(delay), ..LinkConfig::default() },
@@ -49,6 +49,7 @@ impl Nominal {
         let mean = model.mean_delay();
         match model {
             LinkModel::Fixed(config) => stripped(config, size),
+            // A recording ends and stability concerns an endless motion, so the recording cannot stand for the link.
             LinkModel::Replay(log) => {
                 let mean = mean_delivered(log);
                 only(
@@ -80,7 +81,7 @@ impl Nominal {
         self.cycle().is_none() && self.config.outages.is_empty()
     }
 
-    /// Returns the longest period of the parts of the link that depend on the time; `None` if no part does.
+    /// Returns the longest period of the time-dependent parts of the link; `None` without such parts.
     pub(crate) fn cycle(&self) -> Option<Duration> {
         let LinkConfig { outages, loss, bottleneck, trace, .. } = &self.config;
         let outage = outages.random().map(|random| random.up.mean() + random.down.mean());
@@ -96,9 +97,10 @@ impl Nominal {
         pattern(&self.config.loss, Counts::Packets).and_then(Pattern::period).unwrap_or(1)
     }
 
-    /// Returns the rate of the queue that carries the fewest samples per second [bit/s], and the size of a sample in that queue \[bit\]; `None` without queues.
+    /// Returns the rate of the queue with the fewest samples per second [bit/s], and the size of a sample in that queue \[bit\]; `None` without queues.
     #[expect(clippy::cast_precision_loss, reason = "a rate, compared with a tolerance")]
     pub(crate) fn rate(&self, size: Bytes) -> Option<(f64, f64)> {
+        // Framing adds bytes per packet, so two queues are compared by samples per second and not by bits per second.
         let bits = |bytes: Bytes| bytes.get() as f64 * 8.0;
         let line = self.config.bottleneck.as_ref().map(|line| match &line.service {
             Service::Rate(rate) => (rate.as_bits_per_sec() as f64, bits(line.framing.on_the_line(size))),
@@ -112,6 +114,7 @@ impl Nominal {
 fn stripped(config: &LinkConfig, size: Bytes) -> Nominal {
     let mut replaced = Replaced::default();
     let mut config = config.clone();
+    // Each random part is replaced by its mean where a mean keeps the meaning of the part, and left out otherwise.
     if config.delay.jitter().is_some() {
         let mean = config.delay.mean();
         replaced.chance("jitter", format!("jitter is replaced by the mean delay, {}", Span(mean)));
@@ -123,12 +126,13 @@ fn stripped(config: &LinkConfig, size: Bytes) -> Nominal {
         config.listed = Impairments::default();
         config.delay = Delay::constant(config.delay.mean().saturating_add(mean));
     }
+    // No sample is larger than the MTU then, so the MTU has no effect.
     if config.mtu.is_some_and(|mtu| size <= mtu) {
         config.mtu = None;
     }
     config.outages = outages(&config.outages, &mut replaced);
     if config.marks_instead_of_loss {
-        // Samples understand marks, so that a mark in place of a loss loses no sample.
+        // Samples understand marks, so a mark in place of a loss loses no sample.
         config.loss = Loss::None;
         config.marks_instead_of_loss = false;
     }
@@ -158,6 +162,7 @@ fn stripped(config: &LinkConfig, size: Bytes) -> Nominal {
         if certain.period().is_some() {
             config.trace = Some(certain);
         } else {
+            // After its last row a recorded path stays as in the last row, so this row describes the endless motion.
             replaced.end("a recorded path, which ends, is replaced by its last row");
             let (delay, loss) = certain.last();
             config.delay = Delay::constant(config.delay.mean().saturating_add(delay));
@@ -169,8 +174,8 @@ fn stripped(config: &LinkConfig, size: Bytes) -> Nominal {
     Nominal { config, replaced: replaced.words, chance: replaced.chance }
 }
 
-/// Returns the outages that repeat with spans of fixed length, and the idle outages. Outages with drawn spans are left out, and so are outages at given
-/// times, because they end.
+/// Returns the repeating outages with spans of fixed length, and the idle outages. Outages with drawn spans are left out, and so are outages at given
+/// times, because given times end.
 fn outages(given: &Outages, replaced: &mut Replaced) -> Outages {
     let mut kept = Outages::default();
     if !given.scheduled().is_empty() {
@@ -211,7 +216,7 @@ fn loss(given: Loss, replaced: &mut Replaced) -> Loss {
     Loss::None
 }
 
-/// Returns the pattern of losses, if the losses are a pattern that counts in these units.
+/// Returns the pattern of losses, if the losses are a pattern counted in these units.
 fn pattern(loss: &Loss, counts: Counts) -> Option<&Pattern> {
     if let Loss::Pattern(pattern) = loss { Some(pattern).filter(|pattern| pattern.counts() == counts) } else { None }
 }
@@ -235,6 +240,7 @@ fn regular(slots: Slots, replaced: &mut Replaced) -> Slots {
 }
 
 fn mean_delivered(log: &FateLog) -> Duration {
+    // Copies are left out: the first packet of a sample brings the sample.
     let delays =
         log.records().iter().filter(|record| record.copy == 0 && matches!(record.fate, Fate::Delivered(_))).map(|record| record.at - record.offered);
     let (sum, count) = delays.fold((0_u128, 0_u128), |(sum, count), delay| (sum + delay.as_nanos(), count + 1));

@@ -1,4 +1,4 @@
-//! A probe of an emulated network: samples are sent through the network until their fates repeat.
+//! A probe of an emulated network: samples are sent through the network until the fates repeat.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -12,7 +12,7 @@ use super::timing::LinkTiming;
 /// The longest pattern of all links together \[samples\].
 pub(crate) const MOST_SAMPLES: usize = 64;
 
-/// The largest number of samples of a peer in a probe. [`MOST_PACKETS`] is that of packets of all peers.
+/// The largest number of samples of a peer in a probe. [`MOST_PACKETS`] is the largest number of packets of all peers.
 const MOST_SENT: u64 = 16_384;
 const MOST_PACKETS: u64 = 1 << 24;
 
@@ -22,25 +22,25 @@ const FIRST_LOOK: u64 = 256;
 const PENDING: u64 = u64::MAX;
 const LOST: u64 = u64::MAX - 1;
 
-/// A network and the peers that send samples into it.
+/// A network and its sending peers.
 pub(crate) struct Probe {
     network: Network<()>,
     nodes: usize,
     senders: Vec<Sampling>,
     info: PacketInfo,
-    /// Number of samples that each sender has sent.
+    /// Number of sent samples, indexed by sender.
     sent: Vec<u64>,
-    /// Instants of the next sample of each sender; equal instants in the order of the senders.
+    /// Instant of the next sample of each sender; equal instants in the order of the senders.
     next: BTreeSet<(Instant, usize)>,
-    /// Time that each sample took \[ns\], or `LOST` or `PENDING`; indexed by sender · nodes + receiver, then by sample.
+    /// Travel time of each sample \[ns\], or `LOST` or `PENDING`; indexed by sender · nodes + receiver, then by sample.
     taken: Vec<Vec<u64>>,
 }
 
-/// A line with a limited rate, and the paths whose samples pass the line.
+/// A line with a limited rate, and the paths through the line.
 #[derive(Clone, Debug)]
 pub(crate) struct RatedLine {
     pub(crate) name: String,
-    /// Rate that the line carries [bit/s].
+    /// Rate of the line [bit/s].
     pub(crate) rate: f64,
     /// Size of a sample on the line \[bit\].
     pub(crate) bits: f64,
@@ -55,14 +55,14 @@ pub(crate) enum NoPattern {
 }
 
 impl Probe {
-    /// Returns a probe in which the first nodes of the network, one for each entry of `senders`, send to all other nodes.
+    /// Returns a probe with the first nodes of the network, one for each entry of `senders`, sending to all other nodes.
     pub(crate) fn new(network: Network<()>, nodes: usize, senders: Vec<Sampling>, info: PacketInfo) -> Self {
         let next = senders.iter().enumerate().filter_map(|(place, sampling)| Some((sampling.instant(0)?, place))).collect();
         Self { network, nodes, sent: vec![0; senders.len()], senders, info, next, taken: vec![Vec::new(); nodes * nodes] }
     }
 
-    /// Returns the timing of each path, indexed by sender · nodes + receiver. `cycle` is the largest number of samples until every part of the links that
-    /// depends on time or counts packets begins anew. A pattern must repeat for longer than that to be accepted.
+    /// Returns the timing of each path, indexed by sender · nodes + receiver. `cycle` is the largest number of samples until every time-dependent or
+    /// packet-counting part of the links begins anew. A pattern must repeat for longer than `cycle` samples to be accepted.
     pub(crate) fn patterns(mut self, cycle: u64, lines: &[RatedLine]) -> Result<Vec<LinkTiming>, NoPattern> {
         let paths: Vec<(usize, usize)> =
             (0..self.senders.len()).flat_map(|from| (0..self.nodes).map(move |to| (from, to))).filter(|(from, to)| from != to).collect();
@@ -70,6 +70,7 @@ impl Probe {
         let mut samples = FIRST_LOOK;
         let mut culprit = paths.first().copied().unwrap_or((0, 1));
         loop {
+            // The first half of the samples fills queues. Only the second half is searched for a pattern.
             self.send(samples);
             let mut found = vec![LinkTiming::Constant(Duration::ZERO); self.nodes * self.nodes];
             let mut missing = None;
@@ -79,7 +80,7 @@ impl Probe {
                     None => missing = missing.or(Some((*from, *to))),
                 }
             }
-            // A pattern that carries more than the rate of a line is only seen until the queue of the line has filled.
+            // A pattern above the rate of a line lasts only until the queue of the line has filled.
             let carried = |line: &RatedLine| self.load(line, |from, to| found[from * self.nodes + to].arriving());
             if missing.is_none() && lines.iter().all(|line| carried(line) <= line.rate * (1.0 + 1e-9)) {
                 return Ok(found);
@@ -91,6 +92,7 @@ impl Probe {
             samples *= 2;
         }
         let overloaded = lines.iter().map(|line| (line, self.load(line, |_, _| 1.0))).find(|(line, load)| *load > line.rate * (1.0 + 1e-9));
+        // An overloaded line explains the missing pattern best: its queue grows without end, and so do the delays.
         Err(match overloaded {
             Some((line, load)) => NoPattern::Overloaded { line: line.name.clone(), load, rate: line.rate },
             None => NoPattern::Path { from: culprit.0, to: culprit.1 },
@@ -141,8 +143,7 @@ impl Probe {
     }
 }
 
-/// Returns the shortest pattern that repeats from sample `start` to the last sample before a pending one; `None` if there is none, or if these samples are
-/// too few.
+/// Returns the shortest pattern repeating from sample `start` to the last sample before a pending sample; `None` without a pattern, or with too few samples.
 fn repeated(taken: &[u64], start: u64, cycle: u64) -> Option<LinkTiming> {
     let known = taken.iter().position(|taken| *taken == PENDING).unwrap_or(taken.len());
     let start = usize::try_from(start).ok()?;
@@ -151,9 +152,10 @@ fn repeated(taken: &[u64], start: u64, cycle: u64) -> Option<LinkTiming> {
     if (tail.len() as u64) < needed {
         return None;
     }
+    // A period fits if every sample equals the sample one period later. The smallest fitting period is the pattern.
     let period = (1..=MOST_SAMPLES).find(|period| tail.iter().zip(&tail[*period..]).all(|(one, next)| one == next))?;
     let entry = |place: usize| {
-        // Index in `tail` of the first sample from `start` on that has this place in the pattern.
+        // Index in `tail` of the first sample from `start` on at this place in the pattern.
         let sample = (place + period - start % period) % period;
         (tail[sample] != LOST).then(|| Duration::from_nanos(tail[sample]))
     };

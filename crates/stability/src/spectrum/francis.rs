@@ -15,7 +15,7 @@ const PATIENCE: u32 = 6;
 /// Turns a Hessenberg matrix into a quasi-triangular matrix: blocks of one and two rows on the diagonal, zeros below.
 ///
 /// With `FULL` the whole matrix is transformed (the real Schur form, up to blocks of two with real eigenvalues); without `FULL` only the diagonal blocks
-/// are right, which is less work. Returns false if the iteration did not converge.
+/// are right, with less work. Returns false if the iteration did not converge.
 #[inline]
 pub(super) fn iterate<const FULL: bool, S: Square>(matrix: &mut S) -> bool {
     let size = matrix.size();
@@ -33,8 +33,9 @@ pub(super) fn iterate<const FULL: bool, S: Square>(matrix: &mut S) -> bool {
         while first > 0 {
             let below = matrix.at(first, first - 1).abs();
             let beside = matrix.at(first - 1, first - 1).abs() + matrix.at(first, first).abs();
-            // In the first sweeps the entry is compared with the two diagonal entries that it joins. If several eigenvalues are zero it never becomes so small;
-            // so in later sweeps it is compared with the whole matrix. Dropping it then is an error no larger than those of the reduction.
+            // In the first sweeps the entry is compared with its two neighbours on the diagonal. If several eigenvalues are zero the entry never becomes so
+            // small; so in later sweeps the entry is compared with the whole matrix. The error of a dropped entry is then no larger than an error of the
+            // reduction.
             let beside = if sweeps >= PATIENCE || beside == 0.0 { beside.max(norm / real(size)) } else { beside };
             if below <= f64::EPSILON * 0.5 * beside {
                 matrix.put(first, first - 1, 0.0);
@@ -42,7 +43,7 @@ pub(super) fn iterate<const FULL: bool, S: Square>(matrix: &mut S) -> bool {
             }
             first -= 1;
         }
-        // The last one or two rows have split off: their eigenvalues follow from a block of at most two rows.
+        // The last one or two rows have split off: `pair` gives the eigenvalues of a block of at most two rows.
         if first + 1 >= last {
             end = first;
             sweeps = 0;
@@ -57,12 +58,12 @@ pub(super) fn iterate<const FULL: bool, S: Square>(matrix: &mut S) -> bool {
     true
 }
 
-/// Makes one sweep over the rows `first..=last`, which are at least three. `count` is the number of sweeps for this eigenvalue, this one among them.
+/// Makes one sweep over the rows `first..=last`, at least three. `count` is the number of sweeps for this eigenvalue, this sweep among them.
 #[inline]
 fn sweep<const FULL: bool, S: Square>(matrix: &mut S, first: usize, last: usize, count: u32) {
     let size = matrix.size();
-    // The shifts are the eigenvalues of the last block of two, given by x, y and the product w. Rarely an arbitrary block takes its place, which breaks
-    // cycles; more often it would undo slow progress.
+    // The shifts are the eigenvalues of the last block of two, given by x, y and the product w. Rarely an arbitrary block takes the place of the last block and
+    // breaks cycles; more often it would undo slow progress.
     let (x, y, w) = if count == 10 || count.is_multiple_of(40) {
         let size = matrix.at(last, last - 1).abs() + matrix.at(last - 1, last - 2).abs();
         let middle = 0.75 * size + matrix.at(last, last);
@@ -83,6 +84,7 @@ fn sweep<const FULL: bool, S: Square>(matrix: &mut S, first: usize, last: usize,
             q = matrix.at(place + 1, place - 1);
             r = if three { matrix.at(place + 2, place - 1) } else { 0.0 };
         }
+        // The square of small entries can underflow, so small entries are scaled by the largest before the length is taken.
         let mut scale = 1.0;
         let mut square = p * p + (q * q + r * r);
         if square < TINY_SQUARE {
@@ -94,11 +96,13 @@ fn sweep<const FULL: bool, S: Square>(matrix: &mut S, first: usize, last: usize,
             (p, q, r) = (p / scale, q / scale, r / scale);
             square = p * p + (q * q + r * r);
         }
+        // The length takes the sign of p, so the sum p + length has no cancellation.
         let length = square.sqrt().copysign(p);
         let head = p + length;
         let inverse = 1.0 / head;
         let factor = head / length;
         let (v1, v2) = (q * inverse, r * inverse);
+        // The reflection makes the two entries below the subdiagonal zero. Setting them exactly keeps the Hessenberg form.
         if place > first {
             matrix.put(place, place - 1, -length * scale);
             matrix.put(place + 1, place - 1, 0.0);
@@ -106,6 +110,7 @@ fn sweep<const FULL: bool, S: Square>(matrix: &mut S, first: usize, last: usize,
                 matrix.put(place + 2, place - 1, 0.0);
             }
         }
+        // Without the Schur form only the rows and columns of the active block are needed, since blocks outside keep their eigenvalues.
         let (top, right) = if FULL { (0, size) } else { (first, last + 1) };
         let bottom = (place + 3).min(last);
         if three {
@@ -129,7 +134,7 @@ fn sweep<const FULL: bool, S: Square>(matrix: &mut S, first: usize, last: usize,
     }
 }
 
-/// Returns the eigenvalues of [a b; c d]; of a complex pair the one with the positive imaginary part first.
+/// Returns the eigenvalues of [a b; c d]; of a complex pair the eigenvalue with the positive imaginary part first.
 #[inline]
 pub(super) fn pair(a: f64, b: f64, c: f64, d: f64) -> [Complex64; 2] {
     let half = 0.5 * (a - d);

@@ -1,12 +1,12 @@
-//! Access to a square matrix as the eigenvalue methods need it, so that one source serves arrays of a size known to the compiler and matrices of any size.
+//! Access to a square matrix for the eigenvalue methods. One source serves arrays of a size known to the compiler and matrices of any size.
 
 use std::ops::Range;
 
 use crate::Matrix;
 
-/// A square matrix that is transformed in place.
+/// A square matrix, transformed in place.
 pub(super) trait Square {
-    /// Returns the number of rows, which is that of the columns.
+    /// Returns the number of rows, equal to the number of columns.
     fn size(&self) -> usize;
     fn at(&self, row: usize, column: usize) -> f64;
     fn put(&mut self, row: usize, column: usize, entry: f64);
@@ -41,6 +41,7 @@ pub(super) trait Square {
     /// times the product of vᵀ with the rows, or of the columns with v. The vector v is 1 followed by the entries of `column` from row `column + 2` on.
     #[inline]
     fn reflect_below(&mut self, column: usize, factor: f64) {
+        // From the left: each column loses factor·v times its product with v. From the right the same holds for the rows.
         let (size, pivot) = (self.size(), column + 1);
         for other in pivot..size {
             let mut sum = self.at(pivot, other);
@@ -100,7 +101,7 @@ impl Square for Matrix {
         self[(row, column)] = entry;
     }
 
-    // The result is that of the default method to the bit. Loops over slices let the compiler work on several entries of a row at a time.
+    // The result equals the default method's to the bit. Loops over slices let the compiler work on several entries of a row at a time.
     #[inline]
     fn reflect_rows(&mut self, top: usize, columns: Range<usize>, factor: f64, v1: f64, v2: f64) {
         let (f1, f2) = (factor * v1, factor * v2);
@@ -114,7 +115,7 @@ impl Square for Matrix {
         }
     }
 
-    // The result is that of the default method to the bit. The loops go row after row, because entries of one column of a large matrix are far apart in memory.
+    // The result equals the default method's to the bit. The loops go row after row, because entries of one column of a large matrix are far apart in memory.
     fn reflect_below(&mut self, column: usize, factor: f64) {
         let (size, pivot) = (self.rows(), column + 1);
         let vector: Vec<f64> = (pivot..size).map(|row| if row == pivot { 1.0 } else { self[(row, column)] }).collect();
@@ -141,13 +142,13 @@ impl Square for Matrix {
 }
 
 /// Makes each row about as large as the column of the same number, by an exact similarity transform with powers of two (Parlett & Reinsch 1969). Calls
-/// `scaled` with each place whose column was multiplied by a power of two, and the exponent; a place may come several times.
+/// `scaled` with each place of a column multiplied by a power of two, and the exponent; a place may come several times.
 ///
-/// A row and a column within a factor of eight of each other are left as they are. That test needs no division.
+/// A row and a column within a factor of eight of each other are left as they are. The test needs no division.
 #[inline]
 pub(super) fn balance<S: Square>(matrix: &mut S, mut scaled: impl FnMut(usize, i32)) {
     let size = matrix.size();
-    // Each pass that changes a row lowers the norm, so that the passes end by themselves. The limit cuts off passes that gain little.
+    // Each change of a row lowers the norm, so the passes end by themselves. The limit cuts off passes with little gain.
     for _ in 0..16 {
         let mut changed = false;
         for place in 0..size {
@@ -158,7 +159,7 @@ pub(super) fn balance<S: Square>(matrix: &mut S, mut scaled: impl FnMut(usize, i
             }
             let own = matrix.at(place, place).abs();
             (row, column) = (row - own, column - own);
-            // A row or a column without other entries than the diagonal one is that of an isolated eigenvalue: no factor can balance it. (What is left of
+            // A row or a column with a single entry, on the diagonal, belongs to an isolated eigenvalue: no factor can balance the row. (The rest of
             // the sum may be rounding of the difference.)
             if row <= own * f64::EPSILON || column <= own * f64::EPSILON || (row < 8.0 * column && column < 8.0 * row) {
                 continue;

@@ -1,4 +1,4 @@
-//! Linear frame of copies that turn, and its matrix, computed unit vector by unit vector.
+//! Linear frame of turning copies, and its matrix, computed unit vector by unit vector.
 
 use cohaptic_peer::Motion;
 
@@ -14,9 +14,9 @@ use crate::{Matrix, Watch};
 /// Number of states of a sample: six components of the copy and their velocities.
 pub(super) const SAMPLE: usize = 12;
 
-/// System of nodes that are coupled through samples.
+/// System of nodes coupled through samples.
 ///
-/// A state has, for each node, the components of the copy, their velocities, the components of the device, their velocities, and the forces that are applied a
+/// A state has, for each node, the components of the copy, their velocities, the components of the device, their velocities, and the forces applied a
 /// tick late. The samples of earlier frames follow for each node, the newest sample first.
 #[derive(Clone, Debug)]
 pub(crate) struct Turning<'a> {
@@ -24,9 +24,9 @@ pub(crate) struct Turning<'a> {
     /// Weight of each node's samples (column) in the target of each node (row).
     pub(super) weights: &'a Matrix,
     pub(super) timetable: &'a Timetable,
-    /// Time by which velocities are multiplied \[s\], so that all states are lengths.
+    /// Time by which velocities are multiplied to become lengths \[s\].
     pub(super) time: f64,
-    /// Displacements of everything that no force resists. They are removed from the matrix.
+    /// Displacements of everything without a resisting force, removed from the matrix.
     pub(super) free: Vec<Displacement>,
 }
 
@@ -45,7 +45,7 @@ impl Turning<'_> {
         self.monodromy_under(&mut |_, _, _| None, watch)
     }
 
-    /// Like [`Turning::monodromy`], with a hand that is called in the frame of each unit vector, in the order of [`Turning::kept`].
+    /// Like [`Turning::monodromy`], with a hand called in the frame of each unit vector, in the order of [`Turning::kept`].
     pub(crate) fn monodromy_under(&self, hand: &mut Hand<'_>, watch: &dyn Watch) -> Option<(Matrix, f64)> {
         let (size, events) = (self.size(), self.timetable.events.len());
         let moved: Vec<Vec<f64>> = self.free.iter().map(|free| self.displaced(free)).collect();
@@ -56,6 +56,7 @@ impl Turning<'_> {
             if watch.stops() {
                 return None;
             }
+            // The unit vector is reset after its push, so that one buffer serves all columns.
             unit[*state] = 1.0;
             let reached = self.pushed_under(&unit, &mut growth, hand);
             unit[*state] = 0.0;
@@ -65,7 +66,7 @@ impl Turning<'_> {
             watch.done(pushed_operations(events, 6));
         }
         let ticks = self.timetable.events.iter().filter(|event| matches!(event, Event::Tick { .. })).count();
-        // As for objects that do not turn: each tick rounds, and the rest of the frame magnifies the rounding by at most about the growth.
+        // As for objects without turns: each tick rounds, and the rest of the frame magnifies the rounding by at most about the growth.
         let error = 10.0 * f64::EPSILON * real(ticks) * growth * growth * real(kept.len()).sqrt();
         Some((matrix, error))
     }
@@ -77,7 +78,7 @@ impl Turning<'_> {
         self.relative(&reached, &self.kept(), &moved).collect()
     }
 
-    /// Returns the kept states of `reached`, minus the free displacements by which the references have moved. `moved` are the states of these displacements.
+    /// Returns the kept states of `reached`, minus the motion of the references along the free displacements. `moved` are the states of these displacements.
     fn relative<'r>(&'r self, reached: &'r [f64], kept: &'r [usize], moved: &'r [Vec<f64>]) -> impl Iterator<Item = f64> + 'r {
         kept.iter().map(move |target| {
             let along: f64 = self.free.iter().zip(moved).map(|(free, moved)| reached[free.reference] * moved[*target]).sum();
@@ -85,13 +86,13 @@ impl Turning<'_> {
         })
     }
 
-    /// Returns whether a free displacement moves that component of a node's device, or no force depends on its position.
+    /// Returns whether a free displacement moves the component `component` of a node's device, or no force depends on the component's position.
     pub(crate) fn moves_freely(&self, node: usize, component: usize) -> bool {
         let displaced = self.free.iter().any(|free| free.nodes[node].1[component] != 0.0);
         displaced || self.nodes[node].loose().any(|loose| loose == component)
     }
 
-    /// Returns the indices of the kept states: all but the references of free displacements and the positions on which no force depends.
+    /// Returns the indices of the kept states: all but the references of free displacements and the positions without an effect on forces.
     pub(super) fn kept(&self) -> Vec<usize> {
         let firsts = self.firsts();
         let mut left_out: Vec<usize> = self.free.iter().map(|free| free.reference).collect();
@@ -110,7 +111,7 @@ impl Turning<'_> {
         self.nodes.iter().map(Node::states).sum::<usize>() + SAMPLE * self.timetable.depth.iter().sum::<usize>()
     }
 
-    /// Returns the state in which copies, their samples and devices are displaced by `by`, at rest.
+    /// Returns the state at rest with copies, samples of copies and devices displaced by `by`.
     pub(super) fn displaced(&self, by: &Displacement) -> Vec<f64> {
         let mut state = vec![0.0; self.size()];
         for ((copy, device), first) in by.nodes.iter().zip(self.firsts()) {
@@ -132,7 +133,7 @@ impl Turning<'_> {
         self.pushed_under(state, &mut 0.0, &mut |_, _, _| None)
     }
 
-    /// Returns a state at rest whose late forces are the forces that the peers compute at `state`.
+    /// Returns a state at rest with the forces computed by the peers at `state` as its late forces.
     #[cfg(test)]
     pub(super) fn computed(&self, state: &[f64]) -> Vec<f64> {
         let mut waiting = vec![0.0; state.len()];
@@ -152,7 +153,7 @@ impl Turning<'_> {
         let nodes = self.nodes.len();
         let firsts = self.firsts();
         let mut peers: Vec<Moving> = self.nodes.iter().zip(&firsts).map(|(node, first)| Moving::read(node, &state[*first..], self.time)).collect();
-        // `samples` has the oldest sample of each node first, so that samples of this frame can be appended. In the state the newest is first.
+        // `samples` has the oldest sample of each node first, and samples of this frame are appended. In the state the newest sample is first.
         let mut next: usize = self.nodes.iter().map(Node::states).sum();
         let mut samples: Vec<Vec<[Motion; 6]>> = Vec::with_capacity(nodes);
         for depth in &self.timetable.depth {
@@ -170,6 +171,7 @@ impl Turning<'_> {
                 Event::Sample { node } => samples[node].push(peers[node].copy),
                 Event::Deliver { from, to, sample } => held[to * nodes + from] = Some(sample),
                 Event::Tick { node: to, at, span } => {
+                    // The force of a sample is linear in the sample, so weighted sums over the senders are added component by component.
                     let node = &self.nodes[to];
                     let mut drawn = [0.0; 6];
                     for from in 0..nodes {
@@ -201,6 +203,7 @@ impl Turning<'_> {
         }
         let mut next: usize = self.nodes.iter().map(Node::states).sum();
         for (samples, depth) in samples.iter().zip(&self.timetable.depth) {
+            // The newest `depth` samples are the states of the next frame, newest first.
             for sample in samples.iter().rev().take(*depth) {
                 write(sample, &mut reached[next..], self.time);
                 next += SAMPLE;
@@ -215,7 +218,7 @@ impl Turning<'_> {
 struct Moving {
     copy: [Motion; 6],
     device: Vec<Motion>,
-    /// Forces on the components of the copy that act at the next tick, if the peer applies forces a tick late.
+    /// Forces on the components of the copy at the next tick, if the peer applies forces a tick late.
     on_copy: [f64; 6],
     on_device: Vec<f64>,
 }
@@ -245,7 +248,8 @@ impl Moving {
         }
     }
 
-    /// Advances the node by a tick. `drawn` are the forces of the held samples on the copy; `push` is a component of the device and a hand's force on it.
+    /// Advances the node by a tick. `drawn` are the forces of the held samples on the copy; `push` is a component of the device and a hand's force on this
+    /// component.
     fn tick(&mut self, node: &Node, drawn: &[f64; 6], push: Option<(usize, f64)>, span: std::time::Duration) {
         let mut on_copy: [f64; 6] = std::array::from_fn(|axis| drawn[axis] - node.own[axis].force(self.copy[axis]));
         let mut on_device = vec![0.0; self.device.len()];
@@ -257,6 +261,8 @@ impl Moving {
                 let (handle, rate) = (turned(&self.device), spun(&self.device));
                 let by = [angle, handle, spun(&self.copy), rate];
                 let torque: [f64; 3] = std::array::from_fn(|axis| twist.by.iter().zip(by).map(|(matrix, by)| apply(matrix, by)[axis]).sum());
+                // The reaction on the device follows the coupling torque and the turns of copy and device, because the torque is applied in the axes of the
+                // device.
                 let back = [torque, angle, handle];
                 for axis in 0..3 {
                     on_copy[3 + axis] += torque[axis];
@@ -265,6 +271,7 @@ impl Moving {
                 by_hand = apply(&twist.hand, handle);
             }
         }
+        // The coupling ties a component of the device to the combination `grip` of the copy's components. Action and reaction use the same combination.
         if node.touching {
             let (positions, velocities) = (self.copy.map(|motion| motion.position), self.copy.map(|motion| motion.velocity));
             for (component, grip) in node.grip.iter().enumerate() {
@@ -276,7 +283,7 @@ impl Moving {
                 }
             }
         }
-        // Now the forces of the previous tick act, and the present ones wait for the next tick.
+        // Now the forces of the previous tick act, and the present forces wait for the next tick.
         if node.compute_delay {
             std::mem::swap(&mut self.on_copy, &mut on_copy);
             std::mem::swap(&mut self.on_device, &mut on_device);
