@@ -44,6 +44,7 @@ impl DelayedLoop {
     }
 
     /// Returns the step F/F' = 1/tr(A⁻¹·A') of Newton's method, with A' = 1 − Σ kernel'·matrix (Jacobi's formula).
+    // tr(A⁻¹·M) = Σ A⁻¹(row, column)·M(column, row) needs no product of matrices.
     pub(super) fn newton_step(&self, point: &Point) -> Complex64 {
         let size = self.now.rows();
         let mut trace: Complex64 = (0..size).map(|place| point.inverse[place * size + place]).sum();
@@ -87,6 +88,7 @@ fn invert(matrix: &mut [Complex64], size: usize) -> Option<Complex64> {
     let mut direction = Complex64::new(1.0, 0.0);
     let mut exchanges = Vec::with_capacity(size);
     for step in 0..size {
+        // The largest entry of the column as pivot keeps the growth of rounding errors small.
         let mut pivot_row = step;
         for row in step + 1..size {
             if matrix[row * size + step].norm_sqr() > matrix[pivot_row * size + step].norm_sqr() {
@@ -101,11 +103,13 @@ fn invert(matrix: &mut [Complex64], size: usize) -> Option<Complex64> {
         direction *= pivot / length;
         exchanges.push(pivot_row);
         if pivot_row != step {
+            // An exchange of two rows changes the sign of the determinant.
             direction = -direction;
             for column in 0..size {
                 matrix.swap(step * size + column, pivot_row * size + column);
             }
         }
+        // The column of the pivot becomes a column of the inverse in place: the unit vector there takes part in the same row operations.
         matrix[step * size + step] = Complex64::new(1.0, 0.0);
         let inverse = pivot.inv();
         for column in 0..size {

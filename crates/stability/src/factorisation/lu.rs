@@ -6,9 +6,9 @@ use num_complex::Complex64;
 
 use crate::matrix::Dense;
 
-/// An entry of a matrix that is factorised, real or complex.
+/// An entry of a factorised matrix, real or complex.
 pub trait Entry: Copy + Default + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + From<f64> {
-    /// Returns the sum of the absolute values of real and imaginary part, which is between the modulus and √2 times the modulus.
+    /// Returns the sum of the absolute values of real and imaginary part, between the modulus and √2 times the modulus.
     fn size(self) -> f64;
 }
 
@@ -26,7 +26,7 @@ impl Entry for Complex64 {
 
 /// P·A = L·U of a square matrix A: L is lower triangular with ones on the diagonal, U is upper triangular, P exchanges rows.
 ///
-/// Computed solutions are exact for a matrix that differs from A by a small multiple of n·ε·|L|·|U| (Higham 2002, Theorem 9.4). If A is singular, solutions
+/// Computed solutions are exact for a matrix within a small multiple of n·ε·|L|·|U| of A (Higham 2002, Theorem 9.4). If A is singular, solutions
 /// are not finite or very large.
 #[derive(Clone, Debug)]
 pub struct Lu<T> {
@@ -43,7 +43,7 @@ impl<T: Entry> Lu<T> {
         Self::with_least_pivot(matrix, T::default())
     }
 
-    /// Factorises as [`Lu::of`], with `least` in place of pivots that are zero: the factors of a singular matrix are those of a regular matrix nearby.
+    /// Factorises as [`Lu::of`], with `least` in place of pivots that are zero: the factors of a singular matrix are the factors of a regular matrix nearby.
     pub(crate) fn with_least_pivot(matrix: &Dense<T>, least: T) -> Self {
         let size = matrix.rows();
         let (mut factors, mut rows) = (matrix.clone(), (0..size).collect::<Vec<_>>());
@@ -51,6 +51,7 @@ impl<T: Entry> Lu<T> {
             let larger = |largest: usize, row: usize| if factors[(row, pivot)].size() > factors[(largest, pivot)].size() { row } else { largest };
             let largest = (pivot + 1..size).fold(pivot, larger);
             rows.swap(pivot, largest);
+            // Whole rows are exchanged, the finished part of L included, so L belongs to the final order of rows.
             for column in 0..size {
                 let entry = factors[(pivot, column)];
                 factors[(pivot, column)] = factors[(largest, column)];
@@ -76,6 +77,7 @@ impl<T: Entry> Lu<T> {
     pub(crate) fn solve(&self, right: &[T]) -> Vec<T> {
         let size = self.rows.len();
         let mut x: Vec<T> = self.rows.iter().map(|row| right[*row]).collect();
+        // Forward substitution with L, whose diagonal is 1 and not stored.
         for row in 1..size {
             x[row] = x[row] - sum(&self.factors.row(row)[..row], &x[..row]);
         }
@@ -88,6 +90,7 @@ impl<T: Entry> Lu<T> {
     /// Returns x with Aᵀ·x = b.
     pub(crate) fn solve_transposed(&self, right: &[T]) -> Vec<T> {
         let size = self.rows.len();
+        // Aᵀ = UᵀLᵀP: first Uᵀ from the top, then Lᵀ from the bottom, then the exchange of rows is undone.
         let mut y = right.to_vec();
         for row in 0..size {
             y[row] = y[row] / self.factors[(row, row)];

@@ -16,7 +16,7 @@ pub fn cholesky(symmetric: &Matrix) -> Option<Matrix> {
         for entry in &mut factor.row_mut(pivot)[pivot..] {
             *entry /= root;
         }
-        // The loop subtracts whole rows. So the innermost loop has no sum whose terms must be added in order.
+        // The loop subtracts whole rows. So the innermost loop has no sum with a prescribed order of terms.
         let row = factor.row(pivot)[pivot..].to_vec();
         for below in pivot + 1..size {
             let share = row[below - pivot];
@@ -38,6 +38,7 @@ pub fn triangle_inverse(upper: &Matrix) -> Matrix {
         let mut sum = vec![0.0; size];
         sum[row] = 1.0;
         for k in row + 1..size {
+            // Row k of the inverse is zero left of the diagonal, so only columns from k on change.
             let share = upper[(row, k)];
             for (entry, below) in sum[k..].iter_mut().zip(&inverse.row(k)[k..]) {
                 *entry -= share * below;
@@ -54,6 +55,7 @@ pub fn triangle_inverse(upper: &Matrix) -> Matrix {
 pub fn solve(upper: &Matrix, right: &[f64]) -> Vec<f64> {
     let size = upper.rows();
     let mut x = right.to_vec();
+    // Forward substitution with Rᵀ: each found number is subtracted from the right sides of all later rows.
     for row in 0..size {
         x[row] /= upper[(row, row)];
         let value = x[row];
@@ -61,6 +63,7 @@ pub fn solve(upper: &Matrix, right: &[f64]) -> Vec<f64> {
             *entry -= factor * value;
         }
     }
+    // Back substitution with R, from the last row up.
     for row in (0..size).rev() {
         let sum: f64 = upper.row(row)[row + 1..].iter().zip(&x[row + 1..]).map(|(factor, value)| factor * value).sum();
         x[row] = (x[row] - sum) / upper[(row, row)];
@@ -84,6 +87,8 @@ pub fn eigen(symmetric: &Matrix) -> (Vec<f64>, Matrix) {
                     continue;
                 }
                 rotated = true;
+                // The smaller root of t² + 2θt − 1 = 0 turns by at most 45°, as convergence requires (Golub & Van Loan 2013, Section
+                // 8.5.2).
                 let theta = (a[(q, q)] - a[(p, p)]) / (2.0 * off);
                 let tangent = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
                 let cosine = 1.0 / (tangent * tangent + 1.0).sqrt();
@@ -93,6 +98,7 @@ pub fn eigen(symmetric: &Matrix) -> (Vec<f64>, Matrix) {
                     let entries = a.row_mut(row);
                     (entries[p], entries[q]) = (cosine * entries[p] - sine * entries[q], sine * entries[p] + cosine * entries[q]);
                 }
+                // The rows of `vectors` turn with the rows of A, so they end as the eigenvectors.
                 rotate_rows(&mut vectors, p, q, cosine, sine);
             }
         }

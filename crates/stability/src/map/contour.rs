@@ -1,7 +1,7 @@
 //! Lines of equal radius by marching squares.
 //!
-//! Each square of four neighbouring nodes is crossed by pieces of line that enter and leave it where a side has one node on either side of the level.
-//! Pieces have a direction, the stable side on their left, so that each crossing ends one piece and begins another, and following them gives the lines.
+//! Pieces of line cross each square of four neighbouring nodes. A piece enters and leaves where the two nodes of a side lie on different sides of the level.
+//! Pieces have a direction, the stable side on their left, so each crossing ends a piece and begins the next piece, and following the pieces gives the lines.
 
 use std::collections::BTreeMap;
 
@@ -26,8 +26,8 @@ impl Polyline {
 }
 
 impl Map {
-    /// Returns the lines where the radius is 1, with the stable side on their left, x to the right and y up. A line that does not end at the edge of the map is
-    /// closed. Between two nodes the logarithm of the radius is taken to be linear; rows that were not computed count as unstable.
+    /// Returns the lines where the radius is 1, with the stable side on their left, x to the right and y up. A line without an end at the edge of the map is
+    /// closed. Between two nodes the logarithm of the radius is taken to be linear; rows without values count as unstable.
     #[must_use]
     pub fn contour(&self) -> Vec<Polyline> {
         contour(self, false)
@@ -49,7 +49,7 @@ struct Side {
     up: bool,
 }
 
-/// A map with a margin of nodes around it, 1 wide if lines are to be closed along the edge of the map, otherwise 0.
+/// A map with a margin of nodes around it, 1 wide for lines closed along the edge of the map, otherwise 0.
 struct Field<'a> {
     map: &'a Map,
     margin: usize,
@@ -88,6 +88,7 @@ impl Field<'_> {
     fn point(&self, side: Side) -> (f64, f64) {
         let (row, column) = if side.up { (side.row + 1, side.column) } else { (side.row, side.column + 1) };
         let (from, to) = (self.level(side.row, side.column), self.level(row, column));
+        // The two levels have different signs, so the difference is not zero and the share lies between 0 and 1.
         let share = from / (from - to);
         let at = |values: &[f64], place: usize| values[place.saturating_sub(self.margin).min(values.len() - 1)];
         let between = |values: &[f64], first: usize, second: usize| {
@@ -105,6 +106,7 @@ impl Field<'_> {
         let right = Side { row, column: column + 1, up: true };
         let top = Side { row: row + 1, column, up: false };
         let left = Side { row, column, up: true };
+        // A piece runs from the side with the stable node on its left. Two adjacent squares give a common side to one piece as its end and to one as its start.
         match (a, b, c, d) {
             (false, false, false, false) | (true, true, true, true) => [None, None],
             (true, false, false, false) => [Some((bottom, left)), None],
@@ -142,6 +144,7 @@ pub(super) fn contour(map: &Map, to_the_edge: bool) -> Vec<Polyline> {
             next.extend(field.pieces(row, column).into_iter().flatten());
         }
     }
+    // A side without a piece ending there lies on the edge of the map, and an open line begins there. All remaining lines are closed.
     let ends: std::collections::BTreeSet<Side> = next.values().copied().collect();
     let open: Vec<Side> = next.keys().filter(|side| !ends.contains(side)).copied().collect();
     let mut lines = Vec::new();

@@ -1,7 +1,7 @@
 //! Operator on the second moment of any number of equal peers over equal links with independent losses, at a cost independent of that number.
 //!
-//! A second moment that no permutation of the peers changes keeps this symmetry through every event. Such a moment is determined by its entries for one, two,
-//! three and four peers. With a_i the state of peer i (bodies, samples on the way) and h_ij the sample that peer i holds of peer j:
+//! A second moment unchanged by every permutation of the peers keeps this symmetry through every event. Such a moment is determined by its entries for one,
+//! two, three and four peers. With a_i the state of peer i (bodies, samples on the way) and h_ij the sample of peer j held by peer i:
 //!
 //! ```text
 //! A0 = E a_i a_iᵀ    A1 = E a_i a_jᵀ    r = E a_i h_ij    s = E a_i h_ji    o = E a_i h_jk
@@ -16,8 +16,9 @@
 //! kind is, so these blocks are the coordinates.
 //!
 //! All receivers hold nearly the same sample of a sender, so the sums of h grow with N − 1, and their components in an orthonormal basis with √(N − 1), while
-//! a_i does not grow. Without scaling, more peers would cost more digits. In the blocks of the first two kinds h is therefore divided by √(N − 1), which turns
-//! the sums into the means that exert forces on peers. Then every coefficient of a frame is of size 1 for any N, and none is a difference of large numbers.
+//! a_i does not grow. Without scaling, more peers would cost more digits. In the blocks of the first two kinds h is therefore divided by √(N − 1). The division
+//! turns the sums into the means used by the forces on peers. Then every coefficient of a frame is of size 1 for any N, and no coefficient is a difference of
+//! large numbers.
 
 use super::arrivals::Hazards;
 use super::events::Signs;
@@ -54,25 +55,25 @@ pub struct Symmetric {
 enum Step {
     /// Motion of every peer: a ← own·a + held·(mean of h), with the coefficients of `map`. `sizes` bounds the terms of these coefficients.
     Move { map: Map, sizes: Map },
-    /// Delivery on all links at once: each link takes in the state with the index `state` of its sender, independently, with that probability.
+    /// Delivery on all links at once: each link takes in the state with the index `state` of its sender, independently, with probability `probability`.
     Deliver { state: usize, probability: f64 },
 }
 
-/// Coefficients of a peer's own states and of the mean of the samples that the peer holds.
+/// Coefficients of a peer's own states and of the mean of the held samples.
 #[derive(Clone, Debug)]
 struct Map {
     own: Matrix,
     held: Vec<f64>,
 }
 
-/// Second moment that no permutation of the peers changes, in the notation of the module.
+/// Second moment unchanged by every permutation of the peers, in the notation of the module.
 #[derive(Clone, Debug)]
 struct Moment {
     /// A0, the moment of a peer's states.
     own: Matrix,
     /// A1, the moment of the states of two different peers.
     other: Matrix,
-    /// Moments r, s and o of a peer's states: with a sample that the peer holds, with a sample of the peer that another peer holds, and with a sample between
+    /// Moments r, s and o of a peer's states: with a sample held by the peer, with a sample of the peer held by another peer, and with a sample between
     /// two other peers.
     with: [Vec<f64>; 3],
     /// Moments h of two held samples, in the order of the module.
@@ -87,7 +88,7 @@ impl Symmetric {
         let rows = node.rows(0);
         let (states, depth, sent) = (node.states(), hazards.depth(), lifted.timetable.sent[0]);
         let (size, full) = (states + depth, states + depth + sent);
-        // Map of the ticks since the last delivery. Its columns are the states at its beginning, followed by the mean of the held samples.
+        // Map of the ticks since the last delivery. The columns are the states after the delivery, followed by the mean of the held samples.
         let mut map = Tracked::new(full, size, 1);
         let mut steps = Vec::new();
         let (mut tick, mut sample, mut roundings) = (0, 0, 0);
@@ -109,6 +110,7 @@ impl Symmetric {
                 }
                 Event::Deliver { .. } => {}
                 Event::Tick { span, .. } => {
+                    // A delivery changes the held samples and is random, so the deterministic ticks before must be complete as one map.
                     if !hazards.at[tick].is_empty() {
                         steps.push(flush(&map, &|row| row, full));
                         map = Tracked::new(full, full, 1);
@@ -142,11 +144,12 @@ impl Symmetric {
         self.steps.iter().map(of).sum()
     }
 
-    /// Returns the moment after a motion of every peer. With fewer than four peers the moments of more peers than there are have the factor zero.
+    /// Returns the moment after a motion of every peer. Moments of more peers than the scene has get the factor zero.
     fn moved(&self, moment: &Moment, Map { own: map, held }: &Map) -> Moment {
         let Moment { own, other, with: [r, s, o], held: h } = moment;
         let n = self.peers;
         let w = 1.0 / (n - 1.0);
+        // Moments with the mean of the N − 1 samples held by a peer: each sum over senders is split by how the two index pairs overlap.
         let others: Vec<f64> = s.iter().zip(o).map(|(s, o)| w * (s + (n - 2.0) * o)).collect();
         let own_held = w * (h[0] + (n - 2.0) * h[2]);
         let other_held = w * w * (h[1] + 2.0 * (n - 2.0) * h[4] + (n - 2.0) * h[3] + (n - 2.0) * (n - 3.0) * h[5]);
@@ -182,6 +185,7 @@ impl Symmetric {
         let Moment { own, other, with: [r, s, o], held: h } = moment;
         let blend = |with: &[f64], core: &Matrix| -> Vec<f64> { with.iter().zip(core.row(state)).map(|(with, core)| q * with + p * core).collect() };
         let (own_square, other_square) = (own[(state, state)], other[(state, state)]);
+        // Two different links miss or deliver independently, hence q², q·p and p². The same link twice has q and p only.
         let pair = |before: f64, cross: f64, square: f64| q * q * before + q * p * cross + p * p * square;
         Moment {
             with: [blend(r, other), blend(s, own), blend(o, other)],
@@ -206,6 +210,7 @@ impl Symmetric {
         let (n, minus) = (self.peers, signs.minus());
         let at = self.position;
         let Moment { own, other, with: [r, s, o], held: h } = moment;
+        // Moments with the mean position m of all copies. Subtracting m times the translation from every state gives the three terms of (a − t·m)(a − t·m)ᵀ.
         let with_mean: Vec<f64> = own.row(at).iter().zip(other.row(at)).map(|(own, other)| (own + (n - 1.0) * other) / n).collect();
         let held_mean = (r[at] + s[at] + (n - 2.0) * o[at]) / n;
         let square = with_mean[at];
@@ -282,6 +287,7 @@ impl Symmetric {
         } else {
             let z = 2.0 * (n1 * apart[(size, size)] + minus * antisymmetric) / n;
             let odd = antisymmetric + z;
+            // Three peers have no moment of four different peers, so y and `even` follow from two equations instead of three.
             let rest = n1 * apart[(size + 1, size + 1)];
             let (y, apart_four, even) = if self.count == 3 {
                 let y = (whole + minus * rest) / 1.5;
@@ -319,7 +325,7 @@ impl Symmetric {
         packed
     }
 
-    /// Returns the blocks of an element from its coordinates, with zeros for the parts that [`packed`](Self::packed) leaves out.
+    /// Returns the blocks of an element from its coordinates, with zeros for the parts left out by [`packed`](Self::packed).
     fn unpacked(&self, element: &[f64]) -> (Matrix, Matrix, f64, f64) {
         let skipped = if self.translation.is_some() { self.position } else { usize::MAX };
         let kept = self.size + usize::from(self.translation.is_none());

@@ -261,8 +261,7 @@ impl Moving {
                 let (handle, rate) = (turned(&self.device), spun(&self.device));
                 let by = [angle, handle, spun(&self.copy), rate];
                 let torque: [f64; 3] = std::array::from_fn(|axis| twist.by.iter().zip(by).map(|(matrix, by)| apply(matrix, by)[axis]).sum());
-                // The reaction on the device follows the coupling torque and the turns of copy and device, because the torque is applied in the axes of the
-                // device.
+                // The reaction on the device changes with the turns of copy and device too, and not only with the torque: see `Twist::back`.
                 let back = [torque, angle, handle];
                 for axis in 0..3 {
                     on_copy[3 + axis] += torque[axis];

@@ -66,7 +66,7 @@ impl Load {
     }
 }
 
-/// Scene whose hands exert constant forces, with one node and one load per peer.
+/// Scene with constant forces of the hands, with one node and one load per peer.
 pub(super) struct Loaded<'a> {
     scene: &'a Scene,
     nodes: &'a [Node],
@@ -156,6 +156,7 @@ impl<'a> Loaded<'a> {
             residual.extend(force.map(|force| force / stiff).into_iter().chain(torque.map(|torque| torque / (stiff * node.length))));
             let [force, torque] = forces.on_device;
             let both = force.map(|force| force / stiff).into_iter().chain(torque.map(|torque| torque / (stiff * node.length)));
+            // A loose device is not part of the equations of rest, since its motion is independent of the copies.
             residual.extend(both.take(self.unknowns(place) - 6));
         }
         residual
@@ -167,8 +168,8 @@ impl<'a> Loaded<'a> {
         springs.fold(f64::MIN_POSITIVE, f64::max)
     }
 
-    /// Returns the number of unknown coordinates of a peer's pose in the equations of the state of rest: six of the copy, and those of a device that touches
-    /// the object.
+    /// Returns the number of unknown coordinates of a peer's pose in the equations of the state of rest: six of the copy, and the coordinates of a device that
+    /// touches the object.
     fn unknowns(&self, place: usize) -> usize {
         let node = &self.nodes[place];
         6 + if node.touching { node.device.len() } else { 0 }
@@ -191,7 +192,7 @@ impl<'a> Loaded<'a> {
         poses.iter().enumerate().map(|(place, pose)| take(pose, place)).collect()
     }
 
-    /// Returns the poses at rest that Levenberg's (1944) method reaches from the initial poses; [`AnalysisError::NoRest`] if forces are left.
+    /// Returns the poses at rest found by Levenberg's (1944) method from the initial poses; [`AnalysisError::NoRest`] if forces are left.
     pub(super) fn rest(&self) -> Result<Vec<Pose>, AnalysisError> {
         let size: usize = (0..self.nodes.len()).map(|place| self.unknowns(place)).sum();
         let (poses, left) = zero(self.start(), size, |poses| self.residual(poses), |poses, by| self.moved(poses, by));
@@ -211,6 +212,7 @@ impl<'a> Loaded<'a> {
     fn node(&self, poses: &[Pose], place: usize) -> Node {
         let (mut node, pose, forces) = (self.nodes[place].clone(), &poses[place], self.forces(poses, place));
         let (matrix, gains, square) = (pose.attitude.matrix(), self.gains(place), node.length * node.length);
+        // P = diag(½·Σk − k): the torque per small turn about an axis is then the sum of the other two weights, which is the stiffness k of the axis.
         let half = 0.5 * gains.stiffness.iter().sum::<f64>();
         let weights = gains.stiffness.map(|stiffness| half - stiffness);
         let [x, y, z] = node.grasp;
@@ -236,6 +238,7 @@ impl<'a> Loaded<'a> {
             [over(transposed(&columns)), over(damped)]
         });
         let heard = heard.collect();
+        // The four matrices of δτC and the three of −δ(SᵀτC) from the module head, divided by the squared length, since angles and torques count as lengths.
         let twist = self.coupling(place).map(|coupling| {
             let apart = product(&transposed(&matrix), &pose.handle.matrix());
             let back = transposed(&apart);
@@ -280,6 +283,7 @@ impl<'a> Loaded<'a> {
                 };
                 let turned = |attitude: &Attitude| if axis < 3 { [0.0; 3] } else { apply(&transposed(&attitude.matrix()), unit(axis - 3)) };
                 let ([x, y, z], [a, b, c]) = (moved(pose.centre), turned(&pose.attitude));
+                // A loose device does not move with the copies, so its displacement is zero.
                 let device = moved(pose.device).into_iter().chain(turned(&pose.handle)).take(node.device.len());
                 let device = if node.touching { device.collect() } else { vec![0.0; node.device.len()] };
                 ([x, y, z, a, b, c], device)

@@ -1,10 +1,10 @@
 //! Steady spin: all copies turn at one rate about one axis of the world, driven by torques of the hands along that axis.
 //!
-//! Samples are held, so a copy is drawn towards attitudes that are older by the age of the samples. With KR the coordination brakes a spin ω by about
-//! KR·sin(ω·age), and a spin is steady only if hands make up for that braking and for the damping. The motion repeats if seen from axes that turn with the
-//! spin, and that move along its axis if the motion is a screw: after a frame of T the state is the same but turned by ω·T. With Φ the frame of real peers
+//! Samples are held, so a copy is drawn towards old attitudes. With KR the coordination brakes a spin ω by about
+//! KR·sin(ω·age), and a spin is steady only if hands make up for this braking and for the damping. The motion repeats if seen from axes turning with the
+//! spin, and moving along its axis if the motion is a screw: after a frame of T the state is the same but turned by ω·T. With Φ the frame of real peers
 //! ([`super::peers`]), the steady motion is a zero of Φ(z) minus z turned by ω·T, and the slope of Φ there describes small motions. Displacements of
-//! everything together and the turn of everything about the axis are removed from that slope.
+//! everything together and the turn of everything about the axis are removed from this slope.
 
 use cohaptic_peer::rotation::{Attitude, Triple};
 use cohaptic_peer::{Hand, Signal};
@@ -96,7 +96,7 @@ impl Drive {
 }
 
 impl Spin {
-    /// Finds the steady spin that the hands of a scene drive, near the initial attitude of the object.
+    /// Finds the steady spin driven by the hands of a scene, near the initial attitude of the object.
     pub(super) fn of(scene: &Scene, network: &NominalNetwork, watch: &dyn Watch) -> Result<Self, AnalysisError> {
         let structure = Structure::of_each(scene, network, &contacts(scene)?)?;
         allowed(&structure, watch)?;
@@ -109,7 +109,7 @@ impl Spin {
         let rate = if drive.begun == 0.0 { spin.balance(scene, &drive) } else { drive.begun };
         spin.begin(scene, rate);
         if spin.settle(scene).is_err() {
-            // Devices that hold the object off the axis move that axis, so that the first guess may be too far from the steady spin. Simulated motion comes
+            // Grasps off the axis move the axis, so the first guess may be too far from the steady spin. Simulated motion comes
             // nearer.
             spin.begin(scene, rate);
             spin.relax(scene);
@@ -130,13 +130,15 @@ impl Spin {
         -1e-9 * approximate(sent)
     }
 
-    /// Returns the rate at which damping and the lag of the samples balance the torque [rad/s], for small angles of lag: a first guess of the spin.
+    /// Returns the rate of balance between the torque on one side and damping and the lag of the samples on the other [rad/s], for small angles of lag: a first
+    /// guess of the spin.
     fn balance(&self, scene: &Scene, drive: &Drive) -> f64 {
         let structure = &self.together.structure;
         let lag = structure.timetable.depth.iter().enumerate().map(|(place, depth)| self.age(place, *depth)).fold(0.0, f64::max);
         let braked = |place: usize| {
             let config = scene.rotation_config(place).expect("the object turns");
             let along = apply(&transposed(&scene.rotation.as_ref().expect("the object turns").peers[place].attitude.matrix()), drive.axis);
+            // Held samples of age τ brake a spin ω with about KR·ω·τ for small angles, like a damper of KR·τ.
             let spins = config.device.iter().filter(|_| self.together.nodes[place].touching).map(|device| device.handle.damping);
             let damping = spins.chain([config.copy.damping, config.gains.stiffness.map(|stiffness| lag * stiffness)]);
             damping.map(|damping| (0..3).map(|axis| along[axis] * along[axis] * damping[axis]).sum::<f64>()).sum::<f64>()
@@ -144,7 +146,7 @@ impl Spin {
         drive.torque / (0..scene.peers.len()).map(braked).sum::<f64>().max(f64::MIN_POSITIVE)
     }
 
-    /// Sets the state to copies that coincide and have always turned at `rate` [rad/s], the earlier samples included.
+    /// Sets the state to coinciding copies with an endless turn at `rate` [rad/s], the earlier samples included.
     fn begin(&mut self, scene: &Scene, rate: f64) {
         let rotation = scene.rotation.as_ref().expect("the object turns");
         let attitude = Attitude { rate: [0.0; 3], ..rotation.peers[0].attitude };
@@ -164,6 +166,7 @@ impl Spin {
         let mut z = Vec::new();
         for node in nodes {
             let spun = body_rate.map(|component| component * node.length * time);
+            // Positions are zero, since the state counts from the bases. The grasp moves with ω × r.
             let [vx, vy, vz] = cross(self.axis, apply(&matrix, node.grasp)).map(|component| component * rate * time);
             z.extend([0.0; 9]);
             z.extend(spun);
@@ -197,7 +200,7 @@ impl Spin {
             let reached = self.bases.reached(&mut members, &turning, &self.velocities);
             self.bases = self.bases.clone().moved_to(&turning, &reached);
             self.velocities = reached;
-            // The bases have moved to the reached positions and angles, from which these states now count.
+            // The bases have moved to the reached positions and angles, and the states count from the bases.
             positions(&turning).into_iter().for_each(|state| self.velocities[state] = 0.0);
             let before = std::mem::replace(&mut turned_by, dot(self.axis, self.bases.poses[0].attitude.rotation_from(&from.orientation)));
             if (turned_by - before).abs() <= 1e-13 {
@@ -219,6 +222,8 @@ impl Spin {
             let reached = placed(motion).reached(&mut hands(scene), &turning, &motion.state);
             kept.iter().map(|state| reached[*state] - motion.state[*state]).collect()
         };
+        // The unknowns are the kept states, the rate and the climb, more than there are equations: a displacement or a turn of everything along the axis
+        // changes no residual. Levenberg's method does not need a regular matrix.
         let moved = |motion: &Motion, by: &[f64]| {
             let mut moved = Motion { rate: motion.rate + by[kept.len()] / span, climb: motion.climb + by[kept.len() + 1], ..motion.clone() };
             kept.iter().zip(by).for_each(|(state, by)| moved.state[*state] += by);
@@ -269,12 +274,13 @@ impl Spin {
         Some((matrix, error))
     }
 
-    /// Returns the directions of the three displacements of everything and of its turn about the axis, and the reference state of each. A direction is 1 in its
-    /// own reference and 0 in the other references.
+    /// Returns the directions of the three displacements of everything and of the turn of everything about the axis, and the reference state of each. A
+    /// direction is 1 in its own reference and 0 in the other references.
     fn symmetries(&self, turning: &Turning<'_>) -> (Vec<Vec<f64>>, Vec<usize>) {
         let mut symmetries: Vec<Vec<f64>> = (0..4).map(|which| self.symmetry(turning, which)).collect();
         let mut references = Vec::new();
         for place in 0..symmetries.len() {
+            // The largest component as reference keeps the division exact to rounding. Elimination then makes the other directions zero in this reference.
             let reference = (0..6).max_by(|a, b| symmetries[place][*a].abs().total_cmp(&symmetries[place][*b].abs())).unwrap_or(0);
             let own = symmetries[place][reference];
             symmetries[place].iter_mut().for_each(|entry| *entry /= own);
@@ -354,7 +360,7 @@ const fn approximate(nanos: i64) -> f64 {
     nanos as f64
 }
 
-/// Returns the indices of the states that are positions or angles.
+/// Returns the indices of positions and angles among the states.
 fn positions(turning: &Turning<'_>) -> Vec<usize> {
     let (mut next, mut states) = (0, Vec::new());
     for node in turning.nodes {
