@@ -1,4 +1,4 @@
-//! The result of an analysis: the verdict on a scene, with the modes of contact that it covers and notes about the parts that it leaves out.
+//! The result of an analysis: the verdict on a scene, with the covered modes of contact and notes about the parts left out.
 
 use std::time::Duration;
 
@@ -13,16 +13,16 @@ use crate::{Method, Radius, Verdict};
 pub struct Analysis {
     /// Largest radius of all modes of contact, without the rigid-body modes.
     pub radius: Radius,
-    /// Number of rigid-body modes that were removed: along each axis, displacements of all bodies together (with waves, of each copy alone) and of each device
+    /// Number of removed rigid-body modes: along each axis, displacements of all bodies together (with waves, of each copy alone) and of each device
     /// that touches nothing. Counted in the mode of contact with the largest radius; if the object turns, added over all its motions.
     pub rigid_modes: usize,
-    /// Number of remaining states: of bodies, of forces that wait to be applied, and of samples that are held or in flight.
+    /// Number of remaining states: of bodies, of waiting forces, and of samples held or in flight.
     pub dimension: usize,
     /// Method by which the radius was found.
     pub method: Method,
     /// Length of the frame over which the radius is taken. All events repeat after a frame.
     pub frame: Duration,
-    /// Modes of contact: one for a linear scene, otherwise one per combination of open and closed contacts. If the object turns, each of its motions has
+    /// Modes of contact: one for a linear scene, otherwise one per combination of open and closed contacts. If the object turns, each motion has
     /// modes of its own.
     pub modes: Vec<ContactMode>,
     /// Sentences about the parts of the scene that the verdict leaves out.
@@ -30,13 +30,13 @@ pub struct Analysis {
 }
 
 impl Analysis {
-    /// Returns the verdict that follows from the radius.
+    /// Returns the verdict from the radius.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
         self.radius.verdict()
     }
 
-    /// Tells whether the verdict is that of the worst of several combinations of contacts.
+    /// Tells whether the verdict concerns the worst of several combinations of contacts.
     #[must_use]
     pub fn combines_contacts(&self) -> bool {
         combines(&self.modes)
@@ -57,7 +57,7 @@ pub struct ContactMode {
     pub contacts: String,
     /// Largest radius of the parts.
     pub radius: Radius,
-    /// Parts of the mode that move independently of one another.
+    /// Parts of the mode with independent motions.
     pub parts: Vec<Part>,
     pub(crate) rigid_modes: usize,
     pub(crate) dimension: usize,

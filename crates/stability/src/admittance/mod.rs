@@ -80,7 +80,7 @@ impl Admittance {
     ///
     /// # Errors
     ///
-    /// As [`Admittance::of`], and [`AnalysisError::Stopped`] if the watch ends it.
+    /// As [`Admittance::of`], and [`AnalysisError::Stopped`] if the watch ends the computation.
     pub fn of_watched(scene: &Scene, peer: usize, watch: &dyn Watch) -> Result<Self, AdmittanceError> {
         Self::along_watched(scene, peer, None, watch)
     }
@@ -163,6 +163,7 @@ impl Admittance {
 
     fn new(system: System, radius: Radius, notes: Vec<String>, mass: f64, axes: [PushedAxis; 2]) -> Self {
         let mut admittance = Self { system, highest: 0.0, radius, notes, mass, axes };
+        // Nyquist's limit of the force and the velocity, which change and are seen once per tick.
         admittance.highest = 0.5 * admittance.tick_rate();
         admittance
     }
@@ -241,10 +242,11 @@ impl Admittance {
             System::OneAxis(axis) => axis.tied,
             System::Turned(turned) => turned.tied(),
         };
+        // Slow motion is slow compared with the frame: a quarter of the rate of frames leaves four frames per period.
         LowFrequencyFit::of(|hz| self.impedance(hz), self.highest.min(0.25 / self.timetable().frame.as_secs_f64()), tied)
     }
 
-    /// Returns the highest frequency that has an admittance: half the rate of the peer's ticks \[Hz\].
+    /// Returns the highest frequency with an admittance: half the rate of the peer's ticks \[Hz\].
     #[must_use]
     pub const fn highest_frequency(&self) -> f64 {
         self.highest

@@ -154,6 +154,7 @@ impl Map {
             return Err(MapError::Known { row, cells: cells.radius.len(), columns: if row < grid.rows { grid.columns } else { 0 } });
         }
         let (x, y) = (nodes(first, grid.columns), nodes(second, grid.rows));
+        // Empty rows are unknown rows, so missing rows at the end of `known` become unknown.
         known.resize_with(grid.rows, MapRow::default);
         let stopped = AtomicBool::new(false);
         let stop = || {
@@ -164,6 +165,7 @@ impl Map {
         };
         let pool = Scratches::default();
         let filled = known.par_iter_mut().enumerate().filter(|(_, row)| row.radius.is_empty()).try_for_each(|(number, row)| {
+            // Threads may see the flag late. A row begun late is not wrong, and `cells` asks again within the row.
             if stop() {
                 return Ok(());
             }
@@ -199,7 +201,7 @@ fn cells(
     stop: &impl Fn() -> bool,
     watch: &dyn Watch,
 ) -> Result<Option<MapRow>, FamilyError> {
-    // A cell with a second moment takes long, so that `stop` is called after each. Other cells are quick.
+    // A cell with a second moment takes long, so `stop` is called after each. Other cells are quick.
     let often = if family.criterion() == Criterion::MeanSquare { 1 } else { 256 };
     let mut row = MapRow { radius: Vec::with_capacity(x.len()), nominal: Vec::with_capacity(x.len()) };
     for (column, x) in x.iter().enumerate() {
@@ -220,6 +222,7 @@ fn cells(
 pub(crate) fn nodes(range: &KeyRange, count: usize) -> Vec<f64> {
     let last = crate::rounding::real(count.saturating_sub(1));
     let node = |number: usize| {
+        // The sum below may miss the high end by rounding, and the end of the range must be a node.
         if number + 1 == count && number > 0 {
             return range.high;
         }
@@ -235,6 +238,7 @@ pub(crate) struct Scratches(Mutex<Vec<FamilyScratch>>);
 
 impl Scratches {
     pub(crate) fn with<T>(&self, work: impl FnOnce(&mut FamilyScratch) -> T) -> T {
+        // The lock is held only while a scratch is taken or given back, never during the computation.
         let lent = self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner).pop();
         let mut scratch = lent.unwrap_or_default();
         let result = work(&mut scratch);

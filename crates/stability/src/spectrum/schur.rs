@@ -88,6 +88,7 @@ impl Schur {
     /// Reduces the matrix to Hessenberg form, with zeros below the first subdiagonal, by rotations of neighbouring rows and columns.
     fn reduce(&mut self) {
         for column in 0..self.size.saturating_sub(2) {
+            // From the bottom up: each rotation makes one entry zero and touches no zero made before.
             for row in (column + 2..self.size).rev() {
                 let (upper, lower) = (self.at(row - 1, column), self.at(row, column));
                 if let Some(rotation) = Rotation::of(upper, lower) {
@@ -112,6 +113,7 @@ impl Schur {
             } else {
                 (self.at(place, place - 1), self.at(place + 1, place - 1))
             };
+            // The first rotation brings the shift in, the next rotations move the entry below the subdiagonal out at the bottom.
             let Some(rotation) = Rotation::of(upper, lower) else { continue };
             self.rotate(place, place.saturating_sub(usize::from(place > first)), (place + 3).min(last + 1), rotation);
             if place > first {
@@ -134,6 +136,7 @@ impl Schur {
             self.entries[place] = a * cosine + sine.conj() * b;
             self.entries[place + 1] = b * cosine - sine * a;
         };
+        // A Hessenberg matrix has zeros in the two columns below row `bottom`. The rows after `size` are outputs and always take part.
         (0..bottom).for_each(&mut column);
         (self.size..self.rows).for_each(&mut column);
     }
@@ -154,6 +157,7 @@ impl Rotation {
         }
         let square = upper.norm_sqr();
         let length = (square + lower.norm_sqr()).sqrt();
+        // A phase of a zero entry is not defined, and an exchange of the two entries is the rotation then.
         if square == 0.0 {
             return Some(Self { cosine: 0.0, sine: lower.conj() / length });
         }
@@ -166,6 +170,7 @@ impl Rotation {
 fn nearer(a: Complex64, b: Complex64, c: Complex64, d: Complex64) -> Complex64 {
     let half = 0.5 * (a - d);
     let product = b * c;
+    // The eigenvalues are d + half ± root. The larger of half ± root is free of cancellation, and the product of both is −b·c.
     let root = (half * half + product).sqrt();
     let far = if (half.conj() * root).re >= 0.0 { half + root } else { half - root };
     if far == Complex64::default() { d } else { d - product / far }
