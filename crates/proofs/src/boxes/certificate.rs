@@ -1,7 +1,7 @@
-//! Certificates: numbers by which a proof can be checked without the program that found the proof.
+//! Certificates: numbers for checking a proof without the program behind the proof.
 //!
 //! A certificate names the states of each part of a scene. For each box, or for each span of numbers of peers, a certificate has the coordinates V, the weights
-//! d and the circle of [`super::discs`]. A reader with the scene can derive its matrices and check inequality (1) of that module, as
+//! d and the circle of [`super::discs`]. A reader with the scene can derive its matrices and check inequality (1) of [`super::discs`], as
 //! `crates/stability/tests/reference/check_certificate.py` does.
 
 use std::fmt::Write as _;
@@ -18,14 +18,14 @@ use super::guarantee::{Guarantee, Proven};
 use super::halving::Ranges;
 use super::steps::FrameState;
 
-/// Box of keys, and the numbers by which the verdict on the box can be checked.
+/// Box of keys, and the numbers for a check of the verdict on the box.
 #[derive(Clone, Debug)]
 pub struct BoxCertificate {
     /// Least and greatest value of each key. If the verdict holds for several numbers N of peers, the least and the greatest value of 1/(N − 1) follow.
     pub ranges: Vec<[f64; 2]>,
     /// Verdict on every scene in the box.
     pub guarantee: Guarantee,
-    /// Parts of the motion: for a stable box all parts but devices that touch nothing, for an unstable box one part that grows, and for an undecided box none.
+    /// Parts of the motion: for a stable box all parts but loose devices, for an unstable box one growing part, and for an undecided box no part.
     pub parts: Vec<PartCertificate>,
 }
 
@@ -35,9 +35,10 @@ impl BoxCertificate {
     }
 }
 
-/// Returns the number of boxes of an answer that have a verdict and are undecided in the certificate, whose bounds of frames are wider. Certificate and answer
-/// are in the same order, and an undecided box of the certificate is a whole box of the answer.
+/// Returns the number of boxes of an answer with a verdict in the answer and without a verdict in the certificate, because the certificate's bounds of frames
+/// are wider. Certificate and answer are in the same order, and an undecided box of the certificate is a whole box of the answer.
 pub(super) fn uncertified(certificate: &[BoxCertificate], answer: impl Iterator<Item = (Ranges, Guarantee)>) -> usize {
+    // Both lists are in the same order, so one pass with a peek at the next undecided box of the certificate is enough.
     let mut open = certificate.iter().filter(|one| one.guarantee == Guarantee::Undecided).peekable();
     let is_open = |(ranges, guarantee): &(Ranges, Guarantee)| {
         open.next_if(|one| one.ranges.starts_with(ranges)).is_some() && *guarantee != Guarantee::Undecided
@@ -45,7 +46,7 @@ pub(super) fn uncertified(certificate: &[BoxCertificate], answer: impl Iterator<
     answer.filter(is_open).count()
 }
 
-/// Span of numbers of equal peers, and the numbers by which the verdict on the span can be checked.
+/// Span of numbers of equal peers, and the numbers for a check of the verdict on the span.
 #[derive(Clone, Debug)]
 pub struct NumberCertificate {
     /// Least number of peers.
@@ -56,27 +57,27 @@ pub struct NumberCertificate {
     pub guarantee: Guarantee,
     /// Parts of the motion, chosen as in [`BoxCertificate`]; empty for verdicts in the mean square.
     pub parts: Vec<PartCertificate>,
-    /// Second moments for verdicts in the mean square: one per motion for a stable span, one that grows for an unstable span, otherwise none.
+    /// Second moments for verdicts in the mean square: one per motion for a stable span, one growing moment for an unstable span, otherwise no moment.
     pub moments: Vec<MomentCertificate>,
 }
 
-/// Second moment Y of equal peers, for which γ·Y − L(Y) can be checked to be positive definite for all numbers of a span.
+/// Second moment Y of equal peers. A reader can check that γ·Y − L(Y) is positive definite for all numbers of a span.
 #[derive(Clone, Debug)]
 pub struct MomentCertificate {
     /// Factor γ: 1 for a stable span, above 1 for an unstable span.
     pub factor: f64,
     /// Time by which velocities are multiplied \[s\].
     pub time: f64,
-    /// Gains K and B with which a sample is the one number (K·x + B·v)/(K + B/time); `None`: a sample is a position and a velocity.
+    /// Gains K and B of a sample as the one number (K·x + B·v)/(K + B/time); `None`: a sample is a position and a velocity.
     pub heard: Option<Gains>,
-    /// Number of samples of earlier frames that are states.
+    /// Number of samples of earlier frames among the states.
     pub depth: usize,
-    /// Blocks of Y: of the mean over the peers, of the differences from the mean and, for more than two peers, of held samples whose sums are all zero. Each
+    /// Blocks of Y: of the mean over the peers, of the differences from the mean and, for more than two peers, of held samples with zero sums. Each
     /// block is written row by row, in digits as in [`PartCertificate`].
     pub blocks: Vec<String>,
 }
 
-/// Averaging matrix of a topology, and approximate eigenvectors by which its eigenvalues can be enclosed.
+/// Averaging matrix of a topology, and approximate eigenvectors for an enclosure of its eigenvalues.
 #[derive(Clone, PartialEq, Debug)]
 pub struct TopologyCertificate {
     /// Weights between peers, one row per peer, if the scene reads its topology as a graph from a file; `None` for a topology with a name.
@@ -86,11 +87,11 @@ pub struct TopologyCertificate {
 }
 
 impl TopologyCertificate {
-    /// Returns the certificate of the topology of a family; `None` if every peer sends to every other.
+    /// Returns the certificate of the topology of a family; `None` if every peer sends to every other peer.
     ///
     /// # Errors
     ///
-    /// [`ProofError::NoCertificate`] for weights whose eigenvectors are not found, and if a scene of the family is refused.
+    /// [`ProofError::NoCertificate`] for weights without finite eigenvectors, and if a scene of the family is refused.
     pub fn of(family: &Family) -> Result<Option<Self>, ProofError> {
         let lows: Vec<f64> = family.keys().iter().map(|key| key.low).collect();
         let scene = family.scene(&lows)?;
@@ -106,8 +107,9 @@ impl TopologyCertificate {
 /// Target for the certified parts of a scene and their verdicts; `None` if no certificate is asked for.
 pub(super) type Certified<'a> = Option<&'a mut Vec<(Proven, PartCertificate)>>;
 
-/// Returns the parts that a verdict needs: all parts for a stable verdict, the first unstable part for an unstable verdict, otherwise none.
+/// Returns the parts behind a verdict: all parts for a stable verdict, the first unstable part for an unstable verdict, otherwise no part.
 pub(super) fn needed(verdict: Option<Proven>, mut parts: Vec<(Proven, PartCertificate)>) -> Vec<PartCertificate> {
+    // One growing part makes the scene grow, whatever the other parts do.
     if verdict != Some(Proven::Stable) {
         parts.retain(|(of, _)| Some(*of) == verdict);
         parts.truncate(1);
@@ -129,12 +131,12 @@ pub struct PartCertificate {
     pub members: Vec<Vec<usize>>,
     /// `true` if the part is the differences between the members of a class.
     pub is_difference: bool,
-    /// Interval of the eigenvalues of the averaging matrix that the part stands for. `None` without a topology and for the part of the eigenvalue 1.
+    /// Interval of the part's eigenvalues of the averaging matrix. `None` without a topology and for the part of the eigenvalue 1.
     pub eigenvalues: Option<[f64; 2]>,
     /// States in the order of the rows of the coordinates. Positions are counted from the first copy if nothing ties the scene to ground. Velocities are
     /// multiplied by `time`.
     pub states: Vec<FrameState>,
-    /// Gains K and B with which a sample is the one number (K·x + B·v)/(K + B/time); `None`: a sample is a position and a velocity.
+    /// Gains K and B of a sample as the one number (K·x + B·v)/(K + B/time); `None`: a sample is a position and a velocity.
     pub heard: Option<Gains>,
     /// Time by which velocities are multiplied \[s\].
     pub time: f64,
@@ -145,7 +147,7 @@ pub struct PartCertificate {
     pub coordinates: String,
     /// Weights d, in digits as in `coordinates`.
     pub weights: String,
-    /// Circle on which no matrix of the box has an eigenvalue.
+    /// Circle without an eigenvalue of any matrix of the box.
     pub circle: FreeCircle,
 }
 

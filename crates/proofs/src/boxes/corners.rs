@@ -1,9 +1,9 @@
-//! Boxes of numbers: lifted systems between whose corners every step matrix is multi-affine.
+//! Boxes of numbers: lifted systems with step matrices multi-affine between the corners of a box.
 //!
-//! The gains of a node are numbers of the box themselves. A body enters by the coefficients of its step map. For a body that nothing ties to ground, m·a = f −
-//! b·v, each coefficient is monotone in m and in b, so that the values at the ends of the box enclose the coefficient. If several coefficients vary, each is a
-//! number of its own, which encloses more than the box. If the damping b stays, a constant force f has the final velocity f/b, so that two coefficients follow
-//! from the others: e₁₁ + b·g₁ = 0 and e₀₁ + b·g₀ = h.
+//! The gains of a node are numbers of the box themselves. A body enters by the coefficients of its step map. For a free body, m·a = f −
+//! b·v, each coefficient is monotone in m and in b, so the values at the ends of the box enclose the coefficient. If several coefficients vary, each becomes a
+//! separate number, and the numbers together enclose more than the box. If the damping b stays, a constant force f has the final velocity f/b. Then two
+//! coefficients follow from the other two: e₁₁ + b·g₁ = 0 and e₀₁ + b·g₀ = h.
 
 use std::borrow::Cow;
 
@@ -22,7 +22,7 @@ pub(super) struct Point {
     pub(super) weights: Matrix,
 }
 
-/// Data that all corners of a box share.
+/// Data common to all corners of a box.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Common<'a> {
     pub(super) timetable: &'a Timetable,
@@ -33,11 +33,11 @@ pub(super) struct Common<'a> {
     pub(super) time: f64,
 }
 
-/// Largest number of numbers that vary in a box, since n numbers make 2ⁿ corners. Two dampings make four coefficients of a step map each, if bodies are equal
-/// in all peers. The limit leaves room for the weight with which a peer hears others, and for one number more.
+/// Largest number of varying numbers of a box, since n numbers make 2ⁿ corners. Two dampings make four coefficients of a step map each, if bodies are equal
+/// in all peers. The limit leaves room for the weight of the heard peers, and for a further number.
 const MOST_NUMBERS: usize = 10;
 
-/// Parts of the computation of steps that all points share.
+/// Parts of the computation of steps common to all points.
 struct Frame<'a> {
     plan: &'a Plan,
     sampling: Sampling,
@@ -71,7 +71,7 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// Returns the steps of a frame over the box that 2ⁿ points enclose: point i has number b at its upper end if bit b of i is set. Bodies vary between the bodies
+/// Returns the steps of a frame over the box of 2ⁿ points: point i has number b at its upper end if bit b of i is set. Bodies vary between the bodies
 /// of `ends`; the bodies of the points do not count.
 pub(super) fn steps(points: &[Point], ends: &[Vec<Node>], common: Common<'_>) -> Result<FrameSpan, ProofError> {
     let frame = Frame::of(points, common)?;
@@ -81,14 +81,14 @@ pub(super) fn steps(points: &[Point], ends: &[Vec<Node>], common: Common<'_>) ->
     Ok(FrameSpan { kinds, order: frame.plan.kinds().to_vec() })
 }
 
-/// Encloses matrices over the box that points enclose, given the function that returns the matrices at a corner. Bodies vary between the bodies of `ends`; the
+/// Encloses matrices over the box of the points, given the function from a corner to its matrices. Bodies vary between the bodies of `ends`; the
 /// bodies of the points do not count.
 pub(super) fn enclosed(points: &[Point], ends: &[Vec<Node>], matrices: impl Fn(&Point) -> Vec<StepMatrix>) -> Result<Vec<StepSpan>, ProofError> {
     let corners: Vec<Vec<StepMatrix>> = with_bodies(points, ends)?.iter().map(matrices).collect();
     Ok((0..corners[0].len()).map(|step| StepSpan::of(corners.iter().map(|steps| &steps[step]))).collect())
 }
 
-/// Returns the states of a frame over the box that points enclose.
+/// Returns the states of a frame over the box of the points.
 pub(super) fn states(points: &[Point], common: Common<'_>) -> Result<States, ProofError> {
     let frame = Frame::of(points, common)?;
     let names = frame.plan.states(&frame.nodes(&points[0]), frame.sampling.channels(), frame.tied);
@@ -103,15 +103,16 @@ pub(super) fn states(points: &[Point], common: Common<'_>) -> Result<States, Pro
 pub(super) struct States {
     /// Names in the order of rows and columns.
     pub(super) names: Vec<FrameState>,
-    /// Gains with which receivers combine a sample into one number; `None`: a sample is a position and a velocity.
+    /// Gains of the combination of a sample into one number; `None`: a sample is a position and a velocity.
     pub(super) heard: Option<Gains>,
 }
 
-/// Encloses, for all N ≥ N₀, the steps T of a frame whose entries grow without a limit with N, each step divided by N/N₀ or by (N/N₀)². `at` has the points at
+/// Encloses, for all N ≥ N₀, the steps T of a frame with unlimited growth of entries with N, each step divided by N/N₀ or by (N/N₀)². `at` has the points at
 /// N₀, 2·N₀ and 3·N₀.
 ///
 /// With [`Growth::Linear`], T = A + N·B is affine in N. With u = N₀/N from 0 to 1, u·T = u·A + N₀·B lies between T(N₀) and N₀·B = T(2·N₀) − T(N₀).
-/// With [`Growth::Quadratic`], T = A + N·B + N²·C. With L = N₀·B and Q = N₀²·C, u²·T = u²·A + u·L + Q lies between the four matrices where u² and u are 0 or 1.
+/// With [`Growth::Quadratic`], T = A + N·B + N²·C. With L = N₀·B and Q = N₀²·C, u²·T = u²·A + u·L + Q lies between the four matrices with 0 or 1 for u² and for
+/// u.
 pub(super) fn steps_beyond(at: [&[Point]; 3], growing: Growth, common: Common<'_>) -> Result<FrameSpan, ProofError> {
     let all: Vec<Point> = at.iter().flat_map(|points| points.iter().cloned()).collect();
     let frame = Frame::of(&all, common)?;
@@ -154,12 +155,12 @@ pub(super) fn steps_of_each(points: &[Point], common: Common<'_>) -> Result<Vec<
     Ok(points.iter().map(|point| frame.matrices(point)).collect())
 }
 
-/// Returns all points at the lower end of one more number, followed by all points at its upper end. The new number is so the highest bit of a place.
+/// Returns all points at the lower end of a further number, followed by all points at its upper end. The new number is thus the highest bit of a place.
 pub(super) fn doubled(points: &[Point], at: impl Fn(&Point, bool) -> Point) -> Vec<Point> {
     [false, true].into_iter().flat_map(|upper| points.iter().map(move |point| (point, upper))).map(|(point, upper)| at(point, upper)).collect()
 }
 
-/// Refuses laws that remember numbers in units of gains that vary, since the states would have another meaning at each corner.
+/// Refuses laws with memories in units of varying gains, since the states would have another meaning at each corner.
 pub(super) fn check_units(points: &[Point], scale: Scale) -> Result<(), ProofError> {
     let units = |point: &Point| -> Vec<u64> {
         let of = |node: &Node| (0..node.law.memory.len()).map(|place| node.memory_unit(place, scale).to_bits()).collect::<Vec<_>>();
@@ -171,8 +172,8 @@ pub(super) fn check_units(points: &[Point], scale: Scale) -> Result<(), ProofErr
     Ok(())
 }
 
-/// Returns whether laws take the same combination of the own past position and velocity at each corner. Differences of some roundings are allowed, for which
-/// the bounds of a step have room.
+/// Returns whether laws take the same combination of the own past position and velocity at each corner. Differences of some roundings are allowed:
+/// the bounds of a step have room for such differences.
 pub(super) fn takes_one_past(points: &[Point], scale: Scale) -> bool {
     let shares = |point: &Point| -> Vec<f64> {
         let of = |node: &Node| (node.looks_back() > 0).then(|| node.law.force.past.stiffness / node.past_unit(scale.time));
@@ -183,10 +184,10 @@ pub(super) fn takes_one_past(points: &[Point], scale: Scale) -> bool {
     points.iter().map(shares).all(|shares| shares.len() == first.len() && shares.iter().zip(&first).all(is_first))
 }
 
-/// Bodies at each end of the box, and the nodes that have exactly these bodies.
+/// Bodies at each end of the box, and the nodes with exactly these bodies.
 type EqualBodies = (Vec<Body>, Vec<(usize, BodyOf)>);
 
-/// Returns the points with one more number for each coefficient of a step map that varies between the ends. Bodies that are equal at every end share these
+/// Returns the points with a further number for each coefficient of a step map with different values at the ends. Bodies equal at every end share these
 /// numbers, because their coefficients are the same functions of the keys.
 fn with_bodies(points: &[Point], ends: &[Vec<Node>]) -> Result<Vec<Point>, ProofError> {
     let mut groups: Vec<EqualBodies> = Vec::new();
@@ -217,7 +218,7 @@ fn with_bodies(points: &[Point], ends: &[Vec<Node>]) -> Result<Vec<Point>, Proof
             }
         }
     }
-    // With all bodies at their lower ends, a key that changes bodies alone changes no point any more. The coefficients replace it.
+    // With all bodies at their lower ends, a key of bodies alone changes no point any more. The coefficients replace such a key.
     let mut all = without_idle_numbers(all);
     let numbers = all.len().trailing_zeros() as usize;
     let coefficients_of_bodies: usize = varying.iter().map(|(_, _, together)| together.len()).sum();
@@ -234,6 +235,7 @@ fn with_bodies(points: &[Point], ends: &[Vec<Node>]) -> Result<Vec<Point>, Proof
             }
             point
         };
+        // A falling coefficient is at its greatest value at the lower end of the number, so `upper` is compared with `falls`.
         for places in together {
             all = doubled(&all, |point, upper| {
                 let at = |mut values: [f64; 6]| {
@@ -247,10 +249,11 @@ fn with_bodies(points: &[Point], ends: &[Vec<Node>]) -> Result<Vec<Point>, Proof
     Ok(all)
 }
 
-/// Removes the numbers on which no point depends.
+/// Removes the numbers without an effect on any point.
 fn without_idle_numbers(mut points: Vec<Point>) -> Vec<Point> {
     let mut number = 0;
     while points.len() > 1 << number {
+        // Bit `number` of a place is the end of the number. If both ends give equal points, the points of the upper end are dropped.
         let bit = 1 << number;
         let is_idle = (0..points.len()).filter(|place| place & bit == 0).all(|place| points[place] == points[place | bit]);
         if is_idle {
@@ -303,13 +306,14 @@ fn ranges(bodies: &[Body]) -> Result<[(f64, f64); 6], ProofError> {
         (of.clone().fold(f64::INFINITY, f64::min), of.fold(f64::NEG_INFINITY, f64::max))
     };
     let ranges: [(f64, f64); 6] = std::array::from_fn(range);
+    // The monotony of the coefficients is shown for free bodies only, and a free body has no effects of a position.
     if [0, 2].iter().any(|place| ranges[*place].0 < ranges[*place].1) { Err(ProofError::TiedBody) } else { Ok(ranges) }
 }
 
-/// Coefficients that are affine in one number: the place of each coefficient, and whether the coefficient falls while the number grows.
+/// Coefficients affine in one number: the place of each coefficient, and `true` if the coefficient falls while the number grows.
 type Together = &'static [(usize, bool)];
 
-/// Returns the coefficients that vary, grouped by the number in which they are affine. If damping over mass stays, both effects of a force form one group. If
+/// Returns the varying coefficients, grouped by their common number. If damping over mass stays, both effects of a force form one group. If
 /// the damping stays, each effect of a velocity forms a group with the effect of a force in the same row.
 fn together(ranges: &[(f64, f64); 6], bodies: &[Body]) -> Vec<Together> {
     let varies = |place: usize| ranges[place].0 < ranges[place].1;
@@ -323,10 +327,11 @@ fn together(ranges: &[(f64, f64); 6], bodies: &[Body]) -> Vec<Together> {
     groups.iter().copied().filter(|places| places.iter().any(|(place, _)| varies(*place))).collect()
 }
 
-/// Returns whether all bodies have the same damping but for roundings, and nothing ties them to ground.
+/// Returns whether all bodies are free and have the same damping but for roundings.
 fn keep_their_damping(bodies: &[Body]) -> bool {
     let of = |body: &Body| {
         let [e00, e01, e10, e11, g0, g1] = coefficients(&body.only_map()?);
+        // From e₁₁ + b·g₁ = 0 and e₀₁ + b·g₀ = h of the module head.
         let damping = -e11 / g1;
         (e00 == 0.0 && e10 == 0.0 && damping > 0.0).then_some((damping, e01 + damping * g0))
     };

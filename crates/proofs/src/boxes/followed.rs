@@ -24,7 +24,7 @@ pub(super) struct Motion {
     /// Place of the piece among the pieces of a scene.
     piece: usize,
     pub(super) structure: Structure,
-    /// Class that grows, if a verdict for every number of peers is asked for.
+    /// Growing class, for a verdict on every number of peers.
     growing: Option<usize>,
     /// Action of the peers of the motion on each other.
     action: Action,
@@ -34,9 +34,9 @@ pub(super) struct Motion {
 
 /// Action of peers on each other.
 enum Action {
-    /// Each peer follows the mean of all others.
+    /// Each peer follows the mean of all other peers.
     Mean,
-    /// Equal peers, each of which follows the mean of its neighbours.
+    /// Equal peers. Each peer follows the mean of its neighbours.
     Graph(EnclosedSpectrum),
     /// A server and its clients.
     Server(Server),
@@ -45,7 +45,7 @@ enum Action {
 }
 
 impl Action {
-    /// Returns the feature that limits a proof to the scene's own number of peers, or `None` if a proof can cover every number.
+    /// Returns the feature by which a proof is limited to the scene's own number of peers, or `None` if a proof can cover every number.
     const fn special(&self) -> Option<&'static str> {
         match self {
             Self::Mean => None,
@@ -62,34 +62,35 @@ struct PartOf<'a> {
     timetable: &'a Timetable,
     plans: &'a Plans,
     tied: bool,
-    /// On a graph, least and greatest weight with which the node of the part hears its own samples; otherwise `None`.
+    /// On a graph, least and greatest weight of the node's own samples; otherwise `None`.
     weight: Option<[f64; 2]>,
 }
 
-/// Range of a delay within which all frames are equal, and the motions of the scenes in the range. Without a delay among the keys there is one stretch.
+/// Range of a delay with equal frames throughout, and the motions of the scenes in the range. Without a delay among the keys there is one stretch.
 pub(super) struct Stretch {
     /// Least and greatest value of the delay; `None` if no key is a delay.
     range: Option<[f64; 2]>,
     pub(super) motions: Vec<Motion>,
 }
 
-/// Family whose keys set gains, masses and dampings only, except for at most one key that is a delay, and the motions of the family.
+/// Family with keys for gains, masses and dampings and at most one key for a delay, and the motions of the family.
 pub(super) struct Followed<'a> {
     family: &'a Family,
-    /// Place of the key that is a delay.
+    /// Place of the key of a delay.
     delay: Option<usize>,
     pub(super) stretches: Vec<Stretch>,
-    /// Least and greatest value of 1/(N − 1), if a verdict for every number N of peers is asked for.
+    /// Least and greatest value of 1/(N − 1), for a verdict on every number N of peers.
     numbers: Option<[f64; 2]>,
 }
 
-/// Largest number of halvings of the range of 1/(N − 1) in a box that stays undecided.
+/// Largest number of halvings of the range of 1/(N − 1) in an undecided box.
 const HALVINGS: u32 = 3;
 
 impl<'a> Followed<'a> {
-    /// Prepares the proofs of a family. `every`: first and last number of peers for which verdicts shall hold; `None`: the number that the scene has.
+    /// Prepares the proofs of a family. `every`: first and last number of peers of the verdicts; `None`: the number of the scene.
     pub(super) fn new(family: &'a Family, every: Option<(u64, Option<u64>)>) -> Result<Self, ProofError> {
         let keys = family.keys();
+        // A learned key sets numbers only. An unlearned key may change the frame itself, and only a delay is followed then, stretch by stretch.
         let mut unlearned = (0..keys.len()).filter(|key| !family.learned()[*key]);
         let delay = unlearned.next();
         if let Some(other) = unlearned.next() {
@@ -116,6 +117,7 @@ impl<'a> Followed<'a> {
                 let nodes = all.get(motion.piece).map(|piece| motion.nodes(&piece.scene)).transpose()?;
                 Ok::<_, ProofError>(format!("{:?} {nodes:?}", motion.structure))
             };
+            // Two delays give the same frame if the timetables, weights and nodes are equal, and their text shows every digit of each number.
             motions.iter().map(of).collect::<Result<String, _>>()
         };
         let found = delays::stretches(&keys[place], frame)?;
@@ -123,7 +125,7 @@ impl<'a> Followed<'a> {
         Ok(Self { family, delay, stretches: found.into_iter().map(stretch).collect::<Result<_, _>>()?, numbers })
     }
 
-    /// Returns the boxes of values with which a proof begins: one box per stretch of the delay, otherwise one box.
+    /// Returns the first boxes of values of a proof: one box per stretch of the delay, otherwise one box.
     pub(super) fn beginnings(&self) -> Vec<Vec<[f64; 2]>> {
         let whole: Vec<[f64; 2]> = self.family.keys().iter().map(|key| [key.low, key.high]).collect();
         let of = |stretch: &Stretch| {
@@ -136,7 +138,7 @@ impl<'a> Followed<'a> {
         self.stretches.iter().map(of).collect()
     }
 
-    /// Returns the place of the key that is a delay, whose stretches are not divided further.
+    /// Returns the place of the key of a delay. Stretches of a delay are not divided further.
     pub(super) fn delay(&self) -> Option<usize> {
         self.delay
     }
@@ -149,7 +151,7 @@ impl<'a> Followed<'a> {
         }
     }
 
-    /// Returns the certificates of a box: one, or one per part of the numbers of peers; none if the box is undecided.
+    /// Returns the certificates of a box: one, or one per part of the numbers of peers; no certificate if the box is undecided.
     pub(super) fn certify(&self, ranges: &[[f64; 2]]) -> Result<Vec<BoxCertificate>, ProofError> {
         let mut found = Vec::new();
         let Some(numbers) = self.numbers else {
@@ -170,7 +172,7 @@ impl<'a> Followed<'a> {
         BoxCertificate { ranges, guarantee: Guarantee::Undecided, parts: Vec::new() }
     }
 
-    /// Returns the verdict that holds for all values of 1/(N − 1) from `low` to `high`. An undecided range is halved up to `halvings` times, and both halves
+    /// Returns the common verdict on all values of 1/(N − 1) from `low` to `high`. An undecided range is halved up to `halvings` times, and both halves
     /// must agree.
     fn decide_over(
         &self,
@@ -198,6 +200,7 @@ impl<'a> Followed<'a> {
         let stretch = self.delay.map_or(0, |key| self.stretches.iter().position(|one| one.range == Some(ranges[key])).unwrap_or(0));
         let free: Vec<usize> = (0..ranges.len()).filter(|key| self.delay != Some(*key)).collect();
         let corner = |place: usize| {
+            // Bit b of a corner chooses the end of the b-th free key. A delay is equal in effect over its stretch, so its lower end stands for the stretch.
             let upper = |key: usize| free.iter().position(|own| *own == key).is_some_and(|bit| place >> bit & 1 == 1);
             ranges.iter().enumerate().map(|(key, range)| range[usize::from(upper(key))]).collect::<Vec<f64>>()
         };
@@ -218,14 +221,14 @@ impl<'a> Followed<'a> {
     }
 }
 
-/// Returns the motions of a family. `delayed`: the place of the key that is a delay, and its value.
+/// Returns the motions of a family. `delayed`: the place of the key of a delay, and its value.
 fn motions(family: &Family, delayed: Option<(usize, f64)>, every: Option<(u64, Option<u64>)>) -> Result<Vec<Motion>, ProofError> {
     let keys = family.keys();
     let at = |value: &dyn Fn(usize) -> f64| {
         let of = |key: usize| delayed.filter(|(place, _)| *place == key).map_or_else(|| value(key), |(_, delay)| delay);
         family.scene(&(0..keys.len()).map(of).collect::<Vec<f64>>())
     };
-    // A scene inside the ranges separates peers that are equal by coincidence at an end of the ranges.
+    // A scene inside the ranges separates peers with a coincidental equality at an end of the ranges.
     let scenes = [at(&|key| keys[key].odd(key))?, at(&|key| keys[key].low)?, at(&|key| keys[key].high)?];
     scenes.iter().try_for_each(refuse)?;
     let graph = scenes[0].topology.as_ref().map(|topology| Graph::from(&**topology));
@@ -259,12 +262,12 @@ fn motions(family: &Family, delayed: Option<(usize, f64)>, every: Option<(u64, O
     Ok(motions)
 }
 
-/// Returns the scene without its topology, as if every peer heard every other. The averaging matrix of the graph replaces the topology.
+/// Returns the scene without its topology, as if every peer heard every other peer. The averaging matrix of the graph replaces the topology.
 fn mutual(scene: &Scene) -> Cow<'_, Scene> {
     if scene.topology.is_some() { Cow::Owned(scene.without_topology()) } else { Cow::Borrowed(scene) }
 }
 
-/// Returns the enclosed spectrum of a graph, whose peers must all be equal.
+/// Returns the enclosed spectrum of a graph of equal peers.
 fn on_graph(graph: &Graph, scenes: &[&Scene], structure: &Structure) -> Result<EnclosedSpectrum, AnalysisError> {
     if let Some(other) = structure.classes.get(1) {
         return Err(on_this_topology(GraphError::Unequal { peer: scenes[0].peers[other[0]].name.clone() }));
@@ -274,7 +277,7 @@ fn on_graph(graph: &Graph, scenes: &[&Scene], structure: &Structure) -> Result<E
     Ok(spectrum)
 }
 
-/// Returns the class that grows, if only the weights depend on the number of peers.
+/// Returns the growing class, if only the weights depend on the number of peers.
 fn growing(structure: &Structure, scenes: &[&Scene], from: u64) -> Result<usize, ProofError> {
     let growing = structure.largest_equal().ok_or(ProofError::Unequal)?;
     let least = (structure.peers - structure.classes[growing].len() + 2) as u64;
@@ -282,11 +285,12 @@ fn growing(structure: &Structure, scenes: &[&Scene], from: u64) -> Result<usize,
         return Err(ProofError::Fewer { least });
     }
     let of = |scene: &Scene, number: u64| structure.nodes(&scene.scaled_for(usize::try_from(number).unwrap_or(usize::MAX)));
+    // Three numbers of peers show whether the nodes depend on N: all scalings of a strategy change the nodes from N to 2·N.
     let is_same = |scene: &&Scene| [from, 2 * from, ENDLESS].iter().all(|number| of(scene, *number) == structure.nodes(scene));
     if scenes.iter().all(is_same) { Ok(growing) } else { Err(ProofError::Scaled) }
 }
 
-/// Returns the certificates of boxes of a family, in the order of the boxes. A box is an operation of the watch, which may end the certification.
+/// Returns the certificates of boxes of a family, in the order of the boxes. A box is an operation of the watch. The watch may end the certification.
 pub(super) fn certify(
     family: &Family,
     every: Option<(u64, Option<u64>)>,
@@ -317,7 +321,7 @@ impl Motion {
         }
     }
 
-    /// Returns the verdict on the motion over a box, whose corners are `scenes`, and adds the certificates of its parts to `certified`. `numbers`: least and
+    /// Returns the verdict on the motion over a box with the corners `scenes`, and adds the certificates of its parts to `certified`. `numbers`: least and
     /// greatest value of 1/(N − 1).
     fn decide(&self, scenes: &[&Scene], numbers: Option<[f64; 2]>, mut certified: Certified<'_>) -> Result<Option<Proven>, ProofError> {
         let structure = &self.structure;
@@ -338,6 +342,7 @@ impl Motion {
                     (steps(&points, &ends, common)?, Named::AtPoints(points))
                 }
             };
+            // A checker multiplies the steps one after another, so a certificate must be decided with the product in this order.
             let product = if certified.is_some() { frame.product_in_order() } else { frame.product() };
             let Some(decision) = decide(&product) else { return Ok(None) };
             if let Some(certified) = certified.as_deref_mut() {
@@ -349,6 +354,7 @@ impl Motion {
             Ok::<_, ProofError>(Some(decision.proven))
         };
         let mut proven = Some(Proven::Stable);
+        // One unstable part makes the motion unstable. The motion is stable only if every part is.
         let mut add = |part: Option<Proven>| {
             proven = match (proven, part) {
                 (Some(Proven::Unstable), _) | (_, Some(Proven::Unstable)) => Some(Proven::Unstable),
@@ -362,6 +368,7 @@ impl Motion {
         for class in 0..structure.classes.len() {
             let radii: Vec<_> = scenes.iter().filter_map(|scene| alone(structure, scene, class, 1)).map(|(part, _)| part.radius).collect();
             if let Some(first) = radii.first() {
+                // The radius of a loose device is computed at the corners only, so the verdict holds for the box if the radius does not vary.
                 let is_one = radii.iter().all(|radius| radius == first);
                 add((is_one && first.verdict() == Verdict::Stable).then_some(Proven::Stable));
             }
@@ -369,12 +376,13 @@ impl Motion {
         Ok(proven)
     }
 
-    /// Returns the parts of the motion without devices that touch nothing.
+    /// Returns the parts of the motion without loose devices.
     fn parts(&self) -> Vec<PartOf<'_>> {
         let structure = &self.structure;
         let mut parts = Vec::new();
         match &self.action {
             Action::Graph(spectrum) => {
+                // All parts of a graph are single nodes hearing themselves, so the timetable of the differences serves the eigenvalue 1 too.
                 let timetable = structure.apart[0].as_ref().unwrap_or(&structure.timetable);
                 let of = |weight: &[f64; 2]| PartOf { apart: Some(0), timetable, plans: &self.plans.0, tied: true, weight: Some(*weight) };
                 parts.extend(spectrum.others.iter().map(of));
@@ -402,7 +410,7 @@ impl Motion {
         parts
     }
 
-    /// Returns the corners of a box for a part of the motion. Weights are affine in 1/(N − 1), which is one more number of the box unless the weights are
+    /// Returns the corners of a box for a part of the motion. Weights are affine in 1/(N − 1), a further number of the box unless the weights are
     /// constant.
     fn points(&self, ends: &[Vec<Node>], numbers: Option<[f64; 2]>, part: &PartOf<'_>) -> Vec<Point> {
         let (structure, apart) = (&self.structure, part.apart);
@@ -428,7 +436,7 @@ impl Motion {
     }
 }
 
-/// Refuses scenes with chance, whose frames are not deterministic.
+/// Refuses scenes with chance, since their frames are not deterministic.
 fn refuse(scene: &Scene) -> Result<(), ProofError> {
     if has_chance(scene) { Err(ProofError::Chance) } else { Ok(()) }
 }

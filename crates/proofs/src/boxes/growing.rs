@@ -1,13 +1,13 @@
-//! A scene whose largest class of equal peers grows, and the verdict on all numbers N of peers in a span.
+//! A scene with a growing largest class of equal peers, and the verdict on all numbers N of peers in a span.
 //!
 //! Averages of classes and differences within a class do not mix (`structure`), and only numbers in them depend on N: the mass of a copy, m or m/N; gains,
 //! multiplied by 1, 2/N, N − 1, 4(N − 1)/N² or 4(N − 1)²/N²; and the weights. Of F peers in the other classes, with ν = 1/(N − 1), a class of n is heard with
-//! weight nν, itself with (n − 1)ν, and the growing one with 1 − (F − 1)ν, itself with 1 − Fν; differences hear themselves with −ν. So what a gain hears is
-//! that gain times a constant, and that gain times ν times another. Each of these factors is monotone in N from 2 on, so that those of the ends of a span of
-//! numbers enclose them.
+//! weight nν, itself with (n − 1)ν, and the growing class with 1 − (F − 1)ν, itself with 1 − Fν; differences hear themselves with −ν. So the heard force has two terms:
+//! a gain times a constant, and a gain times ν times another constant. Each of these factors is monotone in N from 2 on, so the factors at the ends of a span of
+//! numbers enclose the factors between.
 //!
 //! Without damping of the object a copy of the mass m/N moves by N times a force, and nothing else of the copy depends on N. Forces may then be counted in
-//! newtons divided by N: gains are N times as large, copies have the mass m, devices have N times their mass, and the motion is the same. Where gains shrink
+//! newtons divided by N: gains are N times as large, copies have the mass m, devices have N times their mass, and the motion is the same. If gains shrink
 //! with N, the scaled numbers have limits and the original numbers have none.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -28,40 +28,40 @@ use super::span::FrameSpan;
 use super::steps::Plans;
 use super::waves::{self, Part, Waves};
 
-/// Number of peers that stands for a span without end: the weight 1/(N − 1) is below a rounding there.
+/// Number of peers in place of the end of an endless span: the weight 1/(N − 1) is below a rounding there.
 pub(super) const ENDLESS: u64 = 1 << 53;
 
 /// Factor by which radii are widened for a certificate, since the checker encloses with wider intervals than the prover.
 pub(super) const WIDER: f64 = 8.0;
 
-/// Motion of the scene in one combination of contacts, with one class that grows.
+/// Motion of the scene in one combination of contacts, with one growing class.
 #[derive(Debug)]
 pub(super) struct Motion {
     pub(super) scene: Scene,
     pub(super) structure: Structure,
-    /// The class that grows.
+    /// The growing class.
     growing: usize,
     /// `true` if forces are counted in newtons divided by N.
     divides_forces: bool,
     /// Plans of the averages of classes, and of the differences within each class, indexed by class.
     plans: (Plans, Vec<Plans>),
-    /// Waves that tie the copies, if the coordination has waves.
+    /// Waves between the copies, if the coordination has waves.
     waves: Option<Waves>,
 }
 
-/// Scene whose largest class of equal peers grows.
+/// Scene with a growing largest class of equal peers.
 #[derive(Debug)]
 pub(super) struct Growing {
     pub(super) motions: Vec<Motion>,
-    /// The first peer of the class that grows.
+    /// The first peer of the growing class.
     pub(super) first: usize,
-    /// Least number of peers that leaves one peer in the class that grows.
+    /// Least number of peers with a peer left in the growing class.
     pub(super) least: u64,
-    /// Place of the part that was last proven unstable, which is tried first for other numbers.
+    /// Place of the part last proven unstable, tried first for other numbers.
     grown: AtomicUsize,
 }
 
-/// Part of the motion: the place of its motion, and the class whose members differ, or `None` for the averages of all classes.
+/// Part of the motion: the place of its motion, and the class of the differences, or `None` for the averages of all classes.
 pub(super) type PartPlace = (usize, Option<usize>);
 
 impl Growing {
@@ -69,7 +69,7 @@ impl Growing {
         let all = pieces(scene, "the proof for every number of peers")?;
         let (mut motions, mut least, mut first) = (Vec::new(), 2, 0);
         let pairs = pairs(&all, &mut false)?;
-        // Refusals come before any frame is made, because a frame of clocks that drift has very many events.
+        // Refusals come before any frame is made, because a frame of drifting clocks has very many events.
         for (piece, combination) in &pairs {
             if !Waves::tie(&piece.scene) {
                 check_laws(&piece.scene)?;
@@ -85,11 +85,12 @@ impl Growing {
             };
             let growing = structure.largest_equal().ok_or(ProofError::Unequal)?;
             for class in 0..structure.classes.len() {
-                // The motion of a device that touches nothing does not depend on N.
+                // The motion of a loose device does not depend on N.
                 if alone(&structure, &piece.scene, class, 1).is_some_and(|(part, _)| part.radius.verdict() != Verdict::Stable) {
                     return Err(ProofError::Loose { peer: scene.peers[structure.classes[class][0]].name.clone() });
                 }
             }
+            // Every other class keeps all its members, and the growing class keeps at least one.
             least = least.max(structure.peers - structure.classes[growing].len() + 1);
             first = structure.classes[growing][0];
             let plans = plans_of(&structure);
@@ -105,8 +106,8 @@ impl Growing {
         self.motions.iter().any(|motion| motion.waves.is_some())
     }
 
-    /// Returns the proven verdict on every number of peers from `low` to `high`, or `None`, and adds the certificates of the parts to `certified`. The parts in
-    /// `stable` are known to be stable for all of these numbers and are skipped; parts that are proven stable here are added to `stable`.
+    /// Returns the proven verdict on every number of peers from `low` to `high`, or `None`, and adds the certificates of the parts to `certified`. Parts in
+    /// `stable` are known to be stable for all of these numbers and are skipped; parts proven stable here are added to `stable`.
     pub(super) fn decide(
         &self,
         low: u64,
@@ -115,7 +116,7 @@ impl Growing {
         mut certified: Certified<'_>,
     ) -> Result<Option<Proven>, ProofError> {
         let parts = self.parts(low);
-        // The part that made other numbers unstable comes first. The order does not change the verdict.
+        // The part behind the last unstable verdict comes first. The order does not change the verdict.
         let grown = self.grown.load(Ordering::Relaxed).min(parts.len() - 1);
         let mut all = Some(Proven::Stable);
         for (place, part) in parts.iter().enumerate().cycle().skip(grown).take(parts.len()) {
@@ -144,7 +145,7 @@ impl Growing {
         self.motions.iter().enumerate().flat_map(|(place, motion)| parts_of(motion).into_iter().map(move |part| (place, part))).collect()
     }
 
-    /// Returns the approximate modulus of the largest eigenvalue and the largest bound of an entry, over all parts that are not proven stable for a number of
+    /// Returns the approximate modulus of the largest eigenvalue and the largest bound of an entry, over all parts without a proof of stability for a number of
     /// peers; `None` if all parts are proven stable.
     pub(super) fn nearness(&self, number: u64) -> Result<Option<[f64; 2]>, ProofError> {
         let mut found: Option<[f64; 2]> = None;
@@ -159,7 +160,7 @@ impl Growing {
         Ok(found)
     }
 
-    /// Returns whether all numbers of peers from `from` on are proven unstable, where a number of the scene grows without a limit.
+    /// Returns whether all numbers of peers from `from` on are proven unstable, if a number of the scene grows without a limit.
     pub(super) fn is_unstable_beyond(&self, from: u64) -> Result<bool, ProofError> {
         for motion in &self.motions {
             let parts =
@@ -173,7 +174,7 @@ impl Growing {
         Ok(false)
     }
 
-    /// Returns the number of a node that has no limit as N grows, in words; `None` if all numbers have limits.
+    /// Returns the number of a node without a limit as N grows, in words; `None` if all numbers have limits.
     pub(super) fn without_limit(&self) -> Result<Option<String>, ProofError> {
         for motion in &self.motions {
             let [far, near] = [ENDLESS, ENDLESS / 2].map(|number| motion.scaled(number).swap_remove(motion.growing));
@@ -194,12 +195,12 @@ impl Growing {
     }
 }
 
-/// Returns the larger of two numbers, or NaN if one of them is NaN.
+/// Returns the larger of two numbers, or NaN if either number is NaN.
 fn larger(one: f64, other: f64) -> f64 {
     if other > one || other.is_nan() { other } else { one }
 }
 
-/// Returns the body with the effects of a force divided by `by`. A body whose ticks differ in length stays as it is.
+/// Returns the body with the effects of a force divided by `by`. A body with ticks of different lengths stays unchanged.
 fn heavier(body: &Body, by: f64) -> Body {
     let of = |map: StepMap| {
         let (e, g) = map.coefficients();
@@ -242,6 +243,7 @@ impl Motion {
         if !self.divides_forces {
             return nodes;
         }
+        // In newtons divided by N a copy of mass m/N moves like a copy of mass m. The copy of two peers with half the effect of a force is such a copy.
         let halves = self.scaled(2);
         let divided = |(node, half): (Node, Node)| {
             let by = count_of(number);
@@ -262,7 +264,7 @@ impl Motion {
         self.structure.time(&self.scene.scaled_for(usize::try_from(number).unwrap_or(usize::MAX)), &self.scaled(number))
     }
 
-    /// Returns whether a force moves a copy in proportion to N, and N times all gains have limits.
+    /// Returns whether the motion of a copy by a force is proportional to N, and N times all gains have limits.
     fn has_limits_of_divided_forces(&self) -> bool {
         let [two, near, far] = [2, ENDLESS / 2, ENDLESS].map(|number| self.scaled(number));
         let free = |node: &Node| node.object.only_map().map(|map| map.coefficients().0);
@@ -274,7 +276,7 @@ impl Motion {
         })
     }
 
-    /// Returns the number of members of the class that grows, for a number of peers.
+    /// Returns the number of members of the growing class, for a number of peers.
     fn size(&self, number: u64) -> u64 {
         number.saturating_sub((self.structure.peers - self.structure.classes[self.growing].len()) as u64)
     }
@@ -290,16 +292,17 @@ impl Motion {
         if self.waves.is_some() && apart.is_none() { waves::with_shares(&weights, &self.shares(nu)) } else { weights }
     }
 
-    /// Returns the size of each class relative to the class that grows, whose own entry is 1 and is not used.
+    /// Returns the size of each class relative to the growing class. The growing class's own entry is 1 and is not used.
     fn shares(&self, nu: f64) -> Vec<f64> {
         let classes = &self.structure.classes;
         let others = real(self.structure.peers - classes[self.growing].len());
         (0..classes.len())
+            // With N − 1 = 1/ν, the growing class has N − others = (1 − (others − 1)·ν)/ν members.
             .map(|class| if class == self.growing { 1.0 } else { real(classes[class].len()) * nu / (1.0 - (others - 1.0) * nu) })
             .collect()
     }
 
-    /// Returns the frame of waves of a part, whose nodes are `ends` at both ends of the span of numbers.
+    /// Returns the frame of waves of a part with the nodes `ends` at both ends of the span of numbers.
     fn frame_of_waves(
         &self,
         waves: &Waves,
@@ -309,7 +312,7 @@ impl Motion {
         apart: Option<usize>,
     ) -> Result<NamedFrame, ProofError> {
         let mut points = points;
-        // With a single other peer the shares are affine in ν, as the weights are. Otherwise the shares are one more number of the box.
+        // With a single other peer the shares are affine in ν, as the weights are. Otherwise the shares are a further number of the box.
         if apart.is_none() && self.structure.peers - self.structure.classes[self.growing].len() > 1 {
             let shares = [low, high].map(|number| self.shares(nu(number)));
             points =
@@ -325,8 +328,8 @@ impl Motion {
         Common { timetable, plans, tied: apart.is_some() || self.structure.tied, time }
     }
 
-    /// Returns the corners of a box, beginning with `nodes`. `heard` is ν times the gain at both ends. Couplings vary from those of `near` to those of `end`,
-    /// and laws vary likewise if `varies`; otherwise laws stay.
+    /// Returns the corners of a box, beginning with `nodes`. `heard` is ν times the gain at both ends. Couplings vary from the couplings of `near` to the
+    /// couplings of `end`, and laws vary likewise if `varies`; otherwise laws stay.
     pub(super) fn corners(&self, nodes: Vec<Node>, [near, end]: [&[Node]; 2], heard: [f64; 2], varies: bool, apart: Option<usize>) -> Vec<Point> {
         let differ = |of: &dyn Fn(&Node, &Node) -> bool| near.iter().zip(end).any(|(near, end)| of(near, end));
         let with = |point: &Point, change: &dyn Fn(&Node, &mut Node)| {
@@ -338,7 +341,7 @@ impl Motion {
         if varies && differ(&|near, end| near.law != end.law) {
             points = doubled(&points, |point, upper| if upper { with(point, &|end, node| node.law = end.law.clone()) } else { point.clone() });
         }
-        // The product of ν and the gains is a number of its own in addition to the gains, which keeps the step affine in each number.
+        // The product of ν and the gains is a number in addition to the gains. The step is then affine in each number.
         if self.weights(0.0, apart) != self.weights(1.0, apart) {
             let hears = |point: &Point, heard: f64| Point { weights: self.weights(heard / gain(&point.nodes[0]), apart), ..point.clone() };
             points = if heard[0].to_bits() == heard[1].to_bits() {
@@ -369,6 +372,7 @@ impl Motion {
             && free(&far) == free(&end)
             && (mass_vanishes || near.iter().zip(&end).all(|(near, end)| near.object == end.object))
             && near.iter().zip(&end).all(|(near, end)| near.device == end.device);
+        // Three equally spaced numbers of peers show an affine growth: the second difference is then zero but for rounding.
         let third = self.part(3 * from, apart);
         let is_affine = |of: &dyn Fn(&Node) -> f64| (of(&third[0]) - 2.0 * of(&far[0]) + of(&near[0])).abs() <= 1e-12 * of(&third[0]).abs();
         if !law_grows && !mass_vanishes || !has_limits || !is_affine(&gain) && law_grows || !is_affine(&force) && mass_vanishes {
@@ -407,6 +411,7 @@ impl Motion {
     /// Returns the verdict on a part for all numbers from `low` to `high`, and adds its certificate to `certified`.
     fn decide(&self, low: u64, high: u64, apart: Option<usize>, certified: Certified<'_>) -> Result<Option<Proven>, ProofError> {
         let (frame, named, time) = self.frame([low, high], apart)?;
+        // The checker multiplies the steps in order and encloses with wider intervals, so a certificate is decided with wider bounds than the answer.
         let span = match certified {
             None => frame.product(),
             Some(_) if low < high => frame.product_in_order().widened(WIDER),
@@ -427,7 +432,7 @@ pub(super) fn plans_of(structure: &Structure) -> (Plans, Vec<Plans>) {
     (Plans::default(), structure.classes.iter().map(|_| Plans::default()).collect())
 }
 
-/// Returns the weights of the averages of classes (columns) in the targets of classes (rows), of which one grows, or the weight of a difference in its own
+/// Returns the weights of the averages of classes (columns) in the targets of classes (rows) with one growing class, or the weight of a difference in its own
 /// target. Each weight is a constant plus a multiple of ν.
 pub(super) fn weights_of_growing(structure: &Structure, growing: usize, nu: f64, is_difference: bool) -> Matrix {
     let classes = &structure.classes;
@@ -435,6 +440,7 @@ pub(super) fn weights_of_growing(structure: &Structure, growing: usize, nu: f64,
     let size = if is_difference { 1 } else { classes.len() };
     Matrix::from_fn(size, size, |row, column| {
         let own = f64::from(u8::from(row == column));
+        // A class of n members has weight n·ν, without the receiver itself. The growing class has all peers but `others`, and N·ν = 1 + ν.
         let (constant, slope) = match column {
             _ if is_difference => (0.0, -1.0),
             _ if column == growing => (1.0, 1.0 - others - own),
@@ -444,7 +450,7 @@ pub(super) fn weights_of_growing(structure: &Structure, growing: usize, nu: f64,
     })
 }
 
-/// Returns a gain of the law that is not zero, or 1 if all are zero. One gain represents all, since all gains are multiples of the same function of N.
+/// Returns a gain of the law that is not zero, or 1 if all are zero. One gain represents all gains, since all gains are multiples of the same function of N.
 fn gain(node: &Node) -> f64 {
     let gains = node.law.rows().flat_map(|row| [row.own.stiffness, row.own.damping, row.past.stiffness, row.past.damping]);
     gains.into_iter().find(|gain| *gain != 0.0).unwrap_or(1.0)

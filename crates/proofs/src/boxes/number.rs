@@ -1,5 +1,5 @@
-//! Every number of equal peers at once: spans of numbers are halved until each is [decided](super::growing). Of a span without end, the other end is N = 2⁵³,
-//! which is as far from the limit as a rounding, if there is a limit.
+//! Every number of equal peers at once: spans of numbers are halved until each is [decided](super::growing). A span without end ends at N = 2⁵³,
+//! as far from the limit as a rounding, if there is a limit.
 
 use cohaptic_scene::Scene;
 use cohaptic_stability::frames::{NominalNetwork, refuse_topology};
@@ -29,9 +29,9 @@ pub enum Openness {
     Ended,
     /// A number of the scene has no limit as N grows, and the span lies beyond [`MOST_FOLLOWED`].
     Beyond,
-    /// No second moment was found that shows a verdict on the first number of the span.
+    /// No second moment was found for a verdict on the first number of the span.
     Moment,
-    /// A frame of the first number of the span has eigenvalues that are nearer to the unit circle, or to each other, than the bounds of the frame tell apart.
+    /// A frame of the first number of the span has eigenvalues nearer to the unit circle, or to each other, than the bounds of the frame tell apart.
     Near(Nearness),
     /// The first number of the span is stable, but a frame of the limit, as N grows, has eigenvalues too near to the unit circle or to each other, as in
     /// [`Openness::Near`].
@@ -40,45 +40,45 @@ pub enum Openness {
     Exhausted,
 }
 
-/// Size and uncertainty of a frame whose eigenvalues decide nothing.
+/// Size and uncertainty of a frame without a decision by eigenvalues.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Nearness {
-    /// Approximate modulus of the largest eigenvalue over all parts that are not proven stable.
+    /// Approximate modulus of the largest eigenvalue over all parts without a proof of stability.
     pub radius: f64,
-    /// Largest bound of the error of an entry over all parts that are not proven stable; infinite if an entry or a bound is not finite.
+    /// Largest bound of the error of an entry over all parts without a proof of stability; infinite if an entry or a bound is not finite.
     pub bound: f64,
 }
 
 /// Verdicts on all numbers of equal peers.
 #[derive(Clone, PartialEq, Debug)]
 pub struct EveryNumber {
-    /// Place in [`Scene::peers`] of the first peer of the class that grows.
+    /// Place in [`Scene::peers`] of the first peer of the growing class.
     pub growing: usize,
     /// Spans in ascending order, without gaps. Neighbours have different verdicts.
     pub spans: Vec<NumberSpan>,
     /// Reason for each undecided span of `spans`, in the order of the undecided spans.
     pub open: Vec<Openness>,
-    /// The number of the scene that grows or vanishes without a limit as N grows, in words; `None` if every number has a limit, or the proof has a last number
+    /// The number of the scene with unlimited growth or fall as N grows, in words; `None` if every number has a limit, or the proof has a last number
     /// of peers.
     pub without_limit: Option<String>,
-    /// Number of spans that were looked at, also of those that were halved afterwards.
+    /// Number of spans looked at, spans halved afterwards included.
     pub attempts: u64,
     /// `true` if the verdicts are about the mean square, because links lose.
     pub is_mean_square: bool,
-    /// `true` if the watch let the proof look at all numbers. Otherwise numbers that were not looked at are undecided too.
+    /// `true` if the watch let the proof look at all numbers. Otherwise the remaining numbers are undecided too.
     pub is_whole: bool,
-    /// Spans as they were decided, before neighbours with the same verdict were joined.
+    /// Spans as decided, before neighbours with the same verdict were joined.
     pieces: Vec<NumberSpan>,
 }
 
-/// Largest number of peers that is followed where a number of the scene has no limit, or where all numbers beyond are not decided together.
+/// Largest followed number of peers if a number of the scene has no limit, or if the numbers beyond are not decided together.
 pub const MOST_FOLLOWED: u64 = 100_000;
-/// Largest number of spans that a search looks at.
+/// Largest number of spans of a search.
 const MOST_ATTEMPTS: u64 = 200_000;
-/// Number of undecided pieces in a row from which on all numbers beyond are left undecided.
+/// Number of undecided pieces in a row after which all numbers beyond are left undecided.
 const MOST_OPEN: u64 = 64;
 
-/// Scene that can be decided for every number of peers.
+/// Scene prepared for a decision for every number of peers.
 #[derive(Debug)]
 pub struct NumberProof {
     network: NominalNetwork,
@@ -100,7 +100,7 @@ pub fn prove_every_number(scene: &Scene, from: u64, to: Option<u64>, watch: &dyn
 
 impl NumberProof {
     /// Prepares the proof for all numbers of peers from `from` to `to`, or without end. The largest class of equal peers over equal links grows, and all other
-    /// classes stay as they are. The scene itself needs two peers of that class; more do not change the result. Numbers that leave no peer in that class are
+    /// classes stay as they are. The scene itself needs two peers of the class; more peers do not change the result. Numbers without a peer in the class are
     /// passed over.
     ///
     /// # Errors
@@ -132,7 +132,7 @@ impl NumberProof {
         self.is_mean_square.then(|| GrowingMoments::new(&self.growing, &self.network)).transpose()
     }
 
-    /// Decides all numbers, or those for which the watch leaves time. Each span that is looked at is an operation of the watch.
+    /// Decides all numbers, or as many as the watch leaves time for. Each span looked at is an operation of the watch.
     ///
     /// # Errors
     ///
@@ -150,7 +150,7 @@ impl NumberProof {
             Some(moments) => moments.decide(low, high),
         };
         let is_unstable_beyond = |low| Ok(without_limit.is_some() && moments.is_none() && growing.is_unstable_beyond(low)?);
-        // Without a limit the search ends at `MOST_FOLLOWED`, so that the span from there without end is decided separately.
+        // Without a limit the search ends at `MOST_FOLLOWED`, so the span from there without end is decided separately.
         let Search { mut pieces, attempts, is_whole } = search([*from, end, growing.least], watch, decide, is_unstable_beyond)?;
         if without_limit.is_some() && pieces.last().is_some_and(|last| last.to.is_some()) {
             let guarantee = if is_whole && is_unstable_beyond(end)? { Guarantee::Unstable } else { Guarantee::Undecided };
@@ -188,13 +188,13 @@ impl NumberProof {
 /// Result of a search: the spans with their verdicts, in ascending order and without gaps.
 struct Search {
     pieces: Vec<NumberSpan>,
-    /// Number of spans that were looked at.
+    /// Number of spans looked at.
     attempts: u64,
     is_whole: bool,
 }
 
-/// Halves spans of numbers until each is decided, or holds a single number. The number `least` lacks parts of the motion that larger numbers have, so that it
-/// is a span of its own. After an unstable span `is_unstable_beyond` is asked about all numbers beyond at once.
+/// Halves spans of numbers until each is decided, or holds a single number. The number `least` lacks some parts of the motion of larger numbers, so `least`
+/// is a separate span. After an unstable span `is_unstable_beyond` is asked about all numbers beyond at once.
 fn search(
     [from, end, least]: [u64; 3],
     watch: &dyn Watch,
@@ -202,7 +202,7 @@ fn search(
     is_unstable_beyond: impl Fn(u64) -> Result<bool, ProofError>,
 ) -> Result<Search, ProofError> {
     let (mut pieces, mut attempts, mut open, mut is_whole) = (Vec::new(), 0, 0, true);
-    // Spans are taken in ascending order: an undecided span is halved, and the far half waits. Parts that are stable for all numbers of a span are stable for
+    // Spans are taken in ascending order: an undecided span is halved, and the far half waits. Parts stable for all numbers of a span are stable for
     // the numbers of both halves too, and are not decided again.
     let mut waiting: Vec<(u64, u64, Vec<PartPlace>)> = vec![(from, end, Vec::new())];
     watch.expects(1.0);
@@ -213,7 +213,7 @@ fn search(
             continue;
         }
         attempts += 1;
-        // At the least number the class that grows has one member, hence no differences within the class.
+        // At the least number the growing class has one member, hence no differences within the class.
         let is_mixed = low == least && high > low;
         let is_left = attempts > MOST_ATTEMPTS || open > MOST_OPEN;
         let is_behind_unstable = pieces.last().is_some_and(|last: &NumberSpan| last.guarantee == Guarantee::Unstable);
@@ -223,9 +223,10 @@ fn search(
             continue;
         }
         let found = if is_left || is_mixed { None } else { decide(low, high, &mut stable)? };
-        // Beyond the numbers that are followed, an undecided span without end is not halved: an eigenvalue of the limit may lie on the unit circle.
+        // Beyond the followed numbers, an undecided span without end is not halved: an eigenvalue of the limit may lie on the unit circle.
         let is_far = low > MOST_FOLLOWED && high == ENDLESS;
         if found.is_none() && low < high && !is_left && !is_far {
+            // ν = 1/(N − 1) sets the size of a box. Long spans are divided near the low end, where ν changes most; short spans in the middle.
             let middle = if is_mixed {
                 low
             } else if high / low > 4 {
@@ -251,7 +252,7 @@ fn piece(low: u64, high: u64, found: Option<Proven>) -> NumberSpan {
 }
 
 impl EveryNumber {
-    /// Returns the ranges of numbers that have a verdict here and are undecided in the certificate, as first and last number (`None`: without end) in ascending
+    /// Returns the ranges of numbers with a verdict here and without a verdict in the certificate, as first and last number (`None`: without end) in ascending
     /// order.
     #[must_use]
     pub fn uncertified(&self, certificate: &[NumberCertificate]) -> Vec<(u64, Option<u64>)> {
@@ -264,6 +265,7 @@ impl EveryNumber {
             decided.map(move |span| (span.from.max(from), last(span.to).min(to))).filter(|(from, to)| from <= to).collect::<Vec<_>>()
         };
         for (from, to) in open.flat_map(decided) {
+            // Neighbouring ranges are joined, so that the message lists few.
             let to = Some(to).filter(|to| *to < u64::MAX);
             match found.last_mut() {
                 Some(before) if before.1.is_some_and(|end| end + 1 == from) => before.1 = to,
@@ -273,25 +275,26 @@ impl EveryNumber {
         found
     }
 
-    /// Returns all spans, the decided spans with the numbers by which their verdicts can be checked. Each span is decided once more, and is halved as often as
-    /// the wider bounds of the checker require. The verdict on a span without end, where a number of the scene has no limit, cannot be checked: such a span is
+    /// Returns all spans, the decided spans with the numbers for a check of the verdicts. Each span is decided once more, and is halved as often as
+    /// the wider bounds of the checker require. The verdict on a span without end cannot be checked if a number of the scene has no limit: such a span is
     /// undecided in the certificate.
     ///
     /// # Errors
     ///
-    /// [`ProofError`] if the watch ends the certification, and for the reasons of [`prove_every_number`] if `scene` is not the scene that was proven.
+    /// [`ProofError`] if the watch ends the certification, and for the reasons of [`prove_every_number`] if `scene` is not the proven scene.
     pub fn certify(&self, scene: &Scene, watch: &dyn Watch) -> Result<Vec<NumberCertificate>, ProofError> {
         let network = NominalNetwork::of(scene)?;
         let growing = Growing::new(scene, &network)?;
         let moments = self.is_mean_square.then(|| GrowingMoments::new(&growing, &network)).transpose()?;
         let mut found = Vec::new();
-        // A span that is undecided with the wider bounds of a certificate is halved, and the far half waits.
+        // A span without a verdict under the wider bounds of a certificate is halved, and the far half waits.
         let mut waiting: Vec<NumberSpan> = self.pieces.iter().rev().copied().collect();
         let mut open = 0;
         while let Some(NumberSpan { from, to, guarantee }) = waiting.pop() {
             if watch.stops() {
                 return Err(ProofError::Analysis(AnalysisError::Stopped));
             }
+            // A span with a verdict by growth beyond all limits is cut at `MOST_FOLLOWED`: the numbers up to there can be certified one span after another.
             if to.is_none() && self.without_limit.is_some() && guarantee != Guarantee::Undecided && from <= MOST_FOLLOWED {
                 waiting.push(NumberSpan { from: MOST_FOLLOWED + 1, to, guarantee });
                 waiting.push(NumberSpan { from, to: Some(MOST_FOLLOWED), guarantee });

@@ -1,7 +1,7 @@
 //! A frame as a straight-line program: operations set registers to sums of multiples of registers, step by step.
 //!
-//! Programs are used for laws whose samples carry more than a state. The multiples within a step are affine in each number of a [`super::corners::Point`], as
-//! the entries of [`super::steps`] are. Registers that no body feels, in this frame or in a later one, are left out.
+//! Programs are used for laws with more than a state in a sample. The multiples within a step are affine in each number of a [`super::corners::Point`], as
+//! the entries of [`super::steps`] are. Registers without an effect on a body, in this frame or in a later frame, are left out.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,40 +15,40 @@ use super::error::ProofError;
 use super::span::FrameSpan;
 use super::steps::{FrameState, StepMatrix};
 
-/// Variable of the program, which operations set and read.
+/// Variable of the program, set and read by operations.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(super) enum Register {
     /// Position or velocity of the device or of the copy of a class.
     Body { class: usize, of_copy: bool, velocity: bool },
-    /// Force that acts one tick later.
+    /// Force of the next tick.
     Pending { class: usize, on_copy: bool },
-    /// Force of this tick, which is set before it is read and so never is a state.
+    /// Force of this tick. Operations set the force before reading it, so the force is never a state.
     Force { class: usize, on_copy: bool },
     /// Sampled position or velocity. Samples of a class in this frame are numbered from 0, and −1 is the last sample before the frame.
     Sample { class: usize, number: i64, velocity: bool },
-    /// Force in a sample of a server that is meant for a class.
+    /// Force for a class in a sample of a server.
     Returned { server: usize, class: usize, number: i64 },
-    /// Sum of the waves of a sampling that a class receives from all other peers, or (`of_others`) that all other peers receive from the class.
+    /// Sum of the waves of a sampling from all other peers to a class, or (`of_others`) from the class to all other peers.
     Waves { class: usize, number: i64, of_others: bool },
 }
 
 /// Linear combination: registers with their factors.
 pub(super) type Sum = Vec<(Register, f64)>;
 
-/// Registers that are set at once: every sum reads the values from before the operation.
+/// Registers set at once: every sum reads the values from before the operation.
 pub(super) type Operation = Vec<(Register, Sum)>;
 
 /// A frame as operations.
 pub(super) struct Program {
     /// Operations of each step, in order, indexed by step.
     pub(super) steps: Vec<Vec<Operation>>,
-    /// Number of samples that each class sends in a frame, indexed by class.
+    /// Number of samples sent in a frame, indexed by class.
     pub(super) sent: Vec<usize>,
-    /// Position from which all positions of a class are counted, indexed by class; `None` where something ties the class to ground.
+    /// Reference of all positions of a class, indexed by class; `None` for a class tied to ground.
     pub(super) references: Vec<Option<Register>>,
 }
 
-/// Registers that are alive before each step and after the last step, in the order of rows and columns.
+/// Live registers before each step and after the last step, in the order of rows and columns.
 struct Layout {
     order: Vec<Vec<Register>>,
 }
@@ -57,7 +57,7 @@ struct Layout {
 const ROUNDINGS: f64 = 32.0;
 
 impl Register {
-    /// Returns the name at the end of a frame of the register that has this name at the beginning of the next frame. `sent`: samples per frame, indexed by
+    /// Returns the name at the end of a frame of the register with this name at the beginning of the next frame. `sent`: samples per frame, indexed by
     /// class.
     fn before(self, sent: &[usize]) -> Self {
         let renamed = |class: usize, number: i64| number + i64::try_from(sent[class]).unwrap_or(i64::MAX);
@@ -69,7 +69,7 @@ impl Register {
         }
     }
 
-    /// Returns the state that the register is at the beginning of a frame, with the place of its class mapped by `placed`.
+    /// Returns the register as a state of the beginning of a frame, with the place of its class mapped by `placed`.
     fn state(self, placed: impl Fn(usize) -> usize) -> FrameState {
         match self {
             Self::Body { class, of_copy: true, velocity } => FrameState::Copy { class: placed(class), velocity },
@@ -83,7 +83,7 @@ impl Register {
         }
     }
 
-    /// Returns the class of a position; `None` for registers that are no position.
+    /// Returns the class of a position; `None` for other registers.
     const fn position_of(self) -> Option<usize> {
         match self {
             Self::Body { class, velocity: false, .. } | Self::Sample { class, velocity: false, .. } => Some(class),
@@ -102,7 +102,7 @@ pub(super) struct NamedFrame {
 
 impl NamedFrame {
     /// Encloses the programs at the corners of a box. `apart`: the class whose differences are followed, or `None` for the averages of classes. `ends`: the
-    /// nodes of that part at the corners.
+    /// nodes of the part at the corners.
     pub(super) fn of(
         points: &[Point],
         ends: &[Vec<Node>],
@@ -135,21 +135,21 @@ impl Layout {
 }
 
 impl Program {
-    /// Returns all registers that the operations set.
+    /// Returns all registers set by the operations.
     fn set(&self) -> impl Iterator<Item = Register> {
         self.steps.iter().flatten().flatten().map(|(register, _)| *register)
     }
 
-    /// Returns the registers that are alive before each step and after the last step: registers whose values reach a body from there on.
+    /// Returns the live registers before each step and after the last step: registers with an effect on a body from there on.
     fn live(&self) -> Vec<BTreeSet<Register>> {
         let bodies: BTreeSet<Register> = self.set().filter(|register| matches!(register, Register::Body { .. })).collect();
         // The registers alive at the end are the bodies, and the registers alive at the beginning of the next frame under their names in this frame. The set
-        // only grows. The number of a sample rises with each pass until this frame takes the sample, so that the set reaches a fixed point.
+        // only grows. The number of a sample rises with each pass until this frame takes the sample, so the set reaches a fixed point.
         let mut end = bodies.clone();
         loop {
             let mut live = vec![end.clone()];
             for step in self.steps.iter().rev() {
-                // Going backwards, a register that is set is dead before, and the registers that its sum reads are alive.
+                // Going backwards, a set register is dead before, and the registers read by its sum are alive.
                 let mut now = live[live.len() - 1].clone();
                 for operation in step.iter().rev() {
                     let read: Vec<Register> = operation
@@ -172,10 +172,10 @@ impl Program {
         }
     }
 
-    /// Returns the layout of the states between steps. Programs that differ in factors alone have the same layout.
+    /// Returns the layout of the states between steps. Programs with different factors alone have the same layout.
     fn layout(&self) -> Layout {
         let mut order: Vec<Vec<Register>> = self.live().into_iter().map(|live| live.into_iter().collect()).collect();
-        // The registers at the end of a frame are in the order of the beginning, so that the product of the steps maps states to the same states.
+        // The registers at the end of a frame are in the order of the beginning, so the product of the steps maps states to the same states.
         order[self.steps.len()] = order[0].iter().map(|register| register.before(&self.sent)).collect();
         Layout { order }
     }
@@ -185,7 +185,7 @@ impl Program {
         (0..self.steps.len()).map(|step| self.matrix(step, &layout.order[step], &layout.order[step + 1])).collect()
     }
 
-    /// Returns the position from which a register is counted; `None` if the register is no position, or its class is tied to ground.
+    /// Returns the reference position of a register; `None` if the register is no position, or its class is tied to ground.
     fn reference(&self, register: Register) -> Option<Register> {
         register.position_of().and_then(|class| self.references[class])
     }
@@ -203,11 +203,12 @@ impl Program {
             .collect();
         let mut roundings = ROUNDINGS;
         for operation in &self.steps[step] {
+            // All sums of an operation read the values from before the operation, so new rows are collected first.
             let mut set = Vec::new();
             for (register, sum) in operation {
                 let (mut row, mut sizes) = (unit(None), unit(None));
                 for (of, by) in sum {
-                    // A register that is not alive is read only by sums of registers that are not alive either, and whose values are not kept.
+                    // A dead register is read only by sums of dead registers, and the values of dead registers are not kept.
                     let Some((values, of_sizes)) = rows.get(of) else { continue };
                     for ((entry, size), (value, of_size)) in row.iter_mut().zip(&mut sizes).zip(values.iter().zip(of_sizes)) {
                         *entry += by * value;
@@ -224,6 +225,7 @@ impl Program {
         let mut largest = 1.0_f64;
         for (row, register) in kept.iter().enumerate() {
             let Some((values, sizes)) = rows.get(register) else { continue };
+            // A position counts from its reference, so the reference's row is subtracted, and both sizes add up for the bound.
             let moved = self.reference(*register).and_then(|reference| rows.get(&reference));
             for column in 0..columns.len() {
                 let (by, size) = moved.map_or((0.0, 0.0), |(values, sizes)| (values[column], sizes[column]));
