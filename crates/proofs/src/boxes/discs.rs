@@ -1,19 +1,19 @@
-//! Discs that hold the eigenvalues of all matrices of a box. The discs lie around the eigenvalues of the mean and move with the numbers of the box.
+//! Discs that contain the eigenvalues of all matrices of a box. The discs lie around the eigenvalues of the mean and move with the numbers of the box.
 //!
-//! In coordinates V that nearly diagonalise the mean, A(z, s) = W·(z·I − M(s))·V with W near V⁻¹ is nearly diagonal for every s of the box. Let dᵢ > 0. Where
+//! In coordinates V with a nearly diagonal mean, A(z, s) = W·(z·I − M(s))·V with W near V⁻¹ is nearly diagonal for every s of the box. Let dᵢ > 0. If
 //! on a circle |z| = ρ
 //!
 //! ```text
 //! |z·(WV)ᵢᵢ − (WMV)ᵢᵢ|·dᵢ > Σ_{j≠i} |z·(WV)ᵢⱼ − (WMV)ᵢⱼ|·dⱼ          for all i and s,                              (1)
 //! ```
 //!
-//! A is diagonally dominant, so that no M(s) has an eigenvalue on the circle (Gershgorin 1931; V and W need no property at all). A stays dominant while the
-//! entries off the diagonal shrink to zero, so that the number of eigenvalues inside the circle equals the number of diagonal entries inside. With ρ = 1 and
+//! A is diagonally dominant, so no M(s) has an eigenvalue on the circle (Gershgorin 1931; V and W need no property at all). A stays dominant while the
+//! entries off the diagonal shrink to zero, so the number of eigenvalues inside the circle equals the number of diagonal entries inside. With ρ = 1 and
 //! all diagonal entries inside, every M(s) is **stable**; (1) then holds for larger |z| too. With ρ ≥ 1 and a diagonal entry outside for all s, every M(s) is
-//! **unstable**. Every M(s) is also **unstable** if (1) holds on a circle around one diagonal entry that moves with that entry, stays outside of the unit
-//! circle and holds no other diagonal entry.
+//! **unstable**. Every M(s) is also **unstable** if (1) holds on a circle around a diagonal entry, if the circle moves with the entry, stays outside of the
+//! unit circle and holds no other diagonal entry.
 //!
-//! cᵢ(s) = (WMV)ᵢᵢ is linear in s but for a radius, so that the distance of cᵢ from the circle is known to first order. Entries off the diagonal are of first
+//! cᵢ(s) = (WMV)ᵢᵢ is linear in s but for a radius, so the distance of cᵢ from the circle is known to first order. Entries off the diagonal are of first
 //! order and count by products of two entries, because of the choice of dᵢ: the comparison matrix of (1) times d is a vector of ones.
 
 use cohaptic_stability::Matrix;
@@ -24,13 +24,13 @@ use super::basis::{Basis, solved};
 use super::guarantee::Proven;
 use super::span::{StepSpan, absolute};
 
-/// Verdict on all matrices of a box, and the numbers by which the verdict can be checked.
+/// Verdict on all matrices of a box, and the numbers for a check of the verdict.
 pub(super) struct Decision {
     pub(super) proven: Proven,
     pub(super) witness: Witness,
 }
 
-/// Numbers for which inequality (1) holds, with W the inverse of V.
+/// Numbers that satisfy inequality (1), with W the inverse of V.
 #[derive(Clone, Debug)]
 pub(super) struct Witness {
     /// V.
@@ -40,7 +40,7 @@ pub(super) struct Witness {
     pub(super) circle: FreeCircle,
 }
 
-/// Circle on which no matrix of a box has an eigenvalue.
+/// Circle without an eigenvalue of any matrix of a box.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum FreeCircle {
     /// Circle around zero with the given radius.
@@ -59,7 +59,7 @@ pub(super) fn decide(span: &StepSpan) -> Option<Decision> {
     let (proven, circle, weights) = if reaches.iter().all(|(_, high)| *high < 1.0) {
         (Proven::Stable, FreeCircle::AroundZero(1.0), near.free_of(1.0, &reaches)?)
     } else {
-        // A circle around zero is tried first. A circle around one entry also works where other entries have the same modulus.
+        // A circle around zero is tried first. A circle around one entry also works if further entries have the same modulus.
         let by_circle = circle(&reaches).and_then(|circle| Some((FreeCircle::AroundZero(circle), near.free_of(circle, &reaches)?)));
         let (circle, weights) = by_circle.or_else(|| near.one_outside(&reaches))?;
         (Proven::Unstable, circle, weights)
@@ -67,7 +67,7 @@ pub(super) fn decide(span: &StepSpan) -> Option<Decision> {
     Some(Decision { proven, witness: Witness { coordinates: near.coordinates, weights, circle } })
 }
 
-/// W·M·V over a box, which is nearly diagonal, and W·V, which is nearly the unit matrix.
+/// W·M·V over a box, nearly diagonal, and W·V, nearly the unit matrix.
 pub(super) struct NearlyDiagonal {
     /// V.
     coordinates: ComplexMatrix,
@@ -89,8 +89,9 @@ impl NearlyDiagonal {
             |matrix: &Matrix| -> ComplexMatrix { w.times(&ComplexMatrix::from_fn(size, size, |i, j| Complex64::from(matrix[(i, j)]))).times(&v) };
         let (mean, unit) = (through(&span.mean), w.times(&v));
         let slopes: Vec<ComplexMatrix> = span.slopes.iter().map(through).collect();
-        // The mean and each slope pass through two complex products, and W·V is one more: eight roundings per term, and the roundings of the sums.
+        // The mean and each slope pass through two complex products, and W·V is a further product: eight roundings per term, and the roundings of the sums.
         let rounding = gamma(8 * size + 32) * real(2 + span.slopes.len());
+        // Errors and sizes pass through W and V by absolute values, since their signs are unknown.
         let (radius, whole) = (w_size.times(&span.radius).times(&v_size), w_size.times(&span.largest()).times(&v_size));
         let unit_sizes = w_size.times(&v_size);
         let one = |i: usize, j: usize| Complex64::new(if i == j { 1.0 } else { 0.0 }, 0.0);
@@ -107,7 +108,7 @@ impl NearlyDiagonal {
         self.mean.rows()
     }
 
-    /// Returns the least and the greatest modulus of a number that is `centre` in the middle of the box, moves with the slopes, and is off by at most `wide`.
+    /// Returns the least and the greatest modulus of a number over the box: `centre` in the middle, moved by the slopes, and off by at most `wide`.
     fn reach(&self, centre: Complex64, slope: impl Fn(&ComplexMatrix) -> Complex64, wide: f64) -> (f64, f64) {
         let size = modulus(centre);
         let direction = if size > 0.0 { Complex64::new(centre.re / size, -centre.im / size) } else { Complex64::new(1.0, 0.0) };
@@ -128,23 +129,25 @@ impl NearlyDiagonal {
         outward(outward(modulus(self.mean[(i, j)]) + moving + self.wide[(i, j)] + self.off_unit[(i, j)] * largest))
     }
 
-    /// Returns a d for which (1) holds on the circle around zero with radius `circle`. `reaches`: the least and the greatest modulus of each diagonal entry.
+    /// Returns a d with (1) on the circle around zero with radius `circle`. `reaches`: the least and the greatest modulus of each diagonal entry.
     fn free_of(&self, circle: f64, reaches: &[(f64, f64)]) -> Option<Vec<f64>> {
         let entry = |i: usize, j: usize| {
             let (low, high) = reaches[i];
+            // If an entry may lie on the circle, `apart` is not above zero, and `dominated` refuses the matrix.
             let apart = if high < circle { circle - high } else { low - circle };
             if i == j { apart - outward(self.off_unit[(i, i)] * circle) } else { -self.beside(i, j, circle) }
         };
         dominated(&Matrix::from_fn(self.size(), self.size(), entry))
     }
 
-    /// Returns a circle around one diagonal entry, and a d for which (1) holds on the circle. The circle moves with the entry, stays outside of the unit circle
+    /// Returns a circle around one diagonal entry, and a d with (1) on the circle. The circle moves with the entry, stays outside of the unit circle
     /// and holds no other diagonal entry.
     fn one_outside(&self, reaches: &[(f64, f64)]) -> Option<(FreeCircle, Vec<f64>)> {
-        // Of two conjugate entries one is enough, since the matrices are real.
+        // Of two conjugate entries the upper entry is enough, since the matrices are real.
         let mut outside: Vec<usize> = (0..self.size()).filter(|place| reaches[*place].0 > 1.0 && self.mean[(*place, *place)].im >= 0.0).collect();
         outside.sort_by(|one, other| reaches[*other].0.total_cmp(&reaches[*one].0));
         outside.into_iter().take(MOST_TRIED).find_map(|centre| {
+            // The distance of two entries moves with the difference of their slopes: a common motion does not bring the entries together.
             let between = |place: usize| {
                 let difference = self.mean[(place, place)] - self.mean[(centre, centre)];
                 let wide = self.wide[(place, place)] + self.wide[(centre, centre)];
@@ -152,6 +155,7 @@ impl NearlyDiagonal {
             };
             let apart: Vec<f64> = (0..self.size()).map(|place| if place == centre { f64::INFINITY } else { between(place) }).collect();
             let nearest = apart.iter().copied().fold(f64::INFINITY, f64::min);
+            // Half the distance to the nearest entry separates the two, and the circle must also stay outside of the unit circle.
             let radius = (reaches[centre].0 - 1.0).min(0.5 * nearest);
             let largest = reaches[centre].1 + radius;
             let entry = |i: usize, j: usize| {
@@ -164,7 +168,7 @@ impl NearlyDiagonal {
     }
 }
 
-/// Largest number of diagonal entries outside of the unit circle around which a circle is tried.
+/// Largest number of tried diagonal entries outside of the unit circle.
 const MOST_TRIED: usize = 3;
 
 fn modulus(value: Complex64) -> f64 {
@@ -176,6 +180,7 @@ fn modulus(value: Complex64) -> f64 {
 fn circle(reaches: &[(f64, f64)]) -> Option<f64> {
     let mut free = None;
     for (low, _) in reaches.iter().filter(|(low, _)| *low > 1.0) {
+        // The gap below an entry ends at the largest entry inside. Entries inside the unit circle do not matter, so the gap begins at 1 at least.
         let inner = reaches.iter().filter(|(other, _)| other < low).map(|(_, high)| *high).fold(1.0, f64::max);
         let gap = low - inner;
         if gap > 0.0 && free.is_none_or(|(widest, _)| gap > widest) {
@@ -185,13 +190,14 @@ fn circle(reaches: &[(f64, f64)]) -> Option<f64> {
     free.map(|(_, circle)| circle)
 }
 
-/// Returns a d > 0 with C·d > 0, rounding included, for a matrix C whose entries off the diagonal are at most zero. `None` if no such d exists or none was
+/// Returns a d > 0 with C·d > 0, rounding included, for a matrix C without positive entries off the diagonal. `None` if no such d exists or no d was
 /// found.
 fn dominated(comparison: &Matrix) -> Option<Vec<f64>> {
     let size = comparison.rows();
     if !comparison.is_finite() || (0..size).any(|place| comparison[(place, place)] <= 0.0) {
         return None;
     }
+    // C⁻¹ of an M-matrix has no negative entries, so d = C⁻¹·1 is positive then and C·d = 1 leaves the same room in each row.
     let d = solved(comparison, &Matrix::from_fn(size, 1, |_, _| 1.0))?;
     let column: Vec<f64> = (0..size).map(|place| d[(place, 0)]).collect();
     let sizes = absolute(comparison).times_column(&column);

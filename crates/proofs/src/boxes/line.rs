@@ -1,4 +1,4 @@
-//! A line along one key: stretches that are proven stable or proven unstable, and undecided stretches between these, which hold every crossing.
+//! A line along one key: stretches proven stable or proven unstable, and undecided stretches between with every crossing.
 
 use cohaptic_stability::{Family, Watch};
 
@@ -17,7 +17,7 @@ pub struct ProvenStretch {
     pub low: f64,
     /// The greatest value.
     pub high: f64,
-    /// The verdict. A boundary of stability lies in a stretch with [`Guarantee::Undecided`], where it may be anywhere, and in no other stretch.
+    /// The verdict. A boundary of stability lies anywhere in a stretch with [`Guarantee::Undecided`], and in no other stretch.
     pub guarantee: Guarantee,
 }
 
@@ -26,36 +26,37 @@ pub struct ProvenStretch {
 pub struct ProvenLine {
     /// Stretches in ascending order. Neighbours meet at their ends and have different verdicts.
     pub stretches: Vec<ProvenStretch>,
-    /// Number of stretches that were looked at, also of those that were halved afterwards.
+    /// Number of stretches looked at, stretches halved afterwards included.
     pub attempts: usize,
-    /// Stretches as they were decided, before neighbours with the same verdict were joined.
+    /// Stretches as decided, before neighbours with the same verdict were joined.
     pieces: Vec<ProvenStretch>,
-    /// `true` if the watch let the proof run to its end. Otherwise stretches that were not looked at are undecided too.
+    /// `true` if the watch let the proof run to its end. Otherwise the remaining stretches are undecided too.
     pub is_whole: bool,
 }
 
-/// Number of stretches from which on undecided stretches are no longer halved. Where an eigenvalue stays at the unit circle, no stretch is ever decided.
+/// Number of stretches after which undecided stretches are no longer halved. If an eigenvalue stays at the unit circle, no stretch is ever decided.
 const MOST_WAITING: usize = 1 << 16;
 
-/// Returns the halving of a line, whose stretches are halved while they are longer than `tolerance`, in the unit of the key.
+/// Returns the halving of a line down to stretches of the length `tolerance`, in the unit of the key.
 pub(super) const fn halving(tolerance: f64) -> Halving {
     Halving { times: u32::MAX, tolerance: Some(tolerance), most: MOST_WAITING - 1, whole: None }
 }
 
 impl ProvenLine {
-    /// Decides a family with one key over the range of the key. Undecided stretches are halved until they are no longer than `tolerance`, in the unit of the
-    /// key, or no floating-point number lies within. A key that is a delay of links is divided where a sample comes into force at another tick, and nowhere
-    /// else. The result does not depend on the number of threads. A stretch is an operation of the watch, which may end the proof.
+    /// Decides a family with one key over the range of the key. Undecided stretches are halved down to the length `tolerance`, in the unit of the
+    /// key, or no floating-point number lies within. The key of a delay of links is divided where a sample comes into force at another tick, and nowhere
+    /// else. The result does not depend on the number of threads. A stretch is an operation of the watch. The watch may end the proof.
     ///
     /// # Errors
     ///
-    /// [`ProofError`] if the family does not have exactly one key, if the key sets anything but gains, masses, dampings or a delay, and for scenes of which
-    /// nothing can be proven.
+    /// [`ProofError`] if the family does not have exactly one key, if the key sets anything but gains, masses, dampings or a delay, and for scenes without
+    /// any possible proof.
     pub fn prove(family: &Family, tolerance: f64, watch: &dyn Watch) -> Result<Self, ProofError> {
         Self::prove_with(family, tolerance, &NothingKnown, watch)
     }
 
-    /// Decides a family like [`ProvenLine::prove`] and with the same result, but takes the verdicts of known stretches from `pieces` and stores new ones there.
+    /// Decides a family like [`ProvenLine::prove`] and with the same result, but takes the verdicts of known stretches from `pieces` and stores new verdicts
+    /// there.
     ///
     /// # Errors
     ///
@@ -82,17 +83,17 @@ impl ProvenLine {
         Ok(Self { stretches, attempts, is_whole, pieces: found })
     }
 
-    /// Returns the pieces of the line with the numbers by which their verdicts can be checked. Each piece is decided once more, and is undecided here if the
+    /// Returns the pieces of the line with the numbers for a check of the verdicts. Each piece is decided once more, and is undecided here if the
     /// wider bounds of the checker decide nothing.
     ///
     /// # Errors
     ///
-    /// [`ProofError`] if the watch ends the certification, and for the reasons of [`ProvenLine::prove`] if `family` is not the family that was proven.
+    /// [`ProofError`] if the watch ends the certification, and for the reasons of [`ProvenLine::prove`] if `family` is not the proven family.
     pub fn certify(&self, family: &Family, watch: &dyn Watch) -> Result<Vec<BoxCertificate>, ProofError> {
         certify(family, None, self.pieces.iter().map(|ProvenStretch { low, high, .. }| vec![[*low, *high]]).collect(), watch)
     }
 
-    /// Returns the number of pieces that have a verdict here and are undecided in the certificate.
+    /// Returns the number of pieces with a verdict here and without a verdict in the certificate.
     #[must_use]
     pub fn uncertified(&self, certificate: &[BoxCertificate]) -> usize {
         uncertified(certificate, self.pieces.iter().map(|piece| (vec![[piece.low, piece.high]], piece.guarantee)))

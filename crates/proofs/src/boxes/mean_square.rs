@@ -1,8 +1,8 @@
-//! Every number of equal peers in the mean square, over equal links that lose independently.
+//! Every number of equal peers in the mean square, over equal links with independent losses.
 //!
-//! A delivery with the probability p = 1 − q turns the sample held, h, into q·h + p·u + ξ, with a noise ξ of variance p·q·σ², σ² = E(u − h)², that is
-//! independent from link to link. So the second moments of N peers, of which none is told from another, are those of three kinds of motion that do not mix but
-//! by σ² (see [`Symmetric`], of which these are other coordinates):
+//! A delivery with the probability p = 1 − q turns the sample held, h, into q·h + p·u + ξ, with a noise ξ of variance p·q·σ², σ² = E(u − h)²,
+//! independent from link to link. So the second moments of N equal peers are the second moments of three kinds of motion, coupled only
+//! by σ² (see [`Symmetric`] for other coordinates of the same moments):
 //!
 //! ```text
 //! C    of √N times the mean over the peers of (a, h)        h ← q·h + p·u,                              noise ν·p·q·σ²
@@ -11,11 +11,12 @@
 //! σ² = µ·C[u − h] + (1 − µ)·A[u − out] + (1 − µ)/(1 − ν²)·A[in + ν·out] + ((1 − 2ν)/2 + (1 − ν)/(2 + 2ν))·x
 //! ```
 //!
-//! Here a is the states of a peer and its samples in transit, `in` the mean of the samples that the peer holds, and `out` the mean of the samples of the peer
-//! that others hold. ν = 1/(N − 1), µ = 1/N, and X\[v\] = vᵀXv. Everything is analytic in ν, down to 0, and a tick is multi-affine in gains and coefficients of
-//! step maps. So the image L(Y) of a fixed Y = (C, A, x) over a span of numbers is a mean, a slope along each number and a radius ([`StepSpan`]). γ·Y − L(Y) is
-//! positive definite on all of the span if the matrix is so at all ends of the slopes, radius included. Y is computed at a number in the middle of the span and
-//! need not be exact. If Y is positive definite and γ = 1, every number is *stable*. If Y has an entry below zero on its diagonal and γ > 1, every number is
+//! Here a is the states of a peer and its samples in transit, `in` the mean of the samples held by the peer, and `out` the mean of the samples of the peer
+//! held by all other peers. ν = 1/(N − 1), µ = 1/N, and X\[v\] = vᵀXv. Everything is analytic in ν, down to 0, and a tick is multi-affine in gains and
+//! coefficients of step maps. So the image L(Y) of a fixed Y = (C, A, x) over a span of numbers is a mean, a slope along each number and a radius
+//! ([`StepSpan`]). γ·Y − L(Y) is positive definite on all of the span if the matrix is so at all ends of the slopes, radius included. Y is computed at a number
+//! in the middle of the span and need not be exact. If Y is positive definite and γ = 1, every number is *stable*. If Y has an entry below zero on its diagonal
+//! and γ > 1, every number is
 //! *unstable* ([`Positive`]).
 
 use cohaptic_peer::Gains;
@@ -32,7 +33,7 @@ use super::guarantee::Proven;
 use super::span::StepSpan;
 use super::steps::{StepMatrix, error};
 
-/// Second moments of a scene whose largest class of equal peers grows.
+/// Second moments of a scene with a growing largest class of equal peers.
 pub(super) struct GrowingMoments<'a> {
     motions: Vec<(&'a Motion, Independent)>,
 }
@@ -49,8 +50,8 @@ impl<'a> GrowingMoments<'a> {
         Ok(Self { motions: growing.motions.iter().map(of).collect::<Result<_, _>>()? })
     }
 
-    /// Returns the proven verdict on every number of peers from `low` to `high`, or `None`. Two peers have fewer kinds of motion, and are never the end of a
-    /// longer span.
+    /// Returns the proven verdict on every number of peers from `low` to `high`, or `None`. Two peers have fewer kinds of motion, and the number 2 is never the
+    /// end of a longer span.
     pub(super) fn decide(&self, low: u64, high: u64) -> Result<Option<Proven>, ProofError> {
         let mut all = Some(Proven::Stable);
         for (motion, independent) in &self.motions {
@@ -68,7 +69,7 @@ impl<'a> GrowingMoments<'a> {
         Ok(all)
     }
 
-    /// Returns the verdict on the numbers from `low` to `high` with the second moments by which the verdict can be checked; `None` if no verdict is proven.
+    /// Returns the verdict on the numbers from `low` to `high` with the second moments for a check of the verdict; `None` if no verdict is proven.
     pub(super) fn certify(&self, low: u64, high: u64) -> Result<Option<(Proven, Vec<MomentCertificate>)>, ProofError> {
         let mut all = Vec::new();
         let mut is_decided = true;
@@ -113,7 +114,7 @@ fn of_two(motion: &Motion, independent: &Independent) -> Option<Proven> {
     }
 }
 
-/// Returns the verdict on two peers with the second moment Y that shows it. The kinds of motion are the mean and the difference of both peers.
+/// Returns the verdict on two peers with the second moment Y behind the verdict. The kinds of motion are the mean and the difference of both peers.
 fn moment_of_two(motion: &Motion, independent: &Independent) -> Option<(Proven, MomentCertificate)> {
     let node = motion.part(2, Some(0)).swap_remove(0);
     let time = motion.time(2);
@@ -121,6 +122,7 @@ fn moment_of_two(motion: &Motion, independent: &Independent) -> Option<(Proven, 
     let (gamma, found) = solution(&operator, factor)?;
     let blocks = operator.matrices(&found);
     let proven = proven(gamma, &blocks)?;
+    // The part of a held sample without a force is no state of Y, so a stable verdict needs this part to die out too.
     let holds = leaves_less(&operator, gamma, &found) && (proven == Proven::Unstable || independent.held.verdict() == Verdict::Stable);
     let heard = heard_by(Sampling::of(std::slice::from_ref(&node)));
     let blocks: Vec<Matrix> = blocks.iter().map(symmetric).collect();
@@ -132,7 +134,7 @@ fn factor(radius: f64) -> f64 {
     if radius < 1.0 { 1.0 } else { (0.5 * radius).max(ABOVE) }
 }
 
-/// Returns the verdict that Y shows if γY − L(Y) is positive definite.
+/// Returns the verdict from Y, provided that γY − L(Y) is positive definite.
 fn proven(gamma: f64, y: &[Matrix]) -> Option<Proven> {
     match (is_definite(y), is_indefinite(y)) {
         (true, _) if gamma <= 1.0 => Some(Proven::Stable),
@@ -141,7 +143,7 @@ fn proven(gamma: f64, y: &[Matrix]) -> Option<Proven> {
     }
 }
 
-/// Returns the gains with which a sample is one number; `None` if a sample is a position and a velocity.
+/// Returns the gains of a sample as one number; `None` if a sample is a position and a velocity.
 const fn heard_by(sampling: Sampling) -> Option<Gains> {
     match sampling {
         Sampling::Combined(gains) => Some(gains),
@@ -203,6 +205,7 @@ impl Numbers {
     /// Encloses a function of ν over the box by its chord. Half of the second derivative of the function is at most `bend` in size.
     fn curve(&self, of: impl Fn(f64) -> f64, bend: f64) -> StepSpan {
         let [high, low] = self.nu.map(of);
+        // A function leaves its chord by at most half its second derivative times the square of half the width.
         let half = 0.5 * (self.nu[0] - self.nu[1]);
         let mut span = self.constant(single(0.5 * (low + high)));
         span.slopes[self.count - 1] = single(0.5 * (high - low));
@@ -230,17 +233,18 @@ fn row(size: usize, entries: &[(usize, f64)]) -> Matrix {
     Matrix::from_fn(1, size, |_, column| entries.iter().filter(|(place, _)| *place == column).map(|(_, entry)| entry).sum())
 }
 
-/// Frame of a peer over links that lose.
+/// Frame of a peer over links with losses.
 struct Frame<'a> {
     motion: &'a Motion,
     independent: &'a Independent,
-    /// Factor by which the radius of L(Y) is widened.
+    /// Widening factor of the radius of L(Y).
     wider: f64,
 }
 
 impl Frame<'_> {
     fn decide(&self, low: u64, high: u64) -> Result<Option<(Proven, MomentCertificate)>, ProofError> {
         let nus = [low, high].map(|number| if number == ENDLESS { 0.0 } else { nu(number) });
+        // ν and not N is the number of the box, because all entries are analytic in ν down to ν = 0. Y belongs to a number near the middle of ν.
         let middle = 0.5 * (nus[0] + nus[1]);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between two numbers")]
         let number = ((1.0 / middle).round() as u64 + 1).clamp(low, high);
@@ -275,6 +279,7 @@ impl Frame<'_> {
         let operator = operator(self.motion, self.independent, number, &node, time);
         let Some((gamma, found)) = solution(&operator, factor) else { return Ok(None) };
         let Some(y) = of_blocks(&operator.matrices(&found), &numbers, nu(number)) else { return Ok(None) };
+        // The sign of Y chooses which verdict the inequality can show, so Y is looked at before the costly image.
         let Some(proven) = proven(gamma, &[&y.common, &y.apart, &y.rest].map(|one| one.mean.clone())) else { return Ok(None) };
         let tied = self.motion.structure.tied;
         let translation: Option<Vec<f64>> = (!tied).then(|| {
@@ -302,6 +307,7 @@ impl Frame<'_> {
                 }
                 Event::Deliver { .. } => {}
                 Event::Tick { span, .. } => {
+                    // Samples taken before a delivery must be in their rows by then, so a move without a tick comes first.
                     if !self.independent.hazards.at[tick].is_empty() && !samples.is_empty() {
                         actions.push(Action::Move { samples: std::mem::take(&mut samples), span: None });
                     }
@@ -320,7 +326,7 @@ impl Frame<'_> {
         actions
     }
 
-    /// Returns L(Y), the second moment after a frame that begins with the second moment Y, over the box.
+    /// Returns L(Y), the second moment after a frame from the second moment Y, over the box.
     fn image(
         &self,
         y: &Moment,
@@ -348,6 +354,7 @@ impl Frame<'_> {
         let mut moment = Moment { common: y.common.through(&begins(1, skipped)), apart: y.apart.through(&begins(2, None)), rest: y.rest.clone() };
         let mut moves = common.iter().zip(apart);
         let mut pending: Option<(StepSpan, StepSpan)> = None;
+        // Moves between two deliveries are multiplied first: a product of matrices is cheaper than passing both moments through each move.
         let flush = |moment: &mut Moment, pending: &mut Option<(StepSpan, StepSpan)>| {
             if let Some((common, apart)) = pending.take() {
                 (moment.common, moment.apart) = (moment.common.through(&common), moment.apart.through(&apart));
@@ -364,6 +371,7 @@ impl Frame<'_> {
                     }
                 }
                 Action::Deliver { row, probability } => {
+                    // A delivery adds noise by the present moment, so the moves before must have been applied.
                     flush(&mut moment, &mut pending);
                     moment = delivered(&moment, (rows.held(), *row), *probability, numbers);
                 }
@@ -392,6 +400,7 @@ fn moved(
         }
     }
     if let Some(span) = span {
+        // A peer hears the mean of its held samples, the first held row: h for the common motion, `in` for the differences.
         let mut heard = Matrix::zeros(1 + node.law.memory.len(), size);
         for (row, by) in node.heard(sampling, 0, 0.0, scale.time).enumerate() {
             heard[(row, rows.held())] = by;
@@ -403,12 +412,13 @@ fn moved(
     StepMatrix { matrix: z, error: error(std::slice::from_ref(node), scale, 0.0) }
 }
 
-/// Returns the second moment after a delivery of the sample at row `sample` to the held samples, whose rows begin at `held`.
+/// Returns the second moment after a delivery of the sample at row `sample` to the held samples in the rows from `held` on.
 fn delivered(moment: &Moment, (held, sample): (usize, usize), probability: f64, numbers: &Numbers) -> Moment {
     let (p, q) = (probability, 1.0 - probability);
     let (sizes, constant) = ((held + 1, held + 2), |matrix| numbers.constant(matrix));
-    // Terms of σ², each with its factor as in the formula of the module.
+    // Terms of σ², with the factors of the formula of the module.
     let square = |of: &StepSpan, by: &StepSpan| of.through(by);
+    // The bounds of half the second derivative hold for ν from 0 to 1/2, that is, from three peers on: 1/(1 + ν)³ ≤ 1 and 1/(1 − ν)³ ≤ 8.
     let mu = numbers.curve(|nu| nu / (1.0 + nu), 1.0);
     let rest_of_mu = numbers.curve(|nu| 1.0 / (1.0 + nu), 1.0);
     let steep = numbers.curve(|nu| 1.0 / (1.0 - nu), 8.0);
@@ -443,6 +453,7 @@ fn delivered(moment: &Moment, (held, sample): (usize, usize), probability: f64, 
     let in_less_out = numbers.of_nu(&row(sizes.1, &[(held, 1.0)]), &row(sizes.1, &[(held + 1, -1.0)]));
     let less = numbers.of_nu(&single(1.0), &single(-1.0)).times(&numbers.of_nu(&single(1.0), &single(1.0)));
     let of_out = outer(&less.times(&of_links), &constant(row(sizes.1, &[(held + 1, 1.0)])));
+    // The outer products of the noise follow the table of the module: C has noise in h, A in `in` and `out`, x in itself.
     Moment {
         common: moment.common.through(&common).plus(&outer(&of_links, &constant(row(sizes.0, &[(held, 1.0)])))),
         apart: moment.apart.through(&apart).plus(&outer(&of_links, &in_less_out)).plus(&of_out),
@@ -450,7 +461,7 @@ fn delivered(moment: &Moment, (held, sample): (usize, usize), probability: f64, 
     }
 }
 
-/// Returns Y from the blocks of [`Symmetric`], whose coordinates of held samples are differences and sums of in and out.
+/// Returns Y from the blocks of [`Symmetric`]. The coordinates of held samples there are differences and sums of in and out.
 fn of_blocks(blocks: &[Matrix], numbers: &Numbers, nu: f64) -> Option<Moment> {
     let [common, apart, rest @ ..] = blocks else { return None };
     let size = apart.rows();
@@ -471,7 +482,7 @@ fn symmetric(matrix: &Matrix) -> Matrix {
 }
 
 /// Returns whether a symmetric matrix is positive definite all over a box. The corners of the box are enough, since the matrix is affine but for its radius.
-/// The check uses coordinates in which the matrix is nearly the unit matrix in the middle of the box.
+/// In the coordinates of the check the matrix is nearly the unit matrix in the middle of the box.
 fn is_everywhere_positive(span: &StepSpan) -> bool {
     let Some(factor) = cholesky(&symmetric(&span.mean)) else { return false };
     let inverse = triangle_inverse(&factor).transposed();
@@ -486,7 +497,7 @@ fn is_everywhere_positive(span: &StepSpan) -> bool {
             |i: usize, j: usize| span.mean[(i, j)] + span.slopes.iter().enumerate().map(|(number, slope)| sign(number) * slope[(i, j)]).sum::<f64>();
         let largest = |i: usize, j: usize| span.mean[(i, j)].abs() + span.slopes.iter().map(|slope| slope[(i, j)].abs()).sum::<f64>();
         let rounded = gamma(span.slopes.len() + 4);
-        // Entries (i, j) and (j, i) stand for the same number. Their mean is off by at most the larger of both errors.
+        // Entries (i, j) and (j, i) are the same number. Their mean is off by at most the larger of both errors.
         let error = |i: usize, j: usize| span.radius[(i, j)] + rounded * largest(i, j);
         let error = Matrix::from_fn(size, size, |i, j| error(i, j).max(error(j, i)) * (1.0 + 8.0 * UNIT));
         is_positive(&Matrix::from_fn(size, size, |i, j| 0.5 * (at(i, j) + at(j, i))), &error)

@@ -1,4 +1,4 @@
-//! A region of two keys: boxes that are proven stable or proven unstable, and boxes that stay undecided.
+//! A region of two keys: boxes proven stable or proven unstable, and undecided boxes.
 
 use cohaptic_stability::{Family, Watch};
 
@@ -24,19 +24,19 @@ pub struct ProvenBox {
 /// Region of two keys, covered by boxes.
 #[derive(Clone, PartialEq, Debug)]
 pub struct ProvenRegion {
-    /// Boxes that overlap at edges only. Larger boxes come first; boxes of one size are ordered by y and then by x.
+    /// Boxes. Two boxes overlap at edges only. Larger boxes come first; boxes of one size are ordered by y and then by x.
     pub boxes: Vec<ProvenBox>,
-    /// Number of boxes that were looked at, also of those that were divided afterwards.
+    /// Number of boxes looked at, boxes divided afterwards included.
     pub attempts: usize,
-    /// `true` if the watch let the proof run to its end. Otherwise boxes that were not looked at are undecided too.
+    /// `true` if the watch let the proof run to its end. Otherwise the remaining boxes are undecided too.
     pub is_whole: bool,
-    /// First and last number of peers for which the verdicts hold (`None` as the last: without end); `None`: the number that the scene has.
+    /// First and last number of peers of the verdicts (`None` as the last: without end); `None`: the number of the scene.
     every: Option<(u64, Option<u64>)>,
 }
 
 /// Largest number of halvings: the range of each key is divided into at most two to the power of this number of parts.
 pub const MOST_HALVINGS: u32 = 16;
-/// Largest number of boxes that wait for a decision; boxes beyond stay undecided. Where an eigenvalue stays at the unit circle, no box is ever decided.
+/// Largest number of boxes waiting for a decision; boxes beyond stay undecided. If an eigenvalue stays at the unit circle, no box is ever decided.
 const MOST_WAITING: usize = 1 << 21;
 
 /// Returns the halving of a region, with at most `halvings` and [`MOST_HALVINGS`] halvings of each key.
@@ -45,20 +45,21 @@ pub(super) fn halving(halvings: u32) -> Halving {
 }
 
 impl ProvenRegion {
-    /// Decides a family with two keys over the ranges of both. Undecided boxes are divided into four, up to `halvings` times. A key that is a delay of links is
+    /// Decides a family with two keys over the ranges of both. Undecided boxes are divided into four, up to `halvings` times. The key of a delay of links is
     /// divided where a sample comes into force at another tick, and nowhere else. With `every` a verdict holds for every number of peers from the first to the
     /// second number, or without end, where the largest class of equal peers grows. The result does not depend on the number of threads. A box is an operation
-    /// of the watch, which may end the proof.
+    /// of the watch. The watch may end the proof.
     ///
     /// # Errors
     ///
     /// [`ProofError`] if the family does not have exactly two keys, if a key sets anything but gains, masses and dampings (one key may set a delay instead),
-    /// and for scenes of which nothing can be proven.
+    /// and for scenes without any possible proof.
     pub fn prove(family: &Family, halvings: u32, every: Option<(u64, Option<u64>)>, watch: &dyn Watch) -> Result<Self, ProofError> {
         Self::prove_with(family, halvings, every, &NothingKnown, watch)
     }
 
-    /// Decides a family like [`ProvenRegion::prove`] and with the same result, but takes the verdicts of known boxes from `pieces` and stores new ones there.
+    /// Decides a family like [`ProvenRegion::prove`] and with the same result, but takes the verdicts of known boxes from `pieces` and stores new verdicts
+    /// there.
     ///
     /// # Errors
     ///
@@ -81,23 +82,23 @@ impl ProvenRegion {
         Ok(Self { boxes, attempts, is_whole, every })
     }
 
-    /// Returns the boxes with the numbers by which their verdicts can be checked. Each box is decided once more, and is undecided here if the wider bounds of
+    /// Returns the boxes with the numbers for a check of the verdicts. Each box is decided once more, and is undecided here if the wider bounds of
     /// the checker decide nothing.
     ///
     /// # Errors
     ///
-    /// [`ProofError`] if the watch ends the certification, and for the reasons of [`ProvenRegion::prove`] if `family` is not the family that was proven.
+    /// [`ProofError`] if the watch ends the certification, and for the reasons of [`ProvenRegion::prove`] if `family` is not the proven family.
     pub fn certify(&self, family: &Family, watch: &dyn Watch) -> Result<Vec<BoxCertificate>, ProofError> {
         certify(family, self.every, self.boxes.iter().map(|ProvenBox { x, y, .. }| vec![*x, *y]).collect(), watch)
     }
 
-    /// Returns the number of boxes that have a verdict here and are undecided in the certificate.
+    /// Returns the number of boxes with a verdict here and without a verdict in the certificate.
     #[must_use]
     pub fn uncertified(&self, certificate: &[BoxCertificate]) -> usize {
         uncertified(certificate, self.boxes.iter().map(|one| (vec![one.x, one.y], one.guarantee)))
     }
 
-    /// Returns the number of boxes without an area that have the verdict. Such boxes belong to a single value of a delay, such as zero, and no share of the
+    /// Returns the number of boxes without an area and with the verdict. Such boxes belong to a single value of a delay, such as zero, and no share of the
     /// area counts them.
     #[must_use]
     pub fn lines(&self, guarantee: Guarantee) -> usize {
@@ -105,11 +106,11 @@ impl ProvenRegion {
         self.boxes.iter().filter(is_line).filter(|one| one.guarantee == guarantee).count()
     }
 
-    /// Returns the share of the area of the region that has the verdict, from 0 to 1. A single value of a delay has no area: see [`ProvenRegion::lines`].
+    /// Returns the share of the verdict in the area of the region, from 0 to 1. A single value of a delay has no area: see [`ProvenRegion::lines`].
     #[must_use]
     pub fn share(&self, guarantee: Guarantee) -> f64 {
         let area = |boxes: &mut dyn Iterator<Item = &ProvenBox>| boxes.map(|one| (one.x[1] - one.x[0]) * (one.y[1] - one.y[0])).sum::<f64>();
-        // The sum of no terms is −0.0, which would be printed with its sign.
+        // The sum of no terms is −0.0, and its sign would be printed.
         area(&mut self.boxes.iter().filter(|one| one.guarantee == guarantee)) / area(&mut self.boxes.iter()) + 0.0
     }
 }

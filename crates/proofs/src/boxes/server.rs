@@ -1,8 +1,8 @@
-//! Frames of a server and its clients, whose samples carry more than the states of copies.
+//! Frames of a server and its clients. Their samples carry more than the states of copies.
 //!
-//! As for other laws, averages of classes of equal peers and differences within a class do not mix. The server is a class of its own. Clients send the states
+//! As for other laws, averages of classes of equal peers and differences within a class do not mix. The server is a separate class. Clients send the states
 //! of their devices to the server and receive the forces of their couplings or the state of the object; a client has no copy. The server feels nothing of
-//! differences within a class of clients, and these differences feel nothing of the object. Forces are multiplied by the compliance of the object, so that
+//! differences within a class of clients, and these differences feel nothing of the object. Forces are multiplied by the compliance of the object, so
 //! registers hold lengths.
 
 use std::time::Duration;
@@ -34,7 +34,7 @@ const RETURNS: usize = 1;
 const FORCE: usize = 0;
 
 impl Server {
-    /// Returns the server of scenes that differ in numbers only, and the classes of the peers of these scenes; `None` if the scenes have no server.
+    /// Returns the server of scenes with different numbers, and the classes of the peers of these scenes; `None` if the scenes have no server.
     pub(super) fn structure(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts) -> Result<Option<(Structure, Self)>, ProofError> {
         let coordination = &scenes[0].coordination;
         if coordination.strategy != Coordination::ClientServer {
@@ -53,35 +53,35 @@ impl Server {
     /// Returns the node of each class.
     pub(super) fn nodes(self, structure: &Structure, scene: &Scene) -> Vec<Node> {
         let mut nodes: Vec<Node> = (0..structure.classes.len()).map(|class| structure.node_with(scene, class, LinearLaw::none())).collect();
-        // A client has no copy of its own. Its node gets the object of the server, so that all nodes have the same compliance as the unit of forces.
+        // A client has no copy. The client's node gets the object of the server, so all nodes have the same compliance as the unit of forces.
         let object = nodes[self.class].object;
         nodes.iter_mut().for_each(|node| node.object = object);
         nodes
     }
 
-    /// Returns whether the members of a class can differ in a way that a device feels.
+    /// Returns whether differences of the members of a class have an effect on a device.
     pub(super) fn has_differences(structure: &Structure, class: usize) -> bool {
         structure.classes[class].len() > 1 && structure.touching[class]
     }
 
-    /// Returns a frame over a box, of the averages of classes or of the differences between the members of the class `apart`. `ends`: the nodes of that part at
+    /// Returns a frame over a box, of the averages of classes or of the differences between the members of the class `apart`. `ends`: the nodes of the part at
     /// the corners of the box.
     pub(super) fn frame(self, structure: &Structure, ends: &[Vec<Node>], apart: Option<usize>, time: f64) -> Result<NamedFrame, ProofError> {
-        // Number of members of each class, all of which send to the server.
+        // Number of members of each class. All members send to the server.
         let sizes = Matrix::from_fn(1, structure.classes.len(), |_, class| real(structure.classes[class].len()));
         let points: Vec<Point> = ends.iter().map(|nodes| Point { nodes: nodes.clone(), weights: sizes.clone() }).collect();
         let scale = Scale { time, compliance: ends[0][0].compliance(time) };
         let heard = Heard::new(&structure.timetable);
         let program = |point: &Point| {
             let frame = Frame { server: self, apart, point, scale, heard: &heard };
-            // Differences contain no common motion of all bodies, so that no position serves as a reference.
+            // Differences contain no common motion of all bodies, so no position serves as a reference.
             frame.program(&structure.timetable, structure.tied || apart.is_some())
         };
         NamedFrame::of(&points, ends, apart, scale, program)
     }
 }
 
-/// Frame of a part of a scene at a point, whose nodes are those of all classes, or the node of the class whose members differ.
+/// Frame of a part of a scene at a point, with the nodes of all classes, or for differences with the node of their class.
 struct Frame<'a> {
     server: Server,
     apart: Option<usize>,
@@ -94,7 +94,7 @@ impl Frame<'_> {
     fn program(&self, timetable: &Timetable, tied: bool) -> Program {
         let classes = timetable.sent.len();
         let (mut ticks, mut sent) = (vec![0_i64; classes], vec![0_i64; classes]);
-        // Consecutive samples form a step, and so do the ticks of one instant. The key of a step is the instant of its ticks, or `None` for samples.
+        // Consecutive samples form a step, and the ticks of one instant too. The key of a step is the instant of its ticks, or `None` for samples.
         let mut steps: Vec<(Option<u64>, Vec<Operation>)> = Vec::new();
         for event in &timetable.events {
             let (at, operations) = match *event {
@@ -115,6 +115,7 @@ impl Frame<'_> {
                 _ => steps.push((at, operations)),
             }
         }
+        // Steps without an operation belong to other parts of the motion and leave all registers as they are.
         let steps = steps.into_iter().map(|(_, step)| step).filter(|step| step.iter().any(|operation| !operation.is_empty())).collect();
         let object = Register::Body { class: self.server.class, of_copy: true, velocity: false };
         Program { steps, sent: timetable.sent.clone(), references: vec![(!tied).then_some(object); classes] }
@@ -128,23 +129,23 @@ impl Frame<'_> {
         }
     }
 
-    /// Returns the node of a class whose device is coupled to the object; `None` if the device touches nothing.
+    /// Returns the node of a class with a coupled device; `None` if the device touches nothing.
     fn touching(&self, class: usize) -> Option<&Node> {
         self.node(class).filter(|node| node.device.is_some())
     }
 
-    /// Returns the registers of the object, which is the copy of the server; `None` for differences of clients.
+    /// Returns the registers of the object, the copy of the server; `None` for differences of clients.
     fn object(&self) -> Option<StateRegisters> {
         let class = self.server.class;
         self.node(class).map(|_| state(|velocity| Register::Body { class, of_copy: true, velocity }))
     }
 
-    /// Returns the sampled state of `from` that `to` holds at a tick of `to`; `None` if no sample ever arrives.
+    /// Returns the sampled state of `from` held by `to` at a tick of `to`; `None` if no sample ever arrives.
     fn held(&self, from: usize, to: usize, tick: i64) -> Option<StateRegisters> {
         self.heard.at(from, to, tick).map(|number| state(|velocity| Register::Sample { class: from, number, velocity }))
     }
 
-    /// Returns the operation that takes sample `number` of a class, before the tick of the class with the number `tick`.
+    /// Returns the operation of taking sample `number` of a class, before the tick of the class with the number `tick`.
     fn sample(&self, class: usize, number: i64, tick: i64) -> Operation {
         let Server { class: server, returns_forces } = self.server;
         let of = |bodies: StateRegisters| -> Operation {
@@ -159,7 +160,7 @@ impl Frame<'_> {
         }
         let returned = |client: usize| {
             let node = self.touching(client).filter(|_| client != server)?;
-            // The force uses the sample that was held at the tick before: a delivery at the instant of the sample counts from the next tick on.
+            // The force uses the sample held at the tick before: a delivery at the instant of the sample counts from the next tick on.
             let force = self.coupling(node.coupling, self.held(client, server, tick - 1), self.object());
             Some((Register::Returned { server, class: client, number }, force))
         };
@@ -186,6 +187,7 @@ impl Frame<'_> {
         let mut bodies: Vec<Pushed> = Vec::new();
         if class == server {
             let mut force = coupling.clone().unwrap_or_default();
+            // All members of a class of clients pull on the object, so the force of one member counts as often as the class has members.
             for client in (0..self.point.weights.columns()).filter(|client| *client != server) {
                 let Some(other) = self.touching(client) else { continue };
                 let of_one = self.coupling(other.coupling, self.held(client, server, tick), self.object());

@@ -1,4 +1,4 @@
-//! Proofs that several processes share: the ranges are cut into blocks, and each block is decided independently of all other blocks.
+//! Proofs shared by several processes: the ranges are cut into blocks, and each block is decided independently of all other blocks.
 
 use cohaptic_stability::{Family, Unwatched, Watch};
 use rayon::prelude::*;
@@ -13,35 +13,35 @@ use super::{line, region};
 /// Proof over the ranges of the open keys of a family, divided into blocks.
 #[derive(Clone, Debug)]
 pub struct SharedProof {
-    /// Ranges with which the proof begins: one per stretch of a delay, otherwise a single entry.
+    /// First ranges of the proof: one entry per stretch of a delay, otherwise a single entry.
     beginnings: Vec<Ranges>,
     halving: Halving,
-    /// First and last number of peers for which the verdicts hold (`None` as the last: without end); `None`: the number that the scene has.
+    /// First and last number of peers of the verdicts (`None` as the last: without end); `None`: the number of the scene.
     every: Option<(u64, Option<u64>)>,
-    /// Number of keys whose ranges are halved.
+    /// Number of keys with halved ranges.
     keys: u32,
     /// Number of halvings from the ranges of a beginning to the ranges of a block.
     depth: u32,
 }
 
-/// Base-two logarithm of the number of blocks into which each beginning is cut.
+/// Base-two logarithm of the number of blocks of each beginning.
 const BLOCKS: u32 = 6;
 
 impl SharedProof {
-    /// Returns the blocks of the proof that [`ProvenRegion::prove`](super::ProvenRegion::prove) makes with the same arguments.
+    /// Returns the blocks of the proof of [`ProvenRegion::prove`](super::ProvenRegion::prove) with the same arguments.
     ///
     /// # Errors
     ///
-    /// [`ProofError`] for the reasons for which the proof fails.
+    /// [`ProofError`] if the proof fails.
     pub fn of_region(family: &Family, halvings: u32, every: Option<(u64, Option<u64>)>) -> Result<Self, ProofError> {
         Self::new(family, region::halving(halvings), every)
     }
 
-    /// Returns the blocks of the proof that [`ProvenLine::prove`](super::ProvenLine::prove) makes with the same arguments.
+    /// Returns the blocks of the proof of [`ProvenLine::prove`](super::ProvenLine::prove) with the same arguments.
     ///
     /// # Errors
     ///
-    /// [`ProofError`] for the reasons for which the proof fails.
+    /// [`ProofError`] if the proof fails.
     pub fn of_line(family: &Family, tolerance: f64) -> Result<Self, ProofError> {
         Self::new(family, line::halving(tolerance), None)
     }
@@ -60,12 +60,12 @@ impl SharedProof {
         (self.beginnings.len() as u64) << (self.depth * self.keys)
     }
 
-    /// Decides every piece of the given blocks that is not known, and every larger piece that holds such a block. Runs on all threads of the current thread
-    /// pool. `done` is called with each block of which every piece is known then.
+    /// Decides every unknown piece of the given blocks, and every larger piece around such a block. Runs on all threads of the current thread
+    /// pool. `done` is called with each completely known block.
     ///
     /// # Errors
     ///
-    /// [`ProofError`] for the reasons for which the proof fails.
+    /// [`ProofError`] if the proof fails.
     pub fn look_at(
         &self,
         family: &Family,
@@ -83,16 +83,16 @@ impl SharedProof {
         })
     }
 
-    /// Returns whether every piece of a block is known, so that nothing of the block needs to be decided.
+    /// Returns whether every piece of a block is known. Nothing of the block then needs a decision.
     #[must_use]
     pub fn is_known(&self, block: u64, pieces: &dyn KnownPieces) -> bool {
         self.walk(block, &|ranges| Ok(pieces.known(ranges)), &Unwatched).unwrap_or(false)
     }
 
-    /// Looks at the ranges from a beginning down to a block, and then at all pieces of the block. Returns whether every one was looked at.
+    /// Looks at the ranges from a beginning down to a block, and then at all pieces of the block. Returns `true` if every piece was looked at.
     fn walk(&self, block: u64, look: Look<'_>, watch: &dyn Watch) -> Result<bool, ProofError> {
-        // The upper bits of a block number are the place of its beginning. Each group of `keys` bits below says which part one halving takes, with the first
-        // halving in the highest group.
+        // The upper bits of a block number are the place of its beginning. Each group of `keys` bits below is the place of the part taken by one halving, with
+        // the first halving in the highest group.
         let beginning = usize::try_from(block >> (self.depth * self.keys)).unwrap_or_default();
         let mut ranges = self.beginnings[beginning].clone();
         for halved in 0..self.depth {
@@ -101,7 +101,7 @@ impl SharedProof {
             }
             match look(&ranges)? {
                 None => return Ok(false),
-                // A larger piece that is decided decides the block.
+                // A decided larger piece decides the block.
                 Some(Guarantee::Stable | Guarantee::Unstable) => return Ok(true),
                 Some(Guarantee::Undecided) if !self.halving.may_halve(&ranges) => return Ok(true),
                 Some(Guarantee::Undecided) => {}

@@ -1,7 +1,7 @@
 //! Matrices over a box: a mean, a slope along each number, and a radius for everything of higher order.
 //!
 //! Let sᵢ ∈ [−1, 1] be the place of number i in the box. Then M(s) = M₀ + Σ sᵢ·Mᵢ + E with |E| ≤ R entry by entry (a Taylor model of the first order, Makino &
-//! Berz 2003). Products of errors, products of two slopes and all roundings go into R, so that R is of the second order in the width of the box.
+//! Berz 2003). Products of errors, products of two slopes and all roundings go into R, so R is of the second order in the width of the box.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -20,7 +20,7 @@ pub(super) struct StepSpan {
 }
 
 impl StepSpan {
-    /// Encloses a multi-affine step by its values at 2ⁿ corners: bit b of the place of a corner says whether number b is at its upper end. A multi-affine
+    /// Encloses a multi-affine step by its values at 2ⁿ corners: bit b of the place of a corner is 1 if number b is at its upper end. A multi-affine
     /// function is the sum of its effects (Yates 1937). The effects of single numbers become slopes, and the effects of several numbers together go into the
     /// radius.
     pub(super) fn of<'a>(corners: impl Iterator<Item = &'a StepMatrix>) -> Self {
@@ -59,7 +59,7 @@ impl StepSpan {
         span
     }
 
-    /// Returns a matrix that is the same at every point of a box with the given number of numbers.
+    /// Returns a constant matrix over a box with the given number of numbers.
     pub(super) fn constant(mean: Matrix, numbers: usize) -> Self {
         let none = Matrix::zeros(mean.rows(), mean.columns());
         Self { slopes: vec![none.clone(); numbers], radius: none, mean }
@@ -71,7 +71,7 @@ impl StepSpan {
         self
     }
 
-    /// Returns the matrix over a box with one more number, on which the matrix does not depend.
+    /// Returns the matrix over a box with a further number without an effect on the matrix.
     pub(super) fn with_another_number(mut self) -> Self {
         self.slopes.push(Matrix::zeros(self.mean.rows(), self.mean.columns()));
         self
@@ -98,6 +98,7 @@ impl StepSpan {
 
     /// Returns T·M·Tᵀ with M this matrix and T the matrix `by`, over the same box.
     pub(super) fn through(&self, by: &Self) -> Self {
+        // (T·(T·M)ᵀ)ᵀ = T·M·Tᵀ, so one function for products is enough.
         by.times(&by.times(self).transposed()).transposed()
     }
 
@@ -111,17 +112,17 @@ impl StepSpan {
         Matrix::from_fn(self.mean.rows(), self.mean.columns(), |i, j| outward(mean(&self.mean, i, j) + slopes(i, j) + self.radius[(i, j)]))
     }
 
-    /// Returns this matrix times another over the same box. A step leaves most of the state as it is, so that most entries of this matrix are zero all over the
-    /// box but for the least radius of all entries. Such entries are skipped; the least radius is counted once per column.
+    /// Returns this matrix times another matrix over the same box. A step leaves most of the state unchanged, so most entries of this matrix are zero all over
+    /// the box but for the least radius of all entries. Such entries are skipped; the least radius is counted once per column.
     ///
-    /// If an entry of `other` is not finite, every radius of the product is not finite either, so that a skipped zero hides no overflow.
+    /// If an entry of `other` is not finite, every radius of the product is not finite either, so a skipped zero hides no overflow.
     pub(super) fn times(&self, other: &Self) -> Self {
         let (rows, columns, inner) = (self.mean.rows(), other.mean.columns(), self.mean.columns());
-        // The part of each entry that is no mean: its slopes and its radius. Products of two such parts are of the second order and go into the radius.
+        // The part of each entry beside the mean: its slopes and its radius. Products of two such parts are of the second order and go into the radius.
         let uneven = |span: &Self| span.reach(|_, _, _| 0.0);
         let (own, others) = (uneven(self), uneven(other));
         let sizes = absolute(&other.mean);
-        // Roundings of the mean and of the slopes, which are sums of `inner` or of twice `inner` products: a share of |M|·|M'| and of the product of the
+        // Roundings of the mean and of the slopes, sums of `inner` or of twice `inner` products: a share of |M|·|M'| and of the product of the
         // largest sizes.
         let share = gamma(2 * inner + 4) * real(1 + self.slopes.len());
         let weighted = |one: &Matrix, by: f64| Matrix::from_fn(inner, columns, |i, j| one[(i, j)] + share * (by * sizes[(i, j)] + others[(i, j)]));
@@ -135,6 +136,7 @@ impl StepSpan {
             slopes: vec![Matrix::zeros(rows, columns); self.slopes.len()],
             radius: Matrix::from_fn(rows, columns, |_, column| of_least[column]),
         };
+        // The radius of the product is |M|·R' + R·|M'| + U·U', with U the slopes and the radius together.
         for row in 0..rows {
             for place in 0..inner {
                 let (mean, radius, uneven) = (self.mean[(row, place)], self.radius[(row, place)] - least_radius, own[(row, place)] - least_uneven);
@@ -162,7 +164,7 @@ impl StepSpan {
     }
 }
 
-/// Largest number of steps of a frame that is multiplied in order, which takes fewer operations than halves do: a step is sparse, a product of steps is not.
+/// Largest number of steps of a frame multiplied in order. The order takes fewer operations than halves: a step is sparse, a product of steps is not.
 const SHORT: usize = 32;
 
 /// Steps of a frame over a box.
@@ -175,14 +177,14 @@ pub(super) struct FrameSpan {
 }
 
 impl FrameSpan {
-    /// Returns the frame of steps that are each a kind of their own.
+    /// Returns the frame of steps of different kinds.
     pub(super) fn of(steps: Vec<StepSpan>) -> Self {
         Self { order: (0..steps.len()).collect(), kinds: steps }
     }
 
     /// Returns the product of all steps, with the first step at the right. A long frame is multiplied in pairs of neighbours, then in pairs of these products,
-    /// and so on. The error of a step then passes through a logarithmic number of products. In order it would be multiplied by the sizes of the entries of all
-    /// later steps, whose product grows without end. Equal pairs are multiplied once.
+    /// and so on. The error of a step then passes through a logarithmic number of products. In order the error would be multiplied by the sizes of the entries
+    /// of all later steps, and their product grows without end. Equal pairs are multiplied once.
     pub(super) fn product(&self) -> StepSpan {
         if self.order.len() <= SHORT {
             return self.product_in_order();
@@ -191,7 +193,7 @@ impl FrameSpan {
         let mut spans: Vec<Cow<'_, StepSpan>> = self.kinds.iter().map(Cow::Borrowed).collect();
         while order.len() > 1 {
             let mut known = BTreeMap::new();
-            // `spans` grows by each new product; `order` holds places in `spans`, so that equal pairs of places are equal pairs of matrices.
+            // `spans` grows by each new product; `order` holds places in `spans`, so equal pairs of places are equal pairs of matrices.
             let joined = order.chunks(2).map(|pair| match *pair {
                 [first, second] => *known.entry((first, second)).or_insert_with(|| {
                     let product = spans[second].times(&spans[first]);
@@ -205,7 +207,7 @@ impl FrameSpan {
         spans.swap_remove(order[0]).into_owned()
     }
 
-    /// Returns the same product, bounded step by step, as the program that checks certificates bounds it.
+    /// Returns the same product, bounded step by step as by the checker of certificates.
     pub(super) fn product_in_order(&self) -> StepSpan {
         let mut steps = self.order.iter().map(|kind| &self.kinds[*kind]);
         let first = steps.next().expect("a frame has a step").clone();
@@ -213,7 +215,7 @@ impl FrameSpan {
     }
 }
 
-/// Adds `factor` times a row to a row. A factor of zero adds nothing, also if the row is not finite.
+/// Adds `factor` times a row to a row. A factor of zero adds nothing, even if the row is not finite.
 fn add(sum: &mut [f64], factor: f64, row: &[f64]) {
     if factor != 0.0 {
         sum.iter_mut().zip(row).for_each(|(sum, entry)| *sum += factor * entry);

@@ -106,7 +106,7 @@ pub(super) struct StepMatrix {
     pub(super) error: f64,
 }
 
-/// Name of a state of a frame, which is a row and a column of its matrix.
+/// Name of a state of a frame, a row and a column of the frame's matrix.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum FrameState {
     /// Position or velocity of the device of a class.
@@ -127,19 +127,19 @@ pub enum FrameState {
     Sample {
         /// The place of the class.
         class: usize,
-        /// Number of the sample: −1 is the last sample before the frame, −2 the sample before that.
+        /// Number of the sample: −1 is the last sample before the frame, −2 the sample before −1.
         number: i64,
-        /// Channel of the sample: 0 is the position and 1 the velocity, or 0 is the only number that is heard.
+        /// Channel of the sample: 0 is the position and 1 the velocity, or 0 is the only heard number.
         channel: usize,
     },
-    /// Force in a sample of a server that is meant for a class.
+    /// Force for a class in a sample of a server.
     Returned {
-        /// The place of the class that receives the force.
+        /// The place of the class of the receiver.
         class: usize,
         /// Number of the sample, counted as in [`FrameState::Sample`].
         number: i64,
     },
-    /// Sum of the waves of a sample that a class receives from all other peers, or that all other peers receive from the class.
+    /// Sum of the waves of a sample from all other peers to a class, or from the class to all other peers.
     Waves {
         /// The place of the class.
         class: usize,
@@ -148,7 +148,7 @@ pub enum FrameState {
         /// `true` if the other peers receive the waves, instead of the class.
         of_others: bool,
     },
-    /// Force that waits for the next tick, or number that a law remembers.
+    /// Force waiting for the next tick, or number of a law's memory.
     Other {
         /// The place of the class.
         class: usize,
@@ -174,7 +174,7 @@ impl FrameState {
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 impl Plan {
-    /// Returns the plan of a timetable. `heard`: at least one sample is heard with a gain that is not zero. `ages`: a law uses the ages of samples.
+    /// Returns the plan of a timetable. `heard`: at least one sample is heard with a nonzero gain. `ages`: a law uses the ages of samples.
     fn of(timetable: &Timetable, heard: bool, ages: bool) -> Self {
         let nodes = timetable.sent.len();
         let instants = ages.then(|| Instants::of(timetable));
@@ -190,7 +190,7 @@ impl Plan {
         for event in &timetable.events {
             match *event {
                 Event::Sample { node } => {
-                    // Samples come before the ticks of a step, so that a sample after a tick begins a new step.
+                    // Samples come before the ticks of a step, so a sample after a tick begins a new step.
                     if steps.last().is_none_or(|step| !step.ticks.is_empty()) {
                         steps.push(Step::default());
                     }
@@ -221,6 +221,7 @@ impl Plan {
         }
         let live = live(&steps, &timetable.sent);
         let (mut known, mut firsts) = (BTreeMap::new(), Vec::new());
+        // Steps with the same live samples and the same ticks have the same matrix, which is then computed once.
         let kinds = steps.iter().zip(live.windows(2)).enumerate().map(|(place, (step, live))| {
             *known.entry(step.kind(&live[0], &live[1])).or_insert_with(|| {
                 firsts.push(place);
@@ -230,8 +231,8 @@ impl Plan {
         Self { kinds: kinds.collect(), steps, live, firsts, oldest }
     }
 
-    /// Returns the states of the frame in the order of its rows and columns. The position of the first copy is no state unless the scene is tied to ground: all
-    /// positions are counted from that copy.
+    /// Returns the states of the frame in the order of its rows and columns. The position of the first copy is a state only in a scene tied to ground.
+    /// Otherwise all positions are counted from the first copy.
     pub(super) fn states(&self, nodes: &[Node], channels: usize, tied: bool) -> Vec<FrameState> {
         let mut names = Vec::new();
         for (place, node) in nodes.iter().enumerate() {
@@ -265,8 +266,8 @@ impl Plan {
             rows.push(node.rows(count));
             count += node.states();
         }
-        // `z` has a row for every state of the nodes, and a column for every state before the step. The reference has a row, which stays zero until the
-        // reference moves, and no column.
+        // `z` has a row for every state of the nodes, and a column for every state before the step. The reference has no column and a row. The row stays zero
+        // until the reference moves.
         let reference = (!tied).then(|| rows[0].object);
         let states = count - usize::from(reference.is_some());
         let columns = states + before.len() * channels;
@@ -332,8 +333,8 @@ pub(super) fn error(nodes: &[Node], scale: Scale, oldest: f64) -> f64 {
     ROUNDING * nodes.iter().map(|node| node.step_norm_up_to(scale, oldest)).fold(1.0, f64::max)
 }
 
-/// Returns the samples that are states before each step, and after the last step: samples sent before the step that are used from the step on, in this frame or
-/// a later one.
+/// Returns the samples among the states before each step, and after the last step: samples sent before the step and used from the step on, in this frame or
+/// a later frame.
 fn live(steps: &[Step], sent: &[usize]) -> Vec<Vec<SampleName>> {
     let mut last: BTreeMap<SampleName, usize> = BTreeMap::new();
     for (place, step) in steps.iter().enumerate() {
@@ -343,6 +344,7 @@ fn live(steps: &[Step], sent: &[usize]) -> Vec<Vec<SampleName>> {
     }
     let whole = |number: usize| i64::try_from(number).unwrap_or(i64::MAX);
     let oldest = last.keys().map(|(_, sample)| *sample).min().unwrap_or(0).min(0);
+    // A sample that this frame uses under the number s is the sample s − k·period of the frame k frames later.
     let later = |(node, sample): SampleName| {
         let period = whole(sent[node]).max(1);
         (1..).map(|frames| sample - frames * period).take_while(|sample| *sample >= oldest).any(|sample| last.contains_key(&(node, sample)))

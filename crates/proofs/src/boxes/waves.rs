@@ -1,18 +1,18 @@
-//! Frames of copies that are tied by waves.
+//! Frames of copies tied by waves.
 //!
-//! Each pair of copies i and j has a line with waves sᵢⱼ in either direction. Over equal links between equal clocks bodies feel only two sums of waves: the
-//! waves that a copy receives, S = Σⱼ sᵢⱼ, and the waves that all others receive from the copy, P = Σⱼ sⱼᵢ. Waves are written as forces (times ρ). Let d be the
-//! distance that a copy has moved since the last sample, ⟨ ⟩ the mean over the ticks since then, and d̄ the mean of d over all others. Then
+//! Each pair of copies i and j has a line with waves sᵢⱼ in either direction. Over equal links between equal clocks only two sums of waves act on bodies: the
+//! waves to a copy, S = Σⱼ sᵢⱼ, and the waves from the copy to all other copies, P = Σⱼ sⱼᵢ. Waves are written as forces (times ρ). Let d be the
+//! motion of a copy since the last sample, ⟨ ⟩ the mean over the ticks since then, and d̄ the mean of d over all other copies. Then
 //!
 //! ```text
 //! S ← 2·b·d̄/(M·h) − ⟨P⟩        P ← 2·b·d/(M·h) − ⟨S⟩        force on the copy: S − b·v
 //! ```
 //!
-//! All other combinations of waves are reflected for ever with eigenvalues of modulus 1, and no body feels them (see `unseen.rs` of `cohaptic-stability`). They
-//! are left out here. Averages of classes and differences within a class do not mix, and the number of peers enters d̄ only. The sums of S and of P over all
-//! peers are equal, so that in the averages the P of one class follows from all other sums. With two peers every P is the S of the other peer.
+//! All other combinations of waves are reflected for ever with eigenvalues of modulus 1, without an effect on bodies (see `unseen.rs` of `cohaptic-stability`).
+//! Such combinations are left out here. Averages of classes and differences within a class do not mix, and the number of peers enters d̄ only. The sums of S
+//! and of P over all peers are equal, so in the averages the P of one class follows from all other sums. With two peers every P is the S of the other peer.
 //!
-//! Waves carry no position, so that a copy may be anywhere unless an arm holds its device. Positions of a class are therefore counted from its copy.
+//! Waves carry no position, so a copy may be anywhere unless an arm holds its device. Positions of a class are therefore counted from its copy.
 
 use std::time::Duration;
 
@@ -33,7 +33,7 @@ use super::pushed::{Pushed, copy, coupling, device, moved, negative};
 /// Coordination by waves over equal links between equal clocks.
 #[derive(Clone, Debug)]
 pub(super) struct Waves {
-    /// Frame of one node that hears itself, which is the frame of every peer.
+    /// Frame of one node hearing itself, equal to the frame of every peer.
     line: Timetable,
     /// Number M of ticks from one sample to the next.
     every: usize,
@@ -50,7 +50,7 @@ const ON_LOSS: usize = 1;
 const HOLD: usize = 1;
 
 impl Waves {
-    /// Returns the waves of scenes that differ in numbers only, and the classes of the peers of these scenes; `None` if no waves tie the copies.
+    /// Returns the waves of scenes with different numbers, and the classes of the peers of these scenes; `None` if no waves tie the copies.
     pub(super) fn structure(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts) -> Result<Option<(Structure, Self)>, ProofError> {
         let scene = scenes[0];
         if !Self::tie(scene) {
