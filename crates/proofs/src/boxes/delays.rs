@@ -1,7 +1,7 @@
-//! A delay of links as a key, whose range falls into stretches with one frame each.
+//! A delay of links as a key. The range of the key falls into stretches with one frame each.
 //!
-//! A sample comes into force at the first tick at or after its arrival. A longer delay makes that tick no earlier, and makes no age smaller that a law takes
-//! from the delay. So if the frames of two delays have the same events, held samples and laws, the frame of every delay between the two has the same too: a
+//! A sample comes into force at the first tick at or after its arrival. A longer delay makes the tick no earlier, and makes no age in a law
+//! smaller. So if the frames of two delays have the same events, held samples and laws, the frame of every delay between the two has the same too: a
 //! *stretch* of delays is one scene. Delays are whole nanoseconds, and two stretches are neighbours if no whole nanosecond lies between them.
 
 use cohaptic_scene::Scene;
@@ -34,6 +34,7 @@ fn per_unit(range: &KeyRange) -> Option<f64> {
 pub(super) fn stretches(range: &KeyRange, frame: impl Fn(f64) -> Result<String, ProofError>) -> Result<Vec<[f64; 2]>, ProofError> {
     let Some(unit) = per_unit(range) else { return Err(ProofError::Key { key: range.key.clone() }) };
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a delay in whole nanoseconds, which saturates")]
+    // The ends of the range may lie between two whole nanoseconds; only whole nanoseconds inside the range are delays.
     let [low, high] = [(range.low * unit).ceil() as u64, (range.high * unit).floor() as u64];
     #[expect(clippy::cast_precision_loss, reason = "a delay of less than 2^53 nanoseconds")]
     let value = |nanoseconds: u64| (nanoseconds as f64 / unit).clamp(range.low, range.high);
@@ -41,8 +42,8 @@ pub(super) fn stretches(range: &KeyRange, frame: impl Fn(f64) -> Result<String, 
     while from <= high {
         let here = frame(value(from))?;
         let is_same = |delay: u64| Ok::<_, ProofError>(frame(value(delay))? == here);
-        // `same` is a delay known to belong to this stretch, `other` a delay known to lie beyond. Most stretches are as long as the stretch before, so that the
-        // end of a stretch of that length is tried first: two frames then replace a bisection.
+        // `same` is a delay known to belong to this stretch, `other` a delay known to lie beyond. Most stretches are as long as the stretch before, so the
+        // end of a stretch of the same length is tried first: two frames then replace a bisection.
         let (mut same, mut other) = (from, high + 1);
         let guess = from.saturating_add(length);
         if guess < high && is_same(guess)? {
@@ -51,6 +52,7 @@ pub(super) fn stretches(range: &KeyRange, frame: impl Fn(f64) -> Result<String, 
                 other = guess + 1;
             }
         }
+        // One frame at the end of the range replaces the bisection of the last stretch.
         if other > high && is_same(high)? {
             same = high;
         }
@@ -72,7 +74,7 @@ pub(super) fn stretches(range: &KeyRange, frame: impl Fn(f64) -> Result<String, 
     Ok(found)
 }
 
-/// Returns whether two scenes agree in objects, coordination, peers and timeline, so that links are all that can differ.
+/// Returns whether two scenes agree in objects, coordination, peers and timeline, so only links can differ.
 pub(super) fn differ_in_delays_alone(one: &Scene, other: &Scene) -> bool {
     let without = |scene: &Scene| format!("{:?} {:?} {:?} {:?}", scene.object, scene.coordination, scene.peers, scene.timeline);
     without(one) == without(other)

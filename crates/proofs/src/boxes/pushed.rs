@@ -1,4 +1,4 @@
-//! Steps of bodies under forces, as operations of a [program](super::program). Forces are multiplied by a compliance, so that registers hold lengths \[m\].
+//! Steps of bodies under forces, as operations of a [program](super::program). Forces are multiplied by a compliance, so registers hold lengths \[m\].
 
 use std::time::Duration;
 
@@ -24,7 +24,7 @@ pub(super) fn copy(class: usize) -> StateRegisters {
     state(|velocity| Register::Body { class, of_copy: true, velocity })
 }
 
-/// Returns the force of a coupling on the object, K·(x_device − x_object) + B·(v_device − v_object), times the compliance. A body that is `None` has no part in
+/// Returns the force of a coupling on the object, K·(x_device − x_object) + B·(v_device − v_object), times the compliance. A body `None` has no part in
 /// the motion and is at rest.
 pub(super) fn coupling(gains: Gains, device: Option<StateRegisters>, object: Option<StateRegisters>, scale: Scale) -> Sum {
     let gains = scale.gains(gains);
@@ -46,7 +46,7 @@ pub(super) struct Pushed {
     pub(super) force: Sum,
 }
 
-/// Returns the operations of a tick of the bodies of a class. `is_late`: the class computes for a whole tick, so that forces act one tick later.
+/// Returns the operations of a tick of the bodies of a class. `is_late`: the class computes for a whole tick, and forces act one tick later.
 pub(super) fn moved(class: usize, bodies: &[Pushed], is_late: bool, span: Duration, scale: Scale) -> Vec<Operation> {
     // All forces come first: they depend on the states of the bodies before any body moves.
     let forces = bodies.iter().map(|pushed| force_of(class, pushed, is_late));
@@ -64,5 +64,6 @@ fn step_of(class: usize, Pushed { body, is_copy, .. }: &Pushed, span: Duration, 
 
 fn force_of(class: usize, Pushed { is_copy, force, .. }: &Pushed, is_late: bool) -> Operation {
     let (acting, pending) = (Register::Force { class, on_copy: *is_copy }, Register::Pending { class, on_copy: *is_copy });
+    // A late class applies the force of the tick before and keeps the new force. Both happen at once, so the old force is not overwritten first.
     if is_late { vec![(acting, vec![(pending, 1.0)]), (pending, force.clone())] } else { vec![(acting, force.clone())] }
 }

@@ -59,12 +59,14 @@ impl Waves {
         if scene.object.enclosure.is_some() {
             return Err(ProofError::WallLeftOut { strategy: scene.coordination.strategy.name() });
         }
+        // Only equal links and clocks leave two sums of waves. Unequal links would tell the lines of a copy apart.
         if !network.is_uniform() || !has_equal_clocks(scene) || scene.peers.iter().any(|peer| peer.phase != scene.peers[0].phase) {
             return Err(ProofError::UnequalWaves);
         }
         let structure = Structure::of_any_law(scenes, network, contacts, |_, _| false)?;
         let clock = NodeClock::of(scene, 0);
         let line = Timetable::with_use_of_held(&[clock], &[(0, 0, network.timing(0, 1).clone())], UseOfHeld::SamplesAndTicks)?;
+        // Any scene of the box may have an arm, and a class tied in one scene has no free position to measure from.
         let arm = |class: &Vec<usize>| contacts.touching[class[0]] && scenes.iter().any(|scene| scene.device_plant(class[0]).stiffness > 0.0);
         let every = usize::try_from(clock.every).unwrap_or(usize::MAX);
         let on_loss = scene.coordination.settings.of(scene.coordination.strategy).get(ON_LOSS);
@@ -73,7 +75,7 @@ impl Waves {
         Ok(Some((structure, Self { line, every, period, holds: on_loss == LawValue::Word(HOLD), tied })))
     }
 
-    /// Returns the node of each class, whose law has the damping b of the wave lines.
+    /// Returns the node of each class, with the damping b of the wave lines as its law.
     pub(super) fn nodes(structure: &Structure, scene: &Scene) -> Vec<Node> {
         let node = |class: usize| {
             let own = Gains { stiffness: 0.0, damping: scene.own_damping(structure.classes[class][0]) };
@@ -88,7 +90,7 @@ impl Waves {
         scene.coordination.strategy == Coordination::Wave
     }
 
-    /// Returns a frame over a box. The weights of `points` are the weights with which classes hear each other, for averages [with shares](with_shares). `ends`:
+    /// Returns a frame over a box. The weights of `points` are the weights of the heard classes, for averages [with shares](with_shares). `ends`:
     /// the nodes of the part at the corners of the box.
     pub(super) fn frame(&self, part: &Part<'_>, points: &[Point], ends: &[Vec<Node>], time: f64) -> Result<NamedFrame, ProofError> {
         let scale = Scale { time, compliance: ends[0][0].compliance(time) };
@@ -104,12 +106,12 @@ pub(super) struct Part<'a> {
     pub(super) apart: Option<usize>,
     /// Class whose P follows from all other sums.
     pub(super) rest: usize,
-    /// `true` if the scene has exactly two peers, so that every P is the S of the other peer.
+    /// `true` if the scene has exactly two peers, and every P is the S of the other peer.
     pub(super) is_pair: bool,
 }
 
 impl<'a> Part<'a> {
-    /// Returns the part for the number of peers that a scene has.
+    /// Returns the part for the number of peers of the scene.
     pub(super) fn of(structure: &'a Structure, apart: Option<usize>) -> Self {
         Self { structure, apart, rest: structure.classes.len() - 1, is_pair: structure.peers == 2 }
     }
@@ -127,13 +129,13 @@ pub(super) fn with_shares(weights: &Matrix, shares: &[f64]) -> Matrix {
     Matrix::from_fn(classes + 1, classes, |row, column| if row < classes { weights[(row, column)] } else { shares[column] })
 }
 
-/// Number of the sampling whose waves are in force, indexed by tick of the frame; `None` where no waves are in force.
+/// Number of the sampling with its waves in force, indexed by tick of the frame; `None` if no waves are in force.
 struct InForce(Vec<Option<i64>>);
 
 impl InForce {
     fn new(line: &Timetable, every: usize, holds: bool) -> Self {
         let mut of = Vec::new();
-        // A frame is not shorter than a wave, so that the state after one frame is the state after every frame.
+        // A frame is not shorter than a wave, so the state after one frame is the state after every frame.
         let mut newest: Option<(i64, usize)> = None;
         for frame in [-1, 0] {
             of.clear();
@@ -142,12 +144,14 @@ impl InForce {
                     Event::Sample { .. } => {}
                     Event::Deliver { sample, .. } => newest = Some((sample, 0)),
                     Event::Tick { .. } => {
+                        // A wave drives for M ticks. With `hold` the last wave drives on until the next wave arrives.
                         of.push(newest.filter(|(_, ticks)| holds || *ticks < every).map(|(sample, _)| sample));
                         newest = newest.map(|(sample, ticks)| (sample, ticks + 1));
                     }
                 }
             }
             if frame < 0 {
+                // The pass before counts samples from its own frame, which began one frame earlier.
                 newest = newest.map(|(sample, ticks)| (sample - whole(line.sent[0]), ticks));
             }
         }
@@ -166,7 +170,7 @@ fn whole(number: usize) -> i64 {
     i64::try_from(number).unwrap_or(i64::MAX)
 }
 
-/// Frame of a part of a scene at a point, whose nodes are those of all classes, or the node of the class whose members differ.
+/// Frame of a part of a scene at a point, with the nodes of all classes, or for differences with the node of their class.
 struct Frame<'a> {
     waves: &'a Waves,
     part: &'a Part<'a>,
@@ -188,6 +192,7 @@ impl Frame<'_> {
                     sample += 1;
                 }
                 Event::Tick { span, .. } => {
+                    // Equal clocks: all classes tick at the same instant, as one step.
                     steps.push((0..self.point.nodes.len()).flat_map(|place| self.ticked(place, tick, span)).collect());
                     tick += 1;
                 }
@@ -203,12 +208,12 @@ impl Frame<'_> {
         self.part.apart.unwrap_or(place)
     }
 
-    /// Returns the register of S, the waves of a sampling that a class receives.
+    /// Returns the register of S, the waves of a sampling to a class.
     fn gets(&self, place: usize, number: i64) -> Register {
         Register::Waves { class: self.class(place), number, of_others: false }
     }
 
-    /// Returns P, the waves of a sampling that all others receive from a class, as a sum of registers.
+    /// Returns P, the waves of a sampling from a class to all other peers, as a sum of registers.
     fn others_get(&self, place: usize, number: i64) -> Sum {
         let own = |place: usize| Register::Waves { class: self.class(place), number, of_others: true };
         let places = 0..self.point.nodes.len();
@@ -218,7 +223,7 @@ impl Frame<'_> {
         if self.part.apart.is_some() || place != self.part.rest {
             return vec![(own(place), 1.0)];
         }
-        // The sums of S and of P over all peers are equal, which determines the P of the last class.
+        // The sums of S and of P over all peers are equal. The equality gives the P of the last class.
         let of = |other: usize| {
             let by = self.point.weights[(places.len(), other)];
             [(self.gets(other, number), by), (own(other), -by)]
@@ -226,13 +231,13 @@ impl Frame<'_> {
         places.clone().filter(|other| *other != place).flat_map(of).chain([(self.gets(place, number), 1.0)]).collect()
     }
 
-    /// Returns the distance that a class has moved since the sampling before `number`, times a factor.
+    /// Returns the motion of a class since the sampling before `number`, times a factor.
     fn moved(&self, place: usize, number: i64, by: f64) -> [(Register, f64); 2] {
         let class = self.class(place);
         [(copy(class)[0], by), (Register::Sample { class, number: number - 1, velocity: false }, -by)]
     }
 
-    /// Returns the operation that takes sampling `number` of all classes, before their tick with the number `tick`.
+    /// Returns the operation of taking sampling `number` of all classes, before the tick with the number `tick` of the classes.
     fn sampled(&self, number: i64, tick: i64) -> Operation {
         let places = 0..self.point.nodes.len();
         // Negative mean over the M ticks since the last sampling, −⟨ ⟩.
@@ -240,9 +245,11 @@ impl Frame<'_> {
             let in_force = (tick - whole(self.waves.every)..tick).filter_map(|tick| self.heard.at(tick, self.waves.line.sent[0]));
             in_force.flat_map(of).map(|(register, by)| (register, -by / real(self.waves.every))).collect()
         };
+        // The factor 2·b/(M·h) of the module head, with forces as lengths.
         let answer = |place: usize| 2.0 * self.point.nodes[place].law.force.own.damping * self.scale.compliance / self.waves.period;
         let mut set = Vec::new();
         for place in places.clone() {
+            // All sums of the operation read the values from before, so S and P of a sampling may refer to each other's older samplings.
             let others = places.clone().flat_map(|other| self.moved(other, number, answer(other) * self.point.weights[(place, other)]));
             set.push((self.gets(place, number), others.chain(mean(&|sample| self.others_get(place, sample))).collect()));
             let own = self.moved(place, number, answer(place));

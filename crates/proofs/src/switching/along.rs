@@ -11,7 +11,7 @@ use super::error::SwitchingError;
 pub(super) struct Along<'a> {
     pub(super) scene: &'a Scene,
     axis: usize,
-    /// Contacts that hold whatever opens and closes, and the pushes along the axis; walls are left open.
+    /// Grasps, held at all times, and the pushes along the axis; walls are left open.
     pub(super) contacts: Contacts,
 }
 
@@ -27,8 +27,8 @@ impl<'a> Along<'a> {
         Self { scene, axis, contacts: Contacts { touching, at_wall: false, absent: piece.absent.clone() } }
     }
 
-    /// Returns whether a peer pushes along the axis to larger positions (`true`) or to smaller positions (`false`); `None` if the peer does not push along the
-    /// axis.
+    /// Returns the direction of a peer's push along the axis: to larger positions (`true`) or to smaller positions (`false`); `None` if the peer does not push
+    /// along the axis.
     pub(super) fn pushes(&self, peer: usize) -> Option<bool> {
         match self.scene.peers[peer].contact {
             ContactKind::Push(direction) if direction.axis == self.axis => Some(direction.positive),
@@ -36,8 +36,8 @@ impl<'a> Along<'a> {
         }
     }
 
-    /// Sets whether the structure is tied to ground: if the structure is silent, or if a peer whose arm has a stiffness grasps the object. The arm of a peer
-    /// that pushes does not tie the object, because that contact can open.
+    /// Sets whether the structure is tied to ground: if the structure is silent, or if a peer with a stiff arm grasps the object. The arm of a
+    /// pushing peer does not tie the object, because the contact can open.
     pub(super) fn tied(&self, mut structure: Structure) -> Structure {
         let holds = |class: &Vec<usize>| {
             self.contacts.touching[class[0]] && self.pushes(class[0]).is_none() && self.scene.device_plant(class[0]).stiffness > 0.0

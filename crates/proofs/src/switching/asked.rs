@@ -1,4 +1,4 @@
-//! The frames, groups of contacts and stable parts of a scene along one axis, from which the inequality and the certificate are made.
+//! The frames, groups of contacts and stable parts of a scene along one axis, for the inequality and the certificate.
 
 use cohaptic_stability::frames::{Lifted, Node, Sampling, Structure, Timetable, lifted_part};
 use cohaptic_stability::numerics::real;
@@ -19,7 +19,7 @@ pub(super) struct Asked {
     groups: Vec<Group>,
     /// Parts with contacts: the frame, the group of each contact of the frame, and whether the part is about differences of equal peers.
     pub(super) frames: Vec<(ContactFrame, Vec<usize>, bool)>,
-    /// Indexed as `frames`: the class whose differences the part is about (`None`: the averages), and the number of sample values of earlier frames in the
+    /// Indexed as `frames`: the class of the differences (`None`: the averages), and the number of sample values of earlier frames in the
     /// states, indexed by class of the part.
     pub(super) parts: Vec<(Option<usize>, Vec<usize>)>,
     pub(super) sampling: Sampling,
@@ -29,7 +29,7 @@ pub(super) struct Asked {
     pub(super) tied: bool,
     /// `true` if every part without contacts is stable.
     rest_is_stable: bool,
-    /// Certificates of the parts without contacts, where a certificate exists.
+    /// Certificates of the parts without contacts, if a certificate exists.
     pub(super) rest: Vec<PartCertificate>,
 }
 
@@ -41,6 +41,7 @@ impl Asked {
         for (class, members) in structure.classes.iter().enumerate() {
             for contact in along.of_class(structure, class, class, true)? {
                 let is_wall = contact.kind == Kind::Wall;
+                // A spring to ground pulls a copy or an armed device back to its rest, and at rest a push or a wall may be open.
                 let has_rest = structure.tied && (is_wall || contact.armed);
                 groups.push(Group { ticks: ticks[class], members: real(members.len()), is_wall, has_rest });
                 contacts.push(contact);
@@ -49,6 +50,7 @@ impl Asked {
         let history: usize = structure.timetable.depth.iter().sum::<usize>() * quotient.sampling.channels();
         let states = nodes.iter().map(Node::states).sum::<usize>() + history;
         let ticks = groups.iter().map(|group| group.ticks).sum::<usize>();
+        // The size is known before any matrix is made, so a scene beyond the limit costs nothing.
         let rows = states + 2 * ticks + groups.len();
         if rows > MOST_ROWS {
             return Err(SwitchingError::TooLarge { ticks, states, rows, most: MOST_ROWS });
@@ -69,6 +71,7 @@ impl Asked {
             let weight = Matrix::from_fn(1, 1, |_, _| structure.difference_weight());
             let lifted = Lifted { nodes: &nodes[class..=class], weights: &weight, timetable, tied: true, ..quotient };
             let own: Vec<usize> = (0..contacts.len()).filter(|contact| contacts[*contact].node == class).collect();
+            // A part without contacts is linear. Its verdict follows from its radius alone, and no product of contacts refers to it.
             if own.is_empty() {
                 let part = lifted_part(&lifted, PartKind::Apart { peer: structure.classes[class][0] }, 1, Method::Reduced, watch)?;
                 asked.rest_is_stable &= part.radius.value + part.radius.error < 1.0;
@@ -93,7 +96,7 @@ impl Asked {
         self.groups.iter().any(|group| group.has_rest)
     }
 
-    /// Returns the inequality of all parts with contacts, or `None` if a part without contacts is not stable or the inequality cannot be written down.
+    /// Returns the inequality of all parts with contacts, or `None` if a part without contacts is not stable or the inequality has no finite form.
     pub(super) fn inequality(&self) -> Option<Inequality> {
         let parts: Vec<PartFrame<'_>> =
             self.frames.iter().map(|(frame, groups, is_apart)| PartFrame { frame, groups, is_apart: *is_apart }).collect();

@@ -1,7 +1,7 @@
-//! The search for a motion that grows while contacts open and close.
+//! The search for a growing motion with opening and closing contacts.
 //!
 //! Away from walls a motion times a is a motion too, for any a > 0. So the search follows a motion frame by frame and scales the motion back to the same size
-//! after each frame, from several beginnings. A motion that grows by a large factor over many frames, the first frames not counted, is taken to grow without
+//! after each frame, from several beginnings. A motion with large growth over many frames, the first frames not counted, is taken to grow without
 //! bound.
 
 use cohaptic_stability::Watch;
@@ -9,25 +9,25 @@ use cohaptic_stability::numerics::real;
 
 use super::contact_frame::ContactFrame;
 
-/// A motion that grows.
+/// A growing motion.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct GrowingMotion {
     /// Mean factor of growth per frame.
     pub growth: f64,
     /// Number of frames over which the growth was measured. As many frames before them let the motion settle.
     pub frames: usize,
-    /// Number of times that a contact opened or closed in the measured frames.
+    /// Number of openings and closings of contacts in the measured frames.
     pub changes: usize,
 }
 
-/// Number of beginnings that the search tries.
+/// Number of tried beginnings.
 pub(super) const BEGINNINGS: usize = 8;
-/// Number of frames that the search follows from each beginning.
+/// Number of followed frames from each beginning.
 pub(super) const FRAMES: usize = 4000;
-/// Factor by which the second half of the frames must magnify a motion that is taken to grow.
+/// Least factor over the second half of the frames of a motion taken to grow.
 const MUCH: f64 = 1e4;
 
-/// Returns the fastest of the motions that grow, or `None` if none of the beginnings leads to growth.
+/// Returns the fastest growing motion, or `None` if none of the beginnings leads to growth.
 pub(super) fn search(frame: &ContactFrame, watch: &dyn Watch) -> Option<GrowingMotion> {
     let found = (0..BEGINNINGS).map_while(|beginning| (!watch.stops()).then(|| follow(frame, beginning)));
     found.flatten().max_by(|one, other| one.growth.total_cmp(&other.growth))
@@ -38,7 +38,7 @@ struct Motion<'a> {
     frame: &'a ContactFrame,
     /// States of the frame, then the inputs of the frame.
     values: Vec<f64>,
-    /// Absolute position of the reference, from which all other positions are measured.
+    /// Absolute position of the reference of all other positions.
     reference: f64,
     /// `true` if a contact was closed at its last tick, indexed by contact.
     closed: Vec<bool>,
@@ -48,7 +48,7 @@ struct Motion<'a> {
 /// Follows the motion from one beginning. `None` if the motion does not grow enough, dies out entirely or overflows.
 fn follow(frame: &ContactFrame, beginning: usize) -> Option<GrowingMotion> {
     let states = frame.next.rows();
-    // A beginning without symmetry, different for each number, so that motions of every kind take part.
+    // A beginning without symmetry, different for each number, so motions of every kind take part.
     let some = |place: usize| libm::sin(1.0 + 7.3 * real(place) + 2.9 * real(beginning) * (1.0 + real(place % 5)));
     let mut values: Vec<f64> = (0..states).map(some).collect();
     values.resize(frame.next.columns(), 0.0);
@@ -84,6 +84,7 @@ impl Motion<'_> {
             // The position of a device with an arm is absolute, the position of its copy is relative to the reference.
             let apart = if contact.contact.armed && frame.reference.is_some() { -contact.contact.sign() * self.reference } else { 0.0 };
             let depth = dot(&contact.depths[tick], &self.values) + apart;
+            // A contact pushes only: the damper may reduce the force to zero, but never below.
             let force = if depth > 0.0 { (depth + dot(&contact.rates[tick], &self.values)).max(0.0) } else { 0.0 };
             self.values[contact.first + tick] = force;
             let closed = force > 0.0;
@@ -98,6 +99,7 @@ impl Motion<'_> {
     }
 
     fn shrink(&mut self, size: f64) {
+        // The equations of contacts are homogeneous of degree one, so a motion divided by its size is a motion again, with the same contacts.
         self.values.iter_mut().for_each(|value| *value /= size);
         self.reference /= size;
     }

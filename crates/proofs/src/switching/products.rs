@@ -11,7 +11,7 @@ pub(super) struct Group {
     /// Number of peers of the class.
     pub(super) members: f64,
     pub(super) is_wall: bool,
-    /// `true` if depths are measured from a rest in which the contact is open.
+    /// `true` if depths are measured from a rest with the contact open.
     pub(super) has_rest: bool,
 }
 
@@ -21,7 +21,7 @@ pub(super) struct PartFrame<'a> {
     pub(super) frame: &'a ContactFrame,
     /// Index of the group of each contact of the frame.
     pub(super) groups: &'a [usize],
-    /// `true` if the part is about the differences of equal peers.
+    /// `true` for the differences of equal peers.
     pub(super) is_apart: bool,
 }
 
@@ -50,10 +50,12 @@ pub(super) fn inequality(parts: &[PartFrame<'_>], groups: &[Group]) -> Option<In
     let mut multipliers = Multipliers { first: Vec::new(), shared: Vec::new(), free: Vec::new(), groups };
     for group in groups {
         multipliers.first.push(multipliers.free.len());
+        // Only product (a) is an equality, f·(f − p − v) = 0, so only its multiplier, the first of a tick, may have either sign.
         let free = (0..group.ticks * PRODUCTS).map(|number| number % PRODUCTS == 0);
         multipliers.free.extend(free);
     }
-    // Copies with common walls have products with each other. A group of one copy has none with itself; a group with a rest has products with the rest instead.
+    // Copies with common walls have products with each other. A group of one copy has no products with itself; a group with a rest has products with the rest
+    // instead.
     for (one, first) in groups.iter().enumerate() {
         for (other, second) in groups.iter().enumerate() {
             if first.is_wall && second.is_wall && !first.has_rest && (one != other || first.members > 1.0) {
@@ -74,11 +76,11 @@ struct Multipliers<'a> {
     first: Vec<usize>,
     /// Pairs of groups of walls: the group of copy i, the group of copy j, and the index of the pair's first multiplier.
     shared: Vec<(usize, usize, usize)>,
-    /// `true` if a multiplier may be below zero, indexed by multiplier: true only for those of (a).
+    /// `true` if a multiplier may be below zero, indexed by multiplier: true only for (a).
     free: Vec<bool>,
 }
 
-/// Returns the inequality of one part. The unknowns are the states that are not loose, the forces, and the p of each contact at each tick and at the next
+/// Returns the inequality of one part. The unknowns are the states but the loose states, the forces, and the p of each contact at each tick and at the next
 /// frame's first tick. `None` if a row depends on a loose state.
 fn part_of(part: &PartFrame<'_>, shape: usize, multipliers: &Multipliers<'_>) -> Option<Part> {
     let frame = part.frame;
@@ -86,7 +88,7 @@ fn part_of(part: &PartFrame<'_>, shape: usize, multipliers: &Multipliers<'_>) ->
     let columns: Vec<usize> = states.iter().copied().chain(frame.next.rows()..frame.next.columns()).collect();
     let unknowns = columns.len() + frame.contacts.iter().map(|contact| contact.depths.len()).sum::<usize>();
     let unit = |place: usize| Row { entries: (0..unknowns).map(|other| f64::from(u8::from(other == place))).collect(), error: 0.0 };
-    // Leaves the loose states out of a row, which is exact only if their coefficients are zero.
+    // Leaves the loose states out of a row. This is exact only if their coefficients are zero.
     let taken = |row: &[f64], error: f64| -> Option<Row> {
         let entries = columns.iter().map(|column| row[*column]).chain(std::iter::repeat_n(0.0, unknowns - columns.len())).collect();
         frame.loose.iter().all(|loose| row[*loose] == 0.0).then_some(Row { entries, error })
@@ -106,6 +108,7 @@ fn part_of(part: &PartFrame<'_>, shape: usize, multipliers: &Multipliers<'_>) ->
     for contact in &frame.contacts {
         let count = contact.rates.len();
         let pressed: Vec<usize> = (first..=first + count).map(|place| put(unit(place))).collect();
+        // The norm measures the depth p at the beginning of the frame and, in the same place, at the beginning of the next frame.
         before.push(pressed[0]);
         after.push(pressed[count]);
         let mut own = Vec::with_capacity(count);
@@ -117,6 +120,7 @@ fn part_of(part: &PartFrame<'_>, shape: usize, multipliers: &Multipliers<'_>) ->
             // The position of a loose device cancels in the difference of two depths.
             let deeper: Vec<f64> = contact.depths[tick].iter().zip(&contact.depths[tick + 1]).map(|(depth, next)| depth - next).collect();
             let mut opening = taken(&deeper, 4.0 * frame.error)?;
+            // b = p − depth, so b of the next tick less b of this tick is p_next − p − (depth_next − depth).
             opening.entries[first + tick] -= 1.0;
             opening.entries[first + tick + 1] += 1.0;
             // Without the check for loose states: groups with a rest and walls, the only users of this row, have no loose state.
@@ -140,6 +144,7 @@ fn part_of(part: &PartFrame<'_>, shape: usize, multipliers: &Multipliers<'_>) ->
             add(1, [tick.pressed, tick.rest], weight);
             add(2, [tick.force, tick.opening], weight);
             add(3, [tick.pressed, tick.opening], weight);
+            // The last product holds with the opposite sign: see (d) of the module head.
             add(4, [tick.pressed_next, tick.opening], -weight);
             if multipliers.groups[*group].has_rest {
                 let inside = put(tick.inside.clone());
@@ -157,6 +162,7 @@ fn part_of(part: &PartFrame<'_>, shape: usize, multipliers: &Multipliers<'_>) ->
         if !part.is_apart && one == other {
             continue;
         }
+        // Copies with different numbers of ticks have no common instants beyond the smaller number.
         let count = multipliers.groups[*one].ticks.min(multipliers.groups[*other].ticks);
         for (tick, own) in ticks[first].iter().take(count).enumerate() {
             let mut row = own.inside.clone();

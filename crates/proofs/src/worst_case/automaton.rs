@@ -51,7 +51,7 @@ pub enum AutomatonError {
 }
 
 impl Automaton {
-    /// Returns the automaton of a pattern whose symbol s stands for `matrices[s]`.
+    /// Returns the automaton of a pattern with `matrices[s]` as the matrix of symbol s.
     ///
     /// # Errors
     ///

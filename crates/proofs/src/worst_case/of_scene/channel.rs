@@ -44,12 +44,12 @@ pub(super) struct Link {
 /// Ticks at which samples arrive, indexed by link of a channel and counted from the frame's first tick; `None`: no sample.
 type Ticks = Vec<Option<usize>>;
 
-/// The ticks at which the samples that are due in a frame arrive, for one range of delays.
+/// The ticks of arrival of the samples due in a frame, for one range of delays.
 #[derive(Clone, PartialEq, Eq, Debug)]
 struct Choice {
     /// Longest delay of the range, beyond the shortest delay.
     extra: Duration,
-    /// Arrivals in the frame in which the samples are due.
+    /// Arrivals in the frame of the due samples.
     now: Ticks,
     /// Arrivals in the next frame.
     later: Ticks,
@@ -58,23 +58,23 @@ struct Choice {
 /// The arrivals in a frame.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(super) struct Symbol {
-    /// Arrivals of samples that were put off in the frame before.
+    /// Arrivals of samples put off in the frame before.
     pub late: Ticks,
-    /// Arrivals of samples that are due in this frame.
+    /// Arrivals of samples due in this frame.
     pub now: Ticks,
 }
 
-/// The fate of the samples that were due in a frame.
+/// The fate of the samples due in a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Fate {
     Lost,
-    /// Received with a delay that exceeds the shortest delay by at most this duration.
+    /// Received with a delay above the shortest delay by at most this duration.
     Received(Duration),
 }
 
 impl Channel {
-    /// Returns the channel of the links `ways` between nodes with the clocks `clocks`, each of which ticks a whole number of times in a frame. At most `most`
-    /// frames in a row lose the samples that are due. Delays exceed the shortest delays by at most `width`, which is less than a frame.
+    /// Returns the channel of the links `ways` between nodes with the clocks `clocks`. Each clock ticks a whole number of times in a frame. At most `most`
+    /// frames in a row lose the due samples. Delays exceed the shortest delays by at most `width`, less than a frame.
     ///
     /// # Errors
     ///
@@ -85,9 +85,10 @@ impl Channel {
         let due = |way: &Way| arrival(way, Duration::ZERO).0 / ticks(way);
         let mut choices = Vec::new();
         let mut extra = Duration::ZERO;
-        // Each round adds one choice, and goes on with the shortest delay at which some link's sample arrives at a later tick.
+        // Each round adds one choice, and goes on with the shortest delay for a later arrival on some link.
         loop {
             let arrivals: Vec<(usize, Duration)> = ways.iter().map(|way| arrival(way, extra)).collect();
+            // All delays up to `longest` give the same ticks, so the smallest `longest` of the links ends the range of this choice.
             let same = ways.iter().zip(&arrivals).map(|(way, (_, longest))| longest.saturating_sub(way.delay)).min().unwrap_or(width).min(width);
             let at = |late: usize| -> Ticks {
                 let in_frame = |(way, (tick, _)): (&Way, &(usize, Duration))| (tick / ticks(way) == due(way) + late).then_some(tick % ticks(way));
@@ -97,6 +98,7 @@ impl Channel {
             if same >= width {
                 break;
             }
+            // Delays are whole nanoseconds, so the next range begins one nanosecond later.
             extra = same.saturating_add(Duration::from_nanos(1));
         }
         let link = |(place, way): (usize, &Way)| {
@@ -108,7 +110,7 @@ impl Channel {
         Ok(Self { links, choices, pattern, symbols })
     }
 
-    /// Returns the fate of the samples that were due in a frame, from the symbol of the frame and the symbol of the next frame.
+    /// Returns the fate of the samples due in a frame, from the symbol of the frame and the symbol of the next frame.
     pub(super) fn fate(&self, symbol: usize, next: usize) -> Fate {
         let (now, later) = (&self.symbols[symbol].now, &self.symbols[next].late);
         let choice = self.choices.iter().find(|choice| choice.now == *now && choice.later == *later);
@@ -116,7 +118,7 @@ impl Channel {
     }
 }
 
-/// Returns the pattern and the symbols of a channel. Nodes 0 to `most` count the losses in a row; after them comes one node for each set of arrivals that can
+/// Returns the pattern and the symbols of a channel. Nodes 0 to `most` count the losses in a row. Then follows one node for each set of arrivals that can
 /// be put off.
 fn pattern(choices: &[Choice], links: usize, most: u32) -> Result<(Pattern, Vec<Symbol>), PatternError> {
     let nothing: Ticks = vec![None; links];
@@ -127,7 +129,7 @@ fn pattern(choices: &[Choice], links: usize, most: u32) -> Result<(Pattern, Vec<
         }
     }
     let most = usize::try_from(most).unwrap_or(usize::MAX);
-    // Refuses a pattern that would not fit into memory, before the edges are made.
+    // Refuses a pattern too large for the memory, before the edges are made.
     Pattern::runs(choices.len() + 1, choices.len(), u32::try_from(most).unwrap_or(u32::MAX))?;
     let node = |later: &Ticks| put_off.iter().position(|other| *other == later).map_or(0, |place| most + 1 + place);
     let mut symbols: Vec<Symbol> = Vec::new();
@@ -145,6 +147,7 @@ fn pattern(choices: &[Choice], links: usize, most: u32) -> Result<(Pattern, Vec<
         for choice in choices {
             add(&choice.now, node(&choice.later));
         }
+        // Samples that were put off have arrived in the end, so the count of losses in a row begins anew.
         let lost = if from > most { 0 } else { from };
         if lost < most {
             add(&nothing, lost + 1);

@@ -1,8 +1,8 @@
-//! Composed rows: rows of a frame in which each heard sample is replaced by the row of that sample, with a bound of the error.
+//! Composed rows: rows of a frame with each heard sample replaced by the row of the sample, with a bound of the error.
 //!
 //! Let r be a row of a frame as computed, (s, b) its coefficients of states and of samples heard, and let the exact one differ from it by δ, ‖δ‖ <= E, in sums
-//! of the sizes of entries. Let H_k be the computed row that is heard as sample k, the exact one H_k + η_k, ‖η_k‖ <= ε_k. The exact composition is Σ (s +
-//! δ_s)·unit + Σ (b_k + δ_k)·(H_k + η_k), so that
+//! of the sizes of entries. Let H_k be the computed row heard as sample k, the exact one H_k + η_k, ‖η_k‖ <= ε_k. The exact composition is Σ (s +
+//! δ_s)·unit + Σ (b_k + δ_k)·(H_k + η_k). So
 //!
 //! ```text
 //! ‖exact − computed‖ <= E·max(1, max_k (‖H_k‖ + ε_k)) + Σ |b_k|·ε_k + γ·(‖s‖ + Σ |b_k|·‖H_k‖)
@@ -10,9 +10,9 @@
 //!
 //! The first two are by the triangle inequality, δ's entries each at a row of at most that size. Each entry is a sum of one term of s and a product for each k,
 //! in any order: γ for as many operations
-//! (Higham 2002, Section 3.1), and a smallest number for each product that underflows.
+//! (Higham 2002, Section 3.1), and a smallest number for each underflowing product.
 //!
-//! The combination that a receiver hears, H = w·S + e − c/(N − 1), has w·S rounded once and w itself once: 3·u·|w|·‖S‖ is more. The other entries of H stand
+//! The combination heard by a receiver, H = w·S + e − c/(N − 1), has w·S rounded once and w itself once: 3·u·|w|·‖S‖ is more. The other entries of H stand
 //! alone, and 1/(N − 1) rounds once.
 
 use cohaptic_stability::numerics::{UNDERFLOW, UNIT, gamma, outward, real};
@@ -34,9 +34,9 @@ impl Composed {
         Self { entries, error: 0.0 }
     }
 
-    /// Returns the composition of a row of a frame whose error is at most `frame_error`. The row has the coefficients of `states` states, then of the samples
+    /// Returns the composition of a row of a frame with an error of at most `frame_error`. The row has the coefficients of `states` states, then of the samples
     /// heard.
-    /// `heard` has the rows of these samples over `unknowns` unknowns; `None` stands for a sample that is not heard yet and adds nothing.
+    /// `heard` has the rows of these samples over `unknowns` unknowns; `None` is a sample not heard yet and adds nothing.
     pub(super) fn of(row: &[f64], states: usize, heard: &[Option<&Self>], unknowns: usize, frame_error: f64) -> Self {
         let mut entries = row[..states].to_vec();
         entries.resize(unknowns, 0.0);
@@ -55,11 +55,12 @@ impl Composed {
         Self { entries, error: outward(error) + real(unknowns * operations) * UNDERFLOW }
     }
 
-    /// Returns the row of the sample that a receiver hears: this row times `weight`, plus 1 at the place `own` of the deviation, plus the weight of `others` at
+    /// Returns the row of the sample heard by a receiver: this row times `weight`, plus 1 at the place `own` of the deviation, plus the weight of `others` at
     /// its place. Both weights were rounded once, and the error covers this rounding.
     pub(super) fn heard(&self, weight: f64, own: usize, others: Option<(usize, f64)>) -> Self {
         let mut entries: Vec<f64> = self.entries.iter().map(|entry| weight * entry).collect();
         entries[own] += 1.0;
+        // w·S is rounded once and w once before, hence 3·u of the size: see the module head.
         let mut error = weight.abs() * (self.error + 3.0 * UNIT * (size(&self.entries) + self.error)) + real(entries.len()) * UNDERFLOW;
         if let Some((place, by)) = others {
             entries[place] += by;

@@ -1,7 +1,7 @@
-//! Bounds for links that each lose and delay on their own, at any number of equal peers.
+//! Bounds for links with independent losses and delays, at any number of equal peers.
 //!
-//! Every link has the same states and steps. Let e be the difference between the samples that a link gives a receiver and the samples of a link that gives each
-//! sample as soon as possible, one entry per stretch of ticks within which the sample does not change. The difference e is a combination of the steps v from
+//! Every link has the same states and steps. Let e be the difference between the samples of a link at a receiver and the samples of a link that delivers each
+//! sample as soon as possible, one entry per stretch of ticks with the same sample. The difference e is a combination of the steps v from
 //! sample to sample of the sender. For each state c of a link, let Q_c be a quadratic form of these steps, and let S be a quadratic form of e and v with
 //!
 //! ```text
@@ -9,10 +9,10 @@
 //! V(after) <= ρ²·V(before) + Σ S(e_ij, v_j)             for all states, and all e_ij whatever
 //! ```
 //!
-//! Then V + ΣQ grows by ρ² a step at most, whatever each link does. For the second, let V be of one kind for the average and one for differences; e_ij of the
-//! link from j to i takes part by its mean over j, and S adds up over all links. Permutations of peers take e apart: into a part that is the same for all, into
-//! a_i·r + a_j·c with Σa = 0, and into parts of which S alone depends, not below zero since it is not for v = 0. With Σa² = 1, the sums over i ≠ j of a_i²,
-//! a_i·a_j and a_j² are N − 1, −1 and N − 1, so that there are two inequalities:
+//! Then V + ΣQ grows by ρ² a step at most, whatever each link does. For the second inequality, let V be a form for the average and a form for differences; e_ij
+//! of the link from j to i takes part by its mean over j, and S adds up over all links. Permutations of peers take e apart: into a part common to all, into
+//! a_i·r + a_j·c with Σa = 0, and into parts in S alone. S is not below zero there, since S is not below zero for v = 0. With Σa² = 1, the sums over i ≠ j of
+//! a_i², a_i·a_j and a_j² are N − 1, −1 and N − 1. So there are two inequalities:
 //!
 //! ```text
 //! average:      V⁺ − ρ²V − (N−1)·S(e, v)                                                             heard: y + e
@@ -20,10 +20,10 @@
 //!                           + 2·T((N−1)·c − r, v) + (N−1)·U(v, v)]        heard: −y/(N−1) + r − c/(N−1)
 //! ```
 //!
-//! with S = R(e, e) + 2·T(e, v) + U(v, v). Their size does not depend on N. All links together are one of the things that links may do, which gives the lower
+//! with S = R(e, e) + 2·T(e, v) + U(v, v). Their size does not depend on N. Links that act all together are a special case, and this case gives the lower
 //! bound; between the two the growth stays open.
 //!
-//! Rows of the second inequality are composed of rows of a frame; how far they may be off is bounded by [`Composed`].
+//! Rows of the second inequality are composed of rows of a frame; [`Composed`] bounds their errors.
 
 use cohaptic_scene::Scene;
 use cohaptic_stability::frames::{Autonomous, Combination, Event, FrameMap, Lifted, NominalNetwork, Structure, Timetable};
@@ -40,9 +40,9 @@ use crate::inequality::{Inequality, Part, Product, Row, holds, search};
 use crate::newton::upper;
 use crate::worst_case::gripenberg::Effort;
 
-/// Relative distance of the bound from the least growth with a certificate, at which the halving ends.
+/// Relative distance of the bound from the least growth with a certificate at the end of the halving.
 const NEAR: f64 = 2e-3;
-/// Largest growth per step for which a certificate is searched.
+/// Largest growth per step in the search for a certificate.
 const LARGEST: f64 = 4.0;
 /// Largest number of states of a link.
 const MOST_STATES: usize = 64;
@@ -66,6 +66,7 @@ pub(super) fn bounds(
     let nodes = structure.nodes(scene);
     let unit = Matrix::identity(1);
     let timetable = link.timetable(&structure.timetable);
+    // The sample of each stretch is an input here, so the single node hears itself with the weight 1, and the weights of peers enter through the rows.
     let one = |tied: bool| Lifted { nodes: &nodes, weights: &unit, timetable: &timetable, tied, ..structure.quotient(scene, &nodes) };
     let frames = [one(structure.tied).frame(&mut Autonomous), one(true).frame(&mut Autonomous)];
     let is_loose = |part: &WorstPart| matches!(part.kind, PartKind::LooseDevice { .. });
@@ -76,6 +77,7 @@ pub(super) fn bounds(
         search(&asked, watch, |solution| holds(&asked, solution).then_some(())).is_some()
     };
     let upper = least(worst.lower, certified, watch).ok_or(AnalysisError::Stopped)?;
+    // Both inequalities share the multipliers of S, so one search covers the average and the differences.
     let dimension = frames.iter().map(|frame| frame.state_unknowns() + link.depth).sum();
     let rounding = frames.iter().map(|frame| frame.error).fold(0.0, f64::max);
     parts.retain(is_loose);
@@ -112,7 +114,7 @@ fn least(lower: f64, certified: impl Fn(f64) -> bool, watch: &dyn Watch) -> Opti
     Some(high)
 }
 
-/// The ages of samples that a link may deliver, as states and steps.
+/// The ages of possibly delivered samples of a link, as states and steps.
 struct Link {
     /// First tick of each stretch.
     stretches: Vec<usize>,
@@ -134,12 +136,14 @@ impl Link {
         let mut stretches: Vec<usize> = channel.symbols.iter().flat_map(ticks).chain([0]).collect();
         stretches.sort_unstable();
         stretches.dedup();
+        // Before the first possible arrival of this frame's sample even the fastest link still gives the sample of the frame before.
         let first = channel.symbols.iter().filter_map(|symbol| symbol.now[0]).min()?;
         let nominal = stretches.iter().map(|tick| if *tick < first { age + 1 } else { age }).collect();
         // A state of the link is a node of the pattern, with the age of the sample held when a frame begins.
         let mut states = vec![(0, age + 1)];
         let mut steps = Vec::new();
         let mut done = 0;
+        // Breadth-first search over the reachable states. A held sample grows older by a frame per lost frame, so the states are finitely many.
         while done < states.len() && done < MOST_STATES {
             let (node, held) = states[done];
             for edge in channel.pattern.edges().iter().filter(|edge| edge.from == node) {
@@ -167,7 +171,7 @@ impl Link {
         (states.len() <= MOST_STATES).then_some(Self { stretches, nominal, steps, states: states.len(), depth })
     }
 
-    /// Returns the timetable of one node that hears a different sample in each stretch: number −1 in the first stretch, −2 in the second, and so on.
+    /// Returns the timetable of one node with a different heard sample in each stretch: number −1 in the first stretch, −2 in the second, and so on.
     fn timetable(&self, nominal: &Timetable) -> Timetable {
         let (mut events, mut tick) = (Vec::new(), 0);
         for event in &nominal.events {
@@ -185,7 +189,7 @@ impl Link {
         Timetable { frame: nominal.frame, events, sent: nominal.sent.clone(), depth: vec![0], held: Vec::new(), clocks: nominal.clocks.clone() }
     }
 
-    /// Returns the inequalities that prove a growth per step of at most `rate`.
+    /// Returns the inequalities for a growth per step of at most `rate`.
     fn inequality(&self, frames: &[FrameMap; 2], peers: f64, rate: f64) -> Inequality {
         let (stretches, steps) = (self.stretches.len(), self.depth);
         let size = stretches + steps;
@@ -196,6 +200,7 @@ impl Link {
             let mut part = Part { unknowns: steps + 1, ..Part::empty(2 + from, 2 + to) };
             let mut put = |entries: Vec<f64>| part.put(Row { entries, error: 0.0 });
             let unit = |place: usize, by: f64| (0..=steps).map(|other| if other == place { by } else { 0.0 }).collect::<Vec<f64>>();
+            // The sample of age a differs from the nominal sample by the sum of the steps between the two, with a negative sign.
             let deviation = |(age, nominal): (&usize, &usize)| {
                 (0..=steps).map(|step| if (*nominal..*age).contains(&step) { -1.0 } else { 0.0 }).collect::<Vec<f64>>()
             };
@@ -225,7 +230,7 @@ impl Link {
         let unknowns = inputs + if apart { 2 * stretches } else { stretches };
         let unit = |place: usize, by: f64| -> Vec<f64> { (0..unknowns).map(|other| if other == place { by } else { 0.0 }).collect() };
         let mut heard: Vec<Composed> = Vec::new();
-        // Composes a row of the frame, whose sample −k is the sample heard in stretch k − 1.
+        // Composes a row of the frame. Sample −k of the frame is the sample heard in stretch k − 1.
         let composed = |row: &[f64], heard: &[Composed]| {
             let rows: Vec<Option<&Composed>> = frame.used.iter().map(|(_, age)| heard.get(age - 1)).collect();
             Composed::of(row, states, &rows, unknowns, frame.error)
@@ -233,7 +238,7 @@ impl Link {
         let sent = frame.sent_by(0).start;
         let own = if apart { -1.0 / others } else { 1.0 };
         for (stretch, age) in self.nominal.iter().enumerate() {
-            // A sample that is sent in this frame depends only on samples heard before, whose rows are in `heard` already.
+            // A sample sent in this frame depends only on samples heard before, and their rows are in `heard` already.
             let sample = if *age == 0 { composed(frame.sent.row(sent), &heard) } else { Composed::exact(unit(states + age - 1, 1.0)) };
             let by_others = apart.then_some((inputs + stretches + stretch, -1.0 / others));
             heard.push(sample.heard(own, inputs + stretch, by_others));
@@ -257,6 +262,7 @@ impl Link {
             part.after.rows.push(after);
             part.before.rows.push(before);
         }
+        // The quadratic forms of the links measure the steps v from sample to sample, newest first.
         let steps: Vec<usize> = (0..self.depth).map(|age| put(&mut part, sample(age).less(&sample(age + 1), 1.0))).collect();
         let input = |part: &mut Part, first: usize, stretch: usize| part.put(Row { entries: unit(first + stretch, 1.0), error: 0.0 });
         let e: Vec<usize> = (0..stretches).map(|stretch| input(&mut part, inputs, stretch)).collect();
@@ -265,6 +271,7 @@ impl Link {
             let by = twice(i, j);
             let mut add =
                 |one: usize, other: usize, weight: f64| part.products.push(Product { factors: [one, other], multiplier, weight: -by * weight });
+            // The terms of the two inequalities of the module head: R for (e, e), T for (e, v) and U for (v, v).
             match (i < stretches, j < stretches) {
                 (true, true) if apart => {
                     add(e[i], e[j], others);

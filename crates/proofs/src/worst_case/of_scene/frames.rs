@@ -1,7 +1,7 @@
-//! The matrix of one frame in which something happens to samples.
+//! The matrix of one frame with losses and delays of samples.
 //!
-//! The frame has the nodes, ticks and samplings of the nominal analysis. The symbol decides what samples a receiver gets, and when. The sample that a receiver
-//! holds at the beginning is an unknown of its own, because the sample may be of any age. The state is the state of the nominal analysis, then the newest
+//! The frame has the nodes, ticks and samplings of the nominal analysis. The symbol decides the samples of a receiver and their ticks. The sample that a
+//! receiver holds at the beginning is a separate unknown, because the sample may be of any age. The state is the state of the nominal analysis, then the newest
 //! samples of each node, then the sample held on each link.
 
 use cohaptic_stability::Matrix;
@@ -9,20 +9,20 @@ use cohaptic_stability::frames::{Autonomous, Event, Lifted, Timetable};
 
 use super::channel::{Channel, Link};
 
-/// One part of a scene: nodes, and the links between them that can lose and delay.
+/// Part of a scene: nodes, and the links between these nodes, with losses and delays.
 pub(super) struct Block<'a> {
     /// Nodes and timetable of a frame. The deliveries of the timetable are replaced.
     pub lifted: Lifted<'a>,
-    /// Indexed by channel: each link of the channel that is in this part, with its index in the channel; the ends are nodes of this part.
+    /// Indexed by channel: each link of the channel in this part, with its index in the channel; the ends are nodes of this part.
     pub links: Vec<Vec<(usize, Link)>>,
 }
 
-/// The sample that a link delivers.
+/// A delivered sample.
 struct Delivery {
     from: usize,
     to: usize,
     tick: usize,
-    /// Number of frames since the frame in which the sample was sent.
+    /// Number of frames since the frame of the sending.
     age: usize,
 }
 
@@ -48,6 +48,7 @@ impl Block<'_> {
             depth[link.from] = depth[link.from].max(link.oldest);
         }
         let (mut deliveries, mut rest) = (Vec::new(), joint);
+        // The first channel is the most significant digit of the joint symbol, so the digits come off from the last channel on.
         for (channel, own) in channels.iter().zip(&self.links).rev() {
             let symbol = &channel.symbols[rest % channel.symbols.len()];
             rest /= channel.symbols.len();
@@ -75,6 +76,7 @@ impl Block<'_> {
         }
         let held = size;
         size += links.len();
+        // The age of a held sample in the timetable is beyond `depth` by one and the receiver's number, see `timetable`.
         let unknown = |column: usize| -> Option<usize> {
             if column < states {
                 return Some(column);
@@ -108,6 +110,7 @@ impl Block<'_> {
         for (node, depth) in depth.iter().enumerate() {
             for age in 1..=*depth {
                 let row = first[node] + age - 1;
+                // Samples grow older by one frame: age 1 is the sample sent now, and each older row takes the row before.
                 match age {
                     1 => put(row, frame.sent.row(frame.sent_by(node).start), None, frame.translation(1)),
                     _ => put(row, &[], Some(row - 1), frame.translation(1)),
@@ -116,6 +119,7 @@ impl Block<'_> {
         }
         for (place, link) in links.iter().enumerate() {
             let newest = deliveries.iter().filter(|delivery| (delivery.from, delivery.to) == (link.from, link.to)).map(|delivery| delivery.age).min();
+            // The youngest delivery of a frame is held at its end. Without a delivery the held sample stays.
             match newest {
                 Some(0) => put(held + place, frame.sent.row(frame.sent_by(link.from).start), None, frame.translation(1)),
                 Some(age) => put(held + place, &[], Some(first[link.from] + age - 1), frame.translation(1)),

@@ -16,9 +16,9 @@ use crate::worst_case::verified::Certificate;
 /// The worst case of a part of a scene.
 #[derive(Clone, PartialEq, Debug)]
 pub struct WorstPart {
-    /// Kind of the part: the bodies that move.
+    /// Kind of the part: the moving bodies.
     pub kind: PartKind,
-    /// Contacts that are closed, in words; empty for a linear scene.
+    /// Closed contacts, in words; empty for a linear scene.
     pub contacts: String,
     /// Number of states of the part, including held samples and samples on the way.
     pub dimension: usize,
@@ -26,13 +26,13 @@ pub struct WorstPart {
     pub lower: f64,
     /// Upper bound of the growth per step; infinite if numbers overflowed.
     pub upper: f64,
-    /// Growth per step that a quadratic certificate proves as an upper bound; `None` without a certificate.
+    /// Upper bound of the growth per step by a quadratic certificate; `None` without a certificate.
     pub certificate: Option<f64>,
-    /// Pattern that attains the lower bound when repeated for ever, in words; empty if the lower bound is zero or the part does not depend on the network.
+    /// Pattern of the lower bound, attained by endless repetition, in words; empty if the lower bound is zero or the part does not depend on the network.
     pub sequence: String,
     /// Number of steps of `sequence`.
     pub period: usize,
-    /// Number of products of matrices that the search computed.
+    /// Number of products of matrices computed in the search.
     pub products: u64,
     /// Upper bound of the errors of the frames' matrices, as the largest sum of absolute errors over a row.
     pub rounding: f64,
@@ -52,6 +52,7 @@ pub(super) fn of_combination(
     let name = |channel: &Channel| channel.links.first().map(|link: &Link| format!("{} to {}", peer(link.from), peer(link.to))).unwrap_or_default();
     let searched = |search: &Search| {
         let found = search.automaton.worst_case_watched(effort, watch).ok_or(AnalysisError::Stopped)?;
+        // The search and the certificate bound the growth independently, so the smaller bound holds.
         let certificate = found.certificate.as_ref().map(Certificate::rate);
         Ok(WorstPart {
             kind: search.kind,

@@ -28,20 +28,21 @@ pub(super) struct Search {
 /// The parts of a linear scene.
 #[derive(Debug)]
 pub(super) struct Prepared {
-    /// Channels whose joint symbols drive every part.
+    /// Channels. Their joint symbols drive every part.
     pub channels: Vec<Channel>,
     pub searches: Vec<Search>,
-    /// Devices without contact, whose motion does not depend on the network.
+    /// Devices without contact. Their motion does not depend on the network.
     pub devices: Vec<Part>,
 }
 
-/// Returns the classes of peers that stay equal under the patterns.
+/// Returns the classes of peers equal under the patterns.
 pub(super) fn structure(scene: &Scene, network: &NominalNetwork, contacts: &Contacts, patterns: &Patterns) -> Result<Structure, SceneWorstCaseError> {
     match patterns.links {
         Links::Each if patterns.choose() => {
             // Each link has at least two symbols (received, lost). Too many links are refused here, before memory per link is allocated.
             let links = scene.peers.len().saturating_mul(scene.peers.len().saturating_sub(1));
             few_enough(links, std::iter::repeat_n(2, links))?;
+            // Links that differ in their losses make peers different, so each peer is a class then.
             Ok(Structure::of_each(scene, network, contacts)?)
         }
         Links::Together | Links::Each => Ok(Structure::of(&[scene], network, contacts)?),
@@ -56,6 +57,7 @@ impl Prepared {
             let (matrices, rounding) = block.matrices(&channels);
             let automaton = Automaton::new(pattern.clone(), matrices)?;
             let (edges, nodes, dimension) = (pattern.edges().len(), pattern.nodes(), automaton.size());
+            // Each edge costs products and factorisations of matrices, the third power of their size.
             if edges.saturating_mul(dimension.saturating_pow(3)) > MOST_WORK {
                 return Err(SceneWorstCaseError::TooLarge { edges, nodes, dimension });
             }
