@@ -17,7 +17,7 @@ pub(super) struct Halving {
     pub(super) times: u32,
     /// Length, in the unit of the key, above which ranges are halved, if a floating-point number lies within. `None`: ranges of every length are halved.
     pub(super) tolerance: Option<f64>,
-    /// Largest number of ranges of one size that are halved. Where an eigenvalue stays at the unit circle, no range is ever decided.
+    /// Largest number of halved ranges of one size. If an eigenvalue stays at the unit circle, no range is ever decided.
     pub(super) most: usize,
     /// The key whose ranges are never halved, a delay.
     pub(super) whole: Option<usize>,
@@ -31,9 +31,9 @@ pub(super) type Look<'a> = &'a (dyn Fn(&[[f64; 2]]) -> Result<Option<Guarantee>,
 pub(super) struct Halved {
     /// Pieces with their verdicts, in the order in which the halving reached them: pieces with fewer halvings first.
     pub(super) pieces: Vec<(Ranges, Guarantee)>,
-    /// Number of ranges that were looked at, also of those that were halved afterwards.
+    /// Number of ranges looked at, ranges halved afterwards included.
     pub(super) attempts: usize,
-    /// `true` if all pieces were looked at. Otherwise pieces that were not looked at are undecided too.
+    /// `true` if all pieces were looked at. Otherwise the remaining pieces are undecided too.
     pub(super) is_whole: bool,
 }
 
@@ -74,6 +74,7 @@ impl Halving {
     pub(super) fn may_halve(self, ranges: &[[f64; 2]]) -> bool {
         let is_long = |[low, high]: [f64; 2], tolerance| {
             let middle = low.midpoint(high);
+            // Between two neighbouring floating-point numbers there is no middle, and halving would go on for ever.
             high - low > tolerance && low < middle && middle < high
         };
         let halved = self.halved_keys(ranges.len());
@@ -92,6 +93,7 @@ impl Halving {
             let mut part = ranges.to_vec();
             for (bit, key) in halved.iter().enumerate() {
                 let middle = part[*key][0].midpoint(part[*key][1]);
+                // The upper half keeps the upper end and the lower half the lower end. The opposite end becomes the middle.
                 part[*key][usize::from(place >> bit & 1 == 0)] = middle;
             }
             part

@@ -48,6 +48,7 @@ fn case(entry: &Value) -> Case {
     let family = Family::new(text("scene"), name.as_ref(), &[], keys.collect()).unwrap_or_else(|error| panic!("{name}: {error}"));
     let digits: Vec<u32> = text("stable").chars().map(|digit| digit.to_digit(16).unwrap()).collect();
     let points = usize::try_from(entry["points"].as_u64().unwrap()).unwrap();
+    // Each hexadecimal digit has the verdicts of four points, the first point in the lowest bit.
     let of_spread = |point: usize| Point { at: spread(&ranges, point), is_stable: digits[point / 4] >> (point % 4) & 1 == 1 };
     let of_near = |entry: &Value| Point { at: [number(&entry[0]), number(&entry[1])], is_stable: entry[2].as_bool().unwrap() };
     let near = entry["near"].as_array().unwrap().iter().map(of_near).collect();
@@ -78,6 +79,7 @@ impl Found {
         if points.is_empty() || self.judge(case, followed, ranges, &points) || depth == 0 {
             return;
         }
+        // Quarters share their edges, so a point on an edge is judged in both.
         let [x, y] = ranges.map(|[low, high]| [[low, low.midpoint(high)], [low.midpoint(high), high]]);
         y.into_iter().flat_map(|y| x.map(|x| [x, y])).for_each(|quarter| self.divide(case, followed, quarter, &points, depth - 1));
     }
@@ -104,6 +106,7 @@ impl Found {
         change(&mut followed);
         self.divide(case, &followed, case.ranges, &case.spread.iter().collect::<Vec<_>>(), 6);
         for (number, point) in case.near.iter().enumerate() {
+            // Boxes from a quarter down to 2⁻²⁵ of the ranges, since a fault may show at one size only.
             for size in 2..26 {
                 let share = |key: usize| spread(&[[0.0, 1.0]; 2], 26 * number + size)[key];
                 let ranges = std::array::from_fn(|key| {

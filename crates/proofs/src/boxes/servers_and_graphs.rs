@@ -51,6 +51,7 @@ fn verdict(scene: &Scene) -> Verdict {
     let contacts = Contacts { touching: vec![true; peers], at_wall: false, absent: vec![false; peers] };
     let structure = Structure::of_each(scene, &network, &contacts).unwrap();
     let nodes = structure.nodes(scene);
+    // Each peer follows the mean of its neighbours, weighted as in the topology. All peers move together in one matrix, so no eigenvalue of the graph is used.
     let weights = Matrix::from_fn(peers, peers, |to, from| topology.weight(to, from) / topology.degree(to));
     let all = Lifted { weights: &weights, ..structure.quotient(scene, &nodes) };
     let frame = all.frame(&mut Autonomous);
@@ -123,6 +124,7 @@ fn sorted(matrices: &[(Matrix, usize)]) -> Vec<(f64, f64)> {
         std::iter::repeat_n(values, *copies).flatten().collect::<Vec<_>>()
     };
     let mut values: Vec<(f64, f64)> = matrices.iter().flat_map(of).collect();
+    // Sorting by rounded real parts keeps conjugate pairs in one order despite rounding.
     let digits = |value: f64| (value * 1e6).round();
     values.sort_by(|one, other| digits(one.0).total_cmp(&digits(other.0)).then(one.1.total_cmp(&other.1)));
     values
@@ -142,6 +144,7 @@ fn server_eigenvalues(scene: &Scene) -> Vec<(f64, f64)> {
     };
     let mut parts = vec![(frame(&nodes, None), 1)];
     for (class, members) in structure.classes.iter().enumerate() {
+        // A class of n members has n − 1 copies of its differences, and a loose device counts once per member.
         if Server::has_differences(&structure, class) {
             parts.push((frame(&nodes[class..=class], Some(class)), members.len() - 1));
         }
@@ -179,10 +182,12 @@ fn lines_are_judged_as_single_scenes_are() {
         let range = &family.keys()[0];
         let length = range.high - range.low;
         let line = ProvenLine::prove(&family, length / 512.0, &Unwatched).unwrap_or_else(|error| panic!("{set:?}: {error}"));
+        // A prover that decides nothing would agree with every scene, so most of the line must be decided.
         let open: f64 = line.stretches.iter().filter(|one| one.guarantee == Guarantee::Undecided).map(|one| one.high - one.low).sum();
         assert!(open < 0.15 * length, "{set:?} {key}: {:?}", line.stretches);
         crossings += line.stretches.windows(3).filter(|three| three[0].guarantee != three[2].guarantee).count();
         for stretch in &line.stretches {
+            // Both ends too: a stretch decided beyond its boundary shows there first.
             for share in [0.0, 0.13, 0.5, 0.77, 1.0] {
                 let value = between([stretch.low, stretch.high], share);
                 let verdict = verdict(&family.scene(&[value]).unwrap());
@@ -225,6 +230,7 @@ fn boxes_hold_no_scene_of_the_other_kind() {
                 found[1] += usize::from(one.guarantee == Guarantee::Unstable);
             }
         }
+        // Enough points of both kinds must lie in decided boxes, or the agreement above says nothing.
         assert!(found[0] + found[1] >= 60 && found[0] >= 8 && found[1] >= 8, "{set:?} {keys:?}: {found:?}");
     }
 }

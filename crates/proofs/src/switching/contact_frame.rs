@@ -108,6 +108,7 @@ impl Instrument for Touching {
             let input = self.first[place] + self.depths[place].len();
             match contact.kind {
                 Kind::Push { .. } => {
+                    // The input is the force divided by the stiffness, hence the stiffness as its coefficient.
                     coupling[input] = contact.sign() * contact.gains.stiffness;
                     acts[0] = true;
                 }
@@ -153,6 +154,7 @@ impl ContactFrame {
             entries
         };
         let seen = contacts.iter().zip(first).zip(depths.iter().zip(&rates)).map(|((contact, first), (depths, rates))| {
+            // The depth at the next frame's first tick follows from the states at the end of this frame.
             let last = Touching::row(contact, &map.states, rows[contact.node], 0);
             ContactRows {
                 contact: *contact,

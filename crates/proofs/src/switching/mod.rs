@@ -158,12 +158,14 @@ fn of_axis(
     watch: &dyn Watch,
 ) -> Result<(SwitchingMotion, bool), SwitchingError> {
     let along = Along::new(piece, axis);
+    // Peers that push in opposite directions have different contacts, so they never share a class.
     let structure = Structure::with_apart(&[along.scene], network, &along.contacts, |one, other| along.pushes(one) != along.pushes(other))?;
     let structure = along.tied(structure);
     let nodes = walled(&along, structure.nodes(along.scene));
     let asked = Asked::of(&along, &structure, &nodes, watch)?;
     let takes_rest = asked.takes_rest();
     let proven = asked.inequality().and_then(|inequality| search(&inequality, watch, |solution| rate(&inequality, solution)));
+    // A stopped search has found nothing. That is no verdict.
     if watch.stops() {
         return Err(AnalysisError::Stopped.into());
     }
@@ -192,6 +194,7 @@ fn grows(along: &Along<'_>, network: &NominalNetwork, watch: &dyn Watch) -> Resu
     let quotient = structure.quotient(along.scene, &nodes);
     let mut contacts = Vec::new();
     for class in 0..structure.classes.len() {
+        // Without walls: a motion may be scaled only if no place of a wall enters the equations as a constant.
         contacts.extend(along.of_class(&structure, class, class, false)?);
     }
     if nodes.iter().map(Node::states).sum::<usize>() > MOST_FOLLOWED {

@@ -117,9 +117,11 @@ impl Pattern {
         }
         let too_large = PatternError::TooLarge { most: MOST_EDGES };
         let most = usize::try_from(most).map_err(|_| too_large)?;
+        // The number of edges is known before the edges take memory.
         if most.saturating_add(1).saturating_mul(symbols) > MOST_EDGES {
             return Err(too_large);
         }
+        // At node `most` the symbol `hit` would lead to a node beyond, so that edge is left out below.
         let step = |from: usize, symbol: usize| Edge { from, to: if symbol == hit { from + 1 } else { 0 }, symbol };
         let edges = (0..=most).flat_map(|from| (0..symbols).map(move |symbol| step(from, symbol))).filter(|edge| edge.to <= most).collect();
         Self::of(most + 1, edges, symbols)
@@ -139,6 +141,7 @@ impl Pattern {
         others.iter().try_fold(first.clone(), |all, next| {
             let nodes = all.nodes.checked_mul(next.nodes).ok_or(too_large)?;
             let symbols = all.symbols.checked_mul(next.symbols).ok_or(too_large)?;
+            // Both patterns make a step at once, so every pair of edges is a joint edge.
             if all.edges.len().checked_mul(next.edges.len()).is_none_or(|edges| edges > MOST_EDGES) {
                 return Err(too_large);
             }
@@ -205,6 +208,7 @@ fn components(nodes: usize, edges: &[Edge]) -> Vec<usize> {
                 left.push(node);
                 continue;
             };
+            // A node is left only after all its edges were tried, so the node goes back under the node that is tried next.
             stack.push((node, tried + 1));
             if !std::mem::replace(&mut seen[next], true) {
                 stack.push((next, 0));

@@ -14,10 +14,12 @@ pub(super) fn sequence(cycle: &[usize], channels: &[Channel], delay: Option<Dura
     }
     let digit = |joint: usize, channel: usize| {
         let below: usize = channels[channel + 1..].iter().map(|channel| channel.symbols.len()).product();
+        // The first channel is the most significant digit of a joint symbol.
         joint / below % channels[channel].symbols.len()
     };
     let fates: Vec<Vec<Fate>> = (0..cycle.len())
         .map(|frame| {
+            // A sample that is put off arrives under the next symbol, so its fate needs both symbols. The last symbol is followed by the first.
             let next = cycle[(frame + 1) % cycle.len()];
             (0..channels.len()).map(|channel| channels[channel].fate(digit(cycle[frame], channel), digit(next, channel))).collect()
         })
@@ -26,7 +28,7 @@ pub(super) fn sequence(cycle: &[usize], channels: &[Channel], delay: Option<Dura
     runs(&rotated(&fates, said))
 }
 
-/// Returns in words the fate of the samples that are due in one frame, with one fate per channel.
+/// Returns in words the fate of the samples due in one frame, with one fate per channel.
 fn one_frame(fates: &[Fate], channels: &[Channel], delay: Option<Duration>, name: &impl Fn(&Channel) -> String) -> String {
     let fate = |fate: &Fate| match (fate, delay) {
         (Fate::Lost, _) => "lost".to_owned(),
@@ -52,6 +54,7 @@ fn one_frame(fates: &[Fate], channels: &[Channel], delay: Option<Duration>, name
 /// Rotates the frames so that the words begin after the last loss of a run, with arrivals before losses.
 fn rotated(fates: &[Vec<Fate>], mut said: Vec<String>) -> Vec<String> {
     let losses = |frame: usize| fates[frame % fates.len()].iter().filter(|fate| **fate == Fate::Lost).count();
+    // Where the words of an endless repetition begin has no meaning. This choice gives a pattern the same words from every start.
     let start = (0..fates.len()).find(|frame| losses(*frame) == 0 && losses(frame + fates.len() - 1) > 0);
     said.rotate_left(start.unwrap_or(0));
     said
