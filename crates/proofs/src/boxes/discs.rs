@@ -56,7 +56,7 @@ pub(super) fn decide(span: &StepSpan) -> Option<Decision> {
     let near = super::mutation::of_discs(near);
     let reaches: Vec<(f64, f64)> =
         (0..near.size()).map(|place| near.reach(near.mean[(place, place)], |slope| slope[(place, place)], near.wide[(place, place)])).collect();
-    // A diagonal entry that may cross the unit circle rules out stability, so instability is tried then.
+    // A diagonal entry that may lie outside of the unit circle rules out a proof of stability, so instability is tried then.
     let (proven, circle, weights) = if reaches.iter().all(|(_, high)| *high < 1.0) {
         (Proven::Stable, FreeCircle::AroundZero(1.0), near.free_of(1.0, &reaches)?)
     } else {
