@@ -17,12 +17,16 @@
 //! order and count by products of two entries, because of the choice of dᵢ: the comparison matrix of (1) times d is a vector of ones.
 
 use cohaptic_stability::Matrix;
+use cohaptic_stability::frames::{Node, Timetable};
 use cohaptic_stability::numerics::{ComplexMatrix, gamma, outward, real};
 use num_complex::Complex64;
 
 use super::basis::{Basis, solved};
+use super::certificate::PartCertificate;
+use super::corners::{self, Common, Point};
 use super::guarantee::Proven;
 use super::span::{StepSpan, absolute};
+use super::steps::Plans;
 
 /// Verdict on all matrices of a box, and the numbers for a check of the verdict.
 pub(super) struct Decision {
@@ -66,6 +70,18 @@ pub(super) fn decide(span: &StepSpan) -> Option<Decision> {
         (Proven::Unstable, circle, weights)
     };
     Some(Decision { proven, witness: Witness { coordinates: near.coordinates, weights, circle } })
+}
+
+/// Returns the certificate of the differences between the members of a class at a single point of the numbers, or `None` if these are not proven stable. `members` are places in the scene,
+/// `weight` is the weight with which a difference hears itself, and velocities are multiplied by `time` \[s\].
+pub(crate) fn stable_difference(members: &[usize], node: &Node, weight: f64, timetable: &Timetable, time: f64) -> Option<PartCertificate> {
+    let nodes = vec![node.clone()];
+    // One point is a box without width: no number varies.
+    let points = [Point { nodes: nodes.clone(), weights: Matrix::from_fn(1, 1, |_, _| weight) }];
+    let common = Common { timetable, plans: &Plans::default(), tied: true, time };
+    let decision = decide(&corners::steps(&points, &[nodes], common).ok()?.product())?;
+    let part = PartCertificate::new(vec![members.to_vec()], true, corners::states(&points, common).ok()?, time, &decision.witness);
+    (decision.proven == Proven::Stable).then_some(part)
 }
 
 /// W·M·V over a box, nearly diagonal, and W·V, nearly the unit matrix.

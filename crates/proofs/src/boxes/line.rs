@@ -7,8 +7,7 @@ use super::certificate::uncertified;
 use super::error::ProofError;
 use super::followed::{Followed, certify};
 use super::guarantee::Guarantee;
-use super::halving::{Halved, Halving};
-use super::known::{KnownPieces, NothingKnown};
+use super::halving::{Halved, Halving, KnownPieces, NothingKnown};
 
 /// Range of values of a key, and the verdict on all scenes with a value in the range.
 #[derive(Clone, Copy, PartialEq, Debug)]

@@ -6,8 +6,7 @@ use rayon::prelude::*;
 use super::error::ProofError;
 use super::followed::Followed;
 use super::guarantee::Guarantee;
-use super::halving::{Halving, Look, Ranges};
-use super::known::KnownPieces;
+use super::halving::{Halving, KnownPieces, Look, Ranges};
 use super::{line, region};
 
 /// Proof over the ranges of the open keys of a family, divided into blocks.
