@@ -1,11 +1,11 @@
 //! One run on several threads, or with groups of peers on one thread. Results equal the results of all peers together, to the bit.
 //!
 //! Each thread moves some of the peers, and has the links to its peers with the samples in flight. Peers act on each other by their samples alone, so threads
-//! need to meet only at ticks at which some peer sends, to exchange the samples. The fate of a packet is drawn at an address of its own, so any thread can draw
+//! need to meet only at ticks of sending, to exchange the samples. The fate of a packet is drawn at a separate address, so any thread can draw
 //! the fate.
 //!
 //! For the same reason a thread need not move all its peers tick by tick. A thread computes one group of peers from one meeting to the next, then the next
-//! group, so the samples that a group holds stay in the cache.
+//! group, so the held samples of a group stay in the cache.
 
 mod barrier;
 mod exchange;
@@ -28,11 +28,11 @@ use crate::summary::{Ending, Summary};
 /// Least number of peers for each thread. With fewer peers, threads wait longer than they work.
 const PEERS_A_THREAD: usize = 8;
 
-/// Memory of the samples that a group holds \[bytes\]: half of a typical second-level cache, which links and packets share.
+/// Memory of the held samples of a group \[bytes\]: half of a typical second-level cache. Links and packets share the cache.
 const HELD_BY_A_GROUP: usize = 1 << 20;
 
 impl Shape {
-    /// Returns the largest number of threads that shortens a run, and the reason why more threads do not.
+    /// Returns the largest useful number of threads of a run, and the reason against more threads.
     pub(crate) fn threads(&self) -> (usize, &'static str) {
         match why_together(self) {
             Some(why) => (1, why),
@@ -49,7 +49,7 @@ impl Shape {
     }
 }
 
-/// Returns the reason for which all peers must move together; `None` if they need not.
+/// Returns the reason for moving all peers together; `None` without such a reason.
 fn why_together(shape: &Shape) -> Option<&'static str> {
     let whys = [(shape.delay.is_some(), "all samples travel together: a tick takes less time than threads take to meet")];
     whys.into_iter().find_map(|(is_so, why)| is_so.then_some(why))
@@ -58,14 +58,16 @@ fn why_together(shape: &Shape) -> Option<&'static str> {
 /// Divides the peers of a thread into groups of whole registers. The held samples of a group take at most `held_by_a_group` bytes, unless one register of peers
 /// takes more.
 fn groups(shape: &Shape, members: &Range<usize>, held_by_a_group: usize) -> Vec<Range<usize>> {
+    // A held sample takes a sequence number, and a position and a velocity per axis.
     let heard = shape.topology.as_ref().map_or(shape.peers - 1, |topology| topology.links().div_ceil(shape.peers));
     let held_by_a_peer = heard.max(1) * (size_of::<u64>() + shape.axes * size_of::<[f64; 2]>());
     let most = (held_by_a_group / held_by_a_peer).max(1).next_multiple_of(WIDTH);
+    // Groups of nearly equal size: the number of groups comes first, and the peers are divided evenly among the groups in whole registers.
     let size = members.len().div_ceil(members.len().div_ceil(most).max(1)).next_multiple_of(WIDTH);
     members.clone().step_by(size).map(|first| first..(first + size).min(members.end)).collect()
 }
 
-/// Runs a scene on the given number of threads to its end. Returns `None` if the run diverged, because threads notice that only at their next meeting.
+/// Runs a scene on the given number of threads to its end. Returns `None` if the run diverged, because threads notice a divergence only at their next meeting.
 pub(super) fn run<const A: usize>(
     scene: &Scene,
     shape: &Shape,
@@ -121,7 +123,7 @@ struct Ended<'a, const A: usize> {
     groups: Vec<Arrays<'a, A, 1>>,
     ending: Ending,
     ticks: u64,
-    /// Instant up to which packets were delivered.
+    /// Instant of the last delivery.
     until: Instant,
     max_discrepancy: f64,
 }
@@ -133,7 +135,7 @@ struct Part<'a, 'e, 'k, const A: usize> {
     keep_going: Option<&'k mut dyn FnMut(Instant) -> bool>,
 }
 
-/// Reason for which the run of a thread ends early.
+/// Reason for the early end of a thread's run.
 enum Early {
     Diverged,
     /// The observer ended the run after the given number of ticks.
@@ -145,6 +147,7 @@ impl<'a, const A: usize> Part<'a, '_, '_, A> {
         let shape = self.groups[0].shape.clone();
         let (mut tick, last) = (0, shape.tick_at(shape.end));
         let (ending, ticks) = loop {
+            // All threads know the same changes of the timeline, so all stop at the same tick without a meeting.
             let until = self.groups[0].next_change().min(last);
             match self.run_over(tick..until) {
                 ControlFlow::Break(Early::Diverged) => return None,
@@ -178,10 +181,12 @@ impl<'a, const A: usize> Part<'a, '_, '_, A> {
     fn run_over(&mut self, ticks: Range<u64>) -> ControlFlow<Early> {
         let mut tick = ticks.start;
         while tick < ticks.end {
+            // Every thread reads the result of the same meeting, so all threads end at the same tick.
             if !self.thread.all_are_finite() {
                 return ControlFlow::Break(Early::Diverged);
             }
             let mut sends = false;
+            // All groups begin the tick alike, so the answer of the last group is the answer of all.
             for group in &mut self.groups {
                 sends = group.begin(tick);
             }
@@ -189,7 +194,7 @@ impl<'a, const A: usize> Part<'a, '_, '_, A> {
                 self.meet();
             }
             let end = self.groups[0].earliest_send.min(self.groups[0].shape.asked_after(tick)).min(ticks.end);
-            // Up to the next tick at which a peer sends or the observer is asked, groups do not depend on each other.
+            // Up to the next tick of a sending or of a question to the observer, groups do not depend on each other.
             self.go_on(tick..end, sends);
             let shape = &self.groups[0].shape;
             let (latest, is_asked) = (shape.instant(end - 1), shape.is_asked_before(end));
@@ -216,6 +221,7 @@ impl<'a, const A: usize> Part<'a, '_, '_, A> {
     /// Computes the given ticks, one group after another. All groups have begun the ticks; samples are sent in the first tick only, if `sends`.
     fn go_on(&mut self, ticks: Range<u64>, sends: bool) {
         let Self { groups, thread, .. } = self;
+        // Extremes of the first group append ticks, extremes of further groups join the same ticks from `noted` on.
         let noted = thread.ticks_noted();
         for group in groups {
             for (tick, place) in ticks.clone().zip(noted..) {

@@ -1,4 +1,4 @@
-//! Samples that reach all other peers at the same tick: all links have the same constant delay and lose nothing.
+//! Samples with an arrival at all other peers at the same tick: all links have the same constant delay and lose nothing.
 //!
 //! All receivers then hold the same sample of a sender, so a sample is stored once for all receivers, both in flight and when held.
 
@@ -17,10 +17,10 @@ use crate::arrays::bodies::Bodies;
 pub(in crate::arrays) struct Broadcast<const A: usize, const L: usize> {
     /// Ticks from sending to arrival.
     delay: u64,
-    /// Samples in flight, in the order of their arrival: with one delay, the order in which the samples were sent.
+    /// Samples in flight, in the order of their arrival: with one delay, the order of sending.
     on_the_way: VecDeque<Sent<A, L>>,
     peers: usize,
-    /// Samples held from each sender but the first, indexed by axis, then by sender − 1: the order in which the first peer holds them.
+    /// Samples held from each sender but the first, indexed by axis, then by sender − 1: the order of the first peer.
     held: [Vec<Quad<L>>; A],
     /// Sample held from the first sender.
     first: Sample<A, L>,
@@ -31,7 +31,7 @@ pub(in crate::arrays) struct Broadcast<const A: usize, const L: usize> {
     changed: Changed,
 }
 
-/// Senders whose samples have arrived since the means were computed.
+/// Senders with an arrival since the means were computed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Changed {
     Nothing,
@@ -42,7 +42,7 @@ enum Changed {
 
 #[derive(Clone, Copy, Debug)]
 struct Sent<const A: usize, const L: usize> {
-    /// Tick at which the sample arrives.
+    /// Tick of the arrival.
     due: u64,
     sender: usize,
     sample: Sample<A, L>,
@@ -65,6 +65,7 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
         for (sender, sample) in initial.iter().enumerate() {
             broadcast.hold(sender, sample);
         }
+        // Exact sums are over all senders. The own sample of a receiver is subtracted later, see `refresh_exactly`.
         broadcast.sums =
             (peers > EXACT_FROM).then(|| ExactMeans::new((0..peers).map(|sender| broadcast.held_from(sender)).collect::<Vec<_>>().iter()));
         broadcast
@@ -77,7 +78,7 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
         self.on_the_way.push_back(Sent { due, sender, sample: bodies.sample(sender) });
     }
 
-    /// Holds the samples that have arrived by `tick`.
+    /// Holds the samples arrived by `tick`.
     pub(in crate::arrays) fn deliver(&mut self, tick: u64) {
         while let Some(Sent { sender, sample, .. }) = self.next_due(tick) {
             self.hold(sender, &sample);
@@ -87,7 +88,7 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
         }
     }
 
-    /// Removes and returns the next sample in flight that has arrived by `tick`.
+    /// Removes and returns the next sample in flight, if the sample has arrived by `tick`.
     #[inline(always)]
     fn next_due(&mut self, tick: u64) -> Option<Sent<A, L>> {
         let sent = *self.on_the_way.front().filter(|sent| sent.due <= tick)?;
@@ -121,8 +122,8 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
         }
     }
 
-    /// Returns the instant and the velocity of each sample that a peer holds in a run, in the order in which the peer holds them. `sent` returns the instant at
-    /// which the sample with a sequence number was sent by a sender.
+    /// Returns the instant and the velocity of each held sample of a peer in a run, in the order of the peer. `sent` returns the instant of
+    /// sending of the sample with a sequence number of a sender.
     pub(in crate::arrays) fn moving(&self, (peer, run): (usize, usize), sent: impl Fn(usize, u64) -> Instant) -> impl Iterator<Item = Moving<A>> {
         (0..self.peers).filter(move |sender| *sender != peer).map(move |sender| Moving {
             sent: self.arrived[sender].checked_sub(1).map_or(Instant::ZERO, |newest| sent(sender, newest)),
@@ -138,7 +139,7 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
         self.changed == Changed::Nothing
     }
 
-    /// Returns whether any sample that `peer` holds has changed since the means were computed.
+    /// Returns whether any held sample of `peer` has changed since the means were computed.
     pub(in crate::arrays) fn has_changed(&self, peer: usize) -> bool {
         match self.changed {
             Changed::Nothing => false,
@@ -147,7 +148,7 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
         }
     }
 
-    /// Computes the mean of the samples that each peer holds.
+    /// Computes the mean of the held samples of each peer.
     #[inline(always)]
     pub(in crate::arrays) fn refresh(&mut self, blocks: &mut Blocks) {
         self.changed = Changed::Nothing;
@@ -159,7 +160,7 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
         for axis in 0..A {
             let held = &mut self.held[axis];
             // Each receiver holds the samples of all senders but itself. From one receiver to the next only one place changes: the receiver's own sample gives
-            // way to that of the receiver before.
+            // way to the sample of the receiver before.
             let mut own = (self.first.position[axis], self.first.velocity[axis]);
             for peer in 0..self.peers {
                 if peer > 0 {

@@ -1,37 +1,37 @@
-//! Samples in flight, in a timing wheel indexed by the tick at which a sample arrives.
+//! Samples in flight, in a timing wheel indexed by the tick of the arrival.
 
 use std::collections::BTreeMap;
 
 use cohaptic_units::Instant;
 
-/// Ticks of the wheel, so a second at 1 kHz fits: delays of satellites with queues. Packets that arrive later are kept in a map, which is slower.
+/// Ticks of the wheel, so a second at 1 kHz fits: delays of satellites with queues. Packets with a later arrival are kept in a slower map.
 const HORIZON: u64 = 1024;
 /// Slots of the wheel: two for each tick.
 const SLOTS: usize = 2048;
 
-/// Returns the first slot of a tick: samples in order. The next slot holds samples that overtake.
+/// Returns the first slot of a tick: samples in order. The next slot holds overtaking samples.
 fn slot(tick: u64) -> usize {
     2 * (tick % HORIZON) as usize
 }
 
-/// Samples in flight, by the tick at which they arrive.
+/// Samples in flight, by the tick of their arrival.
 #[derive(Clone, Debug)]
 pub(super) struct InFlight<const A: usize> {
     ticks: Ticks,
-    /// Packets that arrive within [`HORIZON`] ticks. See [`slot`].
+    /// Packets with an arrival within [`HORIZON`] ticks. See [`slot`].
     wheel: Box<[Vec<Packet<A>>; SLOTS]>,
-    /// Packets that arrive later, by tick.
+    /// Packets with a later arrival, by tick.
     beyond: BTreeMap<u64, Bucket<A>>,
-    /// Allocations of emptied slots. The latest is used first, because its memory is most likely in the cache.
+    /// Allocations of emptied slots. The latest allocation is used first, because its memory is most likely in the cache.
     emptied: Vec<Vec<Packet<A>>>,
 }
 
-/// Samples that arrive at the same tick.
+/// Samples with an arrival at the same tick.
 #[derive(Clone, Debug)]
 pub(super) struct Bucket<const A: usize> {
-    /// Samples that arrive, link by link, in the order in which they were put here.
+    /// Samples with arrivals in the order of insertion on each link.
     pub(super) in_order: Vec<Packet<A>>,
-    /// Samples that may arrive before samples of the same link that were put here earlier.
+    /// Samples with a possible arrival before samples of the same link inserted earlier.
     pub(super) overtaking: Vec<Packet<A>>,
 }
 
@@ -45,7 +45,7 @@ impl<const A: usize> Default for Bucket<A> {
 pub(super) struct Packet<const A: usize> {
     pub(super) arrival: Instant,
     pub(super) sequence: u64,
-    /// Place at which the receiver holds the sample, times the number of runs, plus the run.
+    /// Place of the sample at the receiver, times the number of runs, plus the run.
     pub(super) place: u32,
     pub(super) receiver: u16,
     pub(super) position: [f64; A],
@@ -66,9 +66,9 @@ impl Ticks {
         Self { nanos, reciprocal: (2..1 << 31).contains(&nanos).then(|| u64::MAX / nanos + 1) }
     }
 
-    /// Returns the number of ticks in `span` \[ns\], rounded up, without a division where possible.
+    /// Returns the number of ticks in `span` \[ns\], rounded up, without a division if possible.
     ///
-    /// With r = ⌈2^64/d⌉ = (2^64 + e)/d, 0 ≤ e < d, the product n·r/2^64 is n/d + n·e/(d·2^64), which has the same whole part as n/d while n·e < 2^64. This
+    /// With r = ⌈2^64/d⌉ = (2^64 + e)/d, 0 ≤ e < d, the product n·r/2^64 is n/d + n·e/(d·2^64), with the same whole part as n/d while n·e < 2^64. This
     /// holds for n and d below 2^32.
     #[inline(always)]
     fn count(self, span: u64) -> u64 {
@@ -85,7 +85,7 @@ impl<const A: usize> InFlight<A> {
         Self { ticks: Ticks::new(tick_nanos), wheel: Box::new(std::array::from_fn(|_| Vec::new())), beyond: BTreeMap::new(), emptied: Vec::new() }
     }
 
-    /// Stores a packet that becomes known at the given tick and instant. `overtakes`: whether it may arrive before an earlier packet of its link.
+    /// Stores a packet known from the given tick and instant on. `overtakes`: `true` if the packet may arrive before an earlier packet of its link.
     #[inline(always)]
     pub(super) fn push(&mut self, (tick, now): (u64, Instant), packet: Packet<A>, overtakes: bool) {
         // `now` is a multiple of the tick, so this sum is the first tick at or after the arrival.
@@ -94,10 +94,10 @@ impl<const A: usize> InFlight<A> {
         self.packets_at((ticks, due), overtakes).push(packet);
     }
 
-    /// Returns the packets that are due at the tick `due`, which is `ticks` ahead.
+    /// Returns the packets due at the tick `due`, `ticks` ticks ahead.
     ///
-    /// The caller pushes the packet itself. A packet as an argument would be assembled on the stack and copied in words wider than its fields, for which a
-    /// processor stalls.
+    /// The caller pushes the packet itself. A packet as an argument would be assembled on the stack and copied in words wider than its fields. Such a copy
+    /// stalls the processor.
     #[inline(always)]
     fn packets_at(&mut self, (ticks, due): (u64, u64), overtakes: bool) -> &mut Vec<Packet<A>> {
         if ticks >= HORIZON {
@@ -105,6 +105,7 @@ impl<const A: usize> InFlight<A> {
         }
         // Index by addition, without a branch.
         let packets = &mut self.wheel[slot(due) + usize::from(overtakes)];
+        // A slot gives its allocation away when its packets are taken in, so a slot in use for the first time or again takes an emptied one.
         if packets.capacity() == 0 {
             *packets = self.emptied.pop().unwrap_or_default();
         }
@@ -126,7 +127,7 @@ impl<const A: usize> InFlight<A> {
         self.wheel.iter().flatten().chain(self.beyond.values().flat_map(|bucket| bucket.in_order.iter().chain(&bucket.overtaking)))
     }
 
-    /// Keeps the allocations of a bucket whose packets were taken in.
+    /// Keeps the allocations of a bucket after its packets were taken in.
     pub(super) fn reuse(&mut self, Bucket { in_order, overtaking }: Bucket<A>) {
         for mut packets in [overtaking, in_order] {
             if packets.capacity() > 0 {
@@ -136,7 +137,7 @@ impl<const A: usize> InFlight<A> {
         }
     }
 
-    /// Removes and returns the samples that are due at `tick`; `None` if there are none.
+    /// Removes and returns the samples due at `tick`; `None` without samples.
     #[inline(always)]
     pub(super) fn due(&mut self, tick: u64) -> Option<Bucket<A>> {
         // Checked at every tick: a tick of the map enters the wheel only when due.
@@ -148,11 +149,12 @@ impl<const A: usize> InFlight<A> {
         (!in_order.is_empty() || !overtaking.is_empty()).then_some(Bucket { in_order, overtaking })
     }
 
-    /// Moves the samples of the map that are due at `tick` into the wheel, before the samples that were pushed later.
+    /// Moves the samples of the map due at `tick` into the wheel, before the samples pushed later.
     #[cold]
     fn come_near(&mut self, tick: u64) {
         if let Some(bucket) = self.beyond.remove(&tick) {
             for (mut packets, slot) in [bucket.in_order, bucket.overtaking].into_iter().zip(slot(tick)..) {
+                // The order of insertion is kept: samples of the map were pushed at earlier ticks than all samples of the slot.
                 packets.append(&mut self.wheel[slot]);
                 let emptied = std::mem::replace(&mut self.wheel[slot], packets);
                 if emptied.capacity() > 0 {

@@ -1,7 +1,7 @@
-//! Samples that each arrive at an instant of their own: links that differ, jitter, loss, bursts, outages.
+//! Samples with separate instants of arrival: different links, jitter, loss, bursts, outages.
 //!
-//! Peers read arrived samples only at ticks, and all peers tick together. Samples in flight therefore lie in a timing wheel indexed by the tick at which they
-//! arrive. Nothing is sorted but samples that arrive at the same tick over a link on which one sample overtook another.
+//! Peers read arrived samples only at ticks, and all peers tick together. Samples in flight therefore lie in a timing wheel indexed by the tick of their
+//! arrival. Nothing is sorted but samples with an arrival at the same tick over a link with overtaking samples.
 
 mod neighbours;
 
@@ -22,18 +22,18 @@ use crate::arrays::processor::on_widest;
 use crate::arrays::shape::Way;
 use crate::arrays::{Shape, nanos};
 
-/// Flag in an entry of `next`: a sample that arrives at this tick over this link overtook another.
+/// Flag in an entry of `next`: a sample of this tick and this link overtook an earlier sample.
 const IS_OVERTAKEN: u64 = 1 << 63;
-/// Number of samples that [`PerPacket::take_in_together`] takes in at once.
+/// Number of samples taken in at once by [`PerPacket::take_in_together`].
 const TAKEN_TOGETHER: usize = 16;
 
-/// Links to some peers, samples in flight to these peers, and samples that each of them holds of every other peer.
+/// Links to some peers, samples in flight to these peers, and samples of every other peer held by each of these peers.
 ///
-/// The arrays are ordered by receiver: the samples that a receiver holds are contiguous, and receivers can be shared out among threads.
+/// The arrays are ordered by receiver: the held samples of a receiver are contiguous, and receivers can be shared out among threads.
 #[derive(Clone, Debug)]
 pub(in crate::arrays) struct PerPacket<const A: usize, const L: usize> {
     rows: Rows,
-    /// Peers of the scene that receive. Elsewhere in this type, receivers are counted from 0.
+    /// Receiving peers of the scene. Elsewhere in this type, receivers are counted from 0.
     receivers: Range<usize>,
     /// End of the scene.
     end: Instant,
@@ -42,25 +42,25 @@ pub(in crate::arrays) struct PerPacket<const A: usize, const L: usize> {
     /// `true` if a peer sends at the present tick, indexed by peer of the scene.
     sends: Vec<bool>,
     in_flight: InFlight<A>,
-    /// Samples held, indexed by axis, then ordered by receiver and sender. Each receiver has whole quads, the last of which may be padded.
+    /// Samples held, indexed by axis, then ordered by receiver and sender. Each receiver has whole quads, and the last quad may be padded.
     held: [Vec<Quad<L>>; A],
-    /// Sums of the samples that a receiver holds, indexed by receiver; `None` if the mean of that receiver is not exact. Empty if no mean is exact. Exact means
+    /// Sums of the held samples, indexed by receiver; `None` if the mean of the receiver is not exact. Empty if no mean is exact. Exact means
     /// are computed in single runs only.
     sums: Vec<Option<ExactMeans<A>>>,
-    /// Least sequence number that is newer than the sample held, indexed by place, then run. 0 as long as no sample has arrived.
+    /// Least sequence number newer than the held sample, indexed by place, then run. 0 as long as no sample has arrived.
     next: Vec<u64>,
-    /// Whether a sample has arrived since the means were computed: bit r for run r, indexed by receiver.
+    /// Arrivals since the means were computed: bit r for run r, indexed by receiver.
     changed: Vec<u8>,
-    /// Number of samples that arrived after a newer one, indexed by receiver, then run.
+    /// Number of samples arrived after a newer sample, indexed by receiver, then run.
     stale: Vec<u64>,
 }
 
-/// Links in the form that the shape's [`Way`] needs.
+/// Links in the form required by the shape's [`Way`].
 #[derive(Clone, Debug)]
 enum Links<const A: usize> {
-    /// Links that decide the fate of a packet as it is sent.
+    /// Links with the fate of a packet decided at its sending.
     Direct(DirectLinks),
-    /// Links that need the instant of the sender's next packet. Only in single runs: scenes that run side by side have direct links, and `const { L > 1 }`
+    /// Links with a need for the instant of the sender's next packet. Only in single runs: scenes side by side have direct links, and `const { L > 1 }`
     /// keeps the compiler from generating this case.
     Stepped(SteppedLinks<State<A>>),
 }
@@ -107,7 +107,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
             rows,
         };
         let Self { rows, held, .. } = &mut samples;
-        // A held sample is stored with its weight, as `Rows::packet` weighs samples that arrive.
+        // A held sample is stored with its weight, as `Rows::packet` weighs arriving samples.
         for (receiver, place) in (0..count).flat_map(|receiver| rows.held(receiver).map(move |place| (receiver, place))) {
             let column = rows.column_of(receiver, place);
             let (sample, weight) = (&initial[rows.sender(receiver, column)], rows.weight(receiver, column));
@@ -116,6 +116,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
                 quads::set(&mut held[axis], place, run, weighed(sample.position[axis][run]), weighed(sample.velocity[axis][run]));
             }
         }
+        // With many samples the sums are kept exactly, so a single arrival costs one replacement instead of a sum over all held samples.
         if (0..count).any(|receiver| rows.held(receiver).len() >= EXACT_FROM) {
             let states = |receiver: usize| rows.held(receiver).map(|place| quads::state(held, place, 0)).collect::<Vec<_>>();
             let sums = |receiver: usize| (rows.held(receiver).len() >= EXACT_FROM).then(|| ExactMeans::new(states(receiver).iter()));
@@ -124,10 +125,10 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         samples
     }
 
-    /// Sends the samples of `senders` to all receivers that hear them. `sent` holds samples indexed by peer of the scene. Each sender sends nothing further
+    /// Sends the samples of `senders` to all receivers in their reach. `sent` holds samples indexed by peer of the scene. Each sender sends nothing further
     /// until its `next` instant; before that, only [`PerPacket::pass`] changes the links.
     ///
-    /// A run that has ended goes on sending, because lanes cannot stop one by one; its results are no longer read.
+    /// An ended run goes on sending, because lanes cannot stop one by one; the results of the run are no longer read.
     #[inline(never)]
     pub(in crate::arrays) fn send(
         &mut self,
@@ -147,7 +148,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
                 sends.fill(false);
                 senders.iter().for_each(|sender| sends[*sender] = true);
                 let (receivers, sends) = (receivers.clone(), &**sends);
-                // Links are computed eight at a time, which does not pay if few of eight carry a packet.
+                // Links are computed eight at a time. This does not pay if few of eight carry a packet.
                 let (are_few, are_chains) = (L == 1 && senders.len() * 4 < peers, links.are_chains());
                 let sending = DirectSending { peers, receivers, links, senders, sends, sent, in_flight, at: (tick, now) };
                 match are_chains {
@@ -159,6 +160,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
             Links::Stepped(_) if const { L > 1 } => {}
             Links::Stepped(links) => {
                 for ((receiver, peer), sender) in receivers.clone().enumerate().flat_map(|to| senders.iter().map(move |from| (to, *from))) {
+                    // A peer hears itself without a link.
                     if sender == peer {
                         continue;
                     }
@@ -173,12 +175,13 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
     }
 
-    /// Advances the links of all senders until the `next` instant of each. `latest` is the latest tick that was computed, with its instant.
+    /// Advances the links of all senders until the `next` instant of each sender. `latest` is the latest computed tick, with its instant.
     #[cold]
     pub(in crate::arrays) fn pass(&mut self, latest: (u64, Instant), next: &dyn Fn(usize) -> Instant) {
         if const { L > 1 } {
             return;
         }
+        // Direct links have decided all fates at sending and have nothing to advance.
         let Self { rows, receivers, links: Links::Stepped(links), in_flight, .. } = self else { return };
         for (receiver, peer) in receivers.clone().enumerate() {
             for column in (0..rows.columns(receiver)).filter(|column| rows.sender(receiver, *column) != peer) {
@@ -192,13 +195,13 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
     }
 
-    /// Returns the peers of the scene that a receiver hears.
+    /// Returns the heard peers of a receiver, by index in the scene.
     pub(in crate::arrays) fn senders(&self, receiver: usize) -> impl Iterator<Item = usize> + '_ {
         let senders = (0..self.rows.columns(receiver)).map(move |column| self.rows.sender(receiver, column));
         senders.filter(move |sender| *sender != self.receivers.start + receiver)
     }
 
-    /// Replaces the model of the link from `from` to the receiver `to`, both peers of the scene, from the instant `at` on, which is not before the latest tick.
+    /// Replaces the model of the link from `from` to the receiver `to`, both peers of the scene, from the instant `at` on. `at` is not before the latest tick.
     #[cold]
     pub(in crate::arrays) fn set_link(
         &mut self,
@@ -222,7 +225,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
     }
 
-    /// Takes in the samples that have arrived by `tick`.
+    /// Takes in the samples arrived by `tick`.
     #[inline(always)]
     pub(in crate::arrays) fn deliver(&mut self, tick: u64) {
         if let Some(bucket) = self.in_flight.due(tick) {
@@ -230,8 +233,8 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
     }
 
-    /// Returns the instant and the velocity of each sample that a peer holds in a run, in the order in which the peer holds them. `sent` returns the instant at
-    /// which the sample with a sequence number was sent by a sender.
+    /// Returns the instant and the velocity of each held sample of a peer in a run, in the order of the peer. `sent` returns the instant of
+    /// sending of the sample with a sequence number of a sender.
     pub(in crate::arrays) fn moving(&self, (peer, run): (usize, usize), sent: impl Fn(usize, u64) -> Instant) -> impl Iterator<Item = Moving<A>> {
         self.rows.held(peer).map(move |place| {
             let sender = self.rows.sender(peer, self.rows.column_of(peer, place));
@@ -243,12 +246,12 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         })
     }
 
-    /// Returns whether any sample that a peer holds in a run has changed since the means were computed.
+    /// Returns whether any held sample of a peer in a run has changed since the means were computed.
     pub(in crate::arrays) fn has_changed(&self, peer: usize, run: usize) -> bool {
         self.changed[peer] & (1 << run) != 0
     }
 
-    /// Computes the means of the receivers for which a sample has arrived.
+    /// Computes the means of the receivers with a new sample.
     #[inline(always)]
     pub(in crate::arrays) fn refresh(&mut self, blocks: &mut Blocks) {
         // The usual case first: rows of equal length at computed offsets, without a question for each receiver.
@@ -268,7 +271,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
     }
 
-    /// Like [`PerPacket::refresh`], for receivers that hear different numbers of peers or have exact means.
+    /// Like [`PerPacket::refresh`], for receivers with different numbers of heard peers or with exact means.
     #[inline(never)]
     fn refresh_unequal(&mut self, blocks: &mut Blocks) {
         let Self { rows, held, sums, changed, .. } = self;
@@ -284,6 +287,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
                 }
                 continue;
             }
+            // The padding of the last quad is −0, whose addition changes no sum, so whole quads can be summed.
             let (quads, count) = (places.start / 4..places.end.div_ceil(4), count(places.len()));
             for (axis, held) in held.iter().enumerate() {
                 let (x, v) = quads::mean(&held[quads.clone()], count);
@@ -292,7 +296,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
     }
 
-    /// Takes in the samples that have arrived by the end of the scene, which is at or before the tick after `latest`.
+    /// Takes in the samples arrived by the end of the scene. The end is at or before the tick after `latest`.
     pub(in crate::arrays) fn finish(&mut self, latest: (u64, Instant)) {
         self.pass(latest, &|_| Instant::MAX);
         // The bucket belongs to the tick at or after the end. Packets with an arrival between the end and this tick are removed.
@@ -304,18 +308,18 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
     }
 
-    /// Takes in samples that have arrived.
+    /// Takes in arrived samples.
     ///
-    /// The order among links does not matter: of each link the newest sample stays, and sums of samples are exact. Samples are therefore taken in as they lie,
-    /// from receiver to receiver, without sorting. Samples of links on which one sample overtakes another come last, sorted, because their order decides which
+    /// The order among links does not matter: of each link the newest sample stays, and sums of samples are exact. Samples are therefore taken in unsorted,
+    /// from receiver to receiver. Samples of links with overtaking come last, sorted, because their order decides which
     /// samples are stale.
     #[inline(never)]
     fn take_in(&mut self, mut bucket: Bucket<A>) {
-        // Mark the links first: their samples in order must wait for the sorted pass too.
+        // Mark the links first: the samples of marked links in `in_order` must wait for the sorted pass too.
         for packet in &bucket.overtaking {
             self.next[packet.place as usize] |= IS_OVERTAKEN;
         }
-        // Samples appended below belong to marked links, but did not mark them.
+        // Samples appended below belong to marked links, but did not mark the links.
         let overtaking = bucket.overtaking.len();
         // Without exact means there are no sums to update.
         match self.sums.is_empty() {
@@ -338,8 +342,8 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
     }
 
-    /// Like [`PerPacket::take_in_order`], for exact means. Takes in several samples at once, so the reads of held samples overlap before the sums need them:
-    /// these samples are more than a cache holds.
+    /// Like [`PerPacket::take_in_order`], for exact means. Takes in several samples at once, so the reads of held samples overlap before the sums need the
+    /// samples: these samples are more than a cache holds.
     #[inline(always)]
     fn take_in_together(&mut self, bucket: &mut Bucket<A>) {
         for packets in bucket.in_order.chunks(TAKEN_TOGETHER) {
@@ -349,6 +353,8 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
                 newest[count] = place;
                 count += usize::from(self.is_newest(packet, &mut bucket.overtaking));
             }
+            // All held samples are read before any sum changes. Two packets of a chunk never replace the same sample, since each is the newest of its link at
+            // its turn.
             let mut before = [State { position: [0.0; A], velocity: [0.0; A] }; TAKEN_TOGETHER];
             for (place, before) in newest[..count].iter().zip(&mut before) {
                 let packet = &packets[*place];
@@ -361,7 +367,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
     }
 
-    /// Returns whether a sample is newer than the held one, and notes its sequence number if so. Appends a sample of a marked link to `overtaking`.
+    /// Returns whether a sample is newer than the held sample, and notes its sequence number if so. Appends a sample of a marked link to `overtaking`.
     #[inline(always)]
     fn is_newest(&mut self, packet: &Packet<A>, overtaking: &mut Vec<Packet<A>>) -> bool {
         let next = &mut self.next[packet.place as usize];
@@ -377,18 +383,19 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         is_newest
     }
 
-    /// Takes in all samples of marked links, in the order of arrival. The first `overtaking` packets are those by which links were marked.
+    /// Takes in all samples of marked links, in the order of arrival. The first `overtaking` packets have marked their links.
     fn take_in_overtaking(&mut self, packets: &mut [Packet<A>], overtaking: usize) {
         for packet in &packets[..overtaking] {
             self.next[packet.place as usize] &= !IS_OVERTAKEN;
         }
+        // A stable order is not needed: the arrival and the sequence number tell all packets of a link apart.
         packets.sort_unstable_by_key(|packet| (packet.arrival, packet.sequence));
         for packet in &*packets {
             self.take_in_one(packet);
         }
     }
 
-    /// Takes in a sample, after all samples of its link that arrived before.
+    /// Takes in a sample, after all earlier arrivals of its link.
     #[inline(always)]
     fn take_in_one(&mut self, packet: &Packet<A>) {
         let next = &mut self.next[packet.place as usize];
@@ -410,7 +417,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
     }
 
-    /// Holds a sample: replaces the held one and marks the mean as out of date.
+    /// Holds a sample: replaces the held sample and marks the mean as out of date.
     #[inline(always)]
     fn hold(&mut self, packet: &Packet<A>) {
         let (place, run) = (packet.place as usize / L, packet.place as usize % L);
@@ -427,12 +434,13 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
 
     /// Ends a run at the instant `at` before the end of the scene: samples still in flight never arrive, and links do nothing more.
     ///
-    /// `sent` returns the instant at which a packet of a sender was sent, by its sequence number.
+    /// `sent` returns the instant of sending of a packet of a sender, by its sequence number.
     pub(in crate::arrays) fn end_early(&mut self, run: usize, at: Instant, sent: impl Fn(usize, u64) -> Instant) {
         if let Links::Stepped(links) = &mut self.links {
             // Stepped links exist in single runs only, so stopping all links stops this run only.
             links.stop(at);
         }
+        // The counters must not contain packets in flight at the end: each is taken back from its link.
         for packet in self.in_flight.iter().filter(|packet| packet.place as usize % L == run) {
             let receiver = usize::from(packet.receiver);
             let column = self.rows.column_of(receiver, packet.place as usize / L);
@@ -445,7 +453,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
     }
 
-    /// Returns the number of samples that a receiver took in after a newer one.
+    /// Returns the number of samples taken in by a receiver after a newer sample.
     pub(in crate::arrays) fn stale_samples(&self, receiver: usize, run: usize) -> u64 {
         self.stale[receiver * L + run]
     }
@@ -477,7 +485,7 @@ struct DirectSending<'a, const A: usize, const L: usize> {
     at: (u64, Instant),
 }
 
-/// One type, and so one compiled function, for each way of sending: several ways in one function need more registers than there are.
+/// One type, and so one compiled function, for each way of sending: several ways in one function need more registers than the processor has.
 struct BySender<'a, const A: usize, const L: usize>(DirectSending<'a, A, L>);
 struct ByChain<'a, const A: usize, const L: usize>(DirectSending<'a, A, L>);
 struct ByLink<'a, const A: usize, const L: usize>(DirectSending<'a, A, L>);
@@ -510,8 +518,8 @@ impl<const A: usize, const L: usize> NullaryFnOnce for ByLink<'_, A, L> {
 }
 
 impl<const A: usize, const L: usize> DirectSending<'_, A, L> {
-    /// Sends link by link, eight at a time and without a gap between the rows of receivers, so only the last eight can be incomplete. `CHAINS`: whether
-    /// the links are of a kind in which a delay depends on earlier delays.
+    /// Sends link by link, eight at a time and without a gap between the rows of receivers, so only the last eight can be incomplete. `CHAINS`: `true`
+    /// if a delay of the links depends on earlier delays.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "the bits of eight links")]
     fn by_link<const CHAINS: bool>(self) {
@@ -531,6 +539,7 @@ impl<const A: usize, const L: usize> DirectSending<'_, A, L> {
             while first >= end {
                 (receiver, end) = (receiver + 1, end + row);
             }
+            // A sender that does not send at this tick has its bits set too, one for each run of its links.
             let together = DirectLinks::AT_ONCE.min(count - first);
             if !all_send {
                 for place in (0..together).filter(|place| !sends[(first + place + row - end) % row / L]) {
@@ -556,6 +565,7 @@ impl<const A: usize, const L: usize> DirectSending<'_, A, L> {
         for sender in senders {
             for to in receivers.clone().enumerate().filter(|(_, peer)| peer != sender) {
                 let link = LinkId::new(to.0 * peers + sender);
+                // The sequence number is the number of packets offered before, so it is read before the packet is offered.
                 let sequence = links.offered(link);
                 if let Some((arrival, overtakes)) = links.offer_one(at.1, link) {
                     in_flight.push(at, packet(peers, to, *sender, sent, arrival, sequence), overtakes);
@@ -565,7 +575,7 @@ impl<const A: usize, const L: usize> DirectSending<'_, A, L> {
     }
 }
 
-/// Returns the packet over the link at index `link` of a row, to a receiver that is the peer `peer` of the scene, if all peers hear all other peers. A row is
+/// Returns the packet over the link at index `link` of a row, to a receiver, the peer `peer` of the scene, if all peers hear all other peers. A row is
 /// ordered by sender, then run.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "peers are counted in 16 bits, what they hold in 32")]

@@ -1,4 +1,4 @@
-//! Storage of the samples that one peer holds along one axis, laid out so that their mean takes few instructions.
+//! Storage of the held samples of one peer along one axis, with a layout for a mean of few instructions.
 
 use cohaptic_peer::State;
 
@@ -46,6 +46,7 @@ pub(super) fn swap<const L: usize>(quads: &mut [Quad<L>], one: usize, other: &mu
 /// Returns the mean position and velocity of `count` samples, indexed by run.
 #[inline(always)]
 pub(super) fn mean<const L: usize>(quads: &[Quad<L>], count: f64) -> ([f64; L], [f64; L]) {
+    // Eight independent sums fill a register. Padding adds −0 and changes none.
     let mut sums: Quad<L> = [[0.0; L]; 8];
     for quad in quads {
         for place in 0..8 {
@@ -55,7 +56,7 @@ pub(super) fn mean<const L: usize>(quads: &[Quad<L>], count: f64) -> ([f64; L], 
         }
     }
     let mean = |first: usize| -> [f64; L] {
-        // The order of additions is that of `Held::refresh`, or the last bit would differ.
+        // The order of additions equals the order in `Held::refresh`, or the last bit would differ.
         std::array::from_fn(|run| ((sums[first][run] + sums[first + 1][run]) + (sums[first + 2][run] + sums[first + 3][run])) / count)
     };
     (mean(0), mean(4))

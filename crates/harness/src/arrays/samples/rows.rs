@@ -1,4 +1,4 @@
-//! Senders that each receiver hears, and the indices of its links and of the samples that it holds.
+//! Heard senders of each receiver, and the indices of the receiver's links and held samples.
 //!
 //! A row has a column for each link to its receiver. A place is an index into the arrays of held samples; each receiver has whole quads of places.
 
@@ -11,10 +11,10 @@ use cohaptic_units::Instant;
 
 use super::in_flight::Packet;
 
-/// Rows of some receivers, which are counted from 0. Each row has a link from each sender, in the order of the senders.
+/// Rows of some receivers, counted from 0. Each row has a link from each sender, in the order of the senders.
 #[derive(Clone, Debug)]
 pub(super) enum Rows {
-    /// Every peer hears all other peers. There is also a link from each receiver to itself, over which nothing is sent, so indices are products.
+    /// Every peer hears all other peers. An unused link from each receiver to itself makes indices products.
     All {
         /// Number of peers of the scene.
         peers: usize,
@@ -25,7 +25,7 @@ pub(super) enum Rows {
     Some(SomeRows),
 }
 
-/// Rows of receivers that hear their neighbours only.
+/// Rows of receivers in a topology: receivers hear their neighbours only.
 #[derive(Clone, Debug)]
 pub(super) struct SomeRows {
     topology: Arc<Topology>,
@@ -50,6 +50,7 @@ impl Rows {
             // Whole quads for each receiver, so a mean never mixes samples of two receivers.
             places.push(places[places.len() - 1] + whole(topology.neighbours(peer).len()));
         }
+        // If every receiver weighs its neighbours alike, no weights are stored, and `packet` multiplies nothing.
         let relative: Vec<Option<Vec<f64>>> = receivers.clone().map(|peer| topology.relative_weights(peer)).collect();
         let weights = if relative.iter().all(Option::is_none) {
             Vec::new()
@@ -103,7 +104,7 @@ impl Rows {
         }
     }
 
-    /// Returns the place of the samples that arrive over the link in a column.
+    /// Returns the place of the samples from the link in a column.
     #[inline]
     pub(super) fn place(&self, receiver: usize, column: usize) -> usize {
         match self {
@@ -113,7 +114,7 @@ impl Rows {
         }
     }
 
-    /// Returns the column of the samples that are held in a place of a receiver. Inverse of [`Rows::place`].
+    /// Returns the column of the held samples in a place of a receiver. Inverse of [`Rows::place`].
     #[inline]
     pub(super) fn column_of(&self, receiver: usize, place: usize) -> usize {
         match self {
@@ -125,7 +126,7 @@ impl Rows {
         }
     }
 
-    /// Returns the places of a receiver that hold samples. The padding up to whole quads is left out.
+    /// Returns the places of a receiver with samples. The padding up to whole quads is left out.
     #[inline(always)]
     pub(super) fn held(&self, receiver: usize) -> Range<usize> {
         match self {

@@ -1,23 +1,23 @@
-//! A barrier for threads that meet thousands of times a second.
+//! A barrier for threads with thousands of meetings a second.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// Number of times that a waiting thread looks before it yields the processor.
+/// Number of looks of a waiting thread before the thread yields the processor.
 const LOOKS: u32 = 10_000;
 
-/// Point at which a fixed number of threads wait for each other, again and again. Waiting threads spin, because most waits are shorter than a system call.
+/// Meeting point of a fixed number of threads, again and again. Waiting threads spin, because most waits are shorter than a system call.
 #[derive(Debug)]
 pub(super) struct Barrier {
     threads: usize,
-    /// Number of threads that have come to the present meeting.
+    /// Number of threads arrived at the present meeting.
     arrived: AtomicUsize,
-    /// Number of meetings so far. Its change releases the waiting threads.
+    /// Number of meetings so far. A change of the number releases the waiting threads.
     meetings: AtomicUsize,
-    /// `true` if a thread panicked, so waiting threads must not wait for it.
+    /// `true` if a thread panicked. Nobody must wait for this thread.
     is_broken: AtomicBool,
 }
 
-/// Breaks a barrier when it is dropped by a thread that panics, so that no thread waits for it for ever.
+/// Breaks a barrier when a panicking thread drops the guard, so no thread waits for ever.
 pub(super) struct Guard<'a>(&'a Barrier);
 
 impl Drop for Guard<'_> {
@@ -37,7 +37,7 @@ impl Barrier {
         Guard(self)
     }
 
-    /// Waits until all threads have called this function. Everything that a thread wrote before is visible to all threads after.
+    /// Waits until all threads have called this function. All writes of a thread before the call are visible to all threads after the call.
     ///
     /// # Panics
     ///
@@ -46,7 +46,7 @@ impl Barrier {
         // Read before the arrival is counted: after that, the last thread may end this meeting at any time.
         let meeting = self.meetings.load(Ordering::Acquire);
         if self.arrived.fetch_add(1, Ordering::AcqRel) + 1 == self.threads {
-            // The count is reset before the release, so a released thread that comes again is counted for the next meeting.
+            // The count is reset before the release, so a released thread is counted for the next meeting when the thread arrives again.
             self.arrived.store(0, Ordering::Relaxed);
             self.meetings.store(meeting.wrapping_add(1), Ordering::Release);
             return;

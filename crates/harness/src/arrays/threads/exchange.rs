@@ -8,9 +8,9 @@ use super::barrier::{Barrier, Guard};
 use crate::arrays::lanes::{larger, smaller};
 use crate::arrays::samples::Sample;
 
-/// State that threads share.
+/// State shared by threads.
 pub(super) struct Exchange<const A: usize> {
-    /// Report of each thread, for two alternating meetings: a fast thread writes its next report while slow threads still read the last.
+    /// Report of each thread, for two alternating meetings: a fast thread writes its next report while slow threads still read the last report.
     told: [Vec<Mutex<Told<A>>>; 2],
     barrier: Barrier,
     goes_on: AtomicBool,
@@ -31,7 +31,7 @@ pub(super) struct Thread<'e, const A: usize> {
     exchange: &'e Exchange<A>,
     /// Index of the thread.
     place: usize,
-    /// Peers of the scene that the thread moves.
+    /// Peers of the scene moved by the thread.
     members: Range<usize>,
     /// Index in `told` of the next meeting: 0 or 1.
     turn: usize,
@@ -59,7 +59,7 @@ impl<const A: usize> Exchange<A> {
 }
 
 impl<'e, const A: usize> Thread<'e, A> {
-    /// Returns the side of the thread at index `place`, which moves the peers `members`.
+    /// Returns the side of the thread at index `place` with the peers `members`.
     pub(super) const fn new(exchange: &'e Exchange<A>, place: usize, members: Range<usize>) -> Self {
         Self {
             exchange,
@@ -84,7 +84,7 @@ impl<'e, const A: usize> Thread<'e, A> {
         self.max_discrepancy
     }
 
-    /// Returns the number of ticks whose extremes were noted since the last report.
+    /// Returns the number of ticks with noted extremes since the last report.
     pub(super) const fn ticks_noted(&self) -> usize {
         self.extremes.len() / A
     }
@@ -106,12 +106,13 @@ impl<'e, const A: usize> Thread<'e, A> {
         }
     }
 
-    /// Meets the other threads at a tick at which the peers `senders` of the scene send. Fills `sent` with the samples of the other threads' peers; those of
+    /// Meets the other threads at a tick of sending of the peers `senders`. Fills `sent` with the samples of the other threads' peers; the samples of
     /// the thread's own peers must be there already.
     pub(super) fn exchange(&mut self, senders: &[usize], sent: &mut [Sample<A, 1>]) {
         let told = &self.exchange.told[self.turn];
         self.turn = 1 - self.turn;
         {
+            // No thread waits for this lock for long: a reader of the report of two meetings ago has passed a barrier since.
             let mut own = told[self.place].lock().unwrap_or_else(PoisonError::into_inner);
             own.samples.clear();
             own.samples.extend(senders.iter().filter(|sender| self.members.contains(sender)).map(|sender| (*sender, sent[*sender])));
@@ -134,11 +135,11 @@ impl<'e, const A: usize> Thread<'e, A> {
             }
             self.all_are_finite &= told.is_finite;
         }
-        // Extremes are those of one tick of all copies, so their difference is the discrepancy of that tick.
+        // The extremes of one tick cover all copies, so their difference is the discrepancy of the tick.
         self.max_discrepancy = self.extremes_of_all.iter().fold(self.max_discrepancy, |largest, (low, high)| largest.max(high - low));
     }
 
-    /// Returns whether the run goes on. One thread passes the answer, all others `None`.
+    /// Returns whether the run goes on. One thread passes the answer, all other threads `None`.
     pub(super) fn goes_on(&self, known: Option<bool>) -> bool {
         let Exchange { barrier, goes_on, .. } = self.exchange;
         if let Some(known) = known {

@@ -1,4 +1,4 @@
-//! Sending samples over the links of a topology, in which peers hear their neighbours only.
+//! Sending samples over the links of a topology: peers hear their neighbours only.
 
 use cohaptic_units::Instant;
 use cohaptic_wan::{Arrivals, DirectLinks, LinkId};
@@ -7,7 +7,7 @@ use super::super::Sample;
 use super::{Links, PerPacket};
 
 impl<const A: usize, const L: usize> PerPacket<A, L> {
-    /// Like [`PerPacket::send`], for rows whose receivers have different senders.
+    /// Like [`PerPacket::send`], for receivers with different senders.
     #[inline(never)]
     pub(super) fn send_to_neighbours(
         &mut self,
@@ -16,6 +16,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         sent: &[Sample<A, L>],
         next: impl Fn(usize) -> Instant,
     ) {
+        // Rows have different lengths, so each receiver's links are offered separately and the last eight of a row may be incomplete.
         let Self { rows, receivers, links, sends, in_flight, .. } = self;
         sends.fill(false);
         senders.iter().for_each(|sender| sends[*sender] = true);
@@ -27,7 +28,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
                     let mut arrivals = Arrivals::NONE;
                     for first in (0..row).step_by(DirectLinks::AT_ONCE) {
                         let count = DirectLinks::AT_ONCE.min(row - first);
-                        // One bit for each of up to eight links: a set bit means that the link is offered no packet.
+                        // One bit for each of up to eight links: a link with a set bit is offered no packet.
                         let mut idle = u8::MAX;
                         for place in (0..count).filter(|place| sends[rows.sender(receiver, (first + place) / L)]) {
                             idle &= !(1 << place);
