@@ -7,8 +7,8 @@ use crate::rows::{HoldRow, InputRow, InstantRow, PacketRow, SendRow, StepRow, Ti
 
 /// Observes a run while it happens, in the order of events.
 ///
-/// Peers are indices of [`cohaptic_scene::Scene::peers`]. Rows borrow from the running scene, so an observer copies the parts that it keeps. By default an
-/// observer wants no rows. Rows that an observer does not want are not made.
+/// Peers are indices of [`cohaptic_scene::Scene::peers`]. Rows borrow from the running scene, so an observer copies the kept parts. By default an
+/// observer wants no rows. Unwanted rows are not made.
 ///
 /// ```no_run
 /// use std::convert::Infallible;
@@ -41,7 +41,7 @@ use crate::rows::{HoldRow, InputRow, InstantRow, PacketRow, SendRow, StepRow, Ti
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait Observer {
-    /// Reason for which the run must end, for example a file that cannot be written. [`std::convert::Infallible`] for an observer that never fails.
+    /// Reason for the end of the run, for example a full disk. [`std::convert::Infallible`] for an observer without failures.
     type Error;
 
     /// Returns whether [`Observer::on_tick`] or [`Observer::on_ticks`] is to be called. Asked at the start; the answer must not change.
@@ -83,9 +83,9 @@ pub trait Observer {
         Ok(())
     }
 
-    /// Called when all peers have computed their forces at an instant at which all of them tick: [`Observer::on_tick`] for each peer, in one call.
+    /// Called when all peers have computed their forces at an instant of a tick of all peers: [`Observer::on_tick`] for each peer, in one call.
     ///
-    /// Called only in a run without events, whose observer wants no more than ticks and instants; other runs call [`Observer::on_tick`]. An observer that
+    /// Called only in a run without events and with an observer of ticks and instants only; all other runs call [`Observer::on_tick`]. An observer that
     /// overrides `on_ticks`, for example to read less than whole rows, must get the same result from both.
     ///
     /// # Errors
@@ -113,7 +113,7 @@ pub trait Observer {
         Ok(())
     }
 
-    /// Called when all peers that tick at an instant have ticked.
+    /// Called after the ticks of all peers at an instant.
     ///
     /// # Errors
     ///
@@ -131,7 +131,7 @@ pub trait Observer {
         Ok(())
     }
 
-    /// Called when a peer holds a newer sample of another peer, which takes effect at the receiver's next tick. This tick may be at the same instant.
+    /// Called when a peer holds a newer sample of another peer. The sample takes effect at the receiver's next tick, possibly at the same instant.
     ///
     /// # Errors
     ///
@@ -164,7 +164,7 @@ impl Observer for NoObserver {
     type Error = std::convert::Infallible;
 }
 
-/// Implements all of [`Observer`] but its error by the observer in a field. `map` converts the result of each call.
+/// Implements all of [`Observer`] except the error by the observer in a field. `map` converts the result of each call.
 macro_rules! observe_by_field {
     ($field:ident) => {
         $crate::observer::observe_by_field! { $field, |_: &mut Self, result| result }
@@ -244,22 +244,22 @@ macro_rules! observe_by_field {
 }
 pub(crate) use observe_by_field;
 
-/// Mark that the observer has ended the run. [`Erased`] keeps the error.
+/// Mark of an end of the run by the observer. [`Erased`] keeps the error.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Ended;
 
-/// Any observer, as a trait object. The loops of a run are compiled for this type and once more for measures, whose rows are cheaper than a dynamic call.
+/// Any observer, as a trait object. The loops of a run are compiled for this type and once more for measures, since their rows are cheaper than a dynamic call.
 pub(crate) type AnyObserver<'o> = dyn Observer<Error = Ended> + 'o;
 
 /// Observer with a uniform error type, for [`AnyObserver`]. Keeps the error of the inner observer.
 pub(crate) struct Erased<'o, O: Observer> {
     observer: &'o mut O,
-    /// Error with which the inner observer ended the run.
+    /// Error of the inner observer, if the inner observer ended the run.
     error: Option<O::Error>,
 }
 
 impl<'o, O: Observer> Erased<'o, O> {
-    /// Calls `run` with the erased observer and returns its value, or the error with which the observer ended the run.
+    /// Calls `run` with the erased observer and returns its value, or the error of the observer that ended the run.
     pub(crate) fn run<T>(observer: &'o mut O, run: impl FnOnce(&mut AnyObserver<'_>) -> Result<T, Ended>) -> Result<T, O::Error> {
         Self::run_as_itself(observer, |observer| run(observer))
     }
@@ -354,7 +354,8 @@ impl<O: Observer> Observer for Option<O> {
     }
 }
 
-/// Two observers of one run. The first gets every row before the second, and either can end the run. Errors of the second are converted to errors of the first.
+/// Two observers of one run. The first gets every row before the second, and either can end the run. Errors of the second observer are converted to errors of
+/// the first.
 impl<A: Observer<Error: From<B::Error>>, B: Observer> Observer for (A, B) {
     type Error = A::Error;
 
@@ -388,7 +389,7 @@ impl<A: Observer<Error: From<B::Error>>, B: Observer> Observer for (A, B) {
     }
 
     fn on_ticks(&mut self, ticks: &Ticks<'_>) -> Result<(), Self::Error> {
-        // Making the rows of all peers is work, so an observer that does not want ticks is not called.
+        // Making the rows of all peers is work, so an observer of no ticks is not called.
         if self.0.wants_ticks() {
             self.0.on_ticks(ticks)?;
         }

@@ -1,7 +1,7 @@
 //! Bodies of all peers and their motion, eight lanes at a time.
 //!
 //! A lane computes [`cohaptic_peer::tick`] and the scene's law, as [`cohaptic_peer::Peer`] does, so every bit is the same. Each tick is a loop over lanes
-//! without branches, which the compiler turns into vector instructions.
+//! without branches. The compiler turns the loop into vector instructions.
 
 mod block;
 mod law;
@@ -25,17 +25,17 @@ pub(super) use law::{LawOfLanes, law_of_lanes};
 pub(super) struct Blocks {
     places: Places,
     axes: usize,
-    /// Blocks in the order of [`Places`]: all blocks of the first axis, then those of the next.
+    /// Blocks in the order of [`Places`]: all blocks of the first axis, then all blocks of the next axis.
     blocks: Vec<Block>,
-    /// Displacements of the means since the held samples were sent \[m\], indexed by block. Empty for a law that does not extrapolate.
+    /// Displacements of the means since the held samples were sent \[m\], indexed by block. Empty for a law without extrapolation.
     leads: Vec<Lanes>,
-    /// Numbers that the law remembers, ordered by block, then lane.
+    /// Numbers of the law's memory, ordered by block, then lane.
     memory: Vec<f64>,
-    /// Motions of the copies at the latest ticks, as many as the law looks back: a ring of ticks, each with all blocks.
+    /// Motions of the copies at the latest ticks, as many as the law's lag: a ring of ticks, each with all blocks.
     past: Vec<Motions>,
     /// Index in the ring of the oldest tick in `past`.
     oldest: usize,
-    /// Step map of the copies. One map for all peers, which differs only between runs.
+    /// Step map of the copies. One map for all peers of a run.
     object_map: StepMap<Lanes>,
     /// Forces computed at the latest tick, indexed by block. `None` if all peers apply forces without delay.
     late: Option<Vec<Late>>,
@@ -43,7 +43,7 @@ pub(super) struct Blocks {
     walls: Option<Vec<Option<Enclosure>>>,
     /// Lanes of running runs. Lanes of ended runs are not checked for finite numbers.
     pub(super) goes_on: Mask,
-    /// Least and greatest positions along the axis that is computed at present \[m\]. A field, not local variables of the loop over blocks, because the
+    /// Least and greatest positions along the axis in computation \[m\]. A field, not local variables of the loop over blocks, because the
     /// compiler vectorises this form only.
     extremes: [Lanes; 2],
 }
@@ -51,7 +51,7 @@ pub(super) struct Blocks {
 /// Position \[m\] and velocity \[m/s\] of eight bodies along one axis.
 pub(super) type Motions = Motion<Lanes>;
 
-/// States and forces of eight peers along one axis, as rows show them.
+/// States and forces of eight peers along one axis, as shown in rows.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seen {
     pub(super) device: Motions,
@@ -66,7 +66,7 @@ pub(super) struct Seen {
 /// Results of a tick for each of L runs.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Moved<const L: usize> {
-    /// Largest distance along an axis between two copies before they moved \[m\], indexed by run.
+    /// Largest distance along an axis between two copies before the move \[m\], indexed by run.
     pub(super) discrepancy: [f64; L],
     /// `true` if all numbers are finite after the move, indexed by run.
     pub(super) finite: [bool; L],
@@ -85,8 +85,8 @@ fn set_lane(motions: &mut Motions, lane: usize, motion: Motion) {
 }
 
 impl Blocks {
-    /// Returns the bodies of runs of these scenes, which share the kind of `law` and may differ in its coefficients. `devices` is the choice for each peer's
-    /// device if an observer sees devices. With `None` only those devices move that ever touch their copies.
+    /// Returns the bodies of runs of these scenes. The scenes share the kind of `law` and may differ in its coefficients. `devices` is the choice for each
+    /// peer's device if an observer sees devices. With `None` only devices with a possible contact move.
     pub(super) fn new<const A: usize>(places: Places, scenes: &[&Scene], law: &BuiltIn, devices: Option<&[DeviceChoice]>) -> Self {
         let mut blocks = Vec::with_capacity(A * places.blocks());
         let mut late = Vec::with_capacity(A * places.blocks());
@@ -117,7 +117,7 @@ impl Blocks {
                 block.hand.0[spot.lane] = force.map_or(0.0, |force| force[axis]);
             }
         }
-        // Lists for delays and walls are kept only if a peer or a run has one, so the usual tick skips both.
+        // Lists for delays and walls are kept only if some peer has a delay or some run has walls, so the usual tick skips both.
         let any_late = scenes.iter().any(|scene| scene.peers.iter().any(|peer| peer.compute_delay));
         let walls: Vec<Option<Enclosure>> = scenes.iter().map(|scene| scene.object.enclosure).collect();
         Self {
@@ -144,7 +144,8 @@ impl Blocks {
         (position, velocity)
     }
 
-    /// Returns the least and the greatest position of the copies \[m\] for each axis, in a single run. Lanes beyond the last peer repeat it and change neither.
+    /// Returns the least and the greatest position of the copies \[m\] for each axis, in a single run. Lanes beyond the last peer repeat the last peer and
+    /// change neither position.
     #[inline]
     pub(super) fn extremes(&self) -> impl Iterator<Item = (f64, f64)> {
         self.blocks.chunks(self.places.blocks()).map(|blocks| {
@@ -178,7 +179,7 @@ impl Blocks {
         let (block, remembered, lag) = (&self.blocks[place], law.remembered() * WIDTH, law.looks_back());
         let past = if lag > 0 { self.past[self.oldest * self.blocks.len() + place] } else { block.object };
         let lead = self.leads.get(place).unwrap_or(&Lanes::ZERO);
-        // A copy of the memory: looking must not change what the law remembers.
+        // A copy of the memory: looking must not change the law's memory.
         let mut memory = self.memory[place * remembered..(place + 1) * remembered].to_vec();
         let coupling = block.coupling();
         let (mut coordination, mut target) = (Lanes::ZERO, block.mean);
@@ -191,14 +192,14 @@ impl Blocks {
         Seen { device: block.device, object: block.object, target, coupling, coordination }
     }
 
-    /// Replaces the mean of the samples that a peer holds along an axis, in all runs.
+    /// Replaces the mean of the held samples of a peer along an axis, in all runs.
     #[inline(always)]
     pub(super) fn set_target<const L: usize>(&mut self, axis: usize, peer: usize, x: [f64; L], v: [f64; L]) {
         for run in 0..L {
             let Spot { block, lane } = self.places.spot(axis, peer, run);
             set_lane(&mut self.blocks[block].mean, lane, Motion { position: x[run], velocity: v[run] });
         }
-        // The last run of the last peer fills the unused lanes, which move alike.
+        // The last run of the last peer fills the unused lanes, so unused lanes move alike and change no extreme.
         if L < WIDTH && peer + 1 == self.places.peers {
             let Spot { block, lane } = self.places.spot(axis, peer, L - 1);
             let mean = &mut self.blocks[block].mean;
@@ -212,6 +213,7 @@ impl Blocks {
         for (run, lead) in lead.into_iter().enumerate() {
             let Spot { block, lane } = self.places.spot(axis, peer, run);
             self.leads[block].0[lane] = lead;
+            // As in `set_target`: unused lanes follow the last run of the last peer.
             if peer + 1 == self.places.peers && run + 1 == L {
                 self.leads[block].0[lane..].fill(lead);
             }
@@ -243,7 +245,7 @@ impl Blocks {
             let Spot { block, lane } = self.places.spot(axis, peer, run);
             let hands = &mut self.blocks[block].hand.0;
             hands[lane] = force;
-            // The last run of the last peer fills the unused lanes, which move alike.
+            // The last run of the last peer fills the unused lanes, so unused lanes move alike.
             if peer + 1 == self.places.peers && run + 1 == self.places.runs {
                 hands[lane..].fill(force);
             }
@@ -256,7 +258,7 @@ impl Blocks {
         if lag == known {
             return;
         }
-        // Ticks before the oldest known tick saturate to that tick.
+        // Ticks before the oldest known tick saturate to the oldest known tick.
         let place = |tick: usize| (self.oldest + (tick + known).saturating_sub(lag)) % known * self.blocks.len();
         self.past = match known {
             0 => (0..lag).flat_map(|_| self.blocks.iter().map(|block| block.object)).collect(),
@@ -280,6 +282,7 @@ impl Blocks {
         let (remembered, lag) = (law.remembered() * WIDTH, law.looks_back());
         let oldest = self.oldest * self.axes * per_axis;
         for axis in 0..self.axes {
+            // Extremes are taken before the move, because the discrepancy belongs to the present tick.
             self.extremes = [Lanes::splat(f64::INFINITY), Lanes::splat(f64::NEG_INFINITY)];
             for place in axis * per_axis..(axis + 1) * per_axis {
                 let block = &mut self.blocks[place];
@@ -303,21 +306,24 @@ impl Blocks {
                     }
                     block.advance(&self.object_map, &forces);
                 }
+                // A number that is not finite makes the sum not finite, so one sum per lane replaces a check of each number.
                 size = size + block.size();
             }
             let [low, high] = self.extremes;
             let distances = distances::<L>(low, high);
+            // A comparison instead of `max`: the compiler turns it into one instruction, and NaN changes nothing.
             for run in 0..L {
                 discrepancy[run] = if distances[run] > discrepancy[run] { distances[run] } else { discrepancy[run] };
             }
         }
+        // The ring moves on once per tick, after all blocks of all axes have replaced their oldest motion.
         if lag > 0 {
             self.oldest = if self.oldest + 1 == lag { 0 } else { self.oldest + 1 };
         }
         Moved { discrepancy, finite: self.finite(size) }
     }
 
-    /// Returns whether all numbers of each run are finite. `size` is the sum of the magnitudes of all positions and velocities, by lane.
+    /// Returns whether all numbers of each run are finite. `size` is the sum of the magnitudes of all positions and velocities, indexed by lane.
     #[inline(always)]
     fn finite<const L: usize>(&self, size: Lanes) -> [bool; L] {
         // A finite sum means that every magnitude is finite. An infinite sum can also come from overflow, so each number is then checked.
@@ -344,7 +350,7 @@ pub(super) fn moves(scene: &Scene, peer: usize, devices: Option<&[DeviceChoice]>
     touches(scene, peer) || devices.is_some_and(|devices| devices[peer] == DeviceChoice::Simulated)
 }
 
-/// Visitor of [`Blocks::advance`], which gets the law by its own type.
+/// Visitor of [`Blocks::advance`] with the law by its own type.
 struct Advance<'a, const L: usize> {
     blocks: &'a mut Blocks,
     processor: pulp::Arch,
@@ -362,7 +368,7 @@ impl<const L: usize> LawVisitor<Lanes> for Advance<'_, L> {
     }
 }
 
-/// Motion of a tick as a task that is compiled for each kind of processor.
+/// Motion of a tick as a task compiled for each kind of processor.
 struct Tick<'a, W, const L: usize> {
     blocks: &'a mut Blocks,
     law: &'a W,
@@ -377,7 +383,7 @@ impl<W: LawOfLanes, const L: usize> NullaryFnOnce for Tick<'_, W, L> {
     }
 }
 
-/// Visitor of [`Blocks::seen`], which gets the law by its own type.
+/// Visitor of [`Blocks::seen`] with the law by its own type.
 struct Look<'a> {
     blocks: &'a Blocks,
     place: usize,
@@ -395,6 +401,7 @@ impl LawVisitor<Lanes> for Look<'_> {
 fn object_map(scenes: &[&Scene]) -> StepMap<Lanes> {
     let mut map = ZERO_MAP;
     for lane in 0..WIDTH {
+        // Peers with one clock and one mass per run share the map, so peer 0 represents all copies of its run.
         let scene = scenes[lane % scenes.len()];
         set_map(&mut map, lane, &scene.copy_config(0).plant().step(scene.peers[0].clock.tick, scene.integrator));
     }

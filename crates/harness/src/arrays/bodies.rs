@@ -79,7 +79,7 @@ impl<const A: usize> Bodies<A> {
         self.blocks.advance(processor, law)
     }
 
-    /// Returns states and forces of the peers in the block at index `place`, along each axis, before they move.
+    /// Returns states and forces of the peers in the block at index `place`, along each axis, before the move.
     pub(super) fn seen(&self, place: usize, law: &BuiltIn<Lanes>) -> [Seen; A] {
         let blocks = self.blocks.of_all().len() / A;
         std::array::from_fn(|axis| self.blocks.seen(axis * blocks + place, law))

@@ -5,7 +5,7 @@ use std::ops::{Add, BitAnd, Div, Mul, Sub};
 /// Numbers computed at once: a cache line, and a register of the widest processors.
 pub(crate) const WIDTH: usize = 8;
 
-/// Eight numbers that undergo the same operations. Each number is rounded as it would be alone, so the other lanes change no bit.
+/// Eight numbers with the same operations. Each number is rounded as if alone, so no lane changes a bit of another lane.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 pub(super) struct Lanes(pub(super) [f64; WIDTH]);
@@ -44,6 +44,7 @@ impl Lanes {
 /// Returns the smaller of two numbers; the second if both are equal or either is NaN. Compiles to one instruction, unlike [`f64::min`].
 #[inline(always)]
 pub(crate) fn smaller(one: f64, other: f64) -> f64 {
+    // Written with an operator: `f64::min` treats NaN and signed zeros in further instructions.
     if one < other { one } else { other }
 }
 
@@ -71,14 +72,15 @@ impl Mask {
         f64::from_bits(number.to_bits() & self.0[lane])
     }
 
-    /// Returns the lanes of `yes` where the mask holds and those of `no` elsewhere.
+    /// Returns the lanes of `yes` in the mask, and the lanes of `no` outside of the mask.
     #[inline(always)]
     pub(super) fn choose(self, yes: Lanes, no: Lanes) -> Lanes {
+        // By bits instead of a branch, so NaN and the sign of zero pass unchanged.
         Lanes(std::array::from_fn(|i| f64::from_bits(yes.0[i].to_bits() & self.0[i] | no.0[i].to_bits() & !self.0[i])))
     }
 }
 
-/// Keeps the lanes in which the mask holds, and sets the other lanes to +0.
+/// Keeps the lanes in the mask, and sets all other lanes to +0.
 impl BitAnd<Mask> for Lanes {
     type Output = Self;
 

@@ -87,7 +87,7 @@ pub(crate) fn run_on_threads(
     }
 }
 
-/// Some or all peers of L runs of scenes that have one shape, with A axes.
+/// Some or all peers of L runs of scenes of one shape, with A axes.
 #[derive(Debug)]
 struct Arrays<'a, const A: usize, const L: usize> {
     scenes: [&'a Scene; L],
@@ -98,13 +98,13 @@ struct Arrays<'a, const A: usize, const L: usize> {
     bodies: Bodies<A>,
     samples: Samples<A, L>,
     changes: Changes<'a, L>,
-    /// Horizons of the extrapolation \[s\], indexed by run, and leads of the held samples, indexed by peer, then run. `None` if the law does not extrapolate.
+    /// Horizons of the extrapolation \[s\], indexed by run, and leads of the held samples, indexed by peer, then run. `None` for a law without extrapolation.
     leads: Option<([f64; L], Vec<[Lead<A>; L]>)>,
-    /// Tick at which each peer sends next, indexed by peer of the scene.
+    /// Tick of the next sending, indexed by peer of the scene.
     next_send: Vec<u64>,
     /// Least entry of `next_send`: at earlier ticks nothing is sent.
     earliest_send: u64,
-    /// Peers of the scene that send at the present tick. Used only with [`Samples::PerPacket`].
+    /// Sending peers of the present tick, by index in the scene. Used only with [`Samples::PerPacket`].
     senders: Vec<usize>,
     /// Latest sample of each peer of the scene. Empty with [`Samples::Broadcast`].
     sent: Vec<Sample<A, L>>,
@@ -112,12 +112,12 @@ struct Arrays<'a, const A: usize, const L: usize> {
     max_discrepancy: [f64; L],
     /// `true` if all numbers were finite after the latest tick, indexed by run.
     finite: [bool; L],
-    /// Results of the runs that have ended, indexed by run.
+    /// Results of the ended runs, indexed by run.
     summaries: [Option<Summary>; L],
     processor: pulp::Arch,
 }
 
-/// Samples in flight and samples held, in the form that the links allow.
+/// Samples in flight and samples held, in the form allowed by the links.
 #[derive(Debug)]
 #[expect(clippy::large_enum_variant, reason = "there is one a run, and a box would be another look-up a packet")]
 enum Samples<const A: usize, const L: usize> {
@@ -144,6 +144,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         initial: &[Sample<A, L>],
     ) -> Self {
         let samples = match shape.delay {
+            // A sample counts from the first tick at or after its arrival, hence the division rounded up.
             Some(delay) => Samples::Broadcast(Broadcast::new(initial, nanos(delay).div_ceil(nanos(shape.tick)))),
             None => Samples::PerPacket(PerPacket::new(&scenes, initial, &shape, members.clone())),
         };
@@ -185,6 +186,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
                 break;
             }
             let now = self.shape.instant(tick);
+            // The tick before a change may have diverged, and a change must not be applied to an ended run.
             if self.end_diverged(tick, now) {
                 break;
             }
@@ -231,7 +233,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         self.go_on(now, tick, watch)
     }
 
-    /// Begins a tick: takes the samples of the peers that send now. Returns whether any peer sends; then `senders` lists the sending peers of the scene, and
+    /// Begins a tick: takes the samples of the sending peers. Returns whether any peer sends; then `senders` lists the sending peers of the scene, and
     /// `sent` holds the samples of the members among them.
     #[inline(always)]
     fn begin(&mut self, tick: u64) -> bool {
@@ -245,6 +247,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
     /// Finishes a tick after all samples were sent. Returns the distance between copies \[m\], indexed by run.
     #[inline(always)]
     fn go_on(&mut self, now: Instant, tick: u64, watch: &mut impl RunWatch<A>) -> [f64; L] {
+        // Samples that arrive at a tick count in the forces of the same tick, as in the world of events.
         match &mut self.samples {
             Samples::Broadcast(samples) => samples.deliver(tick),
             Samples::PerPacket(samples) => samples.deliver(tick),
@@ -274,6 +277,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
 
     /// Computes the leads of all held samples, to the bit as [`cohaptic_peer::Held::move_on`] does.
     #[inline(never)]
+    // A lead stays valid until a new sample arrives or its horizon passes. Only then are all held samples looked at.
     fn extrapolate(&mut self, now: Instant) {
         let Shape { tick, send_every, phases, .. } = &self.shape;
         // A link is offered every sample of its sender, so the sequence number of a sample gives its instant.
@@ -299,7 +303,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         }
     }
 
-    /// Takes the samples of the peers that send at this tick, and sets the next tick of sending for each.
+    /// Takes the samples of the sending peers of this tick, and sets the next tick of sending for each of these peers.
     fn gather(&mut self, tick: u64) {
         self.senders.clear();
         for (peer, next) in self.next_send.iter_mut().enumerate() {
@@ -311,6 +315,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
                 Samples::Broadcast(samples) => samples.send(tick, peer, &self.bodies),
                 Samples::PerPacket(_) => {
                     self.senders.push(peer);
+                    // Peers of other groups send too: their samples come by the exchange, but their links to members are here.
                     if self.members.contains(&peer) {
                         self.sent[peer] = self.bodies.sample(peer - self.members.start);
                     }
@@ -320,7 +325,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         self.earliest_send = self.next_send.iter().copied().min().unwrap_or(u64::MAX);
     }
 
-    /// Sends the gathered samples over the links whose receivers are in `members`. A broadcast was sent by [`Arrays::gather`].
+    /// Sends the gathered samples over the links to receivers in `members`. A broadcast was sent by [`Arrays::gather`].
     fn send(&mut self, tick: u64, now: Instant) {
         if let Samples::PerPacket(samples) = &mut self.samples {
             // Links may look ahead only to the next sample or the next change of the timeline, whichever is earlier.
@@ -330,7 +335,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         }
     }
 
-    /// Advances the queues of all links up to `tick`; nothing that happens at `tick` or later is done.
+    /// Advances the queues of all links up to `tick`, without the events at `tick` or later.
     #[cold]
     fn pass(&mut self, tick: u64) {
         if let Samples::PerPacket(samples) = &mut self.samples {
@@ -339,7 +344,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         }
     }
 
-    /// Ends the runs that diverged before `tick`. Returns whether all runs have ended.
+    /// Ends the runs diverged before `tick`. Returns whether all runs have ended.
     #[cold]
     fn end_diverged(&mut self, tick: u64, now: Instant) -> bool {
         for run in 0..L {
@@ -362,12 +367,13 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
     fn end(&mut self, run: usize, ticks: u64, ending: Ending) {
         let until = self.stop(run, ticks, ending);
         self.summaries[run] = Some(summary(std::slice::from_ref(self), run, ticks, ending, until, self.max_discrepancy[run]));
+        // An ended run goes on in its lanes, and its numbers may overflow. They no longer count for the other runs.
         self.bodies.blocks_mut().end(run);
     }
 
-    /// Stops a run after the given number of ticks and discards its packets in flight. Returns the instant up to which packets were delivered.
+    /// Stops a run after the given number of ticks and discards its packets in flight. Returns the instant of the last possible delivery.
     fn stop(&mut self, run: usize, ticks: u64, ending: Ending) -> Instant {
-        // Packets are delivered up to the latest tick, and to the end of the scene if that was reached.
+        // Packets are delivered up to the latest tick, and to the end of the scene if the run reached the end.
         let delivered_until = match ending {
             Ending::Complete => self.shape.end,
             Ending::Diverged(at) if at == self.shape.end => at,
@@ -393,7 +399,7 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         PeerSummary { name, position, velocity, attitude: None, stale_samples, refused_samples: 0 }
     }
 
-    /// Returns the counters of each link from `from` after the given number of ticks, if all links have the constant delay `delay` and packets that arrive up
+    /// Returns the counters of each link from `from` after the given number of ticks, if all links have the constant delay `delay` and packets arriving up
     /// to `until` are delivered.
     fn broadcast_stats(&self, from: usize, delay: Duration, ticks: u64, until: Instant) -> LinkStats {
         let delay = nanos(delay);
@@ -401,12 +407,13 @@ impl<'a, const A: usize, const L: usize> Arrays<'a, A, L> {
         let sent_before = |ticks: u64| ticks.saturating_sub(self.shape.phases[from]).div_ceil(self.shape.send_every);
         let last = until.as_nanos().checked_sub(delay).map(|nanos| nanos / crate::arrays::nanos(self.shape.tick));
         let offered = sent_before(ticks);
+        // Packets of the instant `last` count if the tick was computed, hence the smaller of both numbers of ticks.
         let delivered = last.map_or(0, |last| sent_before(last.saturating_add(1).min(ticks)));
         LinkStats::counted(offered, delivered, u128::from(delivered) * u128::from(delay), [])
     }
 }
 
-/// Returns the counters of the links of a run that ended after the given number of ticks. `parts` together hold all peers.
+/// Returns the counters of the links of a run ended after the given number of ticks. `parts` together hold all peers.
 fn links<const A: usize, const L: usize>(parts: &[Arrays<'_, A, L>], run: usize, ticks: u64, until: Instant) -> LinkSummaries {
     let peers = parts[0].shape.peers;
     if let Some(delay) = parts[0].shape.delay {
@@ -430,7 +437,7 @@ fn links<const A: usize, const L: usize>(parts: &[Arrays<'_, A, L>], run: usize,
     }
 }
 
-/// Returns the summary of a run after the given number of ticks, with the packets that arrived up to `until`. `parts` together hold all peers.
+/// Returns the summary of a run after the given number of ticks, with the packets arrived up to `until`. `parts` together hold all peers.
 fn summary<const A: usize, const L: usize>(
     parts: &[Arrays<'_, A, L>],
     run: usize,
@@ -453,7 +460,7 @@ fn summary<const A: usize, const L: usize>(
         // `Shape::of` refuses scenes with access lines.
         access_lines: Vec::new(),
         max_discrepancy,
-        // `Shape::of` refuses scenes whose object turns.
+        // `Shape::of` refuses scenes with a turning object.
         max_rotation_discrepancy: None,
     }
 }
@@ -468,7 +475,7 @@ fn bodies_of<const A: usize, const L: usize>(
     Bodies::new(Places { first: members.start, peers: members.len(), runs: L }, scenes, &laws[0], devices)
 }
 
-/// Task that computes the means of the held samples, compiled for the widest registers.
+/// Task of computing the means of the held samples, compiled for the widest registers.
 struct Means<'a, const A: usize, const L: usize> {
     samples: &'a mut Samples<A, L>,
     bodies: &'a mut Bodies<A>,

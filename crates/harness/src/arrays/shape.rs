@@ -15,13 +15,13 @@ use super::nanos;
 use crate::plan::{Plan, Ticking};
 use crate::questions::instants_between_questions;
 
-/// Properties that scenes must have in common to run side by side. Made only for a scene that can run in arrays.
+/// Common properties of scenes side by side. Made only for a scene fit for arrays.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Shape {
     pub(super) law: Coordination,
-    /// Numbers that the law remembers along each axis.
+    /// Numbers of the law's memory along each axis.
     pub(super) memory: usize,
-    /// Ticks that the law looks back.
+    /// Lag of the law in ticks.
     pub(super) lag: usize,
     pub(super) peers: usize,
     pub(super) axes: usize,

@@ -6,9 +6,9 @@ use super::blocks::Block;
 use super::lanes::WIDTH;
 use crate::rows::TickRow;
 
-/// All peers of a scene whose object does not turn, at an instant at which all of them tick, with the forces of that instant and before any peer moves.
+/// All peers of a scene without rotation, at an instant of a tick of all peers, with the forces of the instant and before any peer moves.
 ///
-/// Positions are read from the arrays. The other parts of a row are computed when [`Ticks::each`] is called.
+/// Positions are read from the arrays. The rest of a row is computed when [`Ticks::each`] is called.
 #[derive(Clone, Copy)]
 pub struct Ticks<'a> {
     at: Instant,
@@ -41,6 +41,7 @@ impl<'a> Ticks<'a> {
     /// If the scene has no such axis.
     #[inline]
     pub fn positions(&self, axis: usize) -> impl Iterator<Item = f64> {
+        // The last block may be padded: its lanes beyond the last peer are left out.
         self.blocks_of_positions(axis).zip(0..).flat_map(move |(positions, place)| positions[..WIDTH.min(self.peers - place * WIDTH)].iter().copied())
     }
 
@@ -55,11 +56,12 @@ impl<'a> Ticks<'a> {
     ///
     /// # Panics
     ///
-    /// If there is no such peer or axis.
+    /// If the scene has no such peer or axis.
     #[must_use]
     #[inline]
     pub fn position(&self, peer: usize, axis: usize) -> f64 {
         assert!(peer < self.peers, "there are {} peers", self.peers);
+        // Blocks are ordered by axis, and eight peers share a block.
         self.blocks[axis * self.peers.div_ceil(WIDTH) + peer / WIDTH].positions()[peer % WIDTH]
     }
 
@@ -67,7 +69,7 @@ impl<'a> Ticks<'a> {
     ///
     /// # Errors
     ///
-    /// The first error of `on`, which is not called again after it.
+    /// The first error of `on`. After an error `on` is not called again.
     pub fn each<E>(&self, mut on: impl FnMut(&TickRow<'_>) -> Result<(), E>) -> Result<(), E> {
         let mut result = Ok(());
         self.source.each(&mut |row| {

@@ -50,7 +50,7 @@ pub(crate) struct World<const A: usize, S, E: Remote<A> = NoRemote> {
     /// Age up to which receivers extrapolate samples \[s\]; `None` if receivers hold samples.
     horizon: Option<f64>,
     schedule: Schedule,
-    /// Changes of the timeline that are still to come, in reverse order of time: the next change is popped from the end.
+    /// Future changes of the timeline, in reverse order of time: the next change is popped from the end.
     changes: Vec<Change>,
     /// New parameter values of the `ChangeKind::Parameters` changes in `changes`, in the same reverse order.
     parameters: Vec<ParameterChange>,
@@ -68,7 +68,7 @@ pub(crate) struct World<const A: usize, S, E: Remote<A> = NoRemote> {
     finite: bool,
     /// Peers that tick at the present instant, by index. In lockstep all local peers.
     ticking: Vec<usize>,
-    /// Next tick at which any local peer sends. Read in lockstep only, where all peers count the same ticks.
+    /// Next tick of a sending of a local peer. Read in lockstep only, since all peers then count the same ticks.
     earliest_send: u64,
     remote: E,
 }
@@ -79,7 +79,7 @@ pub(crate) struct Bodies<const A: usize> {
     pub(crate) device: [f64; A],
     pub(crate) object: [f64; A],
     pub(crate) contact: Contact,
-    /// Point of the copy that the device grasps \[m\]: the centre of the copy if the object does not turn.
+    /// Grasped point of the copy \[m\]: the centre of the copy if the object does not turn.
     pub(crate) grasp: [f64; A],
     pub(crate) turns: Option<Turns>,
 }
@@ -138,12 +138,12 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         self.now
     }
 
-    /// Returns the instant at which the scene ends.
+    /// Returns the end of the scene.
     pub(crate) fn end(&self) -> Instant {
         self.end
     }
 
-    /// Computes the next instant at which a peer ticks. Ends the run if that instant is not before the end of the scene, or if a number is not finite.
+    /// Computes the next instant of a tick. Ends the run if the instant is not before the end of the scene, or if a number is not finite.
     pub(crate) fn step(&mut self, observer: &mut (impl Observer<Error = Ended> + ?Sized), watch: Watch) -> Result<Step, Ended> {
         let Some(now) = self.schedule.next_instant().filter(|now| *now < self.end) else {
             return self.finish(observer, watch).map(Step::Ended);
@@ -153,9 +153,11 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             return Ok(Step::Ended(Ending::Diverged(now)));
         }
         self.now = now;
+        // Changes come first, so a change at an instant already holds for the samples and forces of the instant.
         if !self.changes.is_empty() {
             self.change(now);
         }
+        // Samples precede deliveries, and deliveries precede forces: a sample of a link without delay counts at the same instant.
         self.schedule.take(now, &mut self.ticking);
         self.send(now, observer, watch)?;
         // Without remote peers nothing else polls the network, so an instant without events need not be delivered.
@@ -215,7 +217,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         })
     }
 
-    /// Step 1 of an instant: each ticking peer whose sample is due sends this sample to all other peers, to its neighbours, or as a client to its server.
+    /// Step 1 of an instant: each ticking peer with a due sample sends the sample to all other peers, to its neighbours, or as a client to its server.
     fn send(&mut self, now: Instant, observer: &mut (impl Observer<Error = Ended> + ?Sized), watch: Watch) -> Result<(), Ended> {
         // In lockstep all local peers have the tick of the leading peer, so one comparison skips the loop at ticks without samples.
         if matches!(self.schedule, Schedule::Lockstep { .. }) && self.members[self.remote.lead()].tick < self.earliest_send {
@@ -250,7 +252,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             {
                 handle
             } else {
-                // The states are finite, because the run ends at a state that is not. A number that is computed from the states has overflowed.
+                // The states are finite, because the run ends at the first state with a number that is not. A number computed from the states has overflowed.
                 self.finite = false;
                 continue;
             };
@@ -259,6 +261,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                 Role::Copy => self.network.handle_broadcast(now, sender, self.packet, handle),
                 Role::Client { server } => {
                     // The role counts servers without the client itself; nodes of the network count all peers.
+                    // Servers after the client have moved down by one in the client's count.
                     let server = if server < from { server } else { server + 1 };
                     self.network.handle_packet(now, sender, NodeId::new(server), self.packet, handle)
                 }
@@ -272,13 +275,14 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         Ok(())
     }
 
-    /// Step 2 of an instant: each packet that has arrived is handed to its receiver.
+    /// Step 2 of an instant: each arrived packet is handed to its receiver.
     fn deliver(&mut self, now: Instant, observer: &mut (impl Observer<Error = Ended> + ?Sized), watch: Watch) -> Result<(), Ended> {
         let Self { network, members, samples, remote, axes, .. } = self;
+        // The network first computes everything due by now. The events are then polled in the order of time.
         network.handle_timeout(now).expect("instants come in order");
         let mut receivers = Receivers { members, samples, remote, axes: *axes };
         loop {
-            // Nearly all events are simple arrivals, for which the network need not build a complete event.
+            // Nearly all events are simple arrivals. For these the network need not build a complete event.
             while let Some(taken) = network.take_mere_arrival(|event| receivers.take(now, &event, observer, watch)) {
                 taken?;
             }
@@ -289,6 +293,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
 
     /// Steps 3 and 4 of an instant: each ticking peer computes its forces and moves to its next tick.
     fn compute_and_move(&mut self, now: Instant, observer: &mut (impl Observer<Error = Ended> + ?Sized), watch: Watch) -> Result<(), Ended> {
+        // In lockstep all ticks have the same length and no queue of ticks is needed.
         let lockstep = match &mut self.schedule {
             Schedule::Lockstep { tick, next } => {
                 *next = now.saturating_add(*tick);
@@ -339,12 +344,13 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             } else {
                 member.peer.advance(now, span);
             }
+            // Checked after the move: the next step ends the run before the number reaches a row.
             self.finite &= member.is_finite();
         }
         Ok(())
     }
 
-    /// Computes and moves all peers in one loop, for runs in lockstep in which nobody watches ticks or steps. The results equal those of the general loop.
+    /// Computes and moves all peers in one loop, for runs in lockstep without an observer of ticks or steps. The results equal those of the general loop.
     #[inline]
     fn move_together(&mut self, now: Instant, span: Duration) {
         if let Some(turning) = &mut self.turning {
@@ -388,7 +394,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         discrepancy
     }
 
-    /// Ends the scene: applies the changes and delivers the packets that are due at the end.
+    /// Ends the scene: applies the changes and delivers the packets due at the end.
     fn finish(&mut self, observer: &mut (impl Observer<Error = Ended> + ?Sized), watch: Watch) -> Result<Ending, Ended> {
         self.change(self.end);
         self.deliver(self.end, observer, watch)?;
@@ -439,9 +445,9 @@ fn network<T: Clone>(scene: &Scene, plan: &Plan) -> Network<T> {
     if scene.relay { network.with_relay() } else { network }
 }
 
-/// Returns the properties that the network needs of each sample's packet.
+/// Returns the properties of each sample's packet for the network.
 fn packet(kind: SampleKind, scene: &Scene) -> PacketInfo {
-    // Packets are ECN-capable, so a queue that marks has packets to mark. No sender reacts to a mark, and a marked packet arrives.
+    // Packets are ECN-capable, so a marking queue has packets to mark. No sender reacts to a mark, and a marked packet arrives.
     PacketInfo { size: Bytes::new(kind.datagram_len(scene.axes.count()) as u64), ecn_capable: true }
 }
 
@@ -467,7 +473,7 @@ fn store_extended<const A: usize, D: Device<A>, S: Strategy<A>>(
     })
 }
 
-/// Receiving side of the world: the parts that a delivered packet changes, borrowed apart from the network that delivers it.
+/// Receiving side of the world: the parts changed by a delivered packet, borrowed apart from the delivering network.
 struct Receivers<'a, const A: usize, S, E: Remote<A>> {
     members: &'a mut [Member<A, S, E::Device>],
     samples: &'a mut SamplesInFlight<A>,

@@ -18,7 +18,7 @@ pub(in crate::arrays) struct Block {
     pub(super) hand: Lanes,
     /// Coupling gains KC \[N/m\] and BC \[N·s/m\].
     pub(super) coupling: Gains<Lanes>,
-    /// Lanes whose device grasps its copy.
+    /// Lanes with a grasp between device and copy.
     pub(super) grasps: Mask,
     pub(super) device_map: StepMap<Lanes>,
     /// Contacts of all eight lanes. `None` if no lane has ever had a one-sided contact along this axis.
@@ -37,12 +37,12 @@ pub(super) struct Forces {
     pub(super) on_object: Lanes,
 }
 
-/// Forces of lanes that apply them a tick late.
+/// Forces of late lanes.
 #[derive(Clone, Debug)]
 pub(super) struct Late {
-    /// Forces that were computed at the latest tick.
+    /// Forces computed at the latest tick.
     pub(super) computed: Forces,
-    /// Lanes that apply their forces a tick late.
+    /// Lanes with forces applied a tick late.
     pub(super) is_late: Mask,
 }
 
@@ -57,6 +57,7 @@ impl Forces {
 
 /// Replaces the step map of one lane.
 pub(super) fn set_map(maps: &mut StepMap<Lanes>, lane: usize, map: &StepMap) {
+    // The numbers come in the order in which `map` visits the coefficients of a step map.
     let (state, force) = map.coefficients();
     let mut numbers = state.into_iter().flatten().chain(force);
     *maps = maps.map(|lanes| {
@@ -66,7 +67,7 @@ pub(super) fn set_map(maps: &mut StepMap<Lanes>, lane: usize, map: &StepMap) {
     });
 }
 
-/// Computes [`Block::tick`]. Each array is a reference of its own, so the compiler knows that no lane reads what another lane writes.
+/// Computes [`Block::tick`]. Each array is a separate reference, so the compiler knows that no lane reads a number written by another lane.
 #[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "each by a reference of its own")]
 fn tick_of_lanes<const TIED: bool, L: LawOfLanes>(
@@ -86,8 +87,10 @@ fn tick_of_lanes<const TIED: bool, L: LawOfLanes>(
         let touch = |apart| grasps.keep(lane, grasp(&gains, apart));
         let seen = Observation { own: object, past: lane_of(pasts, lane), mean: lane_of(means, lane), lead: leads.0[lane] };
         let memory = memory_of_lane(memory, remembered, lane);
+        // Forces first, motion after: the forces belong to the state at the tick.
         let (coupling, on_object) = forces(device, touch, &seen, &law.of_lane(lane), memory);
         let map = device_map.map(|coefficient| coefficient.0[lane]);
+        // A free body has two coefficients less. The branch is on a constant and costs nothing.
         if TIED {
             map.advance(&mut device, on_device(hands.0[lane], coupling));
         } else {
@@ -152,7 +155,9 @@ impl Block {
         for lane in 0..WIDTH {
             coupling.0[lane] = grasp(&self.coupling.map(|gain| gain.0[lane]), apart(lane));
         }
+        // Lanes without a grasp have gains too, so the mask removes their forces, signs of zeros included.
         coupling = coupling & self.grasps;
+        // One-sided contacts depend on the sign of the depth, a branch per lane, and replace the forces of all lanes.
         if let Some(contacts) = &self.contacts {
             for lane in 0..WIDTH {
                 let gains = self.coupling.map(|gain| gain.0[lane]);
@@ -197,6 +202,7 @@ impl Block {
     /// Moves devices and copies to the next tick.
     #[inline(always)]
     pub(super) fn advance(&mut self, object_map: &StepMap<Lanes>, forces: &Forces) {
+        // A lane's device and copy move independently of each other: their forces are known.
         for lane in 0..WIDTH {
             let map = self.device_map.map(|coefficient| coefficient.0[lane]);
             let mut device = lane_of(&self.device, lane);
@@ -214,6 +220,7 @@ impl Block {
     }
 
     #[inline(always)]
+    // Sums of absolute values: a NaN or an infinity of any body survives the addition.
     pub(super) fn size(&self) -> Lanes {
         let size = |motions: &Motions| motions.position.abs() + motions.velocity.abs();
         size(&self.device) + size(&self.object)
@@ -225,6 +232,7 @@ impl Late {
     #[inline(always)]
     pub(super) fn exchange(&mut self, forces: Forces) -> Forces {
         let applied = Forces {
+            // A late lane applies the forces of the tick before. The others apply theirs at once, in the same instructions.
             coupling: self.is_late.choose(self.computed.coupling, forces.coupling),
             on_object: self.is_late.choose(self.computed.on_object, forces.on_object),
         };

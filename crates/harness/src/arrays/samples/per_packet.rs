@@ -353,8 +353,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
                 newest[count] = place;
                 count += usize::from(self.is_newest(packet, &mut bucket.overtaking));
             }
-            // All held samples are read before any sum changes. Two packets of a chunk never replace the same sample, since each is the newest of its link at
-            // its turn.
+            // Each sample is held as soon as the sample before is read, so a second sample of the same link in this chunk replaces the first.
             let mut before = [State { position: [0.0; A], velocity: [0.0; A] }; TAKEN_TOGETHER];
             for (place, before) in newest[..count].iter().zip(&mut before) {
                 let packet = &packets[*place];
