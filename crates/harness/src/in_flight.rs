@@ -11,7 +11,7 @@ pub(crate) struct Handle(NonZeroU32);
 
 /// Store of samples, each until its last copy has arrived or was dropped. The memory is bounded by the largest number of samples in flight at once.
 ///
-/// A sample is stored as numbers. Bytes are made where they are read: for the receiver of a damaged packet, or for a socket.
+/// A sample is stored as numbers. Bytes are made only for the receiver of a damaged packet, or for a socket.
 #[derive(Clone, Debug)]
 pub(crate) struct SamplesInFlight<const A: usize> {
     kind: SampleKind,
@@ -53,6 +53,7 @@ impl<const A: usize> SamplesInFlight<A> {
     #[inline]
     pub(crate) fn store(&mut self, copies: usize, sample: Sample<A>) -> Handle {
         let slot = Slot { sample, copies };
+        // The slot freed last is used first, because its memory is most likely in the cache.
         match self.free.pop() {
             Some(handle) => {
                 *self.slot_mut(handle) = slot;
@@ -62,7 +63,7 @@ impl<const A: usize> SamplesInFlight<A> {
         }
     }
 
-    /// Stores a sample with an attitude and with the extra numbers that `write` appends: one entry for each receiver, by index, or one entry for all.
+    /// Stores a sample with an attitude and with the extra numbers appended by `write`: one entry for each receiver, by index, or one entry for all.
     ///
     /// Returns `None` if an extra number of the first `axes` axes is not finite: no receiver would accept the sample.
     pub(crate) fn store_extended(
@@ -80,6 +81,7 @@ impl<const A: usize> SamplesInFlight<A> {
         }
         let extended = &mut self.extended[slot];
         extended.attitude = attitude;
+        // The vector keeps its allocation from sample to sample.
         extended.numbers.clear();
         write(&mut extended.numbers);
         if extended.numbers.iter().flat_map(|numbers| &numbers[..axes]).all(|number| number.is_finite()) {
@@ -98,6 +100,7 @@ impl<const A: usize> SamplesInFlight<A> {
 
     fn stored_extra(&self, handle: Handle, receiver: usize) -> Extra<A> {
         let Extended { numbers, attitude } = &self.extended[handle.place()];
+        // A single entry is meant for all receivers.
         let numbers = if let [one] = numbers[..] { one } else { numbers[receiver] };
         let receiver = if self.kind.is_personal() { u32::try_from(receiver).unwrap_or(u32::MAX) } else { 0 };
         Extra { receiver, numbers, attitude: *attitude }

@@ -16,8 +16,8 @@ use crate::world::{NoRemote, Remote, Step, Watch, World};
 
 /// A scene in virtual time, as fast as the processor allows.
 ///
-/// Each instant has this order: changes of the timeline; peers that tick sample and send; arrived packets are applied; forces are computed; each peer that
-/// ticks moves to its next tick. Ties are broken by (instant, step, peer) and (instant, link, sequence).
+/// Each instant has this order: changes of the timeline; ticking peers sample and send; arrived packets are applied; forces are computed; each ticking
+/// peer moves to its next tick. Ties are broken by (instant, step, peer) and (instant, link, sequence).
 #[derive(Debug)]
 pub struct Simulation<'a, S = FromScene> {
     scene: &'a Scene,
@@ -30,7 +30,7 @@ pub struct Simulation<'a, S = FromScene> {
 }
 
 impl<'a> Simulation<'a> {
-    /// Returns a scene that is ready to run with its own strategy.
+    /// Returns a scene ready to run with its own strategy.
     #[must_use]
     pub const fn new(scene: &'a Scene, model: Model) -> Self {
         Self { scene, model, disturbance: None, threads: 1, strategies: FromScene }
@@ -48,7 +48,7 @@ impl<'a> Simulation<'a> {
 }
 
 impl<'a, S: Strategies> Simulation<'a, S> {
-    /// Returns a scene that is ready to run with strategies of the caller instead of its own.
+    /// Returns a scene ready to run with strategies of the caller instead of its own.
     #[must_use]
     pub const fn with_strategies(scene: &'a Scene, model: Model, strategies: S) -> Self {
         Self { scene, model, disturbance: None, threads: 1, strategies }
@@ -97,10 +97,11 @@ impl<'a, S: Strategies> Simulation<'a, S> {
     }
 
     fn run_in_lockstep(&self, plan: &Plan, (shape, law): (Shape, BuiltIn), watch: Watch, observer: &mut AnyObserver<'_>) -> Result<Summary, Ended> {
+        // Threads and groups meet at ticks of sending only and show no rows in between, so only a run without rows is divided.
         if watch == Watch::NOTHING {
             let threads = self.threads.clamp(1, shape.threads().0);
             if (threads > 1 || shape.pays_in_groups())
-                // Groups notice a divergence only at their next meeting. The run is then repeated with all peers together, which finds the instant.
+                // Groups notice a divergence only at their next meeting. The run is then repeated with all peers together, to find the instant.
                 && let Some(summary) = arrays::run_on_threads(self.scene, &shape, law, threads, &mut |now| observer.keep_going(now))
             {
                 return Ok(summary);
@@ -122,6 +123,7 @@ impl<'a, S: Strategies> Simulation<'a, S> {
 
     /// Returns the shape and the law of the scene if its run needs no events and only ticks and instants are watched; else `None`.
     fn arrays(&self, plan: &Plan, watch: Watch) -> Option<(Shape, BuiltIn)> {
+        // A disturbance changes initial states that arrays read from the scene, and a full model asks for all events.
         let fits = watch.is_of_ticks() && self.disturbance.is_none() && self.model == Model::Least;
         if fits { Shape::of(self.scene, plan, &self.strategies).ok() } else { None }
     }
@@ -136,7 +138,7 @@ fn run_with_strategies_of_scene(simulation: &Simulation<'_>, observer: &mut AnyO
     simulation.run_observed(observer)
 }
 
-/// Onlooker of a run in arrays that passes rows to an observer and keeps its error.
+/// Onlooker of a run in arrays. Passes rows to an observer and keeps its error.
 struct Watching<'o, 'a> {
     observer: &'o mut AnyObserver<'a>,
     watch: Watch,
@@ -152,6 +154,7 @@ impl Onlooker for Watching<'_, '_> {
     }
 
     fn on_instant(&mut self, row: &InstantRow) -> bool {
+        // After an error of `on_ticks` at the same instant the observer gets no further row.
         if self.watch.instants && self.result.is_ok() {
             self.result = self.observer.on_instant(row);
         }

@@ -15,7 +15,7 @@ use crate::measures::travel::Travelled;
 use crate::observer::observe_by_field;
 use crate::{Ending, Observer, Summary, TickRow, Ticks};
 
-/// Observer of everything that expectations of a scene need.
+/// Observer for all expectations of a scene.
 #[derive(Debug)]
 pub(crate) struct Watched {
     seen: (Positions, Option<Measures>),
@@ -100,6 +100,7 @@ impl Observer for Positions {
     }
 
     fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Infallible> {
+        // A row belongs to one peer, so each expectation takes the rows of its own peer only.
         let is_its = |peer: usize| peer == row.peer;
         self.see(
             row.at,
@@ -110,6 +111,7 @@ impl Observer for Positions {
     }
 
     fn on_ticks(&mut self, ticks: &Ticks<'_>) -> Result<(), Infallible> {
+        // Arrays have no turning objects, so no attitude exists.
         self.see(ticks.at(), |peer, axis| Some(ticks.position(peer, axis)), |_| None);
         Ok(())
     }
@@ -144,6 +146,7 @@ impl Watched {
         }
         for (expected, watched) in expect.travel.iter().zip(&watched.travels) {
             let what = format!("time in which {}'s copy travels {} m along {}", name(expected.peer), expected.distance, AXES[expected.axis]);
+            // A distance reached before an overflow stays reached, so the outcome needs no judgement by the reach.
             outcomes.push(match watched.travelled.reached() {
                 None => Outcome::nothing("travel", what, "s", &expected.bounds, &reach.not_reached()),
                 Some(at) => Outcome::number("travel", what, "s", &expected.bounds, at.as_secs_f64()),
@@ -260,7 +263,7 @@ fn delay(scene: &Scene, expected: &ExpectDelay, summary: &Summary) -> Outcome {
     Outcome { passed, expected: range, found: Span(mean).to_string(), ..Outcome::number("delay", what, "s", &bounds, mean.as_secs_f64()) }
 }
 
-/// Returns the counters of the selected links, each with the number of links that have these counters.
+/// Returns the counters of the selected links, each with the number of links with these counters.
 fn selected(link: LinkSelector, summary: &Summary) -> Vec<(LinkStats, u64)> {
     let access = |peer: usize, uplink: bool| {
         summary.access_lines.iter().filter(|line| line.peer == peer && line.uplink == uplink).map(|line| (line.stats, 1)).collect()

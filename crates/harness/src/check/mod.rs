@@ -16,7 +16,7 @@ use crate::observer::observe_by_field;
 use crate::{Ending, Model, Observer, Simulation, Summary};
 use expectations::Watched;
 
-/// Runs a scene and returns one line for each expectation that fails, in the order of the sections in the file. Empty if all hold.
+/// Runs a scene and returns one line for each failed expectation, in the order of the sections in the file. Empty if all hold.
 ///
 /// A scene [too large](crate::too_large) for a simulation returns the one line with this reason.
 ///
@@ -46,15 +46,15 @@ pub struct Checked {
 }
 
 impl Checked {
-    /// Returns the reason why the scene could not be checked, if any, and one line for each expectation that fails.
+    /// Returns the reason why the scene could not be checked, if any, and one line for each failed expectation.
     #[must_use]
     pub fn failures(&self) -> Vec<String> {
         self.unchecked.iter().cloned().chain(self.outcomes.iter().filter_map(Outcome::failure)).collect()
     }
 }
 
-/// Like [`check`], with the outcome of each expectation. `judge` is asked before a simulation whether the scene is stable; its second argument is the
-/// expectation: `true` for stable, `false` for unstable.
+/// Like [`check`], with the outcome of each expectation. `judge` is asked about the stability of the scene before a simulation; the second argument of `judge`
+/// is the expectation: `true` for stable, `false` for unstable.
 #[must_use]
 pub fn check_with(scene: &Scene, model: Model, judge: impl FnOnce(&Scene, bool) -> Judged, mut keep_going: impl FnMut() -> bool) -> Checked {
     let Some(expect) = &scene.expect else {
@@ -64,6 +64,7 @@ pub fn check_with(scene: &Scene, model: Model, judge: impl FnOnce(&Scene, bool) 
     if let Some(too_large) = crate::too_large(scene, model, true) {
         return unchecked(too_large.reason);
     }
+    // One run serves all expectations but stability, and the second observer passes the question about going on.
     let mut observer = (Watched::new(scene, expect), Asking(&mut keep_going));
     let Ok(summary) = Simulation::new(scene, model).run(&mut observer);
     let (watched, _) = observer;
@@ -71,6 +72,7 @@ pub fn check_with(scene: &Scene, model: Model, judge: impl FnOnce(&Scene, bool) 
         return unchecked(format!("interrupted at {at}"));
     }
     let mut outcomes = Vec::new();
+    // The stability comes last of the computations: an interrupted run says nothing, and the question may need further runs.
     if let Some(expected) = expect.stable {
         let finding = match judge(scene, expected) {
             Judged::Found(finding) => finding,
@@ -82,7 +84,7 @@ pub fn check_with(scene: &Scene, model: Model, judge: impl FnOnce(&Scene, bool) 
     Checked { outcomes, unchecked: None }
 }
 
-/// Observer for the expectations that a single run decides: all but `stable`.
+/// Observer for the expectations decided by a single run: all but `stable`.
 #[derive(Debug)]
 pub struct ExpectationWatch<'a> {
     scene: &'a Scene,
@@ -112,7 +114,7 @@ impl Observer for ExpectationWatch<'_> {
     observe_by_field! { watched }
 }
 
-/// Observer that only asks whether the run goes on.
+/// Observer only for the question about going on.
 struct Asking<'a, F>(&'a mut F);
 
 impl<F: FnMut() -> bool> Observer for Asking<'_, F> {

@@ -12,8 +12,8 @@
 //!
 //! The last row closes the record with the number of rows before it and the instant of the last of these rows. A file without this row was cut short.
 //!
-//! A sample is written in hexadecimal. A device or pointer has position and velocity along each axis in turn (`x vx y vy`), with digits from which the same
-//! numbers are read back, or `none`. A link has all its keys, as a TOML table. The first rows name [the recorded scene](super::RecordedScene).
+//! A sample is written in hexadecimal. A device or pointer has position and velocity along each axis in turn (`x vx y vy`), with enough digits to read the same
+//! numbers back, or `none`. A link has all its keys, as a TOML table. The first rows name [the recorded scene](super::RecordedScene).
 
 use std::fmt;
 use std::path::Path;
@@ -94,13 +94,14 @@ impl Inputs {
         missing.map_or(Ok(inputs), Err)
     }
 
-    /// Reads a record as [`Inputs::read`] does, or an incomplete one, as a killed session leaves behind. For an incomplete record the second value is the
+    /// Reads a record as [`Inputs::read`] does, or an incomplete record, as left behind by a killed session. For an incomplete record the second value is the
     /// reason, and the inputs end the session at the last whole line.
     ///
     /// # Errors
     ///
     /// [`InputsError`] for whole lines without a valid row.
     pub fn read_cut(text: &str, scene: &Scene, keys: &LinkKeys) -> Result<(Self, Option<InputsError>), InputsError> {
+        // Editors of some systems put a byte order mark before the first cell.
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let mut lines = text.lines();
         let header = lines.next().unwrap_or_default();
@@ -133,6 +134,7 @@ impl Inputs {
                 continue;
             }
             let (at, what) = read_row(line, row, scene, keys, folder)?;
+            // Instants may be equal but never fall, and nothing follows the end of the session.
             if at < before || closed.is_some() || matches!(rows.last(), Some((_, Recorded::End))) {
                 return Err(InputsError::Order { line, at, before });
             }
@@ -144,6 +146,7 @@ impl Inputs {
                 let found = last_line as u64 - 1;
                 (said != found).then_some(InputsError::Rows { said, found })
             }
+            // The session ends at the last row, so the rows so far can be replayed.
             None => {
                 let at = rows.last().map_or(Instant::ZERO, |(at, _)| *at);
                 if !matches!(rows.last(), Some((_, Recorded::End))) {
@@ -179,6 +182,7 @@ const COLUMNS: [&str; 5] = ["at_ns", "input", "peer", "to", "value"];
 
 fn read_row(line: usize, row: &str, scene: &Scene, keys: &LinkKeys, folder: &Path) -> Result<(Instant, Recorded), InputsError> {
     let mut cells = [""; 5];
+    // The value is the fifth cell and may contain commas itself, hence the limit of five parts.
     let mut rest = row.splitn(5, ',');
     for cell in &mut cells {
         *cell = rest.next().ok_or_else(|| InputsError::Cell {
@@ -247,6 +251,7 @@ impl Cells<'_> {
         if self.cells[4] == "none" {
             return Ok(None);
         }
+        // `parse` accepts "inf" and "nan", which no device can give.
         let numbers: Vec<f64> = self.cells[4].split(' ').filter_map(|number| number.parse().ok()).filter(|number: &f64| number.is_finite()).collect();
         // Cells without a finite number were dropped above, so both counts must agree.
         if numbers.len() != 2 * axes || self.cells[4].split(' ').count() != numbers.len() {

@@ -18,23 +18,23 @@ use crate::rows::{StepRow, TurnStepRow};
 pub(super) struct Member<const A: usize, S, D> {
     pub(super) peer: Peer<A, DeviceModel<A, D>, S>,
     pub(super) clock: Clock,
-    /// Number of ticks that the peer has computed.
+    /// Number of computed ticks of the peer.
     pub(super) tick: u64,
-    /// Tick at which the next sample is due.
+    /// Tick of the next due sample.
     pub(super) next_send: u64,
     /// Ticks between two samples, at least 1.
     pub(super) send_every: u64,
-    /// State that was sent last. Kept only if the scene has a send condition (dead bands).
+    /// State sent last. Kept only if the scene has a send condition (dead bands).
     pub(super) last_sent: Option<LastSent<A>>,
-    /// Samples that arrived after a newer sample of the same sender.
+    /// Samples arrived after a newer sample of the same sender.
     pub(super) stale_samples: u64,
-    /// Damaged samples that the decoder refused.
+    /// Damaged samples refused by the decoder.
     pub(super) refused_samples: u64,
     /// Held part of the coordination force that was computed at the latest tick \[N\]. Updated only if steps are watched.
     pub(super) commanded: [f64; A],
 }
 
-/// Model of a peer's device. D is the type of the devices that are not simulated.
+/// Model of a peer's device. D is the type of unsimulated devices.
 #[derive(Debug)]
 #[expect(clippy::large_enum_variant, reason = "most peers of most scenes are the large variant, and a box would cost a cache miss a tick")]
 pub(crate) enum DeviceModel<const A: usize, D> {
@@ -79,7 +79,7 @@ impl<const A: usize, S: Strategy<A>, D: Device<A>> Member<A, S, D> {
         }
     }
 
-    /// Like [`Member::advance_watched`], for a client or for a peer that turns. Not inlined, so the frequent case stays small.
+    /// Like [`Member::advance_watched`], for a client or for a turning peer. Not inlined, so the frequent case stays small.
     #[inline(never)]
     fn advance_otherwise(
         &mut self,

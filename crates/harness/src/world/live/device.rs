@@ -7,12 +7,12 @@ use cohaptic_units::Instant;
 
 use super::pulled::PulledDevice;
 
-/// Device of a person in a live session, or pointer that pulls a simulated device. Components beyond the axes of the scene are zero and are ignored.
+/// Device of a person in a live session, or pointer of a simulated device. Components beyond the axes of the scene are zero and are ignored.
 pub trait LiveDevice: Send {
-    /// Returns position \[m\] and velocity \[m/s\] at the tick at `now`, in the coordinates of the scene; for a peer of kind `pointer`, those of the pointer.
-    /// Called once a tick. Returns `None` if there is no device, or if the device does not answer or is not homed.
+    /// Returns position \[m\] and velocity \[m/s\] at the tick at `now`, in the coordinates of the scene; for a peer of kind `pointer`, position and velocity
+    /// of the pointer. Called once a tick. Returns `None` if there is no device, or if the device does not answer or is not homed.
     ///
-    /// A peer whose device is silent for long lets go of the object gradually, and takes the object up again gradually when the device is back.
+    /// A peer with a long silent device lets go of the object gradually, and takes the object up again gradually after the return of the device.
     fn read(&mut self, now: Instant) -> Option<State<3>>;
 
     /// Applies the force FC \[N\] until the next tick, `span` after `now`. The hand feels FC with the opposite sign. Called once a tick, after
@@ -20,10 +20,10 @@ pub trait LiveDevice: Send {
     fn hold(&mut self, now: Instant, span: Duration, coupling_force: [f64; 3]);
 }
 
-/// Device without a simulation of its own.
+/// Device without a simulation.
 #[derive(Debug)]
 pub(crate) enum UnsimulatedDevice<const A: usize> {
-    /// The device stays where it is.
+    /// The device rests.
     Resting(RestingDevice<A>),
     /// The device follows a hand.
     InHand(Box<HandDevice<A>>),
@@ -51,12 +51,12 @@ impl<const A: usize> Device<A> for UnsimulatedDevice<A> {
     }
 }
 
-/// Device of a peer, at the state that was read last.
+/// Device of a peer, at the state read last.
 pub(crate) struct HandDevice<const A: usize> {
     device: Option<Box<dyn LiveDevice>>,
-    /// State that was read last.
+    /// State read last.
     read: State<A>,
-    /// State shown when the device came back. The shown state moves from there to `read`.
+    /// Shown state at the return of the device. The shown state moves from `before` to `read`.
     before: State<A>,
     /// Share of the way from `before` to `read`, from 0 to 1.
     share: f64,
@@ -65,7 +65,7 @@ pub(crate) struct HandDevice<const A: usize> {
 }
 
 impl<const A: usize> HandDevice<A> {
-    /// Returns a device at rest at `state`. `None` for a device that is never there.
+    /// Returns a device at rest at `state`. `None` for a never present device.
     pub(crate) const fn new(device: Option<Box<dyn LiveDevice>>, state: State<A>) -> Self {
         Self { device, read: state, before: state, share: 1.0, pulled: None }
     }
@@ -110,6 +110,7 @@ impl<const A: usize> HandDevice<A> {
     /// Returns the state between `before` and `read`, at `share` of the way.
     fn shown(&self) -> State<A> {
         if self.share < 1.0 {
+            // Position and velocity go the same share of the way, so the shown state moves without a jump.
             let mix = |from: [f64; A], to: [f64; A]| core::array::from_fn(|axis| from[axis] + self.share * (to[axis] - from[axis]));
             State { position: mix(self.before.position, self.read.position), velocity: mix(self.before.velocity, self.read.velocity) }
         } else {
@@ -130,6 +131,7 @@ impl<const A: usize> Device<A> for HandDevice<A> {
     }
 
     fn advance(&mut self, now: Instant, span: Duration, coupling_force: [f64; A]) {
+        // The state is taken before the tick moves anything: it is the state that the forces of the tick have used.
         let wanted = self.shown();
         if let Some(pulled) = &mut self.pulled {
             pulled.advance(now, span, &wanted, coupling_force);

@@ -1,11 +1,11 @@
-//! Numbers that move between 0 and 1 at a given speed.
+//! Numbers moving between 0 and 1 at a given speed.
 
 use std::time::Duration;
 
 use cohaptic_peer::Age;
 use cohaptic_units::Instant;
 
-/// A number from 0 to 1 that moves towards one end, by 1 in the time `over`.
+/// A number from 0 to 1, moving towards one end, by 1 in the time `over`.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Ramp {
     /// Value at `since`.
@@ -18,17 +18,18 @@ pub(crate) struct Ramp {
 }
 
 impl Ramp {
-    /// Returns a ramp that stays at 0.
+    /// Returns a ramp at rest at 0.
     pub(crate) const fn down(over: Duration) -> Self {
         Self { from: 0.0, since: Instant::ZERO, rises: false, over }
     }
 
-    /// Returns a ramp that stays at 1.
+    /// Returns a ramp at rest at 1.
     pub(crate) const fn up(over: Duration) -> Self {
         Self { from: 1.0, since: Instant::ZERO, rises: true, over }
     }
 
     pub(crate) fn value(&self, now: Instant) -> f64 {
+        // The value is computed from the start and not step by step, so the value does not depend on how often it is asked for.
         let way = now.saturating_duration_since(self.since).as_secs_f64() / self.over.as_secs_f64();
         if self.rises { (self.from + way).min(1.0) } else { (self.from - way).max(0.0) }
     }
@@ -47,7 +48,7 @@ impl Ramp {
     }
 }
 
-/// Strength over time with which one peer feels another.
+/// Strength of one peer at another peer over time.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Fade {
     /// Weight of the peer's pull.
@@ -57,7 +58,7 @@ pub(crate) struct Fade {
 }
 
 impl Fade {
-    /// Returns the fade of a peer that was never heard.
+    /// Returns the fade of a never heard peer.
     pub(crate) const fn unheard(over: Duration) -> Self {
         Self { weight: Ramp::down(over), share: Ramp::up(over) }
     }

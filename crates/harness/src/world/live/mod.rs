@@ -1,4 +1,4 @@
-//! Parts of a running scene that only a session needs: datagrams from other processes, devices in hands, changes of links by the operator.
+//! Parts of a running scene for sessions only: datagrams from other processes, devices in hands, changes of links by the operator.
 
 mod device;
 mod fade;
@@ -46,6 +46,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
         let here = |place: &usize| &scene.peers[*place];
         let clocks: Vec<(usize, &Clock)> = self.ticking.iter().map(|place| (*place, &here(place).clock)).collect();
         self.schedule = Schedule::new(ticking(self.ticking.iter().map(here)), clocks);
+        // Packets for other processes must leave at their arrival, so the network tells the next of these instants.
         if self.remote.has_processes {
             let processes = (0..self.members.len()).filter(|place| self.remote.is_process(*place));
             self.network = self.network.awaiting(processes.map(NodeId::new));
@@ -63,6 +64,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
                     *member.peer.device_mut() = DeviceModel::Unsimulated(UnsimulatedDevice::InHand(hand));
                 }
                 PeerKind::Pointer(_, arm) => {
+                    // A pointer pulls a simulated device, so the peer keeps a body with mass and damping.
                     let body = SimulatedDevice::new(peer.device, None, member.peer.device().state(), scene.integrator, &peer.clock);
                     let hand = Box::new(HandDevice::pulling(devices(place), PulledDevice::new(body, arm)));
                     *member.peer.device_mut() = DeviceModel::Unsimulated(UnsimulatedDevice::InHand(hand));
@@ -73,10 +75,10 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
         self
     }
 
-    /// Returns the next instant at which anything happens, at latest the end of the scene.
+    /// Returns the next instant with any event, at latest the end of the scene.
     ///
-    /// Without peers in other processes this is a tick, as in virtual time: a packet that arrives between two ticks is read at the later tick anyway. With such
-    /// a peer, every arrival is an instant of its own, because the record of the session has one order for all receivers.
+    /// Without peers in other processes this is a tick, as in virtual time: a packet arriving between two ticks is read at the later tick anyway. With such
+    /// a peer, every arrival is a separate instant, because the record of the session has one order for all receivers.
     pub(crate) fn next_instant(&self) -> Instant {
         let tick = self.next_tick();
         if !self.remote.has_processes {
@@ -90,7 +92,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
         self.schedule.next_instant().map_or(self.end, |tick| tick.min(self.end))
     }
 
-    /// Returns the next instant that the driver must not miss: a tick, a change of the timeline or the arrival of a packet for another process. Arrivals at
+    /// Returns the next instant of need for the driver: a tick, a change of the timeline or the arrival of a packet for another process. Arrivals at
     /// local peers before this instant can be computed when it comes.
     pub(crate) fn next_wake(&self) -> Instant {
         if self.schedule.next_instant().is_none() {
@@ -98,13 +100,15 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
             return self.next_instant();
         }
         let awaited = self.network.poll_awaited().unwrap_or(self.end);
+        // A change without peers in other processes takes effect at the next tick anyway.
         let change = self.changes.last().filter(|_| self.remote.has_processes).map_or(self.end, |change| change.at);
         self.next_tick().min(awaited).min(change)
     }
 
-    /// Computes everything that happens at `at`, which must be the instant of [`World::next_instant`].
+    /// Computes all events at `at`, the instant of [`World::next_instant`].
     pub(crate) fn happen(&mut self, at: Instant, observer: &mut (impl Observer<Error = Ended> + ?Sized), watch: Watch) -> Result<Step, Ended> {
         self.remote.undrained = None;
+        // Silence first: a peer that falls silent at this instant must not count in the discrepancy of the instant.
         self.notice_silence(at);
         if at >= self.end {
             return self.finish(observer, watch).map(Step::Ended);
@@ -127,6 +131,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
         };
         let peers = self.members.len();
         let kind = self.samples.kind();
+        // A refused sample changes a counter only, since the record of the session has no row for the sample.
         let read = read_sample::<A>(datagram, kind, self.axes, session, (place, peers)).inspect_err(|_| seat.stats.refused += 1);
         let (mut sample, extra) = read?;
         // Admitted before `hear`, because a silent seat admits any number.
@@ -135,7 +140,9 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
         // A peer that joins again counts its samples from 0. The receivers see numbers that go on, or they would take the samples for stale.
         sample.sequence = seat.next_sequence;
         seat.next_sequence += 1;
+        // Receivers fade the peer in from the first sample of its return, and not from samples sent before its silence.
         if joins {
+            // Peers of other processes keep ages of their own.
             for (to, member) in self.members.iter_mut().enumerate() {
                 if to != place && !self.remote.is_process(to) {
                     self.remote.await_return(place, to, sample.sequence, &mut member.peer);
@@ -152,6 +159,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
         }
         // Changes that are due apply to the links before the sample enters the network.
         self.change(at);
+        // A personal sample has one receiver, a sample for all has the other peers of the scene.
         let copies = if kind.is_personal() { 1 } else { peers - 1 };
         let handle = if kind == SampleKind::State {
             self.samples.store(copies, sample)
@@ -171,6 +179,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
     }
 
     /// Changes the configuration of a link from outside of the scene. Everything before `at` must have been computed, nothing at `at`.
+    // A change of the timeline at the same instant comes first, so the operator's change wins.
     pub(crate) fn take_link(&mut self, at: Instant, from: usize, to: usize, link: &LinkModel) {
         self.change(at);
         self.set_link(at, from, to, link);
@@ -214,14 +223,14 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
         (is_there(from) && is_there(to)).then(|| self.network.link_stats(NodeId::new(from), NodeId::new(to))).flatten()
     }
 
-    /// Returns the states of a peer's device and copy. The device is `None` if it is in another process; the result is `None` if there is no peer `place`.
+    /// Returns the states of a peer's device and copy. The device is `None` for a peer in another process; the result is `None` without a peer `place`.
     pub(crate) fn states(&self, place: usize) -> Option<(Option<State<A>>, State<A>)> {
         let member = self.members.get(place)?;
         let is_process = self.remote.is_process(place);
         Some(((!is_process).then(|| member.peer.device().state()), *member.peer.object().state()))
     }
 
-    /// Returns the attitudes of a peer. `None` if the object does not turn or if there is no peer `place`.
+    /// Returns the attitudes of a peer. `None` if the object does not turn or if the scene has no peer `place`.
     pub(crate) fn turn(&self, place: usize) -> Option<TurnState> {
         let rotation = self.members.get(place)?.peer.rotation()?;
         let device = rotation.device().filter(|_| !self.remote.is_process(place));
@@ -230,7 +239,7 @@ impl<const A: usize, S: Strategy<A>> World<A, S, RemotePeers<A>> {
 
     fn notice_silence(&mut self, now: Instant) {
         let (latest, members) = (&mut self.latest, &self.members);
-        // The position of a silent peer is unknown, so the discrepancy leaves it out. A device in a hand keeps its copy in this process.
+        // The position of a silent peer is unknown, so the discrepancy leaves the peer out. A device in a hand keeps its copy in this process.
         self.remote.notice_silence(now, |place| {
             if !matches!(members[place].peer.device(), DeviceModel::Unsimulated(UnsimulatedDevice::InHand(_))) {
                 latest[place] = [f64::NAN; A];
@@ -276,7 +285,7 @@ impl<const A: usize> Remote<A> for RemotePeers<A> {
         Some(match &event.damage {
             None => self.take_in(now, ends, sample.sample(), &sample.extra(), receiver),
             Some(damage) => match Sample::decode_as(sample.datagram(Some(damage), &mut buffer), sample.kind(), sample.axes) {
-                // Damage can change the index of the receiver, which only a personal sample carries.
+                // Damage can change the index of the receiver. Only a personal sample carries the index.
                 Ok((_, extra)) if sample.kind().is_personal() && extra.receiver as usize != ends.1 => {
                     Err(ReceiveError::Receiver { receiver: extra.receiver })
                 }
@@ -296,10 +305,11 @@ impl<const A: usize> Remote<A> for RemotePeers<A> {
     ) -> Result<(), Ended> {
         if let (Some(device), Some(seat)) = (peer.device_mut().hand_mut(), self.seat_mut(place)) {
             let read = device.read(now, axes);
+            // Every reading is recorded, a missing reading too: a replay must see the same silences.
             observer.on_input(&InputRow { at: now, what: Input::Device { peer: place, state: read.as_ref().map(|state| row(state, axes)) } })?;
             if let Some(state) = read {
                 let joins = seat.hear(now);
-                // A device that comes back fades in, and so do all fades that follow its presence.
+                // A returning device fades in, with all fades that follow its presence.
                 if joins {
                     device.keep();
                     seat.fades[place].moved(now);
@@ -307,6 +317,7 @@ impl<const A: usize> Remote<A> for RemotePeers<A> {
                 }
                 device.set(state);
             }
+            // The coupling falls with the weight of the hand: a silent device must not hold the copy at its last place.
             let coupled = device.set_age(seat.fades[place].age(now));
             peer.set_coupling(seat.coupling.scaled(coupled));
         }
@@ -315,7 +326,7 @@ impl<const A: usize> Remote<A> for RemotePeers<A> {
     }
 }
 
-/// Decodes a datagram as a sample of the peer at index `place` of `peers` peers, and refuses samples of other sessions, senders and impossible receivers.
+/// Decodes a datagram as a sample of the peer at index `place` of `peers` peers, and refuses samples of wrong sessions, senders and receivers.
 fn read_sample<const A: usize>(
     datagram: &[u8],
     kind: SampleKind,
@@ -324,6 +335,7 @@ fn read_sample<const A: usize>(
     (place, peers): (usize, usize),
 ) -> Result<(Sample<A>, Extra<A>), SampleError> {
     let (sample, extra) = Sample::decode_as(datagram, kind, axes)?;
+    // A process of an earlier session may still send.
     if sample.session != session {
         return Err(ReceiveError::Session { found: sample.session }.into());
     }

@@ -36,7 +36,7 @@ impl std::fmt::Debug for Datagram {
     }
 }
 
-/// Datagram that the network has delivered to a peer in another process.
+/// Datagram delivered by the network to a peer in another process.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Transmit {
     /// Index of the receiver.
@@ -50,13 +50,13 @@ pub struct Transmit {
 /// Remote peers of a scene.
 #[derive(Debug)]
 pub(crate) struct RemotePeers<const A: usize> {
-    /// Seats, indexed by peer; `None` for a peer that cannot fall silent.
+    /// Seats, indexed by peer; `None` for a never silent peer.
     seats: Vec<Option<Seat>>,
     /// Indices of peers with a seat.
     places: Vec<usize>,
     /// Ages of the remote peers, as applied to each local peer. Indexed by local peer.
     ages: Vec<Ages<A>>,
-    /// Age that was applied last, indexed by sender · number of peers + receiver; `None` before the first.
+    /// Age applied last, indexed by sender · number of peers + receiver; `None` before the first.
     told: Vec<Option<Age>>,
     /// Datagrams for other processes, in the order of arrival.
     outbox: VecDeque<Transmit>,
@@ -64,7 +64,7 @@ pub(crate) struct RemotePeers<const A: usize> {
     pub(crate) has_processes: bool,
     /// Index of the first local peer.
     pub(crate) lead: usize,
-    /// Instant of an input whose packets were not delivered yet. The world must look at this instant again.
+    /// Instant of an input with undelivered packets. The world must look at this instant again.
     pub(crate) undrained: Option<Instant>,
 }
 
@@ -94,8 +94,9 @@ impl<const A: usize> RemotePeers<A> {
         self.seat(place).is_some_and(|seat| seat.is_process)
     }
 
-    /// Notes peers that have fallen silent by `now`, and calls `silent` with the index of each.
+    /// Notes peers fallen silent by `now`, and calls `silent` with the index of each.
     pub(crate) fn notice_silence(&mut self, now: Instant, mut silent: impl FnMut(usize)) {
+        // Peers with a seat are few among many simulated peers, hence the list of places.
         for place in &self.places {
             if self.seats[*place].as_mut().is_some_and(|seat| seat.notice_silence(now)) {
                 silent(*place);
@@ -119,19 +120,21 @@ impl<const A: usize> RemotePeers<A> {
     ) -> Result<Reception, ReceiveError> {
         let (from, to) = ends;
         let received = self.ages[to].handle_extended(peer, sample, extra)?;
+        // A stale sample neither moves what the receiver holds nor ends a silence.
         if received == Reception::Newest {
             self.arrived(now, from, to);
         }
         Ok(received)
     }
 
-    /// Handles a sample newer than all samples before. If this is a return of its sender, the fade begins.
+    /// Handles a sample newer than all samples before. If the sample is a return of its sender, the fade begins.
     fn arrived(&mut self, now: Instant, from: usize, to: usize) {
         let Some(seat) = self.seats.get_mut(from).and_then(Option::as_mut).filter(|seat| seat.is_process) else { return };
         // The sender may return to each receiver at a different instant, when its first new sample arrives there.
         if !self.ages[to].take_return(other(from, to)) {
             return;
         }
+        // The held sample jumps from the place before the silence to the new place, so the share begins anew.
         seat.fades[to].moved(now);
         // The sender can be silent again before its sample arrives. The jump then is faded, but the weight keeps falling.
         if !seat.is_silent() {
@@ -163,7 +166,7 @@ impl<const A: usize> RemotePeers<A> {
     }
 }
 
-/// Returns the index of `from` among the senders of `to`, which do not include `to`.
+/// Returns the index of `from` among the senders of `to`. The senders do not include `to`.
 const fn other(from: usize, to: usize) -> usize {
     if from < to { from } else { from - 1 }
 }

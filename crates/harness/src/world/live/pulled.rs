@@ -6,7 +6,7 @@ use cohaptic_peer::{Device, Hand, Signal, SimulatedDevice, State};
 use cohaptic_scene::PointerSpec;
 use cohaptic_units::Instant;
 
-/// A simulated device at the end of an arm, whose opposite end is a pointer. The force of the arm is constant over a tick, like the force of every hand.
+/// A simulated device at the end of an arm with a pointer at the opposite end. The force of the arm is constant over a tick, like the force of every hand.
 #[derive(Clone, Debug)]
 pub(crate) struct PulledDevice<const A: usize> {
     body: SimulatedDevice<A>,
@@ -30,6 +30,7 @@ impl<const A: usize> PulledDevice<A> {
 
     /// Moves the device to the next tick, with the pointer at `wanted`.
     pub(crate) fn advance(&mut self, now: Instant, span: Duration, wanted: &State<A>, coupling_force: [f64; A]) {
+        // The pull counts as the force of a hand, so the device moves by the same equations as in a simulation.
         let force = self.pull(wanted);
         let padded = core::array::from_fn(|axis| force.get(axis).copied().unwrap_or(0.0));
         self.body.set_hand(Some(&Hand::Force(Signal::Constant(padded))));

@@ -1,4 +1,4 @@
-//! Seats: state of each remote peer, whether present or not.
+//! Seats: state of each remote peer, present or absent.
 
 use std::ops::Range;
 use std::time::Duration;
@@ -19,7 +19,7 @@ pub enum Presence {
     Absent,
     /// The peer is heard.
     Present,
-    /// The peer has been silent for so long that its pull fades or has faded. The fade began at this instant.
+    /// The peer has been silent for long, and its pull fades or has faded. The fade began at this instant.
     Stale(Instant),
 }
 
@@ -36,7 +36,7 @@ pub enum SampleError {
     /// The datagram is no sample of this session and this peer.
     #[error(transparent)]
     Sample(#[from] ReceiveError),
-    /// The sequence number is not higher than that of an earlier sample of the peer.
+    /// The sequence number is not above the number of an earlier sample of the peer.
     #[error("sample {found} after sample {newest}: expected a higher number, or any number once the peer has been silent")]
     OutOfOrder {
         /// Sequence number of the sample.
@@ -60,15 +60,15 @@ impl From<DecodeError> for SampleError {
 pub struct SeatStats {
     /// Samples taken, or ticks with a reading of the device.
     pub taken: u64,
-    /// Number of times that the peer joined, including the first.
+    /// Number of joinings of the peer, including the first.
     pub joined: u64,
-    /// Datagrams that were no samples of this session and this peer.
+    /// Datagrams without a sample of this session and this peer.
     pub refused: u64,
-    /// Samples after a later one, and repeated samples.
+    /// Samples after a later sample, and repeated samples.
     pub out_of_order: u64,
     /// Samples passed in after their instant, and moved to the first open instant.
     pub late: u64,
-    /// Largest time by which a sample was moved.
+    /// Largest shift of a sample.
     pub most_late: Duration,
 }
 
@@ -77,7 +77,7 @@ pub struct SeatStats {
 pub(crate) struct Seat {
     /// `true` if the peer is in another process.
     pub(crate) is_process: bool,
-    /// Indices of the fades that fall and rise with the silence of the peer: all fades, or for a pointer only the fade of its own hand.
+    /// Indices of the fades with the silence of the peer: all fades, or for a pointer only the fade of its own hand.
     followed: Range<usize>,
     /// Time until silence and time of fading.
     silence: Silence,
@@ -85,22 +85,23 @@ pub(crate) struct Seat {
     pub(crate) heard: Option<Instant>,
     /// `true` if the peer is silent. True before the peer is heard for the first time, unless a pointer is held from the start.
     is_silent: bool,
-    /// Sequence number that the peer gave its newest sample.
+    /// Sequence number of the newest sample in the peer's own count.
     newest: u64,
     /// Sequence number of the next sample for the receivers.
     pub(crate) next_sequence: u64,
     pub(crate) stats: SeatStats,
-    /// Strength with which each peer feels this peer, indexed by peer. The peer's own entry is the strength of its own device.
+    /// Strength of this peer at each peer, indexed by peer. The peer's own entry is the strength of its own device.
     pub(crate) fades: Vec<Fade>,
     /// Coupling gains KC and BC at full presence.
     pub(crate) coupling: Gains,
 }
 
 impl Seat {
-    /// Returns the seat of a peer; `None` for a peer that is never silent.
+    /// Returns the seat of a peer; `None` for a never silent peer.
     pub(crate) fn of(kind: &PeerKind, place: usize, peers: usize, coupling: Gains) -> Option<Self> {
         let silence = kind.silence()?;
         let pointer = if let PeerKind::Pointer(_, pointer) = kind { Some(pointer) } else { None };
+        // A pointer lets go of a device simulated here, so other peers go on feeling the device at full strength.
         let followed = if pointer.is_some() { place..place + 1 } else { 0..peers };
         // A held pointer is present from the first instant, before any reading.
         let is_held = pointer.is_some_and(|pointer| pointer.held);
@@ -119,7 +120,7 @@ impl Seat {
         })
     }
 
-    /// Returns the fades that fall and rise with the silence of the peer.
+    /// Returns the fades with the silence of the peer.
     pub(crate) fn followed_mut(&mut self) -> &mut [Fade] {
         &mut self.fades[self.followed.clone()]
     }
@@ -132,7 +133,7 @@ impl Seat {
     /// Notes a silence that has lasted too long by `now`. Returns whether the silence is new.
     pub(crate) fn notice_silence(&mut self, now: Instant) -> bool {
         let Some(since) = self.falls_silent().filter(|since| !self.is_silent && now >= *since) else { return false };
-        // The fade begins when the peer fell silent, which may be before `now`.
+        // The fade begins at the beginning of the silence, possibly before `now`.
         self.is_silent = true;
         self.followed_mut().iter_mut().for_each(|fade| fade.fall(since));
         true
@@ -141,6 +142,7 @@ impl Seat {
     /// Notes that the peer is heard. Returns whether the peer was silent before.
     pub(crate) fn hear(&mut self, now: Instant) -> bool {
         self.heard = Some(now);
+        // `is_silent` is also true before the first sample, so the first sample counts as a joining.
         let joins = core::mem::take(&mut self.is_silent);
         self.stats.joined += u64::from(joins);
         self.stats.taken += 1;
@@ -170,7 +172,7 @@ impl Seat {
         }
     }
 
-    /// Returns the instant from which the peer is silent if nothing more is heard; `None` if nothing was ever heard.
+    /// Returns the beginning of silence if nothing more is heard; `None` if nothing was ever heard.
     fn falls_silent(&self) -> Option<Instant> {
         Some(self.heard?.saturating_add(self.silence.after))
     }
