@@ -27,7 +27,9 @@ impl<'a, const L: usize> Changes<'a, L> {
         if to_come.as_slice().is_empty() {
             return Self { to_come, laws: Vec::new() };
         }
+        // The first law is the law before any change and is in use already.
         let mut laws = side_by_side(scenes.map(|scene| scene.laws_in_time(0).skip(1)));
+        // Reversed, so that each change pops its law from the end.
         laws.reverse();
         Self { to_come, laws }
     }
@@ -53,8 +55,8 @@ impl<const A: usize, const L: usize> Arrays<'_, A, L> {
         self.shape.tick_at(self.changes.next_at())
     }
 
-    /// Applies the changes up to the instant `until`, which is at the tick `tick` or, at the end of the scene, before it. Each change of a link takes effect at
-    /// its own instant. Calls `damped` with the scene whose damping the copies have from then on.
+    /// Applies the changes up to the instant `until`, at the tick `tick` or, at the end of the scene, before this tick. Each change of a link takes effect at
+    /// its own instant. Calls `damped` with the scene of the copies' damping from then on.
     #[cold]
     pub(super) fn change(&mut self, tick: u64, until: Instant, damped: &mut dyn FnMut(&Scene)) {
         while self.changes.next_at() <= until
@@ -91,7 +93,7 @@ impl<const A: usize, const L: usize> Arrays<'_, A, L> {
                 }
             }
         }
-        // Queues wait for this call, because a packet's fate can depend on a change that was not applied yet.
+        // Queues wait for this call, because a packet's fate can depend on a change not applied yet.
         if self.shape.has_queues() {
             self.pass(tick);
         }
@@ -128,6 +130,7 @@ impl<const A: usize, const L: usize> Arrays<'_, A, L> {
             }
         }
         self.bodies.blocks_mut().set_lag(Law::<f64>::lag(&laws[0]));
+        // Own damping is part of the copies' step maps, so the maps are made anew.
         let then = self.scenes.map(|scene| scene.with_parameters(settings));
         self.bodies.blocks_mut().set_damping(&then.each_ref());
         damped(&then[0]);

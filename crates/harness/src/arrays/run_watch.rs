@@ -19,16 +19,16 @@ pub(super) trait RunWatch<const A: usize> {
     #[inline(always)]
     fn before_motion(&mut self, _now: Instant, _bodies: &Bodies<A>, _law: &BuiltIn<Lanes>) {}
 
-    /// Called when the law's own damping becomes that of `scene`.
+    /// Called when the law's own damping becomes the damping of `scene`.
     fn change_damping(&mut self, _scene: &Scene) {}
 
-    /// Called after each tick with the distance between copies before they moved \[m\]. Returns whether the run goes on.
+    /// Called after each tick with the distance between copies before the move \[m\]. Returns whether the run goes on.
     fn after_motion(&mut self, _now: Instant, _discrepancy: f64) -> bool {
         true
     }
 }
 
-/// Observer that is asked only whether the run goes on.
+/// Observer only for the question about going on.
 pub(super) struct Unwatched<'k>(pub(super) &'k mut dyn FnMut(Instant) -> bool);
 
 impl<const A: usize> RunWatch<A> for Unwatched<'_> {
@@ -105,7 +105,7 @@ impl Place {
     fn hand_on<const A: usize>(&self, axes: &[Seen; A], on: &mut dyn FnMut(&TickRow<'_>) -> bool) -> bool {
         let lane = self.peer % WIDTH;
         let object = StateOfLane::of(axes.each_ref().map(|seen| &seen.object), lane);
-        // The law's own damping is part of the copy's step map, not of the force that the law computes, so it is added for the row.
+        // The law's own damping is part of the copy's step map, not of the force computed by the law, so the damping is added for the row.
         let recorded = |axis: usize| {
             let held = axes[axis].coordination.0[lane];
             if self.damping > 0.0 { held + self.damping * object.velocity[axis] } else { held }
@@ -123,7 +123,7 @@ impl Place {
     }
 }
 
-/// All peers at a tick, before they move.
+/// All peers at a tick, before the move.
 struct Peers<'a, const A: usize> {
     at: Instant,
     bodies: &'a Bodies<A>,
@@ -156,6 +156,7 @@ impl<const A: usize> Source for Peers<'_, A> {
     #[inline(never)]
     fn each(&self, on: &mut dyn FnMut(&TickRow<'_>) -> bool) {
         for (place, damping) in self.damping.chunks(WIDTH).enumerate() {
+            // States and forces are computed for eight peers at once, and only if the observer asks for rows.
             let seen = self.bodies.seen(place, self.law);
             for (peer, damping) in (place * WIDTH..).zip(damping) {
                 if !(Place { at: self.at, peer, damping: *damping, shown: self.shown }).hand_on(&seen, on) {

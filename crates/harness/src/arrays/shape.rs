@@ -1,4 +1,4 @@
-//! Selection of the scenes for arrays, and of scenes that can run side by side.
+//! Selection of the scenes for arrays, and of scenes for runs side by side.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -29,7 +29,7 @@ pub(crate) struct Shape {
     pub(super) end: Instant,
     /// Ticks between two samples of a peer.
     pub(super) send_every: u64,
-    /// First tick at which each peer sends, indexed by peer.
+    /// Tick of the first sending, indexed by peer.
     pub(super) phases: Vec<u64>,
     /// Size of the samples and least time between two samples on a link.
     pub(super) load: Load,
@@ -103,7 +103,7 @@ impl Shape {
     /// Returns whether `alike` scenes of this shape run faster in eight lanes than one after the other.
     ///
     /// Unused lanes cost as much as used lanes, so a minimum of scenes is needed. If all samples travel together, lanes share all work up to the number of
-    /// peers from which means are exact; exact means are computed for a single run. If each packet has an arrival of its own, packets are most of the work and
+    /// peers from which means are exact; exact means are computed for a single run. If each packet has a separate arrival, packets are most of the work and
     /// are computed for each run by itself. With many peers, the samples in flight of eight runs then no longer fit into the nearest cache.
     pub(crate) fn pays_side_by_side(&self, alike: usize) -> bool {
         if self.delay.is_some() { alike >= 5 && self.peers <= EXACT_FROM } else { alike >= 7 && self.peers <= 12 && self.way == Way::Direct }
@@ -127,8 +127,10 @@ impl Shape {
         let load = load(scene);
         let links = scene.used_links();
         let links_change = scene.timeline.iter().any(|change| matches!(change.what, ChangeKind::Link(_) | ChangeKind::AllLinks(_)));
+        // A change of a link can alter the fate of packets under way, so changing links need the instants of later packets.
         let are_direct = !links_change && links.iter().all(|(link, _)| DirectLinks::takes(link, load));
         let delay = one_delay(scene, load).filter(|_| !links_change);
+        // Links of later changes count from the start, because the form of the arrays stays the same for the whole run.
         let late = links.iter().find_map(|(link, _)| why_known_late(link)).or_else(|| models_to_come(scene).find_map(why_known_late));
         // The law after a change is known only for the scene's own strategies.
         let changes_law = |change: &Change| matches!(change.what, ChangeKind::Coordination(_) | ChangeKind::Parameters(_));
@@ -184,7 +186,7 @@ fn sends_by_difference(scene: &Scene) -> bool {
     scene.coordination.send_when.is_some() || scene.timeline.iter().any(|change| matches!(change.what, ChangeKind::SendWhen(_)))
 }
 
-/// Returns the link models that the timeline sets.
+/// Returns the link models set by the timeline.
 fn models_to_come(scene: &Scene) -> impl Iterator<Item = &LinkModel> {
     scene.timeline.iter().flat_map(|change| match &change.what {
         ChangeKind::Link(link) => vec![&*link.config],
@@ -201,7 +203,7 @@ fn models_to_come(scene: &Scene) -> impl Iterator<Item = &LinkModel> {
 
 /// Returns why the fate of a packet over a link may be unknown when the sender sends the next packet; `None` if the fate is known by then.
 ///
-/// Meaningless for a link that damages packets, for which [`Shape::of`] gives another reason first.
+/// Meaningless for a link with damage: [`Shape::of`] gives another reason for such a link first.
 fn why_known_late(link: &LinkModel) -> Option<&'static str> {
     (!SteppedLinks::takes(link)).then_some(match link {
         LinkModel::Replay(_) => "a link replays a log",
@@ -214,11 +216,13 @@ fn why_known_late(link: &LinkModel) -> Option<&'static str> {
 /// Returns the load of each link of a scene: the size of a sample, and the least time between two samples.
 fn load(scene: &Scene) -> Load {
     let ticks = |peer: usize| u32::try_from(scene.samples_every(peer)).unwrap_or(u32::MAX);
+    // The shortest time between two samples of any peer bounds the load of all links.
     let gaps = scene.peers.iter().enumerate().map(|(peer, spec)| spec.clock.tick.saturating_mul(ticks(peer)));
     Load { size: Bytes::new(SampleKind::State.datagram_len(scene.axes.count()) as u64), gap: gaps.min().unwrap_or(Duration::ZERO) }
 }
 
-/// Returns the delay of all links for the samples of a scene. Returns `None` if links do anything else, differ, or do not lead from every peer to all others.
+/// Returns the delay of all links for the samples of a scene. Returns `None` if links do more than delay, differ, or do not lead from every peer to all other
+/// peers.
 fn one_delay(scene: &Scene, load: Load) -> Option<Duration> {
     if scene.topology.is_some() {
         return None;

@@ -123,6 +123,7 @@ fn follow<const A: usize>(
 }
 
 fn verdict(initial: f64, early: f64, late: f64) -> Stability {
+    // Growth below `DIED_OUT` is rounding: a disturbance that has died out may still fluctuate.
     if late > GREW * initial || late > CLEARLY * early && late > DIED_OUT * initial {
         Stability::Unstable
     } else if late < DIED_OUT * initial || CLEARLY * late < early {
@@ -142,6 +143,7 @@ fn relative_displacement<const A: usize>(nominal: &World<A, BuiltInStrategy<A>>,
             let copy = other.object[axis] - one.object[axis];
             // The device is compared with the grasped point, which differs from the centre if the copy turns.
             let device = (other.device[axis] - one.device[axis]) - (other.grasp[axis] - one.grasp[axis]);
+            // A common displacement of all copies means nothing, so only the spread of the copies' displacements counts.
             low[axis] = low[axis].min(copy);
             high[axis] = high[axis].max(copy);
             let touches = match one.contact {

@@ -41,7 +41,7 @@ pub struct LiveScene {
     ended: Option<Ending>,
 }
 
-/// A world with one axis, or with three axes, which also simulates scenes of two.
+/// A world with one axis, or with three axes for scenes of two or three axes.
 enum AnyWorld {
     One(Box<World<1, BuiltInStrategy<1>, RemotePeers<1>>>),
     Three(Box<World<3, BuiltInStrategy<3>, RemotePeers<3>>>),
@@ -72,8 +72,7 @@ pub struct PeerState {
 }
 
 impl LiveScene {
-    /// Returns the scene before its first instant. `devices` returns the device or pointer of the peer with the given index; `None` for a device that is never
-    /// there.
+    /// Returns the scene before its first instant. `devices` returns the device or pointer of the peer with the given index; `None` for a never present device.
     ///
     /// # Panics
     ///
@@ -104,7 +103,7 @@ impl LiveScene {
     ///
     /// # Errors
     ///
-    /// The outer error is the error of the observer, which sees everything due before `at`, and the sample if taken. The inner error is the reason of a
+    /// The outer error is the error of the observer. The observer sees everything due before `at`, and the sample if taken. The inner error is the reason of a
     /// refusal.
     pub fn handle_sample<O: Observer>(
         &mut self,
@@ -137,16 +136,17 @@ impl LiveScene {
             let size = Bytes::new(datagram.len() as u64);
             observer.on_send(&SendRow { at: counts, peer, packets: self.others, size })?;
         }
+        // The row comes after the sample was taken, so a refused sample leaves no row in the record.
         observer.on_input(&InputRow { at: counts, what: Input::Sample { peer, datagram } })?;
         Ok(Ok(counts))
     }
 
-    /// Changes a link from `at` on, or from the first open instant if `at` has passed. Returns the instant of the change; `None` if there is no such link or if
+    /// Changes a link from `at` on, or from the first open instant if `at` has passed. Returns the instant of the change; `None` without such a link or if
     /// the session has ended. `model` is the model of `keys`: see [`LinkKeys::model`]. Packets in flight keep their delay.
     ///
     /// # Errors
     ///
-    /// The error of the observer, which sees everything due before `at`, and the change.
+    /// The error of the observer. The observer sees everything due before `at`, and the change.
     pub fn set_link<O: Observer>(
         &mut self,
         at: Instant,
@@ -172,6 +172,7 @@ impl LiveScene {
     /// The error of the observer.
     pub fn handle_timeout<O: Observer>(&mut self, now: Instant, observer: &mut O) -> Result<(), O::Error> {
         Erased::run(observer, |observer| self.let_happen(now, observer))?;
+        // `now` itself has happened, so the next open instant is one nanosecond later.
         self.open = self.open.max(now.saturating_add(NANOSECOND));
         Ok(())
     }
@@ -183,7 +184,7 @@ impl LiveScene {
         if self.ended.is_some() { None } else { Some(each!(&self.world, world => world.next_wake())) }
     }
 
-    /// Returns the next instant at which anything happens; `None` once the session has ended.
+    /// Returns the next instant with an event; `None` once the session has ended.
     fn next_instant(&self) -> Option<Instant> {
         if self.ended.is_some() { None } else { Some(each!(&self.world, world => world.next_instant())) }
     }
@@ -233,7 +234,7 @@ impl LiveScene {
         each!(&self.world, world => world.seat_stats(peer))
     }
 
-    /// Returns the counters of a link; `None` if there is no such link.
+    /// Returns the counters of a link; `None` without such a link.
     #[must_use]
     pub fn link_stats(&self, from: usize, to: usize) -> Option<LinkStats> {
         each!(&self.world, world => world.link_stats(from, to))
@@ -256,7 +257,7 @@ impl LiveScene {
         each!(&self.world, world => world.summary(self.ended.unwrap_or_else(|| Ending::Interrupted(world.now()))))
     }
 
-    /// Computes everything before `at`, and returns the instant at which an input of `at` takes effect; `None` if the session has ended by then.
+    /// Computes everything before `at`, and returns the effective instant of an input of `at`; `None` if the session has ended by then.
     fn come_in(&mut self, at: Instant, observer: &mut AnyObserver<'_>) -> Result<Option<Instant>, Ended> {
         let at = at.max(self.open);
         // Up to the nanosecond before, because an input comes before everything else at its instant.
@@ -271,6 +272,7 @@ impl LiveScene {
 
     fn let_happen(&mut self, now: Instant, observer: &mut AnyObserver<'_>) -> Result<(), Ended> {
         let watch = Watch::of(observer);
+        // An event may make a further event due, so the next instant is asked for again after each event.
         while let Some(at) = self.next_instant().filter(|at| *at <= now) {
             if let Step::Ended(ending) = each!(&mut self.world, world => world.happen(at, observer, watch))? {
                 self.end(ending);
@@ -281,6 +283,7 @@ impl LiveScene {
 
     fn end(&mut self, ending: Ending) {
         self.ended = Some(ending);
+        // No force of the session may remain on a hand after the end.
         each!(&mut self.world, world => world.let_go(world.now()));
     }
 }

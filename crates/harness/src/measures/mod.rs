@@ -1,7 +1,7 @@
 //! Measures: numbers that summarise a run, computed during the run, in one pass and constant memory. Sums are added in the order of ticks, so a measure has the
 //! same bits with every [`Model`].
 //!
-//! [`Measures`] is an [`Observer`]. A scene without measures has none, and its runs are unwatched. [`cohaptic_scene::Measure`] has names, units and
+//! [`Measures`] is an [`Observer`]. A scene without measures has no such observer, and its runs are unwatched. [`cohaptic_scene::Measure`] has names, units and
 //! descriptions. Each file of this module accumulates one quantity and gives the measures of this quantity. A new quantity is a new file, a line in the list
 //! below, and lines in [`cohaptic_scene::Measure`].
 //!
@@ -84,7 +84,7 @@ impl Asked<'_> {
     }
 }
 
-/// Kinds of rows that an observer wants: `true` for each wanted kind.
+/// Kinds of rows wanted by an observer: `true` for each wanted kind.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Rows {
     ticks: bool,
@@ -134,6 +134,7 @@ macro_rules! accumulators {
                 let asked = Asked { scene, names, settings };
                 let mut rows = Rows::NONE;
                 $(
+                    // Only accumulators of an asked measure exist, so a run computes nothing else.
                     let needed = <$kind>::GIVES.iter().any(|(measure, _)| asked.has(*measure));
                     let $field = needed.then(|| {
                         rows = rows.and(<$kind>::ROWS);
@@ -196,6 +197,7 @@ macro_rules! accumulators {
         #[inline(always)]
         fn $on(&mut self, row: &$row) -> Result<(), Infallible> {
             $(
+                // The constant removes the call at compile time for accumulators without this kind of row.
                 if <$kind>::ROWS.$rows && let Some(accumulator) = &mut self.$field {
                     accumulator.$on(row);
                 }
@@ -236,7 +238,7 @@ impl Measures {
             let Ok(summary) = simulation.run(&mut NoObserver);
             return (summary, Vec::new());
         };
-        // Rows are many and cheap for measures, so that a dynamic call for each would be a good part of the run.
+        // Rows are many and cheap for measures, so a dynamic call for each row would be a good part of the run.
         let Ok(summary) = simulation.run_compiled(&mut measures);
         let values = measures.values(summary.duration);
         (summary, values)

@@ -51,6 +51,7 @@ impl Bands {
     #[must_use]
     pub fn new(duration: Duration, spans: usize, curves: usize) -> Self {
         let spans = spans.max(1);
+        // Rounded up, so that `spans` spans cover the whole duration.
         let width = duration.as_nanos().div_ceil(spans as u128).max(1);
         let width = u64::try_from(width).unwrap_or(u64::MAX);
         Self { duration, spans, width, curves, extremes: vec![Extremes::NONE; spans * curves.div_ceil(WIDTH)], latest: (0, 0..0) }
@@ -60,7 +61,7 @@ impl Bands {
     ///
     /// # Panics
     ///
-    /// If there is no such curve.
+    /// If the curve does not exist.
     pub fn add(&mut self, curve: usize, at: Instant, value: f64) {
         assert!(curve < self.curves, "there are {} curves", self.curves);
         if let Some(span) = self.of_span(at) {
@@ -85,6 +86,7 @@ impl Bands {
     /// Returns the extremes of all curves in the span of an instant; `None` at the end of the scene and beyond.
     #[inline]
     fn of_span(&mut self, at: Instant) -> Option<&mut [Extremes]> {
+        // The values of a run come in the order of time, so the span of the latest value is usually the right span.
         if !self.latest.1.contains(&at.as_nanos()) {
             let span = self.span(at)?;
             let begin = self.width.saturating_mul(span as u64);
@@ -128,6 +130,7 @@ impl Bands {
             for span in 0..self.spans {
                 for curve in 0..part.curves {
                     if let Some((low, high)) = self.extremes(span, first + curve) {
+                        // A part may begin in the middle of a block of eight curves, so each curve is copied by itself.
                         let extremes = &mut part.extremes[span * part.curves.div_ceil(WIDTH) + curve / WIDTH];
                         (extremes.low[curve % WIDTH], extremes.high[curve % WIDTH]) = (low, high);
                     }
@@ -156,17 +159,17 @@ impl Bands {
         self.duration.as_secs_f64()
     }
 
-    /// Returns a curve as (middle of the span \[s\], lowest, highest), without the spans that have no value.
+    /// Returns a curve as (middle of the span \[s\], lowest, highest), without empty spans.
     ///
     /// # Panics
     ///
-    /// If there is no such curve.
+    /// If the curve does not exist.
     pub fn curve(&self, curve: usize) -> impl Iterator<Item = (f64, f64, f64)> {
         assert!(curve < self.curves, "there are {} curves", self.curves);
         (0..self.spans).filter_map(move |span| self.extremes(span, curve).map(|(low, high)| (self.middle_of(span), low, high)))
     }
 
-    /// Returns the extremes of all curves in some spans, where there are any.
+    /// Returns the extremes of all curves in some spans, without empty spans.
     fn all(&self, spans: Range<usize>) -> impl Iterator<Item = (f64, f64)> {
         spans.flat_map(move |span| (0..self.curves).filter_map(move |curve| self.extremes(span, curve)))
     }

@@ -52,6 +52,7 @@ const STEP: u64 = 10_000;
 impl Network {
     /// Returns the state before the run, with `spans` spans of time.
     pub(super) fn new(scene: &Scene, spans: usize) -> Self {
+        // With changes of the timeline a single configured law would not describe the whole run.
         let configured = |from: usize, to: usize| {
             let config = scene.links.between(from, to).as_fixed().filter(|_| scene.timeline.is_empty());
             config.map(|config| config.delay.clone())
@@ -88,6 +89,7 @@ impl Network {
         for (t, low, high) in self.delays.curve(place) {
             // The first loss after the span before. Losses of a span with delivered packets are at the instant of the span itself, and leave no gap.
             let lost = losses.get(losses.partition_point(|loss| *loss <= before)).is_some_and(|loss| *loss < t);
+            // A new run of points leaves a gap in the drawn line.
             if lost || runs.is_empty() {
                 runs.push(Vec::new());
             }
@@ -104,6 +106,7 @@ impl Network {
     /// Draws the picture.
     pub(super) fn picture(&self, title: &str, names: &[String]) -> Picture {
         let name = |from: usize, to: usize| format!("{} → {}", names[from], names[to]);
+        // Both panels of a link share the range of delays, so the curves can be compared.
         let longest = self.shown.iter().filter_map(|link| link.delays.last_key_value()).map(|(steps, _)| milliseconds(*steps)).fold(0.0, f64::max);
         let delay = || Axis::new("Delay").unit("ms").range(0.0, if longest > 0.0 { 1.05 * longest } else { 1.0 });
         let mut picture = Picture::new(format!("{title}: delays and losses of links")).columns(2).aspect(0.42);

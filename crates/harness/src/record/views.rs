@@ -46,6 +46,7 @@ impl Views {
     pub(crate) fn new(scene: &Scene, spans: usize) -> Option<Self> {
         let (rotation, edges) = scene.rotation.as_ref().zip(scene.even_box())?;
         let along = |axis: usize| std::array::from_fn(|other| if axis == other { 0.5 * edges[axis] } else { 0.0 });
+        // A grasp at the centre of mass has no arm to trace, so the ends of the body axes show the turn.
         let traced = |grasp: Triple| if grasp.iter().any(|r| *r != 0.0) { vec![grasp] } else { (0..3).map(along).collect() };
         let peers = rotation.peers.len();
         Some(Self {
@@ -118,6 +119,7 @@ impl Pose {
 }
 
 fn corners(edges: Triple) -> [Triple; 8] {
+    // Bit `axis` of the number of a corner chooses the side of the box along this axis.
     std::array::from_fn(|corner| std::array::from_fn(|axis| if corner >> axis & 1 == 0 { -0.5 * edges[axis] } else { 0.5 * edges[axis] }))
 }
 
@@ -133,6 +135,7 @@ fn hull(mut points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     let chain = |points: &mut dyn Iterator<Item = (f64, f64)>| {
         let mut chain: Vec<(f64, f64)> = Vec::new();
         for point in points {
+            // A point that makes no left turn with the two points before shows that the point between is not a corner of the hull.
             while let [.., a, b] = chain[..]
                 && (b.0 - a.0) * (point.1 - a.1) - (b.1 - a.1) * (point.0 - a.0) <= 0.0
             {

@@ -20,7 +20,7 @@ pub struct LinkSummary {
 
 /// Counters of the N·(N−1) links between N peers, or of the links of a topology, by sender, then receiver.
 ///
-/// If all links of a sender have equal counters, these are stored once. Equality and [`fmt::Debug`] are those of the list of all links, whatever the storage.
+/// If all links of a sender have equal counters, the counters are stored once. Equality and [`fmt::Debug`] follow the list of all links, not the storage.
 #[derive(Clone)]
 pub struct LinkSummaries {
     peers: usize,
@@ -28,7 +28,7 @@ pub struct LinkSummaries {
     stats: Vec<LinkStats>,
     /// Number of links of a sender with a common entry: 1, or N − 1.
     together: usize,
-    /// Links that exist; `None` if every peer has a link to every other peer.
+    /// Existing links; `None` if every peer has a link to every other peer.
     topology: Option<Arc<Topology>>,
 }
 
@@ -90,7 +90,7 @@ impl LinkSummaries {
         self.len() == 0
     }
 
-    /// Returns the counters of the link from one peer to another; `None` if there is no such link.
+    /// Returns the counters of the link from one peer to another; `None` without such a link.
     #[must_use]
     pub fn between(&self, from: usize, to: usize) -> Option<&LinkStats> {
         if let Some(topology) = &self.topology {
@@ -106,12 +106,14 @@ impl LinkSummaries {
         let (neighbours, stats) = match &self.topology {
             Some(topology) => (Some(topology.neighbours(from)), &self.stats[topology.places(from)]),
             None => {
+                // With common entries a sender has a single entry, otherwise one entry per receiver.
                 let entries = self.peers.saturating_sub(1) / self.together;
                 (None, &self.stats[from * entries..(from + 1) * entries])
             }
         };
         let links = neighbours.map_or_else(|| self.peers.saturating_sub(1), <[u32]>::len);
         let receiver = move |place: usize| neighbours.map_or_else(|| place + usize::from(place >= from), |neighbours| neighbours[place] as usize);
+        // A common entry is repeated for each receiver.
         (0..links).map(receiver).zip(stats.iter().cycle())
     }
 
@@ -121,7 +123,7 @@ impl LinkSummaries {
         EachLink { links: self, from: 0, place: 0 }
     }
 
-    /// Returns the stored counters, each with the number of links that have these counters. Covers all links, in as few steps as entries are stored.
+    /// Returns the stored counters, each with the number of links with these counters. Covers all links, in as few steps as entries are stored.
     pub fn counted(&self) -> impl Iterator<Item = (&LinkStats, u64)> + Clone {
         self.stats.iter().map(|stats| (stats, self.together as u64))
     }
@@ -201,6 +203,7 @@ impl Iterator for EachLink<'_> {
     fn next(&mut self) -> Option<LinkSummary> {
         loop {
             let from = self.from;
+            // After the last link of a sender, or for a sender without links, the next sender follows.
             let to = match &self.links.topology {
                 _ if from >= self.links.peers => return None,
                 Some(topology) => topology.neighbours(from).get(self.place).map(|to| *to as usize),

@@ -30,7 +30,7 @@ pub(super) struct Member<const A: usize, S, D> {
     pub(super) stale_samples: u64,
     /// Damaged samples refused by the decoder.
     pub(super) refused_samples: u64,
-    /// Held part of the coordination force that was computed at the latest tick \[N\]. Updated only if steps are watched.
+    /// Held part of the coordination force computed at the latest tick \[N\]. Updated only if steps are watched.
     pub(super) commanded: [f64; A],
 }
 
@@ -121,6 +121,7 @@ impl<const A: usize, S: Strategy<A>, D: Device<A>> Member<A, S, D> {
         self.peer.advance(now, span);
         let turn = turn.map(|turn| TurnStepRow { after: self.peer.attitude().rate, ..turn });
         let after = self.moved_by_coordination(role);
+        // A client feels the other peers by its coupling force only.
         let coordination = if role == Role::Copy { coordination } else { acting.coupling };
         observer.on_step(&StepRow {
             at: now,
@@ -146,6 +147,7 @@ impl<const A: usize, S: Strategy<A>, D: Device<A> + From<RestingDevice<A>>> Memb
         let spec = &scene.peers[place];
         let (clock, integrator) = (spec.clock, scene.integrator);
         let displaced = |body| {
+            // Body 0 is the device and body 1 the copy: each has a separate disturbance.
             let state = if body == 0 { scene.initial_device(place) } else { initial[place] };
             disturbance.map_or(state, |disturbance| disturbance.displace(state, scene.axes.count(), place, body))
         };
