@@ -42,6 +42,7 @@ impl Schedule {
         let mut clocks = clocks.into_iter();
         match ticking {
             Ticking::Lockstep => {
+                // In lockstep all clocks are equal, so the clock of the first peer is enough.
                 let tick = clocks.next().map_or(Duration::MAX, |(_, clock)| clock.tick);
                 Self::Lockstep { tick, next: Instant::ZERO }
             }
@@ -80,6 +81,7 @@ impl Schedule {
     }
 
     pub(crate) fn tick_again(&mut self, peer: usize, at: Option<Instant>) {
+        // In lockstep all peers share one next instant, so a single peer changes nothing.
         if let (Self::EventDriven(queue), Some(at)) = (self, at) {
             queue.push(Tick { at, peer });
         }

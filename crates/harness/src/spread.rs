@@ -56,6 +56,7 @@ impl Spread {
     pub(crate) fn take(&mut self, copies: impl Iterator<Item = [f64; 4]>) {
         self.copies.clear();
         self.copies.extend(copies);
+        // The number of present copies can shrink, so the former reference may be gone.
         let reference = if self.reference < self.copies.len() { self.reference } else { 0 };
         let Some(of_reference) = self.copies.get(reference) else { return };
         chords(of_reference, &self.copies, &mut self.near);
@@ -85,6 +86,7 @@ impl Spread {
         let few = if count(near) < count(far) { &*near } else { &*far };
         let above = |squares: &[f64], one: usize, other: usize, longest: f64| squares[one].sqrt() + squares[other].sqrt() > longest.sqrt();
         for one in 0..copies.len() {
+            // The bounds use square roots only for candidates, because most pairs fail the first test.
             for other in 0..copies.len() {
                 if 4.0 * few[one] > *longest && above(near, one, other, *longest) && above(far, one, other, *longest) {
                     *longest = longest.max(squared_chord(&copies[one], &copies[other]));

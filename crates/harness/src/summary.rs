@@ -39,6 +39,7 @@ impl Summary {
     /// Returns whether the run diverged: a position or a velocity was not finite, or two copies were more than [`DIVERGED_DISTANCE`] apart along an axis.
     #[must_use]
     pub fn has_diverged(&self) -> bool {
+        // A NaN compares as not larger, so it is asked for separately.
         matches!(self.ending, Ending::Diverged(_)) || self.max_discrepancy.is_nan() || self.max_discrepancy > DIVERGED_DISTANCE
     }
 

@@ -25,6 +25,7 @@ impl<const A: usize> Bodies<A> {
         let varying = |(peer, run): (usize, usize)| {
             let (scene, member) = (scenes[run], places.first + peer);
             let hand = HandForce::of(scene.peers[member].hand.as_ref());
+            // Constant hands are part of the blocks, and an unmoved device needs no hand: only varying forces remain.
             (hand.constant().is_none() && moves(scene, member, devices)).then_some((peer, run, hand))
         };
         Self {
@@ -58,6 +59,7 @@ impl<const A: usize> Bodies<A> {
     /// Replaces the hand of a peer in all runs. `None`: no hand.
     pub(super) fn set_hand(&mut self, peer: usize, hand: Option<&Hand>) {
         let (hand, runs) = (HandForce::<A>::of(hand), self.blocks.runs());
+        // The old hand may vary and the new hand not, so the list forgets the old hand in both cases.
         self.hands.retain(|(other, ..)| *other != peer);
         match hand.constant() {
             None => self.hands.extend((0..runs).map(|run| (peer, run, hand.clone()))),
@@ -81,6 +83,7 @@ impl<const A: usize> Bodies<A> {
 
     /// Returns states and forces of the peers in the block at index `place`, along each axis, before the move.
     pub(super) fn seen(&self, place: usize, law: &BuiltIn<Lanes>) -> [Seen; A] {
+        // The blocks of an axis stand together, so the next axis is one axis' blocks away.
         let blocks = self.blocks.of_all().len() / A;
         std::array::from_fn(|axis| self.blocks.seen(axis * blocks + place, law))
     }

@@ -93,6 +93,7 @@ pub fn explain(scene: &Scene) -> Explanation {
     rows.peers(scene, &plan);
     rows.coordination(scene);
     rows.turns(scene);
+    // A broadcast decides the row about packets on the way, so the shape comes before the rows about the network.
     let shape = Shape::of(scene, &plan, &FromScene);
     rows.network(scene, shape.as_ref().is_ok_and(|(shape, _)| watch.is_of_ticks() && shape.is_broadcast()));
     if let Some(measure) = &scene.measure {
@@ -123,6 +124,7 @@ pub fn explain(scene: &Scene) -> Explanation {
             "in arrays: binary64 in eight lanes, eight peers of one run or one peer of eight runs",
             "all tick together, and the fate of each packet is known before the next one comes; a run that is recorded has events, since packets are recorded",
         );
+        // Only a bottleneck or a token bucket has a queue, so the row may be absent.
         if let Some((queues, why)) = shape.queues(&used_links(scene)) {
             rows.model("queues of such a run", queues, why);
         }
@@ -149,6 +151,7 @@ impl Rows {
 
     fn clock_and_motion(&mut self, scene: &Scene, plan: &Plan) {
         let axes = scene.axes.count();
+        // A world of events has one axis or three axes.
         let reason = match scene.axes {
             Axes::One => "scene.axes = 1; the other axes do not exist",
             Axes::Two => "scene.axes = 2; a third axis is simulated too and rests, because two alone would save about a quarter of the time",
@@ -184,6 +187,7 @@ impl Rows {
     fn peers(&mut self, scene: &Scene, plan: &Plan) {
         let copy = if scene.object.split_mass { "the mass of the object is split" } else { "every copy has the whole mass" };
         self.model("object", format!("{} of {} kg", Counted(scene.peers.len(), "copy"), Number(scene.copy_mass())), copy);
+        // Peers with equal devices share a row, so a scene of thousands of equal peers stays readable.
         self.rotation(scene);
         for (group, peers) in groups(scene, plan) {
             let part = format!("peer {}", names(&peers));
@@ -202,6 +206,7 @@ impl Rows {
 
     fn rotation(&mut self, scene: &Scene) {
         let (Some(rotation), Some(copy)) = (&scene.rotation, scene.copy_spin()) else { return };
+        // A scene without rotation has no rows about turns.
         let triple = |numbers: [f64; 3]| numbers.map(|number| Number(number).to_string()).join(", ");
         self.model(
             "rotation",
@@ -253,6 +258,7 @@ impl Rows {
                 (LawValue::Place(peer), _) => model.push_str(&scene.peers[peer].name),
             }
         }
+        // Peers can tick at different rates, so one lag in time is a different number of ticks for each.
         let lags = (0..scene.peers.len()).map(|peer| scene.law(peer).map_or(0, |law| Law::<f64>::lag(&law)));
         match (lags.clone().min().unwrap_or(0), lags.max().unwrap_or(0)) {
             (0, 0) => {}
@@ -263,6 +269,7 @@ impl Rows {
         if damping > 0.0 {
             model.push_str(&format!("; each copy is damped by another {} N·s/m", Number(damping)));
         }
+        // A strategy without use of a gain still accepts the gain, so a reader must hear that the gain has no effect.
         match spec.strategy.gains() {
             UsedGains::Stiffness if gains.damping > 0.0 => model.push_str("; BT is not used"),
             UsedGains::Neither => model.push_str("; KT and BT are not used"),
@@ -331,6 +338,7 @@ impl Rows {
         for (peer, direction, line) in access_lines(scene) {
             self.model(&format!("{direction} of {peer}"), line.words(), "shared by all that passes it");
         }
+        // A later change can bring chance into links without chance at the start.
         let timeline_is_random = scene.timeline.iter().any(|change| {
             matches!(&change.what, ChangeKind::Link(link) if link.config.has_chance())
                 || matches!(&change.what, ChangeKind::AllLinks(links) if links.configs().iter().any(|link| link.has_chance()))
@@ -346,6 +354,7 @@ impl Rows {
 fn groups<'a>(scene: &'a Scene, plan: &Plan) -> Vec<(DeviceChoice, Vec<&'a PeerSpec>)> {
     let mut groups: Vec<(DeviceChoice, Vec<&PeerSpec>)> = Vec::new();
     for (peer, choice) in scene.peers.iter().zip(&plan.devices) {
+        // Equal descriptions are enough: a reader cannot tell such devices apart.
         match groups.iter_mut().find(|(other, peers)| other == choice && describe(peers[0]) == describe(peer)) {
             Some((_, peers)) => peers.push(peer),
             None => groups.push((*choice, vec![peer])),
@@ -356,6 +365,7 @@ fn groups<'a>(scene: &'a Scene, plan: &Plan) -> Vec<(DeviceChoice, Vec<&'a PeerS
 
 fn names(peers: &[&PeerSpec]) -> String {
     match peers {
+        // Beyond four names, the first and the last name stand for all.
         [first, .., last] if peers.len() > 4 => format!("{} to {} ({} peers)", first.name, last.name, peers.len()),
         _ => peers.iter().map(|peer| peer.name.as_str()).collect::<Vec<_>>().join(", "),
     }
@@ -395,6 +405,7 @@ fn dimensions(scene: &Scene, plan: &Plan) -> Dimensions {
     let (peers, axes) = (scene.peers.len() as u64, scene.axes.count() as u64);
     let devices = plan.devices.iter().filter(|choice| **choice == DeviceChoice::Simulated).count() as u64;
     let links = used_links(scene).into_iter();
+    // Little's law: packets in flight are packets per second times mean delay.
     let delays: f64 = links.map(|(config, count)| config.mean_delay().as_secs_f64() * count_f64(count)).sum();
     Dimensions {
         plant: 2 * axes * (peers + devices),
@@ -407,11 +418,13 @@ fn cost(scene: &Scene, nanos: &Nanos) -> Cost {
     let axes = count_f64(scene.axes.count() as u64);
     let peer_ticks_per_s: f64 = scene.peers.iter().map(|peer| peer.clock.tick.as_secs_f64().recip()).sum();
     let update = scene.coordination.update.as_secs_f64();
+    // Every link carries one packet per update, so packets per second are links over the update.
     let packets = |constant: bool| -> f64 {
         used_links(scene).iter().filter(|(config, _)| config.is_constant_delay() == constant).map(|(_, count)| count_f64(*count) / update).sum()
     };
     let busy = peer_ticks_per_s * nanos.a_tick * axes + packets(true) * nanos.a_packet + packets(false) * nanos.an_impaired_packet;
     let packets_per_s = packets(true) + packets(false);
+    // A row has the columns of every axis, but instant and name of the peer only once.
     let record_bytes_per_s = peer_ticks_per_s * (BYTES_A_TICK + BYTES_AN_AXIS * axes) + packets_per_s * BYTES_A_PACKET;
     Cost { peer_ticks_per_s, packets_per_s, realtime_factor: 1e9 / busy, record_bytes_per_s }
 }

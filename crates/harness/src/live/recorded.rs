@@ -63,6 +63,7 @@ pub enum SceneDifference {
 
 impl fmt::Display for SceneDifference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // A value can be a long list, for example the samples of a table, so messages show only its beginning.
         let value = |value: &Option<String>| value.as_deref().map(shorten);
         match self {
             Self::Key { key, recorded, now } => match (value(recorded), value(now)) {
@@ -149,6 +150,7 @@ impl RecordedScene {
 
 /// Returns the names whose entries in two maps differ, with both entries, in the order of the names.
 fn differing<T: Clone + PartialEq>(one: &BTreeMap<String, T>, other: &BTreeMap<String, T>) -> impl Iterator<Item = (String, Option<T>, Option<T>)> {
+    // A name may stand in only one of the maps, so the names of both are joined.
     let mut names: Vec<&String> = one.keys().chain(other.keys()).collect();
     names.sort();
     names.dedup();
@@ -163,6 +165,7 @@ pub(super) fn is_about_the_scene(row: &str) -> bool {
 
 /// Returns the kind and the value of a row about the scene; `None` for different rows.
 fn kind_and_value(row: &str) -> Option<(&str, &str)> {
+    // Rows about the scene have the instant 0 and neither peer nor receiver, so their cells are empty.
     let (kind, rest) = row.strip_prefix("0,")?.split_once(',')?;
     let value = rest.strip_prefix(",,")?;
     KINDS.contains(&kind).then_some((kind, value))
@@ -171,6 +174,7 @@ fn kind_and_value(row: &str) -> Option<(&str, &str)> {
 /// Returns the name and the value in a quoted cell; `None` if the cell has a different form.
 fn line_in(cell: &str) -> Option<(String, String)> {
     let quoted = cell.strip_prefix('"')?.strip_suffix('"')?;
+    // In a quoted cell of CSV, a doubled quotation mark stands for one.
     SceneContent::read_line(&quoted.replace("\"\"", "\""))
 }
 

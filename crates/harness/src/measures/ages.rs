@@ -41,6 +41,7 @@ impl Receiver {
     /// searches only if a different sender is found there.
     #[inline]
     fn place_of(&self, from: usize, to: usize) -> Result<usize, usize> {
+        // In a mesh the senders of a receiver are all peers but itself, so a sender after the receiver stands one place earlier.
         let likely = from - usize::from(from > to);
         match self.sampled.get(likely) {
             Some((sender, _)) if *sender == from => Ok(likely),
@@ -58,6 +59,7 @@ impl Receiver {
             };
             let place = place.expect("each sample held is counted");
             self.instants[place].1 -= 1;
+            // An instant without samples is removed, so the list stays as short as the number of distinct instants.
             if self.instants[place].1 == 0 {
                 self.instants.remove(place);
             }
@@ -113,6 +115,7 @@ impl Accumulator for Ages {
 
     #[inline]
     fn on_tick(&mut self, row: &TickRow<'_>) {
+        // One sum for each receiver makes the tick of a peer independent of its number of senders.
         let Receiver { sampled, nanos, instants } = &self.receivers[row.peer];
         let held = sampled.len() as u64;
         // Σ (tick − sampled) over all held samples, in one multiplication.

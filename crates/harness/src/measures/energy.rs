@@ -59,10 +59,12 @@ impl PeerEnergy {
     #[inline(always)]
     fn of_step(&self, row: &StepRow<'_>) -> f64 {
         let mut energy = 0.0;
+        // Share of the law's own damping in all damping: β/(bO + β).
         let share = if row.own_damping > 0.0 { row.own_damping / (self.damping + row.own_damping) } else { 0.0 };
         let positions = row.before.position.iter().zip(row.after.position);
         let velocities = row.before.velocity.iter().zip(row.after.velocity);
         let forces = row.coordination_force.iter().zip(row.held_force);
+        // The forces are held over the whole step, so force times displacement is the exact work.
         for (((from, to), (before, after)), (coordination_force, held_force)) in positions.zip(velocities).zip(forces) {
             let moved = to - from;
             energy -= coordination_force * moved;
@@ -83,6 +85,7 @@ impl PeerEnergy {
 fn of_turn(turn: &TurnStepRow, spin: &Spin) -> f64 {
     let TurnStepRow { before, after, travel, held_torque, coordination_torque, own_damping, .. } = turn;
     let mut energy = 0.0;
+    // Work of the held coordination torque, −T·Θ.
     for (torque, travel) in coordination_torque.iter().zip(travel) {
         energy -= torque * travel;
     }

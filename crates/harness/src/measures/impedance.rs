@@ -36,8 +36,10 @@ impl Probe {
     fn new(asked: &Asked<'_>) -> Option<Self> {
         let peer = asked.settings.probe?;
         let Some(Hand::Force(Signal::Sine { amplitude, frequency, phase })) = &asked.scene.peers[peer].hand else { return None };
+        // The velocity along the push is v·a/|a|, and the push has the amplitude |a|: division by |a|² gives both at once.
         let square: f64 = amplitude.iter().map(|amplitude| amplitude * amplitude).sum();
         let direction = amplitude.map(|amplitude| amplitude / square);
+        // The first half of the scene lets the transient at the start of the push decay.
         let from = Instant::ZERO.saturating_add(asked.scene.duration / 2);
         Some(Self { peer, from, omega: RadPerSec::from(*frequency).0, phase: *phase, direction, fit: Fit::default() })
     }
@@ -61,6 +63,7 @@ impl Accumulator for Impedance {
 
     #[inline]
     fn on_tick(&mut self, row: &TickRow<'_>) {
+        // Earlier ticks and other peers say nothing about the steady response of the probe.
         let Some(probe) = self.0.as_mut().filter(|probe| probe.peer == row.peer && probe.from <= row.at) else { return };
         let angle = probe.omega * row.at.as_secs_f64();
         let velocity = row.device.velocity.iter().zip(probe.direction).map(|(velocity, direction)| velocity * direction).sum();
@@ -95,6 +98,7 @@ const DEPENDENT: f64 = 1e-9;
 impl Fit {
     #[inline]
     fn add(&mut self, regressors: [f64; 3], signals: [f64; 2]) {
+        // Normal equations of least squares: Σ r·rᵀ on the left and Σ r·s on the right, summed tick by tick.
         for (row, one) in self.normal.iter_mut().zip(regressors) {
             for (sum, other) in row.iter_mut().zip(regressors) {
                 *sum += one * other;

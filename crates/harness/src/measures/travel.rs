@@ -54,6 +54,7 @@ impl Accumulator for Travel {
 
     #[inline]
     fn on_tick(&mut self, row: &TickRow<'_>) {
+        // Other peers have no part in the figure: `[measure]` names the one peer.
         let MeasureTravel { peer, axis, distance } = self.travel;
         if row.peer == peer {
             self.travelled.see(row.at, row.object.position[axis], distance);

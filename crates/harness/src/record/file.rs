@@ -56,6 +56,7 @@ impl RecordFile {
     ///
     /// [`RecordError`] if the rest cannot be written or the file cannot be renamed.
     pub fn finish(self) -> Result<PathBuf, RecordError> {
+        // `finish` consumes the file, so both names are copied before.
         let [path, written_to] = [self.0.path(), self.0.written_to()].map(Path::to_path_buf);
         self.0.finish().map_err(|source| RecordError { path: written_to, source })?;
         Ok(path)
@@ -70,6 +71,7 @@ pub(crate) fn create_folder(path: &Path) -> Result<(), RecordError> {
 /// Appends a number with the fewest digits from which the same `f64` is read back; `inf`, `-inf` and `NaN` for values that are not finite.
 pub(crate) fn push_f64(line: &mut Vec<u8>, value: f64) {
     let mut buffer = zmij::Buffer::new();
+    // The sign of a positive exponent is left out, so the number is written in two parts.
     let (mantissa, exponent) = parts(&mut buffer, value);
     line.extend_from_slice(mantissa.as_bytes());
     line.extend_from_slice(exponent.as_bytes());
@@ -91,6 +93,7 @@ pub(crate) fn push_seconds(line: &mut Vec<u8>, at: Instant) {
         // 10⁹ + rest has ten digits: its first digit is overwritten by the point, and the leading zeros of the rest stay.
         push_whole(line, NANOS + rest);
         line[point] = b'.';
+        // Trailing zeros of the fraction say nothing.
         while line.last() == Some(&b'0') {
             line.pop();
         }

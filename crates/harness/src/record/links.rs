@@ -66,6 +66,7 @@ fn push_counters(row: &mut Vec<u8>, stats: &LinkStats) {
     let mut zeros = 0;
     for count in counts.chain(DropCause::ALL.map(|cause| stats.dropped(cause))).chain([stats.in_flight()]) {
         // Most counts are zero: their columns are appended in one piece.
+        // A comma and the digit 0 for each column.
         if count == 0 {
             zeros += 2;
             continue;

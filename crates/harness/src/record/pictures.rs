@@ -47,6 +47,7 @@ impl Pictures {
     #[must_use]
     pub fn new(scene: &Scene) -> Self {
         let names: Vec<String> = scene.peers.iter().map(|peer| peer.name.clone()).collect();
+        // All curves together stay below a fixed size of memory, but a curve keeps at least 50 spans.
         let curves = names.len() * scene.axes.count();
         let spans = SPANS.min(MOST_NUMBERS / curves).max(50);
         let bands = |curves| Bands::new(scene.duration, spans, curves);
@@ -75,6 +76,7 @@ impl Pictures {
             drawn.push(("orientations.svg", orientations, "orientation of each copy", axis, 180.0 / std::f64::consts::PI, sane));
         }
         for (file, bands, what, axis, scale, sane) in drawn {
+            // Curves are ordered by axis, so each part of equal size is one panel.
             let by_axis = bands.split(bands.curves() / names.len());
             let heading = |along: usize| match (file, by_axis.len()) {
                 ("orientations.svg", _) => TURNS[along].to_owned(),

@@ -59,12 +59,14 @@ pub(super) const CUT: &str = "What goes far beyond is cut off.";
 
 /// Returns the panel, and whether values are cut off.
 fn drawn(panel: &Panel<'_>) -> (cohaptic_picture::Panel, bool) {
+    // A scene that diverges would press all sane values into a line, so the range is cut.
     let (range, cut) = panel.bands.range(panel.sane);
     let range = range.start * panel.scale..range.end * panel.scale;
     let time = Axis::new("Time").symbol("t").unit("s").range(0.0, panel.bands.seconds());
     let mut drawn = cohaptic_picture::Panel::new(time, panel.axis.clone().range(range.start, range.end)).titled(panel.title.as_str());
     let few = panel.bands.curves() <= MOST_NAMED;
     for curve in 0..panel.bands.curves() {
+        // With more curves than looks, names and colours would repeat.
         let look = if few { Look::of(curve) } else { Look::of(0).thin() };
         let name = panel.names.get(curve).filter(|_| few).map_or("", String::as_str);
         drawn = drawn.with(Line::runs(visible_runs(panel, curve, &range), look).named(name));
@@ -93,6 +95,7 @@ fn visible_runs(panel: &Panel<'_>, curve: usize, range: &std::ops::Range<f64>) -
         }
         last = second;
     }
+    // Two values out of range in sequence leave an empty run.
     runs.retain(|run| !run.is_empty());
     runs
 }

@@ -53,6 +53,7 @@ pub(crate) struct Trajectory {
 
 impl Trajectory {
     pub(crate) fn create(folder: &Path, names: Vec<String>, axes: Axes, turn: Turns) -> Result<Self, RecordError> {
+        // Columns of the first axis have no axis in their names, so records of one axis stay as they are.
         let mut file = RecordFile::create(folder.join("trajectory.csv"))?;
         file.write(b"t,peer,xh,vh,xo,vo,xd,vd,fc,ft")?;
         for axis in ["y", "z"].into_iter().take(axes.count() - 1) {

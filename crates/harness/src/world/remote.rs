@@ -70,6 +70,7 @@ impl<const A: usize> Remote<A> for NoRemote {
         sample: &Arriving<'_, A>,
         receiver: &mut Peer<A, DeviceModel<A, Self::Device>, S>,
     ) -> Option<Result<Reception, ReceiveError>> {
+        // Only a damaged packet needs its bytes: without damage, encoding and decoding return the sent numbers.
         Some(match &event.damage {
             None if sample.kind() == SampleKind::State => receiver.handle_sample(sample.sample()),
             None => receiver.handle_extended(sample.sample(), &sample.extra()),
