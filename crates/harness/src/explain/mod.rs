@@ -1,9 +1,7 @@
 //! Explanation of a scene: which parts the program models, which parts the program leaves out, and why.
 
 #[cfg(test)]
-mod costs;
-#[cfg(test)]
-mod links;
+mod tests;
 
 use cohaptic_peer::coordination::{Law, LawValue, Pull, UsedGains};
 use cohaptic_peer::{Contact, Hand, Integrator, SendWhen};

@@ -31,7 +31,6 @@ mod energy;
 mod forces;
 mod impedance;
 mod quantiles;
-mod settling;
 mod traffic;
 pub(crate) mod travel;
 
@@ -210,7 +209,7 @@ macro_rules! accumulators {
 accumulators! {
     discrepancy: discrepancy::Discrepancy;
     travel: travel::Travel;
-    settling: settling::Settling;
+    settling: discrepancy::Settling;
     coordination_force: forces::CoordinationForce;
     felt_force: forces::FeltForce;
     energy: energy::Energy;
