@@ -1,4 +1,4 @@
-//! Instants at which packets may reach the receivers that a driver waits for.
+//! Instants of possible arrivals at the receivers awaited by a driver.
 
 use alloc::collections::BinaryHeap;
 use alloc::vec::Vec;
@@ -10,12 +10,12 @@ use super::id::NodeId;
 use super::paths::Paths;
 use super::pending::LineId;
 
-/// Awaited receivers, and the instants at which packets may reach them.
+/// Awaited receivers, and the instants of possible arrivals there.
 #[derive(Clone, Debug)]
 pub(super) struct Awaited {
     /// `true` if a node is awaited, indexed by node.
     is_awaited: Vec<bool>,
-    /// `true` if the receiver of a link is awaited, indexed by link. Empty in a network with links between all nodes, whose link numbers give the receiver.
+    /// `true` if the receiver of a link is awaited, indexed by link. Empty in a network with links between all nodes: there the link number gives the receiver.
     is_receiver_awaited: Vec<bool>,
     /// Instants to come, earliest first. An instant may occur several times.
     instants: BinaryHeap<Reverse<Instant>>,
@@ -25,6 +25,7 @@ impl Awaited {
     pub(super) fn new(paths: &Paths, receivers: impl IntoIterator<Item = NodeId>) -> Self {
         let mut is_awaited = alloc::vec![false; paths.nodes().into()];
         for node in receivers {
+            // Missing nodes are ignored.
             if let Some(is_awaited) = is_awaited.get_mut(node.index()) {
                 *is_awaited = true;
             }
@@ -36,7 +37,7 @@ impl Awaited {
         Self { is_awaited, is_receiver_awaited, instants: BinaryHeap::new() }
     }
 
-    /// Notes that a packet to node `to` leaves a line at `at`.
+    /// Notes the departure of a packet to node `to` from a line at `at`.
     #[inline]
     pub(super) fn schedule(&mut self, at: Instant, to: NodeId) {
         if self.is_awaited[to.index()] {
@@ -44,7 +45,7 @@ impl Awaited {
         }
     }
 
-    /// Notes that the engine of `line` must be woken at `at`.
+    /// Notes a wake of the engine of `line` at `at`.
     pub(super) fn announce(&mut self, at: Instant, line: LineId) {
         let is_awaited = match line {
             // The packets of an uplink go to any node.

@@ -7,9 +7,9 @@ use core::fmt;
 use super::id::NodeId;
 use crate::line::pipeline::TimeWentBack;
 
-/// A line that a node shares between all its paths.
+/// A line of a node, shared by all paths of the node.
 ///
-/// A network with a slow uplink, links that flip a bit before a receiver without a checksum, and a filter:
+/// A network with a slow uplink, links with one flipped bit before a receiver without a checksum, and a filter:
 ///
 /// ```
 /// use cohaptic_units::{Bytes, Instant, Probability, parse};
@@ -49,9 +49,9 @@ use crate::line::pipeline::TimeWentBack;
 /// ```
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub enum AccessLine {
-    /// The line that all packets of the node pass before their links.
+    /// The line of all packets from the node, before their links.
     Uplink(NodeId),
-    /// The line that all packets to the node pass after their links.
+    /// The line of all packets to the node, after their links.
     Downlink(NodeId),
 }
 
@@ -62,11 +62,11 @@ pub struct NetworkConfig {
     pub seed: u64,
     /// Names of the nodes. The names address the random numbers of links: links with equal names and an equal seed draw equal numbers.
     pub nodes: Vec<String>,
-    /// `true` if links with a constant delay and no other impairment take the general pipeline too. Only speed differs, no answer.
+    /// `true` if links with a constant delay and no further impairment take the general pipeline too. Only speed differs, no answer.
     pub general: bool,
 }
 
-/// Why a call failed. The network is unchanged after each of these errors.
+/// Why a call failed. The network is unchanged after an error.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum NetworkError {

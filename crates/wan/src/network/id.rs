@@ -5,7 +5,7 @@
 pub struct NodeId(pub u16);
 
 impl NodeId {
-    /// Returns the node with this index. An index from 65,535 on gives a node that no network has.
+    /// Returns the node with this index. An index from 65,535 on gives a node outside of every network.
     #[must_use]
     #[inline]
     pub fn new(index: usize) -> Self {
@@ -37,7 +37,7 @@ impl LinkId {
     ///
     /// # Panics
     ///
-    /// With an index from 2^32 on, which no list in memory has.
+    /// With an index from 2^32 on, impossible for a list in memory.
     #[must_use]
     #[inline]
     pub fn new(index: usize) -> Self {

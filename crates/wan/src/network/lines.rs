@@ -1,4 +1,4 @@
-//! The lines of a network, and how a line is found.
+//! The lines of a network, and the search for a line.
 
 use alloc::vec::Vec;
 
@@ -11,7 +11,7 @@ use crate::line::Line;
 /// Links and access lines of a network.
 #[derive(Clone, Debug)]
 pub(super) struct Lines<P> {
-    /// Links, indexed by [`LinkId`]: in the order of senders, then of receivers. Where all nodes have links to all, the diagonal is included and never used.
+    /// Links, indexed by [`LinkId`]: in the order of senders, then of receivers. With links between all nodes, the diagonal is included and never used.
     /// Links on demand are in the order of their making instead, and `on_demand` gives their indices.
     pub(super) links: Vec<Line<P, InNetwork<P>>>,
     /// Models and places of links on demand; `None` if all links are made with the network.
@@ -23,7 +23,7 @@ pub(super) struct Lines<P> {
 }
 
 impl<P> Lines<P> {
-    /// Makes the lines of a network that has no links and no access lines yet.
+    /// Makes the lines of a network without links and access lines.
     pub(super) fn new(config: &NetworkConfig, on_demand: Option<OnDemand>) -> Self {
         let none = || config.nodes.iter().map(|_| None).collect();
         Self { links: Vec::new(), on_demand, uplinks: none(), downlinks: none() }
@@ -31,6 +31,7 @@ impl<P> Lines<P> {
 
     /// Returns a link, or `None` if the link was not made yet or does not exist.
     pub(super) fn find_link(&self, link: LinkId) -> Option<&Line<P, InNetwork<P>>> {
+        // Without links on demand, number and index of a link are equal.
         let place = match &self.on_demand {
             None => link.index(),
             Some(on_demand) => on_demand.place(link)?,
@@ -38,7 +39,7 @@ impl<P> Lines<P> {
         self.links.get(place)
     }
 
-    /// Returns a link that was made. Panics if the link does not exist.
+    /// Returns an existing link. Panics if the link does not exist.
     #[inline(always)]
     pub(super) fn link_mut(&mut self, link: LinkId) -> &mut Line<P, InNetwork<P>> {
         let place = match &self.on_demand {

@@ -6,11 +6,11 @@
 //! ```
 //!
 //! Every pair of nodes has a link in either direction, unless the network is one [of some](Network::of_some). Links are made with the network, or [on
-//! demand](Network::on_demand). A node may have an *uplink*, a shared line that all packets of the node pass before their links, and a *downlink*, a shared
-//! line that all packets to the node pass after their links.
+//! demand](Network::on_demand). A node may have an *uplink*, a line shared by all packets from the node before their links, and a *downlink*, a line shared by
+//! all packets to the node after their links.
 //!
 //! The module takes packets with a size and an opaque payload, and gives one [`PacketEvent`] per fate of a packet. The module knows no clock and never reads
-//! payloads: the driver says what time it is.
+//! payloads: the driver gives the time.
 
 mod awaited;
 mod config;
@@ -49,22 +49,21 @@ use crate::line::name::LinkName;
 use crate::line::pipeline::{Outcome, TimeWentBack, check_time};
 use crate::packet::{Outputs, PacketInfo};
 
-/// Number of nodes, at most, of a [`Network`] in which every node has a link to every node. Link numbers have 29 bits, and the table of links has
-/// `MOST_NODES`² entries.
+/// Number of nodes, at most, of a [`Network`] with links between all nodes. Link numbers have 29 bits, and the table of links has `MOST_NODES`² entries.
 pub const MOST_NODES: usize = 23_170;
 
-/// Number of receivers of a packet for which random words are drawn at once.
+/// Number of receivers of a packet with random words drawn at once.
 const DRAWN_AT_ONCE: u16 = 8;
 
 /// A network of N nodes as a state machine.
 ///
-/// The driver hands packets in with [`Network::handle_packet`], asks [`Network::poll_timeout`] for the next instant at which to come back, calls
-/// [`Network::handle_timeout`] at that instant, and drains [`Network::poll_event`] until `None` is returned. A driver that calls late receives the same
-/// events, only later.
+/// The driver hands packets in with [`Network::handle_packet`], asks [`Network::poll_timeout`] for the instant of its next call, calls
+/// [`Network::handle_timeout`] at that instant, and drains [`Network::poll_event`] until `None` is returned. A late driver receives the same events, only
+/// later.
 ///
-/// Events come in the order of their instants. At equal instants, packets that leave an uplink enter their links before arrivals are reported, a departure
-/// makes room before a packet is offered, arrivals come in the order of (sender, receiver, sequence), and packets dropped at their offer come after the
-/// arrivals that were due. With a delay of zero, a packet arrives at the instant at which it was sent.
+/// Events come in the order of their instants. At equal instants, packets enter their links after an uplink before arrivals are reported, a departure makes
+/// room before a packet is offered, arrivals come in the order of (sender, receiver, sequence), and packets dropped at their offer come after the arrivals due.
+/// With a delay of zero, a packet arrives at the instant of its sending.
 ///
 /// Drain [`Network::poll_event`] after every call: a packet may be dropped at once, and [`Network::poll_timeout`] does not announce such a drop.
 #[derive(Clone, Debug)]
@@ -80,17 +79,17 @@ pub struct Network<P> {
     has_uplinks: bool,
     traffic: Traffic<P>,
     outputs: Outputs<InNetwork<P>>,
-    /// Whether events other than final arrivals can be pending: wakes of engines, or packets between two lines.
+    /// Whether events apart from final arrivals can be pending: wakes of engines, or packets between two lines.
     has_inner_events: bool,
     /// Whether the model of any link draws random numbers, or did before it was changed.
     is_random: bool,
     has_filters: bool,
-    /// `true` if a packet that a node sends to all passes the node's uplink once, instead of once per receiver.
+    /// `true` if a packet to all passes the uplink of its node once, instead of once per receiver.
     has_relay: bool,
 }
 
 impl<P: Clone> Network<P> {
-    /// Makes a network in which `link` gives the model of the link for (sender, receiver).
+    /// Makes a network. `link` gives the model of the link for (sender, receiver).
     ///
     /// # Panics
     ///
@@ -100,13 +99,12 @@ impl<P: Clone> Network<P> {
         Self::on(Paths::All { nodes: nodes_of_all(&config) }, config, link)
     }
 
-    /// Makes a network in which each node has links to some nodes only. `receivers` gives the receivers of each node, in ascending order, and `link` the
-    /// model for (sender, receiver). Memory is taken for these links only.
+    /// Makes a network with links from each node to some nodes only. `receivers` gives the receivers of each node, in ascending order, and `link` the model for
+    /// (sender, receiver). Memory is taken for these links only.
     ///
     /// # Panics
     ///
-    /// With more than 65,535 nodes or 2^29 links, with a receiver that does not exist or is the sender, and with receivers that are not in strictly ascending
-    /// order.
+    /// With more than 65,535 nodes or 2^29 links, with a missing receiver or a node as its own receiver, and with receivers out of strictly ascending order.
     #[must_use]
     pub fn of_some<M: Into<LinkModel>, R: IntoIterator<Item = NodeId>>(
         config: NetworkConfig,
@@ -117,8 +115,8 @@ impl<P: Clone> Network<P> {
         Self::on(Paths::some(nodes, receivers), config, link)
     }
 
-    /// Makes a network like [`Network::new`], but makes each link when the link is first used. Memory and time are taken for the nodes and for the links that
-    /// carry packets or are changed, not for all pairs. Every answer is the same as that of [`Network::new`].
+    /// Makes a network like [`Network::new`], but makes each link at the first use of the link. Memory and time are taken for the nodes and for the used or
+    /// changed links, not for all pairs. Every answer is the same as the answer of [`Network::new`].
     ///
     /// # Panics
     ///
@@ -126,6 +124,7 @@ impl<P: Clone> Network<P> {
     #[must_use]
     pub fn on_demand<M: Into<LinkModel>>(config: NetworkConfig, link: impl Fn(NodeId, NodeId) -> M + Send + Sync + 'static) -> Self {
         let places = Paths::All { nodes: nodes_of_all(&config) };
+        // Only the list of links differs from a network without links: the models come from `link` later.
         Self { lines: Lines::new(&config, Some(OnDemand::new(move |from, to| link(from, to).into()))), ..Self::without_links(places, config) }
     }
 
@@ -134,12 +133,13 @@ impl<P: Clone> Network<P> {
         let mut network = Self::without_links(places, config);
         network.lines.links.reserve_exact(network.places.lines());
         for from in (0..nodes).map(NodeId) {
+            // The list of receivers may be shorter than the number of nodes, so the list itself says when it ends.
             let mut place = 0;
             while let Some(to) = network.places.receiver(from, place) {
                 let path = Path { from, to };
                 let model = if from == to { LinkModel::default() } else { link(from, to).into() };
                 network.is_random |= model.is_random();
-                // The diagonal of a full table has a link too, which is never used, so that a link's number is `from * nodes + to` without a correction.
+                // The diagonal of a full table has an unused link too, so a link's number is `from * nodes + to` without a correction.
                 let line = network.line(&network.link_name(path), model);
                 network.lines.links.push(line);
                 place += 1;
@@ -180,29 +180,30 @@ impl<P: Clone> Network<P> {
         };
         let line = self.line(&name, model.into());
         match access {
-            // The counters of paths begin at zero for the links made so far. Links made later on demand append their own.
+            // The counters of paths begin at zero for the links made so far. A later link on demand appends a counter.
             AccessLine::Uplink(_) => {
                 (self.has_uplinks, self.paths) = (true, alloc::vec![0; self.lines.links.len()]);
                 self.lines.uplinks[node.index()] = Some(line);
             }
             AccessLine::Downlink(_) => self.lines.downlinks[node.index()] = Some(line),
         }
+        // The departure from an access line is an event inside the network, even over a line of constant delay.
         self.has_inner_events = true;
         Ok(self)
     }
 
-    /// Puts a relay between uplinks and links. Call this function before the first packet is sent. A packet sent with [`Network::handle_broadcast`] then
-    /// passes the uplink of its sender once, and the relay hands one packet to the link of each receiver at the instant at which the packet leaves the
-    /// uplink. If the uplink drops or copies the packet, each receiver gets an event.
+    /// Puts a relay between uplinks and links. Call this function before the first packet is sent. A packet sent with [`Network::handle_broadcast`] then passes
+    /// the uplink of its sender once, and the relay hands one packet to the link of each receiver at the instant of departure from the uplink. If the uplink
+    /// drops or copies the packet, each receiver gets an event.
     ///
-    /// A node sends either all its packets or none of them with [`Network::handle_broadcast`], because the numbers of its packets are one sequence.
+    /// A node sends either all packets or no packet with [`Network::handle_broadcast`], because the numbers of its packets are one sequence.
     #[must_use]
     pub fn with_relay(mut self) -> Self {
         self.has_relay = true;
         self
     }
 
-    /// Drops every packet from one node to another for which `drops` returns true, before anything else happens to the packet on the link.
+    /// Drops every packet between two nodes with `drops` true for the packet, before anything else happens to the packet on the link.
     ///
     /// # Errors
     ///
@@ -220,26 +221,25 @@ impl<P: Clone> Network<P> {
         Ok(self)
     }
 
-    /// Makes [`Network::poll_awaited`] announce events for these receivers. Call this function before the first packet is sent. Nodes that do not exist are
-    /// ignored.
+    /// Makes [`Network::poll_awaited`] announce events for these receivers. Call this function before the first packet is sent. Missing nodes are ignored.
     #[must_use]
     pub fn awaiting(mut self, receivers: impl IntoIterator<Item = NodeId>) -> Self {
         self.traffic.awaited = Some(Box::new(Awaited::new(&self.places, receivers)));
         self
     }
 
-    /// Takes a packet from one node to another at `now`. A plain size means a packet without ECN; a size above 16,777,215 bytes counts as 16,777,215 bytes.
+    /// Takes a packet between two nodes at `now`. A plain size means a packet without ECN; a size above 16,777,215 bytes counts as 16,777,215 bytes.
     ///
     /// # Errors
     ///
-    /// [`NetworkError`] if `now` is before an earlier call's instant or there is no such link; the network is unchanged then.
+    /// [`NetworkError`] if `now` is before an earlier call's instant or the link is missing; the network is unchanged then.
     #[inline(always)]
     pub fn handle_packet(&mut self, now: Instant, from: NodeId, to: NodeId, info: impl Into<PacketInfo>, payload: P) -> Result<(), NetworkError> {
         self.handle_packet_timed(now, Path { from, to }, info, payload).map(|_| ())
     }
 
-    /// Takes a packet like [`Network::handle_packet`], and returns the instant of the packet's arrival if that arrival is already certain. Returns `None`
-    /// if the packet was dropped or its arrival is not certain yet; an event may then wait to be polled.
+    /// Takes a packet like [`Network::handle_packet`], and returns the instant of the packet's arrival if this arrival is already certain. Returns `None` if
+    /// the packet was dropped or the arrival is not certain yet; an event may then wait to be polled.
     ///
     /// # Errors
     ///
@@ -263,10 +263,12 @@ impl<P: Clone> Network<P> {
         }
         // Neither an access line nor a filter exists, so the link alone decides the fate of the packet.
         let line = &mut self.lines.links[place];
+        // The number is taken before the offer, because the offer counts the packet.
         let sequence = line.offered();
         let packet = InNetwork { sequence, offered: now, entered: now, path, size, payload };
         match line.offer(now, None) {
             Outcome::Arrives(at) => {
+                // An arrival at `now` itself must come after everything due at `now`.
                 self.settle_before(at, now);
                 self.traffic.schedule(at, LineId::Link(link), packet);
                 Ok(Some(at))
@@ -282,7 +284,7 @@ impl<P: Clone> Network<P> {
         }
     }
 
-    /// Takes a packet in a network that has access lines, engines or filters.
+    /// Takes a packet in a network with access lines, engines or filters.
     #[inline(never)]
     fn send_through(&mut self, now: Instant, path: Path, (link, place): (LinkId, usize), size: SizeAndMarks, payload: P) {
         // Departures due by `now` make room in queues before the packet is offered.
@@ -297,21 +299,23 @@ impl<P: Clone> Network<P> {
                 *count - 1
             }
         };
+        // A packet with an uplink meets its link only after the uplink, and the link then counts the packet.
         let line = if self.lines.uplinks[path.from.index()].is_some() { LineId::Uplink(path.from) } else { LineId::Link(link) };
         self.offer(now, line, None, || InNetwork { sequence, offered: now, entered: now, path, size, payload });
     }
 
-    /// Takes a packet from one node to each node to which it has a link, in the order of receivers. The result is the same as that of
-    /// [`Network::handle_packet`] for each receiver; work that the receivers share is done once.
+    /// Takes a packet from one node to each of its receivers, in the order of receivers. The result is the same as the result of [`Network::handle_packet`] for
+    /// each receiver; work common to all receivers is done once.
     ///
     /// # Errors
     ///
-    /// [`NetworkError`] if `now` is before an earlier call's instant or there is no such node; the network is unchanged then.
+    /// [`NetworkError`] if `now` is before an earlier call's instant or the node is missing; the network is unchanged then.
     pub fn handle_broadcast(&mut self, now: Instant, from: NodeId, info: impl Into<PacketInfo>, payload: P) -> Result<(), NetworkError> {
         let info = info.into();
         if from.0 >= self.nodes {
             return Err(NetworkError::NoLink { from, to: from });
         }
+        // The uplink is passed once, so a single offer stands for all receivers.
         if self.has_relay && self.lines.uplinks[from.index()].is_some() {
             self.let_pass(now)?;
             self.send_to_relay(now, from, SizeAndMarks::new(info), payload);
@@ -331,7 +335,7 @@ impl<P: Clone> Network<P> {
         self.let_pass(now)?;
         let size = SizeAndMarks::new(info);
         if self.lines.on_demand.is_some() || matches!(self.places, Paths::Some(_)) {
-            // Links lie at places that only a lookup per link gives, so random words are not drawn ahead for neighbours.
+            // The place of each link needs a lookup, so random words are not drawn ahead for neighbours.
             let mut place = 0;
             while let Some(to) = self.places.receiver(from, place) {
                 if to != from {
@@ -342,19 +346,18 @@ impl<P: Clone> Network<P> {
             return Ok(());
         }
         if !self.is_random {
-            // No link draws random numbers, so that no words need to be collected first.
+            // No link draws random numbers, so no words need to be collected first.
             for to in (0..self.nodes).map(NodeId).filter(|to| *to != from) {
                 self.send(now, Path { from, to }, size, payload.clone(), None);
             }
             return Ok(());
         }
         for begin in (0..self.nodes).step_by(usize::from(DRAWN_AT_ONCE)) {
-            // All draws for some receivers come before any other work. The draws do not depend on each other, so that a processor can compute several at
-            // once.
+            // All draws for some receivers come before any other work. The draws do not depend on each other, so a processor can compute several at once.
             let receivers = (begin..self.nodes.min(begin + DRAWN_AT_ONCE)).map(NodeId);
             let mut words = [[0; 2]; DRAWN_AT_ONCE as usize];
             for (words, to) in words.iter_mut().zip(receivers.clone()) {
-                // The diagonal link has words as well, so that `words` and `receivers` stay in step; the filter below leaves it out.
+                // The diagonal link has words as well, so `words` and `receivers` stay in step; the filter below leaves this link out.
                 *words = self.lines.links[self.link(Path { from, to }).index()].words();
             }
             for (words, to) in words.into_iter().zip(receivers).filter(|(_, to)| *to != from) {
@@ -364,7 +367,7 @@ impl<P: Clone> Network<P> {
         Ok(())
     }
 
-    /// Lets time pass until `now`, at which all events due become pollable.
+    /// Lets time pass until `now`. All events due become pollable.
     ///
     /// # Errors
     ///
@@ -374,8 +377,8 @@ impl<P: Clone> Network<P> {
         self.let_pass(now)
     }
 
-    /// Returns the instant at which [`Network::handle_timeout`] must be called next, or `None` if no packet is on the way. The instant is never before the
-    /// last instant given, once all events are polled. After a change of rate the instant may be one at which nothing happens.
+    /// Returns the instant of the next necessary call of [`Network::handle_timeout`], or `None` if no packet is on the way. The instant is never before the
+    /// last instant given, once all events are polled. After a change of rate nothing may happen at the instant.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         self.traffic.pending.next_at()
@@ -389,19 +392,20 @@ impl<P: Clone> Network<P> {
         !self.traffic.happened.is_empty() || self.traffic.pending.may_be_due(now)
     }
 
-    /// Returns the instant at which [`Network::handle_timeout`] must be called next for a packet to reach one of the receivers of [`Network::awaiting`] in
+    /// Returns the instant of the next call of [`Network::handle_timeout`] necessary for a packet to reach one of the receivers of [`Network::awaiting`] in
     /// time, or `None` if no packet is on the way to these receivers. The instant is never before the last instant given, once all events are polled. At some
-    /// instants no packet reaches a receiver, for example when an uplink wakes for packets to other nodes.
+    /// instants no packet reaches a receiver, for example when an uplink wakes for packets to further nodes.
     #[must_use]
     pub fn poll_awaited(&self) -> Option<Instant> {
         self.traffic.awaited.as_ref()?.next_at()
     }
 
-    /// Returns the next packet that has arrived or was dropped, up to the last instant given, or `None` when all events have been polled.
+    /// Returns the next arrived or dropped packet up to the last instant given, or `None` when all events have been polled.
     #[must_use]
     #[inline(always)]
     pub fn poll_event(&mut self) -> Option<PacketEvent<P, Path>> {
         if self.has_relay {
+            // The driver sees receivers only: an event before the relay becomes one event per receiver before it is given.
             self.tell_each_receiver();
         }
         if let Some(event) = self.traffic.happened.pop_front() {
@@ -419,15 +423,16 @@ impl<P: Clone> Network<P> {
                 return Some(event);
             }
         }
+        // Everything due has happened, so the awaited instants up to now are over.
         if let Some(awaited) = &mut self.traffic.awaited {
             awaited.pass(self.now);
         }
         None
     }
 
-    /// Polls like [`Network::poll_event`], but only if the next event is an arrival in a network of direct links. `take` is given the event, and its result
-    /// is returned. `None` says nothing about other events: call [`Network::poll_event`] then. Parts of the event that `take` does not use need not be
-    /// computed, since the call is inlined.
+    /// Polls like [`Network::poll_event`], but only if the next event is an arrival in a network of direct links. `take` is given the event, and its result is
+    /// returned. `None` says nothing about further events: call [`Network::poll_event`] then. The call is inlined, so unused parts of the event need not be
+    /// computed.
     #[inline(always)]
     pub fn take_mere_arrival<T>(&mut self, take: impl FnOnce(PacketEvent<P, Path>) -> T) -> Option<T> {
         if self.has_inner_events || !self.traffic.happened.is_empty() {
@@ -446,12 +451,13 @@ impl<P: Clone> Network<P> {
     ///
     /// # Errors
     ///
-    /// [`NetworkError`] if `now` is before an earlier call's instant or there is no such link; the network is unchanged then.
+    /// [`NetworkError`] if `now` is before an earlier call's instant or the link is missing; the network is unchanged then.
     pub fn set_link(&mut self, now: Instant, from: NodeId, to: NodeId, model: impl Into<LinkModel>) -> Result<(), NetworkError> {
         let path = self.path(from, to)?;
         self.let_pass(now)?;
         let (link, _) = self.link_and_place(path);
         let model = model.into();
+        // A link may leave the direct way, so the network looks for inner events from now on.
         self.has_inner_events |= !model.is_direct();
         self.is_random |= model.is_random();
         let name = self.link_name(path);
@@ -460,7 +466,7 @@ impl<P: Clone> Network<P> {
         Ok(())
     }
 
-    /// Returns the number of packets that a link was offered, or `None` if there is no such link.
+    /// Returns the number of packets offered to a link, or `None` if the link is missing.
     #[must_use]
     pub fn offered(&self, from: NodeId, to: NodeId) -> Option<u64> {
         let path = self.path(from, to).ok()?;
@@ -468,14 +474,14 @@ impl<P: Clone> Network<P> {
         Some(self.lines.find_link(self.link(path)).map_or(0, Line::offered))
     }
 
-    /// Returns the counters of a link, or `None` if there is no such link.
+    /// Returns the counters of a link, or `None` if the link is missing.
     #[must_use]
     pub fn link_stats(&self, from: NodeId, to: NodeId) -> Option<LinkStats> {
         let path = self.path(from, to).ok()?;
         Some(self.lines.find_link(self.link(path)).map_or_else(LinkStats::default, Line::stats))
     }
 
-    /// Returns the counters of an access line, or `None` if the node has no such line.
+    /// Returns the counters of an access line, or `None` without such a line.
     #[must_use]
     pub fn access_stats(&self, access: AccessLine) -> Option<LinkStats> {
         let line = match access {
@@ -500,7 +506,7 @@ impl<P: Clone> Network<P> {
         if exists { Ok(Path { from, to }) } else { Err(NetworkError::NoLink { from, to }) }
     }
 
-    /// Returns the number of the link of a path. The path must be one that `path` has checked.
+    /// Returns the number of the link of a path. `path` must have checked the path.
     #[inline]
     fn link(&self, path: Path) -> LinkId {
         match &self.places {
@@ -520,8 +526,8 @@ impl<P: Clone> Network<P> {
         (link, place.unwrap_or_else(|| self.make(path, link)))
     }
 
-    /// Makes a link on demand, and returns its place in `lines.links`. The instant at which a link is made changes no answer: an unused link is in its
-    /// initial state, its model begins at [`Instant::ZERO`], and its random numbers are addressed by its name.
+    /// Makes a link on demand, and returns its place in `lines.links`. The instant of making changes no answer: an unused link is in its initial state, its
+    /// model begins at [`Instant::ZERO`], and its random numbers are addressed by its name.
     #[cold]
     #[inline(never)]
     fn make(&mut self, path: Path, link: LinkId) -> usize {
@@ -533,13 +539,14 @@ impl<P: Clone> Network<P> {
         self.is_random |= model.is_random();
         let line = self.line(&name, model);
         self.lines.links.push(line);
+        // The list of path counters has one entry per link, in the order of the links.
         if self.has_uplinks {
             self.paths.push(0);
         }
         place
     }
 
-    /// Lets time pass. Inner events happen now, so that the next packet finds the state that they leave. Mere arrivals wait to be polled.
+    /// Lets time pass. Inner events happen now, so the next packet finds their result. Mere arrivals wait to be polled.
     #[inline]
     fn let_pass(&mut self, now: Instant) -> Result<(), TimeWentBack> {
         check_time(&mut self.now, now)?;
@@ -550,7 +557,7 @@ impl<P: Clone> Network<P> {
     }
 }
 
-/// Returns the number of nodes of a network in which every node has a link to every node. Panics with more than [`MOST_NODES`] nodes.
+/// Returns the number of nodes of a network with links between all nodes. Panics with more than [`MOST_NODES`] nodes.
 fn nodes_of_all(config: &NetworkConfig) -> u16 {
     u16::try_from(config.nodes.len()).ok().filter(|nodes| usize::from(*nodes) <= MOST_NODES).expect("a network has at most 23,170 nodes")
 }

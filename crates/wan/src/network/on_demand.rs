@@ -1,4 +1,4 @@
-//! Links that are made when they are first used: their models, and their places in the list of links.
+//! Links made at their first use: their models, and their places in the list of links.
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -9,7 +9,7 @@ use crate::line::model::LinkModel;
 
 type ModelOf = dyn Fn(NodeId, NodeId) -> LinkModel + Send + Sync;
 
-/// Models of links that are made when they are first used, and places of the links made so far.
+/// Models of links made at their first use, and places of the links made so far.
 #[derive(Clone)]
 pub(super) struct OnDemand {
     model: Arc<ModelOf>,
@@ -21,7 +21,7 @@ impl OnDemand {
         Self { model: Arc::new(model), places: Places::new() }
     }
 
-    /// Returns the model of a link that is to be made.
+    /// Returns the model of a link before its making.
     pub(super) fn model(&self, path: Path) -> LinkModel {
         if path.from == path.to { LinkModel::default() } else { (self.model)(path.from, path.to) }
     }
@@ -32,7 +32,7 @@ impl OnDemand {
         self.places.find(link.0)
     }
 
-    /// Notes that a link was made, and that its index in the list of links is `place`.
+    /// Notes the making of a link with the index `place` in the list of links.
     pub(super) fn made(&mut self, link: LinkId, place: usize) {
         self.places.insert(link.0, LinkId::new(place).0);
     }
@@ -44,8 +44,8 @@ impl fmt::Debug for OnDemand {
     }
 }
 
-/// Places of links in the list of links, indexed by link number, in an open-addressed hash table. The order of the slots is never visible, so that the hash
-/// function changes no answer.
+/// Places of links in the list of links, indexed by link number, in an open-addressed hash table. The order of the slots is never visible, so the hash function
+/// changes no answer.
 #[derive(Clone, Debug)]
 struct Places {
     /// Pairs of link number and place, or [`FREE`]. The number of slots is a power of two, and at most half of the slots are taken.
@@ -61,13 +61,13 @@ impl Places {
         Self { slots: alloc::vec![FREE; 16], len: 0 }
     }
 
-    /// Returns the index of the slot that holds `number`, or of the free slot at which `number` is to be inserted.
+    /// Returns the index of the slot with `number`, or of the free slot for its insertion.
     #[inline(always)]
     fn slot(&self, number: u32) -> usize {
         let mask = self.slots.len() - 1;
         // Fibonacci hashing: link numbers at a fixed distance, for example of a ring of hosts, are spread evenly by the upper bits of the product.
         let mut slot = (u64::from(number).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 32) as usize & mask;
-        // At least half of the slots are free, so that the search ends.
+        // At least half of the slots are free, so the search ends.
         while self.slots[slot].0 != number && self.slots[slot].0 != FREE.0 {
             slot = (slot + 1) & mask;
         }
@@ -77,6 +77,7 @@ impl Places {
     #[inline(always)]
     fn find(&self, number: u32) -> Option<usize> {
         let (found, place) = self.slots[self.slot(number)];
+        // The search ends at a free slot if the number is missing.
         (found == number).then_some(place as usize)
     }
 
@@ -86,7 +87,7 @@ impl Places {
             for (number, place) in core::mem::replace(&mut self.slots, doubled) {
                 // Doubling at half load: at most half of the slots are taken after this insertion.
                 if number != FREE.0 {
-                    // Each number's slot depends on the length of the table, so that all pairs are inserted again.
+                    // Each number's slot depends on the length of the table, so all pairs are inserted again.
                     self.put(number, place);
                 }
             }

@@ -1,8 +1,7 @@
 //! The way of a packet from line to line, until the packet arrives or is dropped.
 //!
-//! The way that most packets take is `#[inline(always)]`, from the call that offers a packet to the queue of events and back, and rare branches are
-//! `#[inline(never)]` or `#[cold]`. The crate that names the payload then compiles the usual way as one function, whose speed `benches/benches/mesh.rs`
-//! measures.
+//! The usual way of packets is `#[inline(always)]`, from the call with the packet to the queue of events and back, and rare branches are `#[inline(never)]` or
+//! `#[cold]`. The crate with the type of the payload then compiles the usual way as one function. `benches/benches/mesh.rs` measures the speed.
 
 use cohaptic_units::Instant;
 
@@ -19,7 +18,7 @@ use crate::line::pipeline::Outcome;
 use crate::packet::{Marks, Outputs};
 
 impl<P: Clone> Network<P> {
-    /// Lets all events due by `now` happen, and keeps the final arrivals in `happened` until they are polled.
+    /// Lets all events due by `now` happen, and keeps the final arrivals in `happened` for the poll.
     #[inline]
     pub(super) fn let_happen(&mut self, now: Instant) {
         while let Some(pending) = self.traffic.pending.pop_due(now) {
@@ -29,10 +28,10 @@ impl<P: Clone> Network<P> {
         }
     }
 
-    /// Lets everything that is due happen before an event that is appended at `now`, mere arrivals included. Networks with inner events have done so when the
-    /// packet was offered. In networks without inner events arrivals wait in `pending` until they are polled, and `pending` orders events of one instant by
-    /// link. If they waited on, their order among events of the present instant would depend on whether the driver polled them in between, and on whether
-    /// another link of the network has inner events.
+    /// Lets everything due happen before an event is appended at `now`, mere arrivals included. Networks with inner events have done so at the offer of the
+    /// packet. In networks without inner events arrivals wait in `pending` for the poll, and `pending` orders events of one instant by link. The order of
+    /// waiting arrivals among events of the present instant would depend on a poll of the driver in between, and on inner events of another link of the
+    /// network.
     #[inline(always)]
     pub(super) fn settle(&mut self, now: Instant) {
         if !self.has_inner_events && self.traffic.pending.may_be_due(now) {
@@ -40,7 +39,7 @@ impl<P: Clone> Network<P> {
         }
     }
 
-    /// Settles what is due if a packet that is offered at `now` arrives at `now`. Any other arrival is later than all that is due.
+    /// Settles due events if a packet is offered and arrives at `now`. Any other arrival is later than all due events.
     #[inline(always)]
     pub(super) fn settle_before(&mut self, at: Instant, now: Instant) {
         if at <= now {
@@ -59,8 +58,9 @@ impl<P: Clone> Network<P> {
         };
         let packet = InNetwork { sequence, offered, entered, path, size, payload };
         let next = match line {
-            // The packet has no receiver yet. `relay` makes one packet for each.
+            // The packet has no receiver yet. `relay` makes a packet for each receiver.
             LineId::Uplink(_) if path.is_to_relay() => {
+                // The delivery is counted on the uplink once, whatever the number of receivers.
                 self.lines.get_mut(line).deliver(entered, at);
                 self.relay(at, packet);
                 return None;
@@ -69,16 +69,18 @@ impl<P: Clone> Network<P> {
             LineId::Link(_) if self.has_inner_events && self.lines.downlinks[path.to.index()].is_some() => Some(LineId::Downlink(path.to)),
             LineId::Link(_) | LineId::Downlink(_) => None,
         };
+        // The left line has delivered the packet, whatever the next line does.
         let Some(next) = next else { return Some(self.arrive(at, line, packet)) };
         self.lines.get_mut(line).deliver(entered, at);
         self.offer(at, next, None, || InNetwork { entered: at, ..packet });
         None
     }
 
-    /// Ends the way of a packet after the last line: counts and returns the delivery, or the drop of a packet that is discarded on arrival.
+    /// Ends the way of a packet after the last line: counts and returns the delivery, or the drop of a packet discarded on arrival.
     #[inline(always)]
     fn arrive(&mut self, at: Instant, line: LineId, packet: InNetwork<P>) -> PacketEvent<P, Path> {
         let line = self.lines.get_mut(line);
+        // A checksum is a matter of the receiver: the packet takes its full way before the drop.
         if packet.size.has(SizeAndMarks::DISCARDED_ON_ARRIVAL) {
             line.drop(DropCause::Checksum);
             return self.traffic.event(packet, at, Fate::Dropped(DropCause::Checksum));
@@ -96,7 +98,7 @@ impl<P: Clone> Network<P> {
     #[inline(always)]
     pub(super) fn send(&mut self, now: Instant, path: Path, size: SizeAndMarks, payload: P, words: Option<Words>) {
         let (link, place) = self.link_and_place(path);
-        // As if the packets of a broadcast were sent one by one: an arrival of an earlier one at `now` comes before the events of this one. After `let_pass`,
+        // As if the packets of a broadcast were sent singly: an arrival of an earlier packet at `now` comes before the events of this packet. After `let_pass`,
         // because the link may just have been made, and may have switched the network to inner events.
         if self.has_inner_events && self.traffic.pending.may_be_due(now) {
             self.let_happen(now);
@@ -105,8 +107,8 @@ impl<P: Clone> Network<P> {
         self.offer(now, LineId::Link(link), words, || InNetwork { sequence, offered: now, entered: now, path, size, payload });
     }
 
-    /// Offers a packet to a line. `words` holds the first random words of the packet if they were drawn before. `packet` is called in the branch that needs
-    /// the packet, so that a packet in mere propagation is written once, into the event queue.
+    /// Offers a packet to a line. `words` holds the first random words of the packet if they were drawn before. `packet` is called
+    /// only in the branch with need for the packet, so a packet in mere propagation is written once, into the event queue.
     #[inline(always)]
     pub(super) fn offer(&mut self, now: Instant, line: LineId, words: Option<Words>, packet: impl FnOnce() -> InNetwork<P>) {
         if self.has_filters {
@@ -125,6 +127,7 @@ impl<P: Clone> Network<P> {
     /// Offers a packet like [`Network::offer`], in a network with filters.
     #[inline(never)]
     fn offer_filtered(&mut self, now: Instant, line: LineId, words: Option<Words>, packet: InNetwork<P>) {
+        // A filter stands before all stages of its line.
         if self.is_filtered(now, line, &packet) {
             return self.drop(now, line, DropCause::Filter, packet);
         }
@@ -146,6 +149,7 @@ impl<P: Clone> Network<P> {
 
     #[inline(never)]
     pub(super) fn enter_engine(&mut self, now: Instant, line: LineId, packet: InNetwork<P>) {
+        // Marks of earlier lines travel with the packet, so the engine can add to them.
         let marks = Marks {
             congestion: packet.size.has(SizeAndMarks::MARKED),
             damage: self.traffic.take_damage(&packet),
@@ -154,17 +158,18 @@ impl<P: Clone> Network<P> {
         self.with_engine(line, |line, outputs, exits| line.enter(now, packet.size.info(), marks, packet, outputs, exits));
     }
 
-    /// Lets `act` act on the engine of a line, and schedules the wake that the engine announces.
+    /// Lets `act` act on the engine of a line, and schedules the announced wake of the engine.
     pub(super) fn with_engine(&mut self, line: LineId, act: impl FnOnce(&mut Line<P, InNetwork<P>>, &mut Outputs<InNetwork<P>>, &mut Exits<'_, P>)) {
         self.settle(self.now);
         let engine = self.lines.get_mut(line);
         act(engine, &mut self.outputs, &mut Exits { traffic: &mut self.traffic, line });
+        // An engine announces a wake only once, so the queue holds no second wake for the same instant.
         if let Some(at) = engine.announce() {
             self.traffic.announce(at, line);
         }
     }
 
-    /// Counts and reports a packet that was dropped when it was offered.
+    /// Counts and reports a packet dropped at its offer.
     #[inline(never)]
     pub(super) fn drop(&mut self, now: Instant, line: LineId, cause: DropCause, packet: InNetwork<P>) {
         self.lines.get_mut(line).drop(cause);

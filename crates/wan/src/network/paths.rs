@@ -1,4 +1,4 @@
-//! Pairs of nodes that have links, and the numbers of these links.
+//! Pairs of nodes with links, and the numbers of their links.
 
 use alloc::vec::Vec;
 
@@ -16,7 +16,7 @@ pub(super) enum Paths {
     Some(SomePaths),
 }
 
-/// Numbers of links where each node has its own list of receivers.
+/// Numbers of links for nodes with separate lists of receivers.
 #[derive(Clone, Debug)]
 pub(super) struct SomePaths {
     /// Begin of each sender's part of `receivers`, indexed by sender, followed by the length of `receivers`. So `first[n]..first[n + 1]` is the part of node
@@ -29,15 +29,15 @@ pub(super) struct SomePaths {
 const MOST_LINKS: usize = 1 << 29;
 
 impl Paths {
-    /// Makes the paths from each node to the receivers that `receivers_of` gives. Panics if a list of receivers is not strictly ascending, names a missing
-    /// node or its own sender, or if there are more than 2^29 links.
+    /// Makes the paths from each node to the receivers from `receivers_of`. Panics if a list of receivers is not strictly ascending, names a missing node or
+    /// its own sender, or if there are more than 2^29 links.
     pub(super) fn some<R: IntoIterator<Item = NodeId>>(nodes: u16, mut receivers_of: impl FnMut(NodeId) -> R) -> Self {
         let (mut first, mut receivers) = (Vec::with_capacity(usize::from(nodes) + 1), Vec::new());
         first.push(0);
         for from in (0..nodes).map(NodeId) {
             let begin = receivers.len();
             receivers.extend(receivers_of(from));
-            // `link` finds receivers by binary search, so that each list must be in order.
+            // `link` finds receivers by binary search, so each list must be in order.
             let own = &receivers[begin..];
             assert!(
                 own.iter().all(|to| to.0 < nodes && *to != from) && own.is_sorted_by(|one, next| one < next),
@@ -56,7 +56,7 @@ impl Paths {
         }
     }
 
-    /// Returns the number of links, those of nodes to themselves included.
+    /// Returns the number of links, links of nodes to themselves included.
     pub(super) fn lines(&self) -> usize {
         match self {
             Self::All { nodes } => usize::from(*nodes) * usize::from(*nodes),
@@ -64,8 +64,8 @@ impl Paths {
         }
     }
 
-    /// Returns the receiver at index `place` in the list of `from`, or `None` after the last. The receiver may be `from` itself where all nodes have links to
-    /// all.
+    /// Returns the receiver at index `place` in the list of `from`, or `None` after the last receiver. With links between all nodes the receiver may be `from`
+    /// itself.
     pub(super) fn receiver(&self, from: NodeId, place: u16) -> Option<NodeId> {
         match self {
             Self::All { nodes } => (place < *nodes).then_some(NodeId(place)),

@@ -16,7 +16,7 @@ use crate::packet::PacketInfo;
 pub(super) struct InNetwork<P> {
     pub(super) sequence: u64,
     pub(super) offered: Instant,
-    /// Instant at which the packet entered its current line.
+    /// Instant of entry into the current line.
     pub(super) entered: Instant,
     pub(super) path: Path,
     pub(super) size: SizeAndMarks,
@@ -34,11 +34,12 @@ impl<P> InNetwork<P> {
 }
 
 /// Size of a packet in bytes (upper 24 bits), its flags (bits 3 to 6) and its copy bits (bits 0 to 2, see [`LineId::copy_bit`]). Bit 7 is always set: the
-/// number is never zero, so that an `Option` of a type with this field needs no extra space.
+/// number is never zero, so an `Option` of a type with this field needs no extra space.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct SizeAndMarks(NonZeroU32);
 
 impl SizeAndMarks {
+    // The constant is made of safe operations only: 1 times (1 + 127) is bit 7.
     pub(super) const NOTHING: Self = Self(NonZeroU32::MIN.saturating_mul(NonZeroU32::MIN.saturating_add((1 << 7) - 1)));
     pub(super) const ECN_CAPABLE: u32 = 1 << 3;
     pub(super) const MARKED: u32 = 1 << 4;
@@ -46,7 +47,7 @@ impl SizeAndMarks {
     pub(super) const DISCARDED_ON_ARRIVAL: u32 = 1 << 6;
 
     pub(super) fn new(info: PacketInfo) -> Self {
-        // Sizes above 24 bits saturate, so that the shift below loses no bit.
+        // Sizes above 24 bits saturate, so the shift below loses no bit.
         let size = u32::try_from(info.size.get().min((1 << 24) - 1)).unwrap_or(u32::MAX);
         Self(Self::NOTHING.0 | size << 8).with(Self::ECN_CAPABLE, info.ecn_capable)
     }
@@ -97,7 +98,7 @@ pub(super) enum LineId {
 }
 
 impl LineId {
-    /// Returns the copy bit of [`SizeAndMarks`] that this line sets in the copies that it makes.
+    /// Returns the copy bit of [`SizeAndMarks`] for copies made by this line.
     pub(super) const fn copy_bit(self) -> u32 {
         match self {
             Self::Uplink(_) => 1,
@@ -107,12 +108,12 @@ impl LineId {
     }
 }
 
-/// Kind of event and line in one number, which orders simultaneous events. Wakes (kinds 0 to 2) come before arrivals (kinds 3 to 5): a packet that leaves one
-/// line finds the room that a departure from the next line makes at the same instant.
+/// Kind of event and line in one number. The number orders simultaneous events. Wakes (kinds 0 to 2) come before arrivals (kinds 3 to 5): a packet from line to
+/// line finds the room of a simultaneous departure from the next line.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(super) struct Turn(u32);
 
-/// Number of lower bits of a [`Turn`] that hold the number of the link or node.
+/// Number of lower bits of a [`Turn`], with the number of the link or node.
 const NUMBER_BITS: u32 = 29;
 
 impl Turn {
@@ -131,7 +132,7 @@ impl Turn {
         Self(Self::waking(line).0 + (3 << NUMBER_BITS))
     }
 
-    /// Returns the link of the event. The event must be one of a link, not of an access line.
+    /// Returns the link of the event. The event must belong to a link, not to an access line.
     pub(super) const fn link(self) -> LinkId {
         LinkId(self.0 & ((1 << NUMBER_BITS) - 1))
     }
@@ -157,6 +158,7 @@ impl<P> Event for Pending<P> {
 
     #[inline(always)]
     fn key(&self) -> Self::Key {
+        // The copy bits tell a packet from its copies.
         (self.at, self.turn, self.sequence, self.path, self.size.copy())
     }
 }

@@ -10,7 +10,7 @@ use super::pending::{InNetwork, LineId, SizeAndMarks};
 use crate::fates::record::{PacketEvent, PacketRecord};
 
 impl Path {
-    /// Returns the path of a packet before the relay, where the packet has no receiver yet: sender and receiver are equal, as in no other path.
+    /// Returns the path of a packet before the relay, still without a receiver: sender and receiver are equal, unlike in all real paths.
     pub(super) const fn to_relay(from: NodeId) -> Self {
         Self { from, to: from }
     }
@@ -28,7 +28,7 @@ impl<P: Clone> Network<P> {
         while let Some(to) = self.places.receiver(from, place) {
             if to != from {
                 let (_, link) = self.link_and_place(Path { from, to });
-                // All paths of the sender have the same count, since a node sends all its packets to all. The last one read is the number for all receivers.
+                // All paths of the sender have the same count, since a node sends all its packets to all. The last count read is the number for all receivers.
                 sequence = self.paths[link];
                 self.paths[link] += 1;
             }
@@ -38,7 +38,7 @@ impl<P: Clone> Network<P> {
         self.offer(now, LineId::Uplink(from), None, || InNetwork { sequence, offered: now, entered: now, path, size, payload });
     }
 
-    /// Offers a packet that has left its uplink to the link of each receiver.
+    /// Offers a packet after its uplink to the link of each receiver.
     #[inline(never)]
     pub(super) fn relay(&mut self, now: Instant, packet: InNetwork<P>) {
         let damage = self.traffic.take_damage(&packet);
@@ -48,7 +48,7 @@ impl<P: Clone> Network<P> {
             if to != from {
                 let path = Path { from, to };
                 let packet = InNetwork { entered: now, path, payload: packet.payload.clone(), ..packet };
-                // The flag `DAMAGED` is copied with `size`, so that each receiver's packet needs its own entry.
+                // The flag `DAMAGED` is copied with `size`, so each receiver's packet needs an entry.
                 if let Some(damage) = &damage {
                     self.traffic.put_damage(&packet, damage.clone());
                 }
@@ -58,7 +58,7 @@ impl<P: Clone> Network<P> {
         }
     }
 
-    /// Replaces the next event, if the event is one of a packet before the relay, by one event for each receiver.
+    /// Replaces the next event, if its packet is before the relay, by an event for each receiver.
     pub(super) fn tell_each_receiver(&mut self) {
         if !self.traffic.happened.front().is_some_and(|event| event.path.is_to_relay()) {
             return;
@@ -68,7 +68,7 @@ impl<P: Clone> Network<P> {
         let receivers = (0..).map_while(|place| self.places.receiver(from, place)).filter(|to| *to != from);
         let on = |to| PacketEvent { record: PacketRecord { path: Path { from, to }, ..event.record }, ..event.clone() };
         let events: Vec<PacketEvent<P, Path>> = receivers.map(on).collect();
-        // Pushed in reverse order to the front, so that the events come out in the order of receivers.
+        // Pushed in reverse order to the front, so the events come out in the order of receivers.
         events.into_iter().rev().for_each(|event| self.traffic.happened.push_front(event));
     }
 }

@@ -1,4 +1,4 @@
-//! Packets of a network after the decisions of its lines: packets in propagation, and events that were not polled yet.
+//! Packets of a network after the decisions of its lines: packets in propagation, and events not polled yet.
 
 use alloc::boxed::Box;
 use alloc::collections::{BTreeMap, VecDeque};
@@ -19,10 +19,10 @@ use crate::packet::Marks;
 pub(super) struct Traffic<P> {
     pub(super) pending: EventQueue<Pending<P>>,
     pub(super) happened: VecDeque<PacketEvent<P, Path>>,
-    /// Damage of packets on their way, indexed by path, sequence and copy bits. A packet has an entry exactly if its flag `DAMAGED` is set, so that undamaged
+    /// Damage of packets on their way, indexed by path, sequence and copy bits. A packet has an entry exactly if its flag `DAMAGED` is set, so undamaged
     /// packets are never looked up.
     damages: BTreeMap<(Path, u64, u8), Damage>,
-    /// Instants at which single receivers may get a packet; `None` if no driver asks for single receivers.
+    /// Instants of possible packets for single receivers; `None` if no driver asks for single receivers.
     pub(super) awaited: Option<Box<Awaited>>,
 }
 
@@ -36,11 +36,11 @@ impl<P> Traffic<P> {
     pub(super) fn schedule(&mut self, at: Instant, line: LineId, packet: InNetwork<P>) {
         let InNetwork { sequence, offered, entered, path, size, payload } = packet;
         if let Some(awaited) = &mut self.awaited {
-            // After a relay the packet goes to every receiver of its sender, so that any awaited node may be concerned.
+            // After a relay the packet goes to every receiver of its sender, so any awaited node may be concerned.
             if path.is_to_relay() { awaited.announce(at, line) } else { awaited.schedule(at, path.to) }
         }
         let turn = Turn::arrival(line);
-        // The order of events is that of `Pending::key`. Instants and turns differ for nearly all pairs, so the whole key is compared only when both are
+        // `Pending::key` orders the events. Instants and turns differ for nearly all pairs, so the whole key is compared only when both are
         // equal.
         let follows = match self.pending.last_in_order() {
             None => true,
@@ -53,6 +53,7 @@ impl<P> Traffic<P> {
 
     /// Schedules a wake of the engine of `line` at `at`.
     pub(super) fn announce(&mut self, at: Instant, line: LineId) {
+        // A wake may end in an arrival at the same instant.
         if let Some(awaited) = &mut self.awaited {
             awaited.announce(at, line);
         }
@@ -97,6 +98,7 @@ impl<P> Exits<'_, P> {
             .with(SizeAndMarks::MARKED, marks.congestion)
             .with(SizeAndMarks::DAMAGED, marks.damage.is_some())
             .with(SizeAndMarks::DISCARDED_ON_ARRIVAL, marks.discarded_on_arrival);
+        // A packet keeps earlier copy bits: each kind of line has a separate bit.
         InNetwork { size, ..packet }
     }
 }
@@ -112,7 +114,7 @@ impl<P> Sink<InNetwork<P>> for Exits<'_, P> {
 
     fn happened(&mut self, at: Instant, fate: Fate, packet: InNetwork<P>, copy: u8, marks: Marks) {
         let packet = self.marked(packet, copy, &marks);
-        // A copy event is not the end of its packet: packet and copy each get a later event, and the damage goes with the last one only.
+        // A copy event is not the end of its packet: packet and copy each get a later event, and the damage goes with the last event only.
         let damage = marks.damage.filter(|_| fate.is_end());
         self.traffic.happened.push_back(packet.event(at, fate, damage));
     }
