@@ -1,6 +1,6 @@
-//! The stages that decide at once and make no copies: outage, loss, delay with jitter, and order.
+//! The stages with immediate decisions and without copies: outage, loss, delay with jitter, and order.
 //!
-//! A link with no other stage is a function from a packet to its arrival.
+//! A link without further stages is a function from a packet to its arrival.
 
 use alloc::boxed::Box;
 
@@ -43,7 +43,7 @@ impl Direct {
         }
     }
 
-    /// Returns the first random words of packet number `number`, which [`Direct::offer`] takes, or zeros if the link draws none.
+    /// Returns the first random words of packet number `number` for [`Direct::offer`], or zeros without random draws.
     #[inline]
     pub(crate) fn words(&self, number: u64) -> Words {
         if self.is_random { self.draws.packet(number).loss_and_jitter() } else { [0; 2] }
@@ -55,7 +55,7 @@ impl Direct {
         self.offer_through(now, number, words, Ok)
     }
 
-    /// Returns the arrival of a packet, or the cause of its drop. `queue` stands between loss and delay: it takes the instant of the packet's entry, and
+    /// Returns the arrival of a packet, or the cause of its drop. `queue` stands between loss and delay: `queue` takes the instant of the packet's entry, and
     /// returns the instant of its departure or the cause of its drop.
     #[inline(always)]
     pub(crate) fn offer_through(
@@ -71,21 +71,22 @@ impl Direct {
         }
     }
 
-    /// Returns the cause for which a packet is dropped before the queue, or `None` if the packet reaches the queue.
+    /// Returns the cause of a packet's drop before the queue, or `None` if the packet reaches the queue.
     #[inline(always)]
     pub(crate) fn dropped(&mut self, now: Instant, number: u64, [word, _]: Words) -> Option<DropCause> {
         if self.is_down(now) {
             return Some(DropCause::Outage);
         }
-        // Outage comes before loss, and a packet in an outage leaves the chain of losses as it is.
+        // Outage comes before loss, and a packet in an outage leaves the chain of losses unchanged.
         let packet = self.draws.packet(number);
         let is_lost = self.loss.as_mut().is_some_and(|loss| loss.loses(now, number, word, packet));
         is_lost.then_some(DropCause::Loss)
     }
 
-    /// Returns the arrival of a packet that leaves the queue at `leaves`.
+    /// Returns the arrival of a packet with the departure `leaves` from the queue.
     #[inline(always)]
     pub(crate) fn arrival(&mut self, leaves: Instant, number: u64, [_, word]: Words) -> Instant {
+        // Order comes last: a packet may wait for an earlier packet with a longer delay.
         let delay = self.delay.draw_nanos(leaves, word, self.draws.packet(number));
         self.order.arrival(leaves.saturating_add_nanos(delay))
     }
@@ -94,7 +95,7 @@ impl Direct {
         self.outages.is_some()
     }
 
-    /// Returns whether the link is down for a packet that is offered at `now`.
+    /// Returns whether the link is down for a packet offered at `now`.
     #[inline]
     pub(crate) fn is_down(&mut self, now: Instant) -> bool {
         self.outages.as_mut().is_some_and(|outages| outages.is_down(now, self.draws))
@@ -104,6 +105,7 @@ impl Direct {
     pub(crate) fn reconfigure(&mut self, now: Instant, config: &LinkConfig) {
         self.is_random = config.is_random();
         self.outages = OutageStage::reconfigured(self.outages.take().map(|stage| *stage), now, config.outages.clone(), self.draws).map(Box::new);
+        // A loss without earlier state begins in the state of a link with this loss from the start.
         let initial = self.draws.packet(0).first(Purpose::InitialState);
         self.loss = LossStage::reconfigured(self.loss.take(), config.loss.clone(), initial);
         self.delay.reconfigure(&config.delay);

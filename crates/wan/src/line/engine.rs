@@ -1,4 +1,4 @@
-//! The state machine of a link whose packets have no certain fate when they are offered.
+//! The state machine of a link without immediately certain fates.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -11,13 +11,13 @@ use crate::line::staged::Staged;
 use crate::netem::kernel_link::KernelStage;
 use crate::packet::{Carried, Outputs, PacketInfo};
 
-/// The current engine of a link, and earlier engines of other kinds that still hold packets.
+/// The current engine of a link, and earlier engines of different kinds with packets inside.
 #[derive(Clone, Debug)]
 pub(crate) struct Engine<T> {
     pub(crate) kind: Kind<T>,
-    /// Earlier engines, which take no new packets.
+    /// Earlier engines. Such an engine takes no new packets.
     retiring: Vec<Kind<T>>,
-    /// Earliest instant for which the owner has been told to wake this engine; `None` if no such wake is outstanding.
+    /// Earliest announced instant of a wake of this engine; `None` without an outstanding wake.
     announced: Option<Instant>,
 }
 
@@ -51,7 +51,7 @@ impl<T: Clone> Engine<T> {
         Self { kind, retiring: Vec::new(), announced: None }
     }
 
-    /// Offers a packet while `inside` other packets are inside the link.
+    /// Offers a packet with `inside` further packets inside the link.
     pub(crate) fn offer(&mut self, now: Instant, packet: Carried<T>, inside: u64, outputs: &mut Outputs<T>) {
         match &mut self.kind {
             Kind::Staged(staged) => staged.offer(now, packet, inside, outputs),
@@ -64,7 +64,7 @@ impl<T: Clone> Engine<T> {
     #[inline]
     pub(crate) fn offer_at_once(&mut self, now: Instant, number: u64, info: PacketInfo, until: Instant) -> Option<Result<Instant, DropCause>> {
         match &mut self.kind {
-            // Nothing may be inside the link for a certain fate, so that no earlier engine may hold packets.
+            // Nothing may be inside the link for a certain fate, so no earlier engine may hold packets.
             Kind::Staged(staged) if self.retiring.is_empty() => staged.offer_at_once(now, number, info, until),
             Kind::Staged(_) | Kind::Replay(_) | Kind::Kernel(_) => None,
         }
@@ -72,7 +72,7 @@ impl<T: Clone> Engine<T> {
 
     /// Lets everything due by `now` happen.
     pub(crate) fn pass(&mut self, now: Instant, outputs: &mut Outputs<T>) {
-        // Earlier engines go first, so that older packets come out first at equal instants.
+        // Earlier engines go first, so older packets come out first at equal instants.
         for kind in &mut self.retiring {
             kind.pass(now, outputs);
         }
@@ -81,7 +81,7 @@ impl<T: Clone> Engine<T> {
         self.kind.pass(now, outputs);
     }
 
-    /// Returns the instant at which [`Engine::pass`] must be called next, or `None` if no packet waits.
+    /// Returns the instant of the next call of [`Engine::pass`], or `None` if no packet waits.
     pub(crate) fn next_at(&self) -> Option<Instant> {
         let next = self.kind.next_at();
         if self.retiring.is_empty() {
@@ -90,18 +90,18 @@ impl<T: Clone> Engine<T> {
         self.retiring.iter().filter_map(Kind::next_at).chain(next).min()
     }
 
-    /// Notes that the owner woke the engine for `at`, so that the next wake is announced again.
+    /// Notes the owner's wake of the engine for `at`, so the next wake is announced again.
     pub(crate) fn woken(&mut self, at: Instant) {
         if self.announced == Some(at) {
             self.announced = None;
         }
     }
 
-    /// Returns the instant at which [`Engine::pass`] must be called next, if no wake at or before that instant was announced. For an owner that keeps
-    /// announced instants.
+    /// Returns the instant of the next call of [`Engine::pass`], if no wake at or before this instant was announced. For an owner with a list of announced
+    /// instants.
     pub(crate) fn announce(&mut self) -> Option<Instant> {
         let next = self.next_at()?;
-        // The announced wake comes first, and the engine announces the next one then.
+        // The announced wake comes first, and the engine announces the next wake then.
         if self.announced.is_some_and(|announced| announced <= next) {
             return None;
         }
@@ -109,9 +109,10 @@ impl<T: Clone> Engine<T> {
         Some(next)
     }
 
-    /// Replaces the current engine. Packets offered from now on enter the new engine, and packets inside go on in the engine that took them.
+    /// Replaces the current engine. Packets offered from now on enter the new engine, and packets inside go on in their engine.
     pub(crate) fn replace(&mut self, kind: Kind<T>) {
         let before = core::mem::replace(&mut self.kind, kind);
+        // An engine without packets has nothing to finish.
         if before.next_at().is_some() {
             self.retiring.push(before);
         }

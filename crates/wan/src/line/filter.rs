@@ -1,4 +1,4 @@
-//! Filters: predicates of a program that choose packets to drop.
+//! Filters: a program's predicates for packets to drop.
 
 use alloc::sync::Arc;
 use core::fmt;
@@ -20,7 +20,7 @@ pub struct Offered<'a, P> {
     pub payload: &'a P,
 }
 
-/// A predicate that returns true for packets to drop. Shared between clones of a line.
+/// A predicate, true for packets to drop. Shared between clones of a line.
 pub(crate) struct Filter<P>(Arc<Predicate<P>>);
 
 type Predicate<P> = dyn Fn(&Offered<'_, P>) -> bool + Send + Sync;

@@ -1,8 +1,8 @@
-//! A line: decides the fates of packets that are offered to the line, and counts them. Packets in propagation are outside.
+//! A line: decides the fates of offered packets, and counts the packets. Packets in propagation are outside.
 //!
-//! A [`model`] is compiled to the smallest [`pipeline`] that does what the model says. A [`Line`] is such a pipeline with a filter before the pipeline and
-//! counters around it. The owner of a line ([`Link`](crate::Link), [`Network`](crate::Network)) keeps packets in propagation in an event queue of its own,
-//! and tells the line the time.
+//! A [`model`] is compiled to the smallest [`pipeline`] with the behaviour of the model. A [`Line`] is such a pipeline with a filter before the pipeline and
+//! counters around it. The owner of a line ([`Link`](crate::Link), [`Network`](crate::Network)) keeps packets in propagation in a separate event queue, and
+//! tells the line the time.
 
 pub(crate) mod direct;
 pub(crate) mod engine;
@@ -27,7 +27,7 @@ use crate::fates::fate::{DropCause, Fate};
 use crate::fates::stats::{Flow, LinkStats, Seldom};
 use crate::packet::{Exit, Marks, Outputs, Packet, PacketInfo};
 
-/// A line. `P` is the payload type that filters see, and `T` is the packet type that the owner hands in and gets back.
+/// A line. `P` is the payload type for filters, and `T` is the packet type of the owner.
 #[derive(Clone, Debug)]
 pub(crate) struct Line<P, T> {
     flow: Flow,
@@ -36,19 +36,19 @@ pub(crate) struct Line<P, T> {
     rare: Option<Box<Rare<P>>>,
 }
 
-/// Parts that few lines have, and counters that few packets touch.
+/// Parts of few lines, and counters for few packets.
 #[derive(Clone, Debug)]
 struct Rare<P> {
     filter: Option<Filter<P>>,
     seldom: Seldom,
 }
 
-/// The owner's side of a line: takes the packets that come out of the line's engine.
+/// The owner's side of a line: takes the packets out of the line's engine.
 pub(crate) trait Sink<T> {
-    /// Takes a packet that propagates until `at`, and arrives then. `copy` is the packet's copy number, 0 for the packet itself.
+    /// Takes a packet in propagation until its arrival at `at`. `copy` is the packet's copy number, 0 for the packet itself.
     fn arrives(&mut self, at: Instant, packet: T, copy: u8, marks: Marks);
 
-    /// Takes a packet that was dropped at `at`, or of which a copy was made at `at`.
+    /// Takes a packet dropped or copied at `at`.
     fn happened(&mut self, at: Instant, fate: Fate, packet: T, copy: u8, marks: Marks);
 }
 
@@ -65,22 +65,22 @@ impl<P, T: Clone> Line<P, T> {
         Self { flow: Flow::default(), pipeline: Pipeline::new(seed, name, model, general), rare: None }
     }
 
-    /// Makes a line that goes on with the counters and the pipeline of another line. The new line has no filter.
+    /// Makes a line from the counters and the pipeline of another line. The new line has no filter.
     pub(crate) fn resumed(stats: LinkStats, pipeline: Pipeline<T>) -> Self {
         Self { flow: stats.flow, pipeline, rare: Some(Box::new(Rare { filter: None, seldom: stats.seldom })) }
     }
 
-    /// Sets the filter of the line, which drops packets before anything else happens to them.
+    /// Sets the filter of the line. The filter drops packets before any stage.
     pub(crate) fn set_filter(&mut self, filter: Filter<P>) {
         self.rare().filter = Some(filter);
     }
 
-    /// Returns the number of packets offered so far, which is the number of the next packet.
+    /// Returns the number of packets offered so far: the number of the next packet.
     pub(crate) const fn offered(&self) -> u64 {
         self.flow.offered
     }
 
-    /// Returns the first random words of the next packet, or zeros if the packet needs none.
+    /// Returns the first random words of the next packet, or zeros if the packet needs no words.
     #[inline]
     pub(crate) fn words(&self) -> Words {
         self.pipeline.words(self.flow.offered)
@@ -102,8 +102,8 @@ impl<P, T: Clone> Line<P, T> {
         is_dropped
     }
 
-    /// Decides about the next packet. `words` holds the packet's first random words if they were drawn before. The caller must tell [`Line::drop`] about a
-    /// packet that is [dropped](Outcome::Dropped), and hand a packet that [enters](Outcome::Enters) the engine to [`Line::enter`].
+    /// Decides about the next packet. `words` holds the packet's first random words if the words were drawn before. The caller must tell [`Line::drop`] about a
+    /// [dropped](Outcome::Dropped) packet, and hand a packet with the outcome [enters](Outcome::Enters) to [`Line::enter`].
     #[inline(always)]
     pub(crate) fn offer(&mut self, now: Instant, words: Option<Words>) -> Outcome {
         let number = self.flow.offered;
@@ -122,7 +122,7 @@ impl<P, T: Clone> Line<P, T> {
         self.rare().seldom.take_back(dropped);
     }
 
-    /// Hands the packet that was offered last to the engine, with the marks that earlier lines left on the packet.
+    /// Hands the packet of the latest offer to the engine, with the marks of earlier lines on the packet.
     pub(crate) fn enter(&mut self, now: Instant, info: PacketInfo, marks: Marks, item: T, outputs: &mut Outputs<T>, sink: &mut impl Sink<T>) {
         // `offer` has counted the packet itself already.
         let inside = self.stats().in_flight() - 1;
@@ -130,21 +130,23 @@ impl<P, T: Clone> Line<P, T> {
         if let Some(engine) = self.pipeline.engine() {
             engine.offer(now, Packet::new(number, info, marks, item), inside, outputs);
         }
+        // The packet itself, or an earlier packet pushed out by it, may leave at once.
         self.come_out(outputs, sink);
     }
 
-    /// Takes the packet that was offered last, in place of [`Line::enter`], if the packet's fate is certain at once, and returns its arrival or the cause of
-    /// its drop. No earlier line may have marked the packet, and no other packet may be offered before `until`. If the fate is not certain, returns
-    /// `None` and takes no packet: the caller then calls [`Line::enter`].
+    /// Takes the packet of the latest offer, in place of [`Line::enter`], if the packet's fate is certain at once, and returns its arrival or the cause of its
+    /// drop. No earlier line may have marked the packet, and no further packet may be offered before `until`. If the fate is not certain, returns `None` and
+    /// takes no packet: the caller then calls [`Line::enter`].
     #[inline]
     pub(crate) fn enter_at_once(&mut self, now: Instant, info: PacketInfo, until: Instant) -> Option<Result<Instant, DropCause>> {
         let number = self.flow.offered - 1;
         self.pipeline.engine()?.offer_at_once(now, number, info, until)
     }
 
-    /// Wakes the engine at `at`, and hands on the packets that come out.
+    /// Wakes the engine at `at`, and hands on the packets at the exit.
     pub(crate) fn wake(&mut self, at: Instant, outputs: &mut Outputs<T>, sink: &mut impl Sink<T>) {
         if let Some(engine) = self.pipeline.engine() {
+            // The next wake can be announced again from now on, even for the same instant.
             engine.woken(at);
             engine.pass(at, outputs);
         }
@@ -161,45 +163,46 @@ impl<P, T: Clone> Line<P, T> {
         outputs: &mut Outputs<T>,
         sink: &mut impl Sink<T>,
     ) {
+        // A new model can free packets at once, for example from a queue that is given up.
         self.pipeline.reconfigure(now, seed, name, model, outputs);
         self.come_out(outputs, sink);
     }
 
-    /// Counts the arrival at `at` of a packet that entered the line at `entered`.
+    /// Counts the arrival at `at` of a packet with the entry `entered` into the line.
     #[inline(always)]
     pub(crate) fn deliver(&mut self, entered: Instant, at: Instant) {
         self.flow.deliver(entered, at);
     }
 
-    /// Returns the counters that every packet touches, for an owner that counts arrivals itself.
+    /// Returns the counters touched by every packet, for an owner with separate counting of arrivals.
     pub(crate) const fn flow(&mut self) -> &mut Flow {
         &mut self.flow
     }
 
-    /// Returns whether packets may enter an engine, which must be woken.
+    /// Returns whether packets may enter an engine, with need for wakes.
     #[inline]
     pub(crate) const fn has_engine(&self) -> bool {
         matches!(self.pipeline, Pipeline::Engine(_))
     }
 
-    /// Returns the instant at which the engine must be woken, for an owner that asks before every step.
+    /// Returns the instant of the engine's next wake, for an owner with a question before every step.
     #[inline]
     pub(crate) fn next_wake(&self) -> Option<Instant> {
         self.pipeline.next_wake()
     }
 
-    /// Returns the instant at which the engine must be woken if that instant was not announced yet, for an owner that keeps announced instants.
+    /// Returns the instant of the engine's next wake if not announced yet, for an owner with a list of announced instants.
     pub(crate) fn announce(&mut self) -> Option<Instant> {
         self.pipeline.engine()?.announce()
     }
 
-    /// Hands the packets that came out of the engine to `sink`, and counts marks, damage, drops and copies.
+    /// Hands the packets at the exit of the engine to `sink`, and counts marks, damage, drops and copies.
     fn come_out(&mut self, outputs: &mut Outputs<T>, sink: &mut impl Sink<T>) {
         for output in outputs.drain(..) {
             let Packet { copy, was_marked, was_damaged, marks, item, .. } = *output.packet;
             match output.exit {
                 Exit::Arrives(at) => {
-                    // Marks and damage of earlier lines were counted there. Only what is new is counted here.
+                    // Marks and damage of earlier lines were counted there. Only new marks and damage are counted here.
                     let (is_marked, is_damaged) = (marks.congestion && !was_marked, marks.damage.is_some() && !was_damaged);
                     if is_marked || is_damaged {
                         let seldom = &mut self.rare().seldom;

@@ -33,8 +33,8 @@ pub enum LinkModel {
     Kernel(KernelNetem),
 }
 
-/// A checked configuration of the kernel's netem. Packets have the length that the link sees, to which a configured overhead is added. Each link draws with a
-/// seed of its own, unless the words name a seed.
+/// A checked configuration of the kernel's netem. Packets have the length seen by the link, plus a configured overhead. Each link draws with a separate seed,
+/// unless the words name a seed.
 #[derive(Clone, PartialEq, Debug)]
 pub struct KernelNetem {
     words: Netem,
@@ -42,13 +42,14 @@ pub struct KernelNetem {
 }
 
 impl KernelNetem {
-    /// Checks the words. `tables` holds the distributions that the words name and that are not built in.
+    /// Checks the words. `tables` holds the named distributions that are not built in.
     ///
     /// # Errors
     ///
     /// [`QdiscError`] if options contradict each other, a delay is larger than `tc` can represent, or a table is missing.
     pub fn new(words: Netem, tables: Vec<(TableName, kernel::Table)>) -> Result<Self, QdiscError> {
         let checked = Self { words, tables: tables.into() };
+        // A trial with any seed finds every error.
         checked.build::<()>(0)?;
         Ok(checked)
     }
@@ -109,19 +110,19 @@ impl LinkModel {
     pub(crate) fn layout(&self) -> Option<Layout> {
         match self {
             Self::Fixed(config) => Some(config.layout),
-            // All configurations of a modulated link have one layout, so that the first configuration is enough.
+            // All configurations of a modulated link have one layout, so the first configuration is enough.
             Self::Modulated(modulated) => modulated.configs().first().map(|config| config.layout),
             Self::Replay(_) | Self::Kernel(_) => None,
         }
     }
 
-    /// Returns whether the link delays every packet by the same time and does nothing else.
+    /// Returns whether the link delays every packet by the same time and does no more.
     #[must_use]
     pub fn is_constant_delay(&self) -> bool {
         self.as_fixed().is_some_and(LinkConfig::is_constant_delay)
     }
 
-    /// Returns the time by which the link delays every packet of this load, or `None` if the link does anything else: see [`LinkConfig::constant_delay_of`].
+    /// Returns the link's delay of every packet of this load, or `None` if the link does more: see [`LinkConfig::constant_delay_of`].
     #[must_use]
     pub fn constant_delay_of(&self, load: Load) -> Option<Duration> {
         self.as_fixed()?.constant_delay_of(load)
@@ -141,7 +142,7 @@ impl LinkModel {
         }
     }
 
-    /// Returns whether anything that this link does is random.
+    /// Returns whether any part of this link is random.
     #[must_use]
     pub fn has_chance(&self) -> bool {
         match self {
@@ -162,18 +163,18 @@ impl LinkModel {
         }
     }
 
-    /// Returns whether this link draws random numbers for loss or for jitter when a packet is offered.
+    /// Returns whether this link draws random numbers for loss or for jitter at an offer.
     pub(crate) fn is_random(&self) -> bool {
         self.as_fixed().is_some_and(LinkConfig::is_random)
     }
 
-    /// Returns whether a packet's fate is certain when the packet is offered, and no packet is copied.
+    /// Returns whether a packet's fate is certain at its offer, and no packet is copied.
     pub(crate) fn is_direct(&self) -> bool {
         self.as_fixed().is_some_and(LinkConfig::is_direct)
     }
 }
 
-/// Parameters that choose the kind of a link. A modulator cannot change them between its states.
+/// Parameters that choose the kind of a link. A modulator cannot change these parameters between its states.
 pub const LINK_KIND_PARAMETERS: [Key; 4] = [
     usual(
         "modulated",
@@ -194,7 +195,7 @@ static MODULATED: Table = Table::with_others(
     &[&[required("by", Form::Text, "The name of a modulator; beside it keys of the link under the names of its states")]],
     &Form::Table(&STATE),
 );
-/// Keys of a link that hold in one state of a modulator.
+/// Keys of a link in one state of a modulator.
 static STATE: Table = Table::over(&LINK_PARAMETERS);
 const PROFILES: [(&str, &str); 2] = [("exact", "what the words say"), ("kernel-6.6", "what Linux 6.6 does when it is told so")];
 const NETEM: Form = Form::Like(&["delay 20ms 5ms 25% distribution normal loss gemodel 1% 10%", "none"]);

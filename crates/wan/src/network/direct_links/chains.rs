@@ -1,5 +1,5 @@
-//! Links with correlated delays, eight at a time. Each step is done for all eight links before the next step, so that a processor can compute several links
-//! at once. Most delays are computed by fewer terms of their series than a single delay needs; the rest is left to a slower function.
+//! Links with correlated delays, eight at a time. Each step is done for all eight links before the next step, so a processor can compute several links at once.
+//! Most delays are computed with fewer terms of their series than in a single computation; the rest is left to a slower function.
 
 use alloc::vec::Vec;
 
@@ -13,7 +13,7 @@ use crate::random::PacketDraws;
 use crate::stages::delay::CorrelatedDelays;
 use crate::stages::loss::GilbertElliottState;
 
-/// Links of a kind whose only state is the state of the losses and the normal number from which the latest delay was computed.
+/// Links of a kind without state except the state of the losses and the normal number of the latest delay.
 #[derive(Clone, Debug)]
 pub(super) struct Chains {
     /// Threshold for leaving a state, indexed by state (good, bad): a link leaves the state if the upper 53 bits of the packet's loss word are below the
@@ -25,7 +25,7 @@ pub(super) struct Chains {
     cubics: GammaCubics,
 }
 
-/// State of the chain of delays and of the chain of losses, indexed by link. Padded by seven links, so that a load of eight links starting at any link stays
+/// State of the chain of delays and of the chain of losses, indexed by link. Padded by seven links, so a load of eight links starting at any link stays
 /// within the arrays.
 #[derive(Clone, Debug)]
 pub(super) struct ChainStates {
@@ -39,6 +39,7 @@ pub(super) struct ChainStates {
 fn threshold(probability: Probability) -> u64 {
     const TWO_POW_53: f64 = 9_007_199_254_740_992.0;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number from 0 to 2^53")]
+    // `Probability::happens` compares the upper 53 bits as a fraction with the probability, so the bound is the next whole number.
     let threshold = libm::ceil(probability.get() * TWO_POW_53) as u64;
     threshold
 }
@@ -74,7 +75,7 @@ impl Chains {
         [loss_word, jitter_word]: Words,
         packet: PacketDraws,
     ) -> Verdict {
-        // Both thresholds are those of the state before the packet, also for the loss, although the state has changed by then.
+        // Both thresholds belong to the state before the packet, also for the loss, although the state has changed by then.
         let state = usize::from(states.bad_from(place) & 1);
         states.change(place, u8::from(is_below(loss_word, self.leaves[state])));
         if is_below(loss_word, self.loses[state]) {
@@ -83,7 +84,7 @@ impl Chains {
         Verdict::Arrives(now.saturating_add_nanos(self.delays.draw_nanos(&mut states.normals[place], jitter_word, packet)))
     }
 
-    /// Offers a packet to each of these neighbouring links, of which the first has the number `first`. Links whose bit is set in `excluded` are left out.
+    /// Offers a packet to each of these neighbouring links, from number `first` on. Links with their bit set in `excluded` are left out.
     #[inline(always)]
     pub(super) fn offer(
         &self,
@@ -105,6 +106,7 @@ impl Chains {
         }
         // Lost packets change the state too. Links in `excluded` got no packet and keep their state.
         states.change(first, leave & !excluded);
+        // The padding makes the load valid for every existing link.
         let Some(normals) = states.normals_from(first) else { return };
         let following = self.delays.following(normals, &jitter_words);
         let nanos = self.cubics.nanos(&following);
@@ -134,7 +136,7 @@ impl Chains {
         }
     }
 
-    /// Delivers the packets of the links in `slow`, whose delays `cubics` could not compute. A function of its own, because a call within the loop over all
+    /// Delivers the packets of the links in `slow`, with delays beyond `cubics`. A separate function, because a call within the loop over all
     /// links would force the loop's values out of registers.
     #[cold]
     #[inline(never)]
@@ -146,6 +148,7 @@ impl Chains {
         arrivals: &mut Arrivals,
     ) {
         for (place, link) in links.iter_mut().enumerate().filter(|(place, _)| slow >> place & 1 == 1) {
+            // The number was noted before the count moved on.
             let packet = link.draws.packet(arrivals.sequences[place]);
             let [_, word] = packet.loss_and_jitter();
             let at = now.saturating_add_nanos(self.delays.draw_nanos(&mut normals[place], word, packet));
@@ -161,11 +164,12 @@ impl ChainStates {
         Self { normals: Vec::new(), bad: Vec::new() }
     }
 
-    /// Sets the initial state of link `place`, whose number must be higher than those of all links before.
+    /// Sets the initial state of link `place`. The number must be higher than all numbers before.
     pub(super) fn begin(&mut self, place: usize, state: GilbertElliottState) {
         self.normals.resize(place + DirectLinks::AT_ONCE, f64::NAN);
-        // `place / 8 + 2` bytes, so that a load of two bytes from any link's byte stays within the array.
+        // `place / 8 + 2` bytes, so a load of two bytes from any link's byte stays within the array.
         self.bad.resize(place / 8 + 2, 0);
+        // A new bit is 0, so a toggle sets the bit.
         self.change(place, u8::from(state == GilbertElliottState::Bad));
     }
 
@@ -183,7 +187,7 @@ impl ChainStates {
         low
     }
 
-    /// Toggles the state of the links from `first` on whose bit is set in `which`.
+    /// Toggles the state of the links with their bit set in `which`, from `first` on.
     #[inline(always)]
     fn change(&mut self, first: usize, which: u8) {
         let [low, high] = (u16::from(which) << (first % 8)).to_le_bytes();

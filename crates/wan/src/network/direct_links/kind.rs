@@ -1,4 +1,4 @@
-//! Data that links of one configuration share, and the state of each link.
+//! Data shared by links of one configuration, and the state of each link.
 
 use cohaptic_units::Instant;
 
@@ -12,7 +12,7 @@ use crate::stages::loss::{GilbertElliottState, Loss};
 use crate::stages::order::Order;
 use crate::stages::queue::{EqualPackets, Load, nanos};
 
-/// A kind of link: the configuration that links share, prepared for packets of one load.
+/// A kind of link: a configuration shared by links, prepared for packets of one load.
 #[derive(Clone, Debug)]
 pub(super) struct Kind {
     /// `true` if the links draw random numbers.
@@ -29,7 +29,7 @@ pub(super) struct Kind {
 pub(super) enum Line {
     /// No packet waits. Each packet takes this time to transmit \[ns\]; 0 without a rate.
     Free(u64),
-    /// A queue with tail drop, in which packets of one size may wait.
+    /// A queue with tail drop, for packets of one size.
     Queued(EqualPackets),
 }
 
@@ -39,7 +39,7 @@ enum Delays {
     Correlated(CorrelatedDelays),
 }
 
-/// State that a link keeps from earlier packets, and a counter that few links need.
+/// State of a link from earlier packets, and a counter for few links.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Remembered {
     /// Instant at which the previous packet leaves the queue.
@@ -47,12 +47,12 @@ pub(super) struct Remembered {
     /// Latest value of the chain of delays; NaN before the first packet.
     normal: f64,
     state: GilbertElliottState,
-    /// Packets that found no room in the queue.
+    /// Packets without room in the queue.
     pub(super) found_full: u64,
 }
 
 impl Kind {
-    /// Makes the kind of links of this configuration, for packets of this load. Returns `None` if the links need more state than [`Remembered`] has.
+    /// Makes the kind of links of this configuration, for packets of this load. Returns `None` if [`Remembered`] has too little state for the links.
     pub(super) fn new(config: &LinkConfig, load: Load) -> Option<Self> {
         let loss = match &config.loss {
             Loss::None => Losses::None,
@@ -65,10 +65,12 @@ impl Kind {
             None => Delays::Independent(DelayStage::new(&config.delay)),
         };
         let remembers_more = matches!(&delay, Delays::Independent(delay) if delay.remembers());
+        // Outages, order and some delays have state beyond `Remembered`.
         if !config.outages.is_empty() || config.order != Order::AllowReordering || remembers_more {
             return None;
         }
         let line = Line::new(config, load)?;
+        // `Chains` adds the delay to the instant of the offer, so the transmitter must take no time.
         let chains = match (&delay, line) {
             (Delays::Correlated(delays), Line::Free(0)) => Chains::new(&loss, delays),
             (Delays::Correlated(_) | Delays::Independent(_), _) => None,
@@ -121,7 +123,7 @@ impl Kind {
         if is_lost {
             return Verdict::Lost;
         }
-        // Lost packets take no time to transmit, since losses come before the queue.
+        // Lost packets take no time to transmit, because losses come before the queue.
         let leaves = match &self.line {
             Line::Free(nanos) => now.saturating_add_nanos(*nanos),
             Line::Queued(queue) => match queue.offer(now, &mut link.departure) {
@@ -141,18 +143,19 @@ impl Kind {
 }
 
 impl Remembered {
-    /// The state of a link that has none.
+    /// The state of a link without state.
     pub(super) const NOTHING: Self = Self { departure: Instant::ZERO, normal: f64::NAN, state: GilbertElliottState::Good, found_full: 0 };
 }
 
 impl Line {
-    /// Makes the transmitter of a link for packets of this load. Returns `None` if departures depend on more than [`EqualPackets`] knows, or if the transmitter
-    /// comes after the delay (the layout of netem).
+    /// Makes the transmitter of a link for packets of this load. Returns `None` if departures depend on more than the state of [`EqualPackets`], or if the
+    /// transmitter comes after the delay (the layout of netem).
     pub(super) fn new(config: &LinkConfig, load: Load) -> Option<Self> {
         let Some(bottleneck) = &config.bottleneck else { return Some(Self::Free(0)) };
         if config.layout == Layout::Netem {
             return None;
         }
+        // With a long enough gap between packets no packet ever waits, so the queue becomes a constant time.
         match bottleneck.time_without_wait(load) {
             Some(time) => Some(Self::Free(nanos(time))),
             None => EqualPackets::new(bottleneck, load.size).map(Self::Queued),

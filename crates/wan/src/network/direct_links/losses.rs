@@ -1,10 +1,10 @@
-//! Losses of links whose fates are known at once, and the fate of a packet.
+//! Losses of links with immediately certain fates, and the fate of a packet.
 
 use cohaptic_units::{Instant, Probability};
 
 use crate::stages::loss::GilbertElliott;
 
-/// Law by which a link loses packets.
+/// Law of the losses of a link.
 #[derive(Clone, Debug)]
 pub(super) enum Losses {
     None,
@@ -17,6 +17,6 @@ pub(super) enum Losses {
 pub(super) enum Verdict {
     Arrives(Instant),
     Lost,
-    /// Dropped for a cause other than loss. The function that returns this value has counted the drop.
+    /// Dropped, but not by loss. The returning function has counted the drop.
     Dropped,
 }

@@ -1,4 +1,4 @@
-//! Many links that decide at once what becomes of a packet. The driver keeps the packets on the way itself.
+//! Many links with packets of immediately certain fate. The driver keeps the packets on the way itself.
 
 mod chains;
 mod kind;
@@ -22,41 +22,41 @@ use crate::random::Stream;
 use crate::stages::config::LinkConfig;
 use crate::stages::queue::Load;
 
-/// Links that know the arrival of a packet when the packet is offered. Possible parts are outages, loss, a tail-drop queue before a transmitter of constant
-/// rate, a queue of any discipline in which no packet waits, delay with jitter, and order. Each link is a function from a packet to its arrival, with the state
-/// that bursts of loss, correlated delays and the transmitter need. All links have one [`Load`].
+/// Links with the arrival of a packet known at its offer. Possible parts are outages, loss, a tail-drop queue before a transmitter of constant rate, a queue of
+/// any discipline without waiting packets, delay with jitter, and order. Each link is a function from a packet to its arrival, with the state for bursts of
+/// loss, correlated delays and the transmitter. All links have one [`Load`].
 ///
-/// Random numbers, their addresses and the counters are those of [`crate::Network`] with the same links. The queue of packets on the way is left to the
-/// driver, since a driver that looks at arrivals on a lattice of its own can use a simpler queue. The driver says until when it will look, so that a packet
-/// is counted as delivered or not when it is offered.
+/// Random numbers, their addresses and the counters are equal to [`crate::Network`] with the same links. The queue of packets on the way is left to the driver:
+/// a driver with arrivals on a lattice can use a simpler queue. The driver gives the end of its interest, so a packet is counted as delivered or not at its
+/// offer.
 ///
-/// Links are numbered from 0 in the order in which they are added. A link without state takes one cache line, and most links with state take one and a half.
+/// Links are numbered from 0 in the order of addition. A link without state takes one cache line, and most links with state take one and a half.
 #[derive(Clone, Debug)]
 pub struct DirectLinks {
-    /// End of the run. Packets that arrive later do not count as delivered.
+    /// End of the run. Packets with a later arrival do not count as delivered.
     until: Instant,
     load: Load,
     links: Vec<LinkState>,
-    /// Configurations of kinds of links, and the data that links of one kind share. Indexed by the number in [`Memory`].
+    /// Configurations of kinds of links, and the data shared by links of one kind. Indexed by the number in [`Memory`].
     kinds: Vec<(LinkConfig, Kind)>,
-    /// State of each link, indexed by link. Shorter than `links`, or empty, if the last links, or all of them, need no such state.
+    /// State of each link, indexed by link. Shorter than `links`, or empty, if the last links, or all links, need no such state.
     remembered: Vec<Remembered>,
     /// State of links in [`Memory::Chained`], indexed by link.
     chained: ChainStates,
     /// Links of no kind, indexed by the number in [`Memory::Other`].
     others: Vec<Other>,
-    /// Instant of the latest packet offered to each link, indexed by link; `None` before the first packet. Resized at the first offer after links are
-    /// added.
+    /// Instant of the latest packet offered to each link, indexed by link; `None` before the first packet. Resized at the first offer after an addition of
+    /// links.
     #[cfg(debug_assertions)]
     latest_offers: Vec<Option<Instant>>,
 }
 
-/// Fates of packets that were offered to neighbouring links at one instant: one bit and one array entry for each link, from the first link on.
+/// Fates of packets offered to neighbouring links at one instant: one bit and one array entry for each link, from the first link on.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Arrivals {
-    /// Bits of the links whose packet arrives.
+    /// Bits of the links with an arriving packet.
     pub arrive: u8,
-    /// Bits of the links whose packet arrives before a packet that was sent earlier. A subset of `arrive`.
+    /// Bits of the links with a packet arriving before an earlier packet. A subset of `arrive`.
     pub overtake: u8,
     /// Number of each packet on its link, from 0.
     pub sequences: [u64; DirectLinks::AT_ONCE],
@@ -64,7 +64,7 @@ pub struct Arrivals {
     pub at: [Instant; DirectLinks::AT_ONCE],
 }
 
-/// Counters of a link, and where the rest of the link is kept.
+/// Counters of a link, and the place of the rest of the link.
 #[derive(Clone, Debug)]
 struct LinkState {
     draws: Stream,
@@ -81,17 +81,17 @@ struct LinkState {
 /// Place of the state of a link, and the index of its kind in `kinds`.
 #[derive(Clone, Copy, Debug)]
 enum Memory {
-    /// A link of this kind, which has no state.
+    /// A link of this kind, without state.
     Plain(u16),
-    /// A link of this kind, whose state is in `remembered`.
+    /// A link of this kind, with its state in `remembered`.
     Remembering(u16),
-    /// A link of this kind, whose state is in `chained`.
+    /// A link of this kind, with its state in `chained`.
     Chained(u16),
     /// A link of no kind: the index in `others`.
     Other(u32),
 }
 
-/// A link of no kind, with stages and counters of its own.
+/// A link of no kind, with separate stages and counters.
 #[derive(Clone, Debug)]
 struct Other {
     direct: Direct,
@@ -100,16 +100,15 @@ struct Other {
     departure: Instant,
     /// Packets dropped in outages.
     outage: u64,
-    /// Packets that found no room in the queue.
+    /// Packets without room in the queue.
     found_full: u64,
 }
 
 impl DirectLinks {
-    /// Number of links to which a packet is offered at once. The computations for these links do not depend on each other, so that a processor can overlap
-    /// them.
+    /// Number of links offered a packet at once. The computations for these links do not depend on each other, so a processor can overlap them.
     pub const AT_ONCE: usize = 8;
 
-    /// Makes an empty set of links for packets of this load. Packets that arrive by `until` count as delivered.
+    /// Makes an empty set of links for packets of this load. Packets with an arrival by `until` count as delivered.
     #[must_use]
     pub const fn new(until: Instant, load: Load) -> Self {
         Self {
@@ -125,8 +124,8 @@ impl DirectLinks {
         }
     }
 
-    /// Returns whether a link of this model can be added. The fate of a packet of this load must be certain when the packet is offered, and the link must not
-    /// copy, mark or damage packets.
+    /// Returns whether a link of this model can be added. The fate of a packet of this load must be certain at its offer, and the link must not copy, mark or
+    /// damage packets.
     #[must_use]
     pub fn takes(model: &LinkModel, load: Load) -> bool {
         model.as_fixed().is_some_and(|config| config.is_direct_but_for_queue(load) && Line::new(config, load).is_some())
@@ -141,13 +140,14 @@ impl DirectLinks {
     #[must_use]
     pub fn add(&mut self, seed: u64, name: &LinkName, model: &LinkModel) -> bool {
         let Some(config) = model.as_fixed() else { return false };
-        // A configuration in `kinds` was checked when its first link was added, and needs no second check.
+        // A configuration in `kinds` was checked with its first link, and needs no second check.
         let known = self.kinds.iter().position(|(other, _)| other == config);
         if known.is_none() && !Self::takes(model, self.load) {
             return false;
         }
         let draws = Stream::new(seed, name.as_str().as_bytes());
         let memory = match self.kind(known, config) {
+            // Chains come first: a kind with chains has state too, but keeps it in arrays for eight links at once.
             Some((place, kind)) if kind.chains.is_some() => {
                 let state = kind.initial_state(draws);
                 self.chained.begin(self.links.len(), state);
@@ -155,7 +155,7 @@ impl DirectLinks {
             }
             Some((place, kind)) if kind.remembers() => {
                 let beginning = kind.beginning(draws);
-                // Links added since the last one with state have none. Their entries keep the index equal to the link's number.
+                // Links added since the last link with state have no state. Their entries keep the index equal to the link's number.
                 self.remembered.resize(self.links.len(), Remembered::NOTHING);
                 self.remembered.push(beginning);
                 Memory::Remembering(place)
@@ -173,13 +173,14 @@ impl DirectLinks {
     }
 
     /// Offers a packet to each of `count` links from `first` on, at most [`DirectLinks::AT_ONCE`] links, and writes the fates of the packets into `arrivals`.
-    /// Links whose bit is set in `excluded` are left out. Instants must not go back.
+    /// Links with their bit set in `excluded` are left out. Instants must not go back.
     ///
     /// # Panics
     ///
-    /// If there are no such links. With debug assertions, also if a packet comes earlier than the [`Load`] allows.
+    /// If a link is missing. With debug assertions, also if a packet comes earlier than the [`Load`] allows.
     #[inline(always)]
     pub fn offer(&mut self, now: Instant, first: LinkId, count: usize, excluded: u8, arrivals: &mut Arrivals) {
+        // The type parameter keeps the rarer code out of the loop: see `offer_as`.
         if self.are_chains() {
             self.offer_as::<true>(now, first, count, excluded, arrivals);
         } else {
@@ -187,15 +188,14 @@ impl DirectLinks {
         }
     }
 
-    /// Returns whether all links are of one kind, and that kind has correlated delays and no other state than the chains of delays and of losses.
+    /// Returns whether all links are of one kind, and this kind has correlated delays and no state but the chains of delays and of losses.
     #[must_use]
     pub fn are_chains(&self) -> bool {
         matches!(&self.kinds[..], [(_, Kind { chains: Some(_), .. })] if self.others.is_empty())
     }
 
-    /// Offers packets like [`DirectLinks::offer`], for a driver that has called [`are_chains`](DirectLinks::are_chains) before a loop: `CHAINS` is the
-    /// answer. Each of the two loops then contains the code of its own kind of links only. With a wrong value the answers are the same, and slower to
-    /// compute.
+    /// Offers packets like [`DirectLinks::offer`], for a driver with a call of [`are_chains`](DirectLinks::are_chains) before a loop: `CHAINS` is the answer.
+    /// Each of the two loops then contains the code of one kind of links only. With a wrong value the answers are the same, and slower to compute.
     ///
     /// # Panics
     ///
@@ -214,9 +214,10 @@ impl DirectLinks {
             [(_, Kind { chains: Some(chains), .. })] if CHAINS && self.others.is_empty() => {
                 chains.offer((links, &mut self.chained, first), span, excluded, arrivals);
             }
+            // A wrong value of `CHAINS` is slow, but gives the same answers.
             [(_, Kind { chains: Some(_), .. })] => self.offer_one_by_one(now, first, count, excluded, arrivals),
             _ if CHAINS => self.offer_one_by_one(now, first, count, excluded, arrivals),
-            // `remembered` may be shorter than `links` only where several kinds exist, so that with one kind the range is valid.
+            // `remembered` may be shorter than `links` only where several kinds exist, so with one kind the range is valid.
             [(_, kind)] if self.others.is_empty() && self.remembered.is_empty() => alike::<false>(kind, (links, &mut []), span, excluded, arrivals),
             [(_, kind)] if self.others.is_empty() => {
                 alike::<true>(kind, (links, &mut self.remembered[first..first + count]), span, excluded, arrivals);
@@ -238,18 +239,18 @@ impl DirectLinks {
         }
     }
 
-    /// Returns the number of packets that a link was offered.
+    /// Returns the number of packets offered to a link.
     ///
     /// # Panics
     ///
-    /// If there is no such link.
+    /// If the link is missing.
     #[must_use]
     #[inline]
     pub fn offered(&self, link: LinkId) -> u64 {
         self.links[link.index()].offered
     }
 
-    /// Offers a packet to one link, and returns the packet's arrival and whether the packet overtakes an earlier packet. Returns `None` if the
+    /// Offers a packet to a single link, and returns the packet's arrival and whether the packet overtakes an earlier packet. Returns `None` if the
     /// packet does not arrive. Instants must not go back.
     ///
     /// # Panics
@@ -262,7 +263,7 @@ impl DirectLinks {
         self.offer_alone(now, link)
     }
 
-    /// Checks that a packet offered to `link` at `now` does not come earlier than the load allows.
+    /// Checks the instant `now` of a packet offered to `link` against the load.
     #[cfg(debug_assertions)]
     fn assert_load(&mut self, now: Instant, link: usize) {
         if self.latest_offers.len() < self.links.len() {
@@ -291,12 +292,13 @@ impl DirectLinks {
         link.count(now, self.until, verdict)
     }
 
-    /// Takes back the count of a delivered packet, of which the driver will not see the arrival.
+    /// Takes back the count of a delivered packet with an arrival unseen by the driver.
     ///
     /// # Panics
     ///
-    /// If there is no such link.
+    /// If the link is missing.
     pub fn forget(&mut self, link: LinkId, sent: Instant, arrival: Instant) {
+        // A later arrival was never counted.
         if arrival <= self.until {
             let link = &mut self.links[link.index()];
             link.delivered -= 1;
@@ -308,11 +310,12 @@ impl DirectLinks {
     ///
     /// # Panics
     ///
-    /// If there is no such link.
+    /// If the link is missing.
     #[must_use]
     pub fn stats(&self, link: LinkId) -> LinkStats {
         let LinkState { offered, delivered, delay_nanos, lost, memory, .. } = self.links[link.index()];
         let (outage, found_full) = match memory {
+            // A kind without queue drops no packet for want of room, and no kind has outages.
             Memory::Plain(_) | Memory::Chained(_) => (0, 0),
             Memory::Remembering(_) => (0, self.remembered[link.index()].found_full),
             Memory::Other(place) => (self.others[place as usize].outage, self.others[place as usize].found_full),
@@ -321,8 +324,8 @@ impl DirectLinks {
         LinkStats::counted(offered, delivered, delay_nanos, dropped)
     }
 
-    /// Returns the index of the link's kind and the kind. `known` is the index if the configuration has a kind already; else the kind is added. Returns
-    /// `None` if the configuration needs more state than a kind has, or if there are too many kinds.
+    /// Returns the index of the link's kind and the kind. `known` is the index if the configuration has a kind already; else the kind is added. Returns `None`
+    /// if a kind has too little state for the configuration, or if there are too many kinds.
     fn kind(&mut self, known: Option<usize>, config: &LinkConfig) -> Option<(u16, &Kind)> {
         let place = match known {
             Some(place) => place,
@@ -340,6 +343,7 @@ impl DirectLinks {
 impl Other {
     fn verdict(&mut self, now: Instant, number: u64, words: Words) -> Verdict {
         let Self { direct, line, departure, .. } = self;
+        // The queue stands between loss and delay, as in the general pipeline.
         let fate = direct.offer_through(now, number, words, |now| match line {
             Line::Free(nanos) => Ok(now.saturating_add_nanos(*nanos)),
             Line::Queued(queue) => queue.offer(now, departure).ok_or(DropCause::QueueFull),
@@ -354,6 +358,7 @@ impl Other {
                 self.found_full += 1;
                 Verdict::Dropped
             }
+            // The remaining cause is loss: a direct link has no further causes.
             Err(_) => Verdict::Lost,
         }
     }
@@ -373,8 +378,8 @@ fn draw(is_random: bool, links: &[LinkState], sequences: &mut [u64; DirectLinks:
     words
 }
 
-/// Offers a packet to each of these links of one kind, which has state if `REMEMBER` is set. All draws come before all verdicts. The verdict is chosen by a
-/// constant rather than given as a closure, so that it is inlined into the loop.
+/// Offers a packet to each of these links of one kind, with state if `REMEMBER` is set. All draws come before all verdicts. The verdict is chosen by a constant
+/// rather than given as a closure, so the verdict is inlined into the loop.
 #[inline(always)]
 fn alike<const REMEMBER: bool>(
     kind: &mut Kind,
@@ -387,6 +392,7 @@ fn alike<const REMEMBER: bool>(
     let (mut bit, mut arrive, mut overtake) = (1, 0, 0);
     for place in 0..links.len().min(DirectLinks::AT_ONCE) {
         let (link, words) = (&mut links[place], words[place]);
+        // An excluded link counts no packet, so its next packet has the same number and random words.
         if excluded & bit == 0 {
             let draws = link.draws.packet(link.offered);
             let verdict = if REMEMBER { kind.verdict(now, &mut remembered[place], words, draws) } else { kind.fate(now, words, draws) };
@@ -410,18 +416,19 @@ impl Arrivals {
     /// No packet arrives.
     pub const NONE: Self = Self { arrive: 0, overtake: 0, sequences: [0; DirectLinks::AT_ONCE], at: [Instant::ZERO; DirectLinks::AT_ONCE] };
 
-    /// Returns the array indices of the packets that arrive, in ascending order.
+    /// Returns the array indices of the arriving packets, in ascending order.
     #[inline(always)]
     pub fn places(&self) -> impl Iterator<Item = usize> + use<> {
         let mut left = self.arrive;
         core::iter::from_fn(move || {
             let place = (left != 0).then(|| left.trailing_zeros() as usize)?;
+            // Clears the lowest set bit.
             left &= left - 1;
             Some(place)
         })
     }
 
-    /// Returns whether the packet at this array index arrives before a packet that was sent earlier.
+    /// Returns whether the packet at this array index arrives before an earlier packet.
     #[must_use]
     pub const fn overtakes(&self, place: usize) -> bool {
         self.overtake >> place & 1 == 1
@@ -443,9 +450,10 @@ impl LinkState {
         }
     }
 
-    /// Counts the arrival of a packet, and returns whether the packet overtakes an earlier one.
+    /// Counts the arrival of a packet, and returns whether the packet overtakes an earlier packet.
     #[inline(always)]
     fn count_arrival(&mut self, now: Instant, until: Instant, at: Instant) -> bool {
+        // An arrival after the end of the run stays in flight for the counters, but counts for the order of arrivals.
         if at <= until {
             self.delivered += 1;
             self.delay_nanos += u128::from(at.as_nanos() - now.as_nanos());

@@ -1,4 +1,4 @@
-//! Many links in which packets wait, each driven from one offer to the next. The driver keeps the packets on the way itself.
+//! Many links with waiting packets, each driven from offer to offer. The driver keeps the packets on the way itself.
 
 mod ahead;
 mod queued;
@@ -19,15 +19,15 @@ use crate::line::{Line, Sink};
 use crate::packet::{Marks, Outputs, PacketInfo};
 use queued::{QueuedKind, QueuedLink};
 
-/// Links of any kind, for a driver that knows when it will offer the next packet to each link.
+/// Links of any kind, for a driver with a known instant of its next offer to each link.
 ///
-/// A queue's decision about a packet may depend on later packets, but never before these packets come. So a link that is told the instant of its next packet
-/// decides at once everything that happens until then, and no queue of events is needed to wake the link. A driver that stops earlier calls
-/// [`stop`](SteppedLinks::stop), which takes back the counts of all that has not happened by then. Random numbers, their addresses and the counters are those
-/// of [`crate::Network`] with the same links. Packets with the payload `T` come out in no order of time. Each comes with its number, and with a flag that is
-/// set if a packet reported before arrives later or at the same instant.
+/// A queue's decision about a packet may depend on later packets, but never before these packets come. So a link with a known instant of its next packet
+/// decides at once about everything until then, and no queue of events is needed to wake the link. A driver with an earlier end calls
+/// [`stop`](SteppedLinks::stop). The function takes back the counts of all events after the end. Random numbers, their addresses and the counters are equal to
+/// [`crate::Network`] with the same links. Packets with the payload `T` come out in no order of time. Each packet comes with its number, and with a flag, set
+/// if an earlier reported packet arrives later or at the same instant.
 ///
-/// Links are numbered from 0 as they are added.
+/// Links are numbered from 0 in the order of addition.
 #[derive(Clone, Debug)]
 pub struct SteppedLinks<T> {
     until: Instant,
@@ -35,7 +35,7 @@ pub struct SteppedLinks<T> {
     now: Instant,
     info: PacketInfo,
     links: Vec<Stepped<T>>,
-    /// Models of the links in `Stepped::Queued`, and the data that links of one model share. Indexed by the number in `Stepped::Queued`.
+    /// Models of the links in `Stepped::Queued`, and the data shared by links of one model. Indexed by the number in `Stepped::Queued`.
     kinds: Vec<(LinkModel, QueuedKind)>,
     outputs: Outputs<Sent<T>>,
     arrivals: Vec<(Instant, Sent<T>)>,
@@ -44,12 +44,12 @@ pub struct SteppedLinks<T> {
 #[derive(Clone, Debug)]
 #[expect(clippy::large_enum_variant, reason = "most links are queued, and lie together: a box for each would be one more place to look at")]
 enum Stepped<T> {
-    /// A link with at most one queue, before a transmitter of constant rate: the index of its kind in `kinds`, and its own state.
+    /// A link with at most one queue, before a transmitter of constant rate: the index of its kind in `kinds`, and its state.
     Queued(u8, QueuedLink<T>),
     Other(Box<Other<T>>),
 }
 
-/// A link of any other kind, and the latest arrival over the link so far.
+/// A link of any further kind, and the latest arrival over the link so far.
 #[derive(Clone, Debug)]
 struct Other<T> {
     line: Line<(), Sent<T>>,
@@ -65,13 +65,13 @@ struct Sent<T> {
     item: T,
 }
 
-/// Number of kinds of links, at most. The list of kinds is searched from its beginning, which takes longer with more kinds; links beyond the limit become
+/// Number of kinds of links, at most. The list of kinds is searched from its beginning, and more kinds take longer; links beyond the limit become
 /// `Stepped::Other`.
 const MOST_KINDS: usize = 64;
 
 impl SteppedLinks<()> {
-    /// Returns whether a link of this model can be added. Links that damage packets, links that limit the number of packets inside, replays, and models of
-    /// the kernel's queue cannot.
+    /// Returns whether a link of this model can be added. Links with damage of packets, links with a limit of the number of packets inside, replays, and models
+    /// of the kernel's queue cannot.
     #[must_use]
     pub fn takes(model: &LinkModel) -> bool {
         let takes = |config: &crate::LinkConfig| config.corruption.is_none() && config.limit.is_none();
@@ -84,13 +84,13 @@ impl SteppedLinks<()> {
 }
 
 impl<T: Clone> SteppedLinks<T> {
-    /// Makes an empty set of links for packets of this size and ECN capability. Packets that arrive by `until` count as delivered.
+    /// Makes an empty set of links for packets of this size and ECN capability. Packets with an arrival by `until` count as delivered.
     #[must_use]
     pub const fn new(until: Instant, info: PacketInfo) -> Self {
         Self { until, now: Instant::ZERO, info, links: Vec::new(), kinds: Vec::new(), outputs: Vec::new(), arrivals: Vec::new() }
     }
 
-    /// Adds a link, whose model must be one that [`takes`](SteppedLinks::takes) accepts.
+    /// Adds a link. [`takes`](SteppedLinks::takes) must accept the model.
     pub fn add(&mut self, seed: u64, name: &LinkName, model: &LinkModel) {
         let link = match self.kind(model) {
             Some(place) => Stepped::Queued(place, QueuedLink::new(seed, name, &self.kinds[usize::from(place)].1)),
@@ -101,7 +101,7 @@ impl<T: Clone> SteppedLinks<T> {
         self.links.push(link);
     }
 
-    /// Returns the index of the model's kind in `kinds`, adding the kind if it is new. Returns `None` if [`QueuedKind::new`]
+    /// Returns the index of the model's kind in `kinds`, adding a new kind. Returns `None` if [`QueuedKind::new`]
     /// does so for the model, or if `kinds` is full.
     fn kind(&mut self, model: &LinkModel) -> Option<u8> {
         let place = match self.kinds.iter().position(|(other, _)| other == model) {
@@ -115,19 +115,20 @@ impl<T: Clone> SteppedLinks<T> {
         u8::try_from(place).ok()
     }
 
-    /// Offers a packet to a link at `now`, and promises that nothing else is offered to the link before `next`. `arrives` is called for each packet whose
-    /// arrival is certain by `next`, with the instant of the arrival, a flag that is set if a packet reported before arrives later or at the same instant,
-    /// and the packet's number on the link, from 0. Instants must not go back.
+    /// Offers a packet to a link at `now`, and promises no further offer to the link before `next`. `arrives` is called for each packet with a certain arrival
+    /// by `next`, with the instant of the arrival, a flag, set if an earlier reported packet arrives later or at the same instant, and the packet's number on
+    /// the link, from 0. Instants must not go back.
     ///
     /// # Panics
     ///
-    /// If there is no such link.
+    /// If the link is missing.
     #[inline]
     pub fn offer(&mut self, (now, next): (Instant, Instant), link: LinkId, item: T, mut arrives: impl FnMut(Instant, bool, u64, T)) {
         // Events after the end of the run are not counted.
         let (until, next) = (self.until, next.min(self.until));
         self.now = now;
         match &mut self.links[link.index()] {
+            // The offer comes before the passage of time, so the packet can leave within the same call.
             Stepped::Queued(kind, link) => {
                 let kind = &self.kinds[usize::from(*kind)].1;
                 link.offer((now, until), kind, item, &mut arrives);
@@ -156,12 +157,14 @@ impl<T: Clone> SteppedLinks<T> {
         let number = line.offered() - 1;
         match fate {
             Some(Ok(at)) => {
+                // The fate is known, so delivery and order are settled at the offer.
                 line.flow().deliver_by(until, now, at);
                 arrives(at, at <= *latest, number, item);
                 *latest = at.max(*latest);
             }
             Some(Err(cause)) => line.drop(cause),
             None => {
+                // An offer happens at the present instant of the driver, so nothing is noted ahead.
                 line.enter(
                     now,
                     *info,
@@ -175,11 +178,11 @@ impl<T: Clone> SteppedLinks<T> {
         }
     }
 
-    /// Lets time pass on a link until `next`, before which nothing is offered to the link.
+    /// Lets time pass on a link until `next`, without an offer to the link before `next`.
     ///
     /// # Panics
     ///
-    /// If there is no such link.
+    /// If the link is missing.
     pub fn pass(&mut self, next: Instant, link: LinkId, arrives: &mut dyn FnMut(Instant, bool, u64, T)) {
         // Events after the end of the run are not counted.
         let (until, next) = (self.until, next.min(self.until));
@@ -189,13 +192,13 @@ impl<T: Clone> SteppedLinks<T> {
         }
     }
 
-    /// Lets time pass on a link in `Stepped::Other` until `next`, which is at most the end of the run. Generic in `arrives`, because most packets over links
+    /// Lets time pass on a link in `Stepped::Other` until `next`, at most the end of the run. Generic in `arrives`, because most packets over links
     /// with further stages pass here.
     fn pass_on_other(&mut self, next: Instant, link: LinkId, mut arrives: impl FnMut(Instant, bool, u64, T)) {
         let Self { until, now, links, outputs, arrivals, .. } = self;
         let Stepped::Other(other) = &mut links[link.index()] else { return };
         let Other { line, latest, ahead } = &mut **other;
-        // Wakes come one instant at a time, so that `span` holds the instant at which a packet was marked.
+        // Wakes come instant by instant, so `span` holds the instant of a packet's mark.
         while let Some(wake) = line.next_wake().filter(|wake| *wake <= next) {
             line.wake(wake, outputs, &mut Arriving { arrivals, ahead, span: (*now, wake) });
         }
@@ -206,12 +209,12 @@ impl<T: Clone> SteppedLinks<T> {
         }
     }
 
-    /// Changes the model of a link at `now`; see [`crate::Network::set_link`]. `seed` and `name` are those with which the link was added. Lets time pass on
+    /// Changes the model of a link at `now`; see [`crate::Network::set_link`]. `seed` and `name` are the link's from its addition. Lets time pass on
     /// the link until `now` first.
     ///
     /// # Panics
     ///
-    /// If there is no such link.
+    /// If the link is missing.
     pub fn set_model(
         &mut self,
         now: Instant,
@@ -239,27 +242,29 @@ impl<T: Clone> SteppedLinks<T> {
             }
             (Stepped::Other(other), _) => other.reconfigure(now, (seed, name), model, outputs, arrivals),
         }
+        // The change can free waiting packets, for example with a faster rate or without a queue.
         self.pass(now, link, arrives);
     }
 
-    /// Stops the driver at an instant that is not before the latest instant given. The counts of packets dropped or marked after `at` are taken back.
+    /// Stops the driver at an instant not before the latest instant given. The counts of packets dropped or marked after `at` are taken back.
     pub fn stop(&mut self, at: Instant) {
         for link in &mut self.links {
             match link {
                 Stepped::Queued(_, link) => link.stop(at),
                 Stepped::Other(other) => {
                     let Other { line, ahead, .. } = &mut **other;
+                    // Earlier events have happened for the driver too.
                     ahead.after(at).for_each(|dropped| line.take_back(dropped));
                 }
             }
         }
     }
 
-    /// Takes back the count of a delivered packet, of which the driver will not see the arrival.
+    /// Takes back the count of a delivered packet with an arrival unseen by the driver.
     ///
     /// # Panics
     ///
-    /// If there is no such link.
+    /// If the link is missing.
     pub fn forget(&mut self, link: LinkId, sent: Instant, arrival: Instant) {
         if arrival <= self.until {
             match &mut self.links[link.index()] {
@@ -273,7 +278,7 @@ impl<T: Clone> SteppedLinks<T> {
     ///
     /// # Panics
     ///
-    /// If there is no such link.
+    /// If the link is missing.
     #[must_use]
     pub fn stats(&self, link: LinkId) -> LinkStats {
         match &self.links[link.index()] {
@@ -297,18 +302,18 @@ impl<T: Clone> Other<T> {
     }
 }
 
-/// The way out of a link's stages: collects arrivals, and notes drops and marks that lie ahead of the driver.
+/// The way out of a link's stages: collects arrivals, and notes drops and marks ahead of the driver.
 struct Arriving<'a, T> {
     arrivals: &'a mut Vec<(Instant, Sent<T>)>,
     ahead: &'a mut Ahead,
-    /// The latest instant given by the driver, and the instant of the wake or offer in which these packets leave the stages.
+    /// The latest instant given by the driver, and the instant of the wake or offer, with the exit of these packets from the stages.
     span: (Instant, Instant),
 }
 
 impl<T> Sink<Sent<T>> for Arriving<'_, T> {
     fn arrives(&mut self, at: Instant, packet: Sent<T>, _copy: u8, marks: Marks) {
         if marks.congestion {
-            // Only the queue from which the packet leaves now can have marked the packet, so that the instant of the wake is the instant of the mark.
+            // Only the queue of the present exit can have marked the packet, so the instant of the wake is the instant of the mark.
             self.ahead.note(self.span, None);
         }
         self.arrivals.push((at, packet));

@@ -1,8 +1,8 @@
-//! Links in which packets wait for one transmitter of constant rate only, for packets of one size.
+//! Links with waiting only for a transmitter of constant rate, for packets of one size.
 //!
-//! A link keeps the stages that decide at once, and its queue. Its answers are those of [`BottleneckStage`](crate::stages::queue::BottleneckStage) between the
-//! stages of [`Staged`](crate::line::staged::Staged), with less memory per link: packets are not boxed, and equal packet sizes make the waiting bytes and bits
-//! multiples of the number of packets.
+//! A link keeps the stages with immediate decisions, and its queue. The answers are the answers of [`BottleneckStage`](crate::stages::queue::BottleneckStage)
+//! between the stages of [`Staged`](crate::line::staged::Staged), with less memory per link: packets are not boxed, and equal packet sizes make the waiting
+//! bytes and bits multiples of the number of packets.
 
 use alloc::boxed::Box;
 use core::time::Duration;
@@ -23,7 +23,7 @@ use crate::random::Purpose;
 use crate::stages::config::{Layout, LinkConfig};
 use crate::stages::queue::{Bottleneck, BottleneckStage, Discipline, Fifo, Load, Red, Rules, Service, giga_bits};
 
-/// Data that all queued links of one configuration share.
+/// Data shared by all queued links of one configuration.
 #[derive(Clone, Debug)]
 pub(super) struct QueuedKind {
     config: LinkConfig,
@@ -68,9 +68,10 @@ impl LineKind {
             Discipline::TailDrop | Discipline::HeadDrop => 0.0,
             Discipline::CoDel(codel) if !codel.ecn => 0.0,
             Discipline::Red(red) if !red.ecn() => bottleneck.time_of_mean_packet(&red),
-            // Marks would have to be carried with each waiting packet, for which `Sent` has no field.
+            // Marks would have to be carried with each waiting packet, but `Sent` has no field for marks.
             Discipline::CoDel(_) | Discipline::Red(_) => return None,
         };
+        // Framing is the same for all packets, because all packets have one size.
         let bits = giga_bits(bottleneck.framing.on_the_line(size));
         Some(Self { bottleneck: bottleneck.clone(), rate, size, bits, time: rate.transmission_time(bits), mean_packet })
     }
@@ -102,7 +103,7 @@ impl<T> Rules<Sent<T>> for LineKind {
     }
 
     fn ecn_capable(&self, _packet: &Sent<T>) -> bool {
-        // `LineKind::new` refuses queues that mark packets, so that no answer depends on this.
+        // `LineKind::new` refuses queues that mark packets, so no answer depends on this.
         false
     }
 
@@ -113,6 +114,7 @@ impl<T> Rules<Sent<T>> for LineKind {
     fn remove(&self, _sums: &mut (), _packet: &Sent<T>) {}
 
     fn waiting(&self, _sums: &(), count: usize) -> (u128, u128) {
+        // Equal sizes make both sums products.
         (count as u128 * u128::from(self.size.get()), count as u128 * self.bits)
     }
 
@@ -121,7 +123,7 @@ impl<T> Rules<Sent<T>> for LineKind {
     }
 
     fn next(&self, now: Instant, left: u128) -> (Instant, u64) {
-        // A whole packet takes a time that is known. The rest of a packet after a change of the rate takes a division of 128 bits.
+        // A whole packet takes a known time. The rest of a packet after a change of the rate takes a division of 128 bits.
         let time = if left == self.bits { self.time } else { self.rate.transmission_time(left) };
         (now.saturating_add(time), 0)
     }
@@ -140,7 +142,7 @@ pub(super) struct QueuedLink<T> {
     drops: Option<Box<Drops>>,
 }
 
-/// Counters of dropped packets, and the drops that the link's driver has not reached.
+/// Counters of dropped packets, and the drops ahead of the link's driver.
 #[derive(Clone, Debug, Default)]
 struct Drops {
     counted: Seldom,
@@ -164,6 +166,7 @@ impl<T> QueuedLink<T> {
         match (self.direct.dropped(now, number, self.direct.words(number)), &mut self.line, &kind.line) {
             (Some(cause), ..) => self.count_drop(now, cause),
             (None, Some(line), Some(kind)) => {
+                // A drop at the offer happens now, so it is not ahead of the driver.
                 let dropped = |cause, _| count_drop(&mut self.drops, (now, now), cause);
                 line.offer(now, kind, packet, || draws.packet(number).first(Purpose::Queue), dropped);
             }
@@ -189,7 +192,7 @@ impl<T> QueuedLink<T> {
 
     #[inline(always)]
     fn propagate(&mut self, (leaves, until): (Instant, Instant), packet: Sent<T>, arrives: &mut (impl FnMut(Instant, bool, u64, T) + ?Sized)) {
-        // The words are computed again from the packet's number, so that waiting packets need not carry them.
+        // The words are computed again from the packet's number, so waiting packets need not carry the words.
         let at = self.direct.arrival(leaves, packet.number, self.direct.words(packet.number));
         self.flow.deliver_by(until, packet.at, at);
         arrives(at, at <= self.latest, packet.number, packet.item);
@@ -230,7 +233,7 @@ impl<T> QueuedLink<T> {
         };
     }
 
-    /// Converts the link to one of any kind, with all packets and counters inside.
+    /// Converts the link to a link of any kind, with all packets and counters inside.
     pub(super) fn into_other(self, now: Instant, kind: &QueuedKind, info: PacketInfo) -> Other<T>
     where
         T: Clone,
@@ -240,6 +243,7 @@ impl<T> QueuedLink<T> {
         let stats = LinkStats { flow, seldom: counted };
         let pipeline = match (line, &kind.line) {
             (Some(line), Some(LineKind { bottleneck, .. })) => {
+                // The number and the offer go on with the packet, so the general stages draw the same random numbers.
                 let boxed = |sent: Sent<T>| (sent.at, Packet::new(sent.number, info, Marks::default(), sent));
                 let stage = BottleneckStage::resumed(bottleneck.clone(), line.converted(bottleneck, boxed));
                 Pipeline::resumed(now, direct, kind.config.clone(), stage)
@@ -260,7 +264,7 @@ impl<T> QueuedLink<T> {
     }
 }
 
-/// Counts a drop at the second instant of `span`. The first instant is the latest one of the driver, which may be earlier.
+/// Counts a drop at the second instant of `span`. The first instant is the latest instant of the driver, possibly earlier.
 fn count_drop(drops: &mut Option<Box<Drops>>, span: (Instant, Instant), cause: DropCause) {
     let Drops { counted, ahead } = &mut **drops.get_or_insert_default();
     counted.dropped[cause.index()] += 1;
