@@ -21,7 +21,7 @@ use crate::packet::{Marks, Outputs, PacketInfo};
 /// State machine of a directed link. Packets enter with [`Link::handle_packet`]; packets and their fates come out with [`Link::poll_event`].
 ///
 /// The driver passes packets in, asks [`Link::poll_timeout`] for the next deadline, calls [`Link::handle_timeout`] at that instant, and drains
-/// [`Link::poll_event`] until it returns `None`. A late driver changes no fate, because every event carries the instant at which it happened. The answer of
+/// [`Link::poll_event`] until it returns `None`. A late driver changes no fate, because every event carries its instant. The answer of
 /// `poll_timeout` can change after `handle_packet`, `handle_timeout` and `set_model`.
 ///
 /// At equal instants a packet leaves a queue before the next packet is offered to the queue, and events come in the order of (instant, sequence, copy).
@@ -35,16 +35,16 @@ pub struct Link<P> {
     /// Stages and counters of the link.
     line: Line<P, InLink<P>>,
     traffic: Traffic<P>,
-    /// Buffer for the outputs of stages, empty between calls. A field, so that its memory is reused.
+    /// Buffer for the outputs of stages, empty between calls. A field, for the reuse of its memory.
     outputs: Outputs<InLink<P>>,
 }
 
-/// Packets that have left the stages.
+/// Packets after the stages.
 #[derive(Clone)]
 struct Traffic<P> {
     /// Packets in propagation, in the order of arrival.
     pending: EventQueue<Pending<P>>,
-    /// Events that have happened and have not been polled yet, in the order in which they happened.
+    /// Events before their poll, in the order of happening.
     happened: VecDeque<PacketEvent<P>>,
 }
 
@@ -62,7 +62,7 @@ impl<P: Clone> Link<P> {
         }
     }
 
-    /// Sets the filter of the link. A packet for which `drops` returns true is dropped before all stages. The filter sees the packet and its payload.
+    /// Sets the filter of the link. A packet with `drops` true is dropped before all stages. The filter sees the packet and its payload.
     #[must_use]
     pub fn with_filter(mut self, drops: impl Fn(&Offered<'_, P>) -> bool + Send + Sync + 'static) -> Self {
         self.line.set_filter(Filter::new(drops));
@@ -90,7 +90,7 @@ impl<P: Clone> Link<P> {
             self.drop(now, DropCause::Filter, packet);
             return Ok(());
         }
-        // Without an engine the fate is known at the offer. Only a packet that enters the engine is boxed.
+        // Without an engine the fate is known at the offer. Only a packet for the engine is boxed.
         match self.line.offer(now, None) {
             Outcome::Arrives(at) => self.traffic.pending.push(Pending { at, packet, copy: 0, marks: None }),
             Outcome::Dropped(cause) => self.drop(now, cause, packet),
@@ -116,24 +116,24 @@ impl<P: Clone> Link<P> {
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         let next = self.line.next_wake().into_iter().chain(self.traffic.pending.next_at()).min()?;
-        // Arrivals that are due and not polled yet can lie before `now`.
+        // Due arrivals before their poll can lie before `now`.
         Some(next.max(self.now))
     }
 
-    /// Returns the next event: a packet that arrived or was dropped, or a copy that was made. Returns `None` when all events up to now have been polled.
+    /// Returns the next event: an arrival, a drop, or the making of a copy. Returns `None` when all events up to now have been polled.
     #[must_use]
     #[inline]
     pub fn poll_event(&mut self) -> Option<PacketEvent<P>> {
         if let Some(event) = self.traffic.happened.pop_front() {
             return Some(event);
         }
-        // Without an engine, arrivals stay in `pending` until they are polled, because no later packet depends on them.
+        // Without an engine, arrivals stay in `pending` until the poll, because no later packet depends on an arrival.
         let Pending { at, packet, copy, marks } = self.traffic.pending.pop_due(self.now)?;
         Some(self.arrive(at, packet, copy, marks))
     }
 
     /// Changes the model from `now` on. Packets in propagation keep their delay. A packet in serialisation keeps the bits already sent. Waiting packets are
-    /// served at the new rate, or go on at once if the new model lacks the stage that holds them. Chains and correlations continue from their present state.
+    /// served at the new rate, or go on at once if the new model lacks their stage. Chains and correlations continue from their present state.
     ///
     /// # Errors
     ///
@@ -151,7 +151,7 @@ impl<P: Clone> Link<P> {
         self.line.stats()
     }
 
-    /// Processes all wakes and arrivals up to `now` in order, and keeps the events until they are polled.
+    /// Processes all wakes and arrivals up to `now` in order, and keeps the events for the poll.
     #[inline(always)]
     fn let_happen(&mut self, now: Instant) {
         loop {
@@ -172,6 +172,7 @@ impl<P: Clone> Link<P> {
     #[inline(always)]
     fn arrive(&mut self, at: Instant, packet: InLink<P>, copy: u8, marks: Option<Box<Marks>>) -> PacketEvent<P> {
         let marks = marks.map_or_else(Marks::default, |marks| *marks);
+        // The checksum is checked at the end of the way, so the packet was in flight until now.
         if marks.discarded_on_arrival {
             self.line.drop(DropCause::Checksum);
             return packet.event(at, Fate::Dropped(DropCause::Checksum), copy, marks);
@@ -185,7 +186,7 @@ impl<P: Clone> Link<P> {
     fn drop(&mut self, now: Instant, cause: DropCause, packet: InLink<P>) {
         self.line.drop(cause);
         if !self.line.has_engine() {
-            // Arrivals in `pending` that are due happened before this drop, and must be polled before it.
+            // Due arrivals in `pending` happened before this drop, and must be polled before the drop.
             self.let_happen(now);
         }
         self.traffic.happened(now, Fate::Dropped(cause), packet, 0, Marks::default());
@@ -195,6 +196,7 @@ impl<P: Clone> Link<P> {
 impl<P> Sink<InLink<P>> for Traffic<P> {
     #[inline]
     fn arrives(&mut self, at: Instant, packet: InLink<P>, copy: u8, marks: Marks) {
+        // Nearly all packets have no marks, so an allocation is rare.
         let marks = (marks != Marks::default()).then(|| Box::new(marks));
         self.pending.push(Pending { at, packet, copy, marks });
     }

@@ -1,10 +1,10 @@
-//! The part of a line that decides the fate of a packet, compiled to the smallest form that the link needs.
+//! The deciding part of a line, compiled to the smallest form sufficient for the link.
 //!
 //! | link | compiled to |
 //! | --- | --- |
 //! | a constant delay | one addition |
 //! | outage, loss, jitter, order policy | a function from a packet to its arrival |
-//! | anything else | an engine that keeps packets, copies them and asks to be woken |
+//! | anything else | an engine with packets inside, with copies and wakes |
 
 use alloc::boxed::Box;
 use core::fmt;
@@ -26,7 +26,7 @@ use crate::stages::modulation::ModulationStage;
 use crate::stages::order::{Order, OrderStage};
 use crate::stages::queue::BottleneckStage;
 
-/// The error of a call with an instant before that of an earlier call. The callee is unchanged.
+/// The error of a call with an instant before an earlier call's instant. The callee is unchanged.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct TimeWentBack {
     /// Instant of the failed call.
@@ -65,14 +65,14 @@ pub(crate) enum Outcome {
 /// The compiled form of a link.
 #[derive(Clone, Debug)]
 pub(crate) enum Pipeline<T> {
-    /// A constant delay \[ns\] only. The order stage keeps the latest arrival, which a later change to the order `in-order` needs.
+    /// A constant delay \[ns\] only. The order stage keeps the latest arrival for a later change to the order `in-order`.
     Constant(u64, OrderStage),
     Direct(Box<Direct>),
     Engine(Box<Engine<T>>),
 }
 
 impl<T: Clone> Pipeline<T> {
-    /// Makes the smallest pipeline for this model, or the most general one if `general` is set.
+    /// Makes the smallest pipeline for this model, or the most general pipeline if `general` is set.
     pub(crate) fn new(seed: u64, name: &LinkName, model: LinkModel, general: bool) -> Self {
         match model {
             LinkModel::Fixed(config) if config.is_constant_delay() && !general => {
@@ -85,12 +85,12 @@ impl<T: Clone> Pipeline<T> {
         }
     }
 
-    /// Makes an engine with the stages in `direct` and a bottleneck, which keeps its packets.
+    /// Makes an engine with the stages in `direct` and a bottleneck. The bottleneck keeps its packets.
     pub(crate) fn resumed(now: Instant, direct: Direct, config: LinkConfig, bottleneck: BottleneckStage<T>) -> Self {
         Self::Engine(Box::new(Engine::new(Kind::Staged(Box::new(Staged::resumed(now, direct, config, bottleneck))))))
     }
 
-    /// Returns the first random words of packet number `number`, which [`Pipeline::offer`] takes, or zeros if the packet needs none.
+    /// Returns the first random words of packet number `number` for [`Pipeline::offer`], or zeros if the packet needs no words.
     #[inline]
     pub(crate) fn words(&self, number: u64) -> Words {
         match self {
@@ -99,10 +99,11 @@ impl<T: Clone> Pipeline<T> {
         }
     }
 
-    /// Decides about packet number `number` of this link. `words` holds the packet's first words if they were drawn before.
+    /// Decides about packet number `number` of this link. `words` holds the packet's first words if drawn before.
     #[inline(always)]
     pub(crate) fn offer(&mut self, now: Instant, number: u64, words: Option<Words>) -> Outcome {
         match self {
+            // The order stage notes the arrival even in the usual case, for a later change of the order.
             Self::Constant(delay, order) => Outcome::Arrives(order.arrival(now.saturating_add_nanos(*delay))),
             Self::Direct(direct) => {
                 let words = words.unwrap_or_else(|| direct.words(number));
@@ -115,7 +116,7 @@ impl<T: Clone> Pipeline<T> {
         }
     }
 
-    /// Returns the engine, or `None` if the link has none.
+    /// Returns the engine, or `None` if the link has no engine.
     pub(crate) fn engine(&mut self) -> Option<&mut Engine<T>> {
         match self {
             Self::Engine(engine) => Some(engine),
@@ -123,7 +124,7 @@ impl<T: Clone> Pipeline<T> {
         }
     }
 
-    /// Returns the instant at which the engine must be woken, or `None` if no engine waits.
+    /// Returns the instant of the engine's next wake, or `None` if no engine waits.
     #[inline]
     pub(crate) fn next_wake(&self) -> Option<Instant> {
         match self {
@@ -132,20 +133,21 @@ impl<T: Clone> Pipeline<T> {
         }
     }
 
-    /// Changes the model at `now`. Packets in propagation keep their delay. Packets that leave the engine because of the change are put into `outputs`.
+    /// Changes the model at `now`. Packets in propagation keep their delay. Packets freed from the engine by the change are put into `outputs`.
     pub(crate) fn reconfigure(&mut self, now: Instant, seed: u64, name: &LinkName, model: LinkModel, outputs: &mut Outputs<T>) {
         match (self, model) {
             (Self::Constant(delay, _), LinkModel::Fixed(config)) if config.is_constant_delay() => *delay = constant_nanos(&config),
             (Self::Direct(direct), LinkModel::Fixed(config)) if config.is_direct() => direct.reconfigure(now, &config),
             (Self::Engine(engine), model) => reconfigure_engine(engine, now, seed, name, model, outputs),
             (pipeline, model) => {
-                // The state of the direct stages and the latest arrival go on in the new pipeline. The new pipeline is never a `Constant`, which keeps no
-                // such state.
+                // The state of the direct stages and the latest arrival go on in the new pipeline. The new pipeline is never a `Constant`, because a `Constant`
+                // has no such state.
                 let past = match pipeline {
                     Self::Direct(direct) => Some((**direct).clone()),
                     Self::Constant(delay, order) => {
                         let delay = crate::stages::delay::Delay::constant(core::time::Duration::from_nanos(*delay));
                         let mut direct = Direct::new(seed, name, &LinkConfig { delay, ..LinkConfig::default() });
+                        // The latest arrival goes on, so packets on the way are not overtaken under `in-order`.
                         direct.order = *order;
                         Some(direct)
                     }
@@ -156,6 +158,7 @@ impl<T: Clone> Pipeline<T> {
                         direct.reconfigure(now, &config);
                         Self::Direct(Box::new(direct))
                     }
+                    // Every model beyond a direct link needs an engine.
                     (model, past) => Self::Engine(Box::new(Engine::new(kind(now, seed, name, model, past)))),
                 };
             }
@@ -164,10 +167,11 @@ impl<T: Clone> Pipeline<T> {
 }
 
 fn reconfigure_engine<T: Clone>(engine: &mut Engine<T>, now: Instant, seed: u64, name: &LinkName, model: LinkModel, outputs: &mut Outputs<T>) {
+    // The old model applies up to and including `now`.
     engine.pass(now, outputs);
     match (&mut engine.kind, model) {
-        // Packets inside are at a place in the old order of stages, and go on in that order. New packets meet the new order, with the state of the direct
-        // stages as it is now.
+        // Packets inside are at a place in the old order of stages, and go on in this order. New packets meet the new order, with the present state of the
+        // direct stages.
         (Kind::Staged(staged), model) if model.layout().is_some_and(|layout| layout != staged.layout()) => {
             let past = staged.direct().clone();
             engine.replace(kind(now, seed, name, model, Some(past)));
@@ -177,15 +181,15 @@ fn reconfigure_engine<T: Clone>(engine: &mut Engine<T>, now: Instant, seed: u64,
             let modulation = ModulationStage::new(seed, modulated, now);
             staged.reconfigure(now, modulation.config().clone(), Some(modulation), outputs);
         }
-        // A replay and the kernel's queue take no state over from stages, and give none to them.
+        // A replay and the kernel's queue take no state over from stages, and give no state to stages.
         (_, model) => engine.replace(kind(now, seed, name, model, None)),
     }
 }
 
-/// Makes the engine of a model. `past` holds the direct stages of the pipeline before, if it had any.
+/// Makes the engine of a model. `past` holds the direct stages of the pipeline before, if any.
 fn kind<T: Clone>(now: Instant, seed: u64, name: &LinkName, model: LinkModel, past: Option<Direct>) -> Kind<T> {
     let staged = |config: LinkConfig, modulation| {
-        // Outages of a link that gets stages during the run begin at `now`, not at the beginning of the run.
+        // Outages of a link with stages from a later change begin at `now`, not at the beginning of the run.
         let direct = past.unwrap_or_else(|| {
             let mut direct = Direct::new(seed, name, &LinkConfig::default());
             direct.reconfigure(now, &config);
@@ -201,6 +205,7 @@ fn kind<T: Clone>(now: Instant, seed: u64, name: &LinkName, model: LinkModel, pa
         }
         LinkModel::Replay(log) => Kind::Replay(ReplayStage::new(log)),
         LinkModel::Kernel(netem) => {
+            // The kernel's queue has a random generator of its kind, so the link's stream gives the seed only.
             let seed = Stream::new(seed, name.as_str().as_bytes()).packet(0).first(Purpose::InitialState);
             Kind::Kernel(Box::new(KernelStage::new(netem.qdisc(seed))))
         }

@@ -1,4 +1,4 @@
-//! A link that replays a log of fates.
+//! A link with a log of fates to replay.
 
 use alloc::collections::BinaryHeap;
 use alloc::sync::Arc;
@@ -20,7 +20,7 @@ pub(crate) struct ReplayStage<T> {
     log: Arc<FateLog>,
     /// Instant of each output to come, and its index in `later`. Simultaneous outputs come in the order of the log.
     order: BinaryHeap<Reverse<(Instant, usize)>>,
-    /// Outputs to come; `None` where the output has come out. Emptied when no output is left, so that indices in `order` stay valid.
+    /// Outputs to come; `None` for an output already out. Emptied when no output is left, so indices in `order` stay valid.
     later: Vec<Option<Output<T>>>,
 }
 
@@ -36,8 +36,7 @@ impl<T: Clone> ReplayStage<T> {
             outputs.push(Output { packet, exit: Exit::Dropped(now, DropCause::EndOfLog) });
             return;
         }
-        // A log may record the making of a copy under the number of the packet or under that of the copy. So the n-th copy made is taken as the n-th copy
-        // that ends.
+        // A log may record the making of a copy under the number of the packet or of the copy. So the n-th copy made is taken as the n-th copy with an end.
         let mut copies = records.iter().filter(|record| record.copy > 0 && record.fate.is_end()).map(|record| record.copy);
         for record in records {
             let at = now.saturating_add(after(record));
@@ -46,13 +45,14 @@ impl<T: Clone> ReplayStage<T> {
                 Fate::Dropped(cause) => (record.copy, Exit::Dropped(at, cause)),
                 Fate::Duplicated => (copies.next().unwrap_or(record.copy), Exit::Copied(at)),
             };
+            // The packet's marks of earlier lines stay, and the recorded marks are added.
             let mut packet = packet.clone().as_copy(copy);
             packet.marks.congestion |= record.marked;
             if record.damaged {
                 packet.marks.damage(Some(Damage::unknown()), false);
             }
             let output = Output { packet, exit };
-            // An arrival goes out at once, since the owner keeps packets in propagation. A later drop or copy waits here for its instant.
+            // An arrival goes out at once, because the owner keeps packets in propagation. A later drop or copy waits here for its instant.
             if at == now || matches!(exit, Exit::Arrives(_)) {
                 outputs.push(output);
             } else {
@@ -71,6 +71,7 @@ impl<T: Clone> ReplayStage<T> {
             let Some(Reverse((_, place))) = self.order.pop() else { break };
             outputs.extend(self.later[place].take());
         }
+        // An empty list starts again from index 0, so memory does not grow over the run.
         if self.order.is_empty() {
             self.later.clear();
         }

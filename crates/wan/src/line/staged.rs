@@ -1,12 +1,12 @@
-//! All stages of a link, for packets that wait, are copied, marked or damaged.
+//! All stages of a link, for waiting, copied, marked or damaged packets.
 //!
 //! ```text
 //! physical   mtu ► outage ► loss ► duplication ► corruption ► limit ► bucket ► bottleneck ► slots ► reorder, trace, delay, order
 //! netem      mtu ► outage ► duplication ► loss ► corruption ► limit ► reorder, trace, delay, order ► bucket ► bottleneck ► slots
 //! ```
 //!
-//! A stage that is not configured is `None`, and is not on the route of packets. A packet walks from stage to stage until a stage keeps the packet, drops it,
-//! or lets it out.
+//! A stage without configuration is `None`, and is not on the route of packets. A packet walks from stage to stage until a stage keeps the packet, drops the
+//! packet, or lets the packet out.
 
 use alloc::boxed::Box;
 use alloc::collections::{BinaryHeap, VecDeque};
@@ -85,35 +85,35 @@ pub(crate) struct Staged<T> {
     limit: Option<u64>,
     bucket: Option<Box<TokenBucketStage<T>>>,
     bottleneck: Option<BottleneckStage<T>>,
-    /// Whether the line has a bottleneck in the physical layout, and no other stage that keeps, copies, marks or damages packets. See
+    /// Whether the line has a bottleneck in the physical layout, and no further stage with waiting, copies, marks or damage. See
     /// [`Staged::offer_at_once`].
     is_plain: bool,
     slots: Option<Box<SlotStage<T>>>,
     reorder: ReorderStage<T>,
     trace: Option<PathTrace>,
     listed: Option<Box<ImpairmentStages>>,
-    /// Packets in propagation. Used only in layouts in which propagation is not the last stage (netem).
+    /// Packets in propagation. Used only in layouts with stages after propagation (netem).
     line: BinaryHeap<Propagating<T>>,
-    /// Packets pushed to `line` so far. Orders packets that leave `line` at the same instant.
+    /// Packets pushed to `line` so far. Orders packets with the same instant of departure from `line`.
     line_count: u64,
     modulation: Option<Box<ModulationStage>>,
-    /// Next event and its stage, and (below) the next change of state. Both are computed by `look_ahead` after each change of the stages, because they are
-    /// read more often than they change.
+    /// Next event and its stage, and (below) the next change of state. Both are computed by `look_ahead` after each change of the stages, because reads are
+    /// more frequent than changes.
     next: Option<(Instant, Stage)>,
     next_change: Option<Instant>,
-    /// Buffer for packets that leave a stage, kept so that its memory is used again. Empty between calls.
+    /// Buffer for packets on their way out of a stage, kept for the reuse of its memory. Empty between calls.
     released: VecDeque<Carried<T>>,
 }
 
-/// The configured stages, in the order of the layout. Most lines have two of the ten, so packets and searches for the next event visit these only.
+/// The configured stages, in the order of the layout. Most lines have two of the ten, so packets and searches for the next event visit few stages.
 #[derive(Clone, Debug)]
 struct Route {
     /// The configured stages in the first `count` entries. The rest is not read.
     stages: [Stage; 10],
     count: u8,
-    /// Index of the first configured stage after the limit: only stages from there on can keep a packet.
+    /// Index of the first configured stage after the limit: only later stages can keep a packet.
     keeping: u8,
-    /// Index in `stages` of the first configured stage after a stage, indexed by that stage.
+    /// Index in `stages` of the first configured stage after a stage, indexed by this stage.
     behind: [u8; 10],
 }
 
@@ -121,6 +121,7 @@ impl Route {
     fn new(layout: &[Stage; 10], is_there: impl Fn(Stage) -> bool) -> Self {
         let mut route = Self { stages: *layout, count: 0, keeping: 0, behind: [0; 10] };
         for &stage in layout {
+            // `behind` is set for unconfigured stages too: packets of a removed stage go on from there.
             if is_there(stage) {
                 route.stages[usize::from(route.count)] = stage;
                 route.count += 1;
@@ -133,13 +134,13 @@ impl Route {
         route
     }
 
-    /// Returns the configured stages that can keep a packet: all stages after the limit.
+    /// Returns the configured stages with the ability to keep a packet: all stages after the limit.
     fn keeping(&self) -> &[Stage] {
         &self.stages[usize::from(self.keeping)..usize::from(self.count)]
     }
 }
 
-/// A packet in propagation between two stages. The order is reversed, so that the heap gives the earliest packet first.
+/// A packet in propagation between two stages. The order is reversed, so the heap gives the earliest packet first.
 #[derive(Clone, Debug)]
 struct Propagating<T> {
     until: Instant,
@@ -168,7 +169,7 @@ impl<T> Ord for Propagating<T> {
 }
 
 impl<T: Clone> Staged<T> {
-    /// Makes the stages of this configuration. `direct` holds the stages that decide at once, which may have state from before.
+    /// Makes the stages of this configuration. `direct` holds the stages with immediate decisions, possibly with state from before.
     pub(crate) fn new(now: Instant, direct: Direct, config: LinkConfig, modulation: Option<ModulationStage>) -> Self {
         let mut stages = Self {
             layout: &PHYSICAL,
@@ -200,9 +201,9 @@ impl<T: Clone> Staged<T> {
         stages
     }
 
-    /// Makes the stages of a line that takes over the packets of `bottleneck` and the state of `direct`.
+    /// Makes the stages of a line with the packets of `bottleneck` and the state of `direct`.
     pub(crate) fn resumed(now: Instant, direct: Direct, config: LinkConfig, bottleneck: BottleneckStage<T>) -> Self {
-        // `new` configures the stages in `direct` with the configuration that they have already, which changes nothing.
+        // `new` configures the stages in `direct` with their present configuration, without effect.
         let mut stages = Self { bottleneck: Some(bottleneck), ..Self::new(now, direct, config, None) };
         stages.look_ahead();
         stages
@@ -210,17 +211,18 @@ impl<T: Clone> Staged<T> {
 
     /// Returns the order of the stages.
     pub(crate) fn layout(&self) -> Layout {
+        // The physical layout alone ends with propagation.
         if self.layout[self.layout.len() - 1] == Stage::Propagation { Layout::Physical } else { Layout::Netem }
     }
 
-    /// Returns the stages that decide at once, with their state.
+    /// Returns the stages with immediate decisions, with their state.
     pub(crate) const fn direct(&self) -> &Direct {
         &self.direct
     }
 
-    /// Offers a packet while `inside` other packets are inside the line.
+    /// Offers a packet with `inside` further packets inside the line.
     pub(crate) fn offer(&mut self, now: Instant, packet: Carried<T>, inside: u64, outputs: &mut Outputs<T>) {
-        // Events due come first, so that departures make room. The pass after the walk lets out packets that leave at `now`.
+        // Events due come first, so departures make room. The pass after the walk lets out packets with a departure at `now`.
         self.pass(now, outputs);
         self.walk(0, now, packet, inside, outputs);
         self.look_ahead();
@@ -228,7 +230,7 @@ impl<T: Clone> Staged<T> {
     }
 
     /// Takes packet number `number` if its fate is certain at once, and returns its arrival or the cause of its drop. The fate is certain if no packet is
-    /// inside and the packet leaves the bottleneck by `until`, before which no other packet comes. In all other cases, returns `None` and takes no packet.
+    /// inside and the packet leaves the bottleneck by `until`, before any further packet. In all other cases, returns `None` and takes no packet.
     #[inline]
     pub(crate) fn offer_at_once(&mut self, now: Instant, number: u64, info: PacketInfo, until: Instant) -> Option<Result<Instant, DropCause>> {
         // A next event means that a packet is inside, and a modulator may change a stage before the packet leaves.
@@ -242,10 +244,10 @@ impl<T: Clone> Staged<T> {
         Some(self.direct.offer_through(now, number, words, |_| Ok(departure)))
     }
 
-    /// Returns the instant at which [`Staged::pass`] must be called next, or `None` if no packet waits.
+    /// Returns the instant of the next call of [`Staged::pass`], or `None` if no packet waits.
     pub(crate) fn next_at(&self) -> Option<Instant> {
         let (next, _) = self.next?;
-        // While a packet waits, a change of state may change the instant at which the packet leaves.
+        // While a packet waits, a change of state may change the packet's departure.
         Some(self.next_change.map_or(next, |change| change.min(next)))
     }
 
@@ -263,17 +265,19 @@ impl<T: Clone> Staged<T> {
             let event = self.next.filter(|(at, _)| *at <= now);
             let change = self.next_change.filter(|at| *at <= now);
             match (event, change) {
-                // A packet that leaves at the instant of a change leaves before the change.
+                // A departure at the instant of a change comes before the change.
                 (Some((at, stage)), change) if change.is_none_or(|change| at <= change) => self.release(at, stage, outputs),
                 (_, Some(change)) => self.change(change, outputs),
                 _ => return,
             }
+            // The packet may now be in a further stage, with a next event at the same instant.
             self.look_ahead();
         }
     }
 
-    /// Changes the configuration. Packets in propagation keep their delay. Packets in a stage that is no longer configured go on at once.
+    /// Changes the configuration. Packets in propagation keep their delay. Packets in a removed stage go on at once.
     pub(crate) fn reconfigure(&mut self, now: Instant, config: LinkConfig, modulation: Option<ModulationStage>, outputs: &mut Outputs<T>) {
+        // The old configuration applies up to and including `now`.
         self.pass(now, outputs);
         self.modulation = modulation.map(Box::new);
         self.apply(now, config, outputs);
@@ -306,8 +310,7 @@ impl<T: Clone> Staged<T> {
         self.limit = config.limit;
         self.trace = config.trace;
         self.listed = ImpairmentStages::reconfigured(self.listed.take(), now, &config.listed, self.direct.draws);
-        // Packets of removed stages, with the stage that they leave. The later stages of the physical order come first, so that older packets go on before
-        // newer ones.
+        // Packets of removed stages, with the stage left. The later stages of the physical order come first, so older packets go on before newer packets.
         let mut given_up: Vec<(Stage, Carried<T>)> = Vec::new();
         self.slots = match (self.slots.take(), config.slots) {
             (None, new) => new.map(|new| Box::new(SlotStage::new(new))),
@@ -342,15 +345,16 @@ impl<T: Clone> Staged<T> {
                 None
             }
         };
-        // The route must be that of the new configuration before any packet goes on.
+        // The route must follow the new configuration before any packet goes on.
         self.route = Route::new(self.layout, |stage| self.has(stage));
-        // Packets that the reorder stage holds back go on with their delay, since no later packet would release them.
+        // Packets held back by the reorder stage go on with their delay, because no later packet would release them.
         if config.reorder.is_none() {
             for packet in self.reorder.dismantle() {
                 self.propagate(now, packet, Travel::InOrder, outputs);
             }
         }
         self.reorder.configure(config.reorder);
+        // In a plain line only the bottleneck keeps packets, and the direct stages decide at once.
         let decides = |stage: &Stage| matches!(stage, Stage::Outage | Stage::Loss | Stage::Bottleneck | Stage::Propagation);
         self.is_plain = self.bottleneck.is_some()
             && self.layout() == Layout::Physical
@@ -368,6 +372,7 @@ impl<T: Clone> Staged<T> {
         match stage {
             Stage::Mtu => self.mtu.is_some(),
             Stage::Outage => self.direct.has_outages(),
+            // A trace and listed impairments lose packets too, at the same place.
             Stage::Loss => self.direct.loss.is_some() || self.trace.is_some() || self.listed.is_some(),
             Stage::Duplication => self.duplication.is_some(),
             Stage::Corruption => self.corruption.is_some(),
@@ -379,11 +384,11 @@ impl<T: Clone> Staged<T> {
         }
     }
 
-    /// Returns the next event and its stage, or `None` if no packet waits. Of simultaneous events the one in the last stage of the route comes first, so that
-    /// a departure makes room for packets from stages before.
+    /// Returns the next event and its stage, or `None` if no packet waits. Of simultaneous events the event in the last stage of the route comes first, so a
+    /// departure makes room for packets from stages before.
     fn next_event(&self) -> Option<(Instant, Stage)> {
         let mut next: Option<(Instant, Stage)> = None;
-        // Reversed, so that the comparison with `<` keeps the last stage among simultaneous events.
+        // Reversed, so the comparison with `<` keeps the last stage among simultaneous events.
         for &stage in self.route.keeping().iter().rev() {
             let at = match stage {
                 Stage::Bucket => self.bucket.as_ref().and_then(|bucket| bucket.next_at()),
@@ -406,7 +411,7 @@ impl<T: Clone> Staged<T> {
     }
 
     fn release(&mut self, now: Instant, stage: Stage, outputs: &mut Outputs<T>) {
-        // Taken out of `self`, since `walk_on` borrows `self` while the buffer is drained.
+        // Taken out of `self`, because `walk_on` borrows `self` during the draining of the buffer.
         let mut released = core::mem::take(&mut self.released);
         match stage {
             Stage::Bucket => released.extend(self.bucket.as_mut().and_then(|bucket| bucket.release(now))),
@@ -421,7 +426,7 @@ impl<T: Clone> Staged<T> {
                 }
             }
             Stage::Propagation => {
-                // Propagation has two sources of events. At equal instants, a packet that has propagated goes before a packet held back.
+                // Propagation has two sources of events. At equal instants, a packet after its propagation goes before a packet held back.
                 if self.line.peek().is_some_and(|first| first.until <= now) {
                     released.extend(self.line.pop().map(|first| first.packet));
                 } else {
@@ -441,11 +446,11 @@ impl<T: Clone> Staged<T> {
     }
 
     fn walk_on(&mut self, after: Stage, now: Instant, packet: Carried<T>, outputs: &mut Outputs<T>) {
-        // All stages that keep packets come after the limit, so that no stage ahead reads `inside`.
+        // All stages with waiting packets come after the limit, so no stage ahead reads `inside`.
         self.walk(usize::from(self.route.behind[after as usize]), now, packet, 0, outputs);
     }
 
-    /// Leads a packet through the stages from index `from` of the route on. `inside` is the number of other packets in the line, which the limit reads.
+    /// Leads a packet through the stages from index `from` of the route on. `inside` is the number of further packets in the line, for the limit.
     fn walk(&mut self, from: usize, now: Instant, mut packet: Carried<T>, inside: u64, outputs: &mut Outputs<T>) {
         let draws = self.direct.draws.copy(packet.number, packet.copy);
         for place in from..usize::from(self.route.count) {
@@ -462,7 +467,7 @@ impl<T: Clone> Staged<T> {
                 }
                 Stage::Loss => {
                     if self.loses(now, &packet) {
-                        // A packet that can carry a congestion mark is marked in place of the loss, and goes on.
+                        // An ECN-capable packet is marked in place of the loss, and goes on.
                         if !(self.marks_instead_of_loss && packet.info.ecn_capable) {
                             return drop(outputs, now, DropCause::Loss, packet);
                         }
@@ -473,6 +478,7 @@ impl<T: Clone> Staged<T> {
                     if let Some(chance) = &mut self.duplication
                         && chance.happens(draws.first(Purpose::Duplication))
                     {
+                        // The copy is made before the packet's walk, because the walk consumes the packet.
                         let copy = packet.clone().as_copy(1);
                         outputs.push(Output { packet: copy.clone(), exit: Exit::Copied(now) });
                         let before = outputs.len();
@@ -483,7 +489,7 @@ impl<T: Clone> Staged<T> {
                     }
                 }
                 Stage::Corruption => {
-                    // The damage is drawn by the packet and copy number, so that packet and copy are damaged independently.
+                    // The damage is drawn by the packet and copy number, so packet and copy are damaged independently.
                     if let Some(corruption) = &mut self.corruption
                         && let Some(damage) = corruption.damage(packet.info, draws)
                     {
@@ -505,6 +511,7 @@ impl<T: Clone> Staged<T> {
                 }
                 Stage::Bottleneck => {
                     if let Some(bottleneck) = &mut self.bottleneck {
+                        // A bottleneck keeps even a packet that finds the transmitter idle, for its time of transmission.
                         return bottleneck.offer(now, packet, || draws.first(Purpose::Queue), outputs);
                     }
                 }
@@ -525,10 +532,11 @@ impl<T: Clone> Staged<T> {
         let by_trace = traced.is_some_and(|loss| loss.happens(draws.first(Purpose::TraceLoss)));
         let by_model = self.direct.loss.as_mut().is_some_and(|loss| loss.loses(now, packet.number, draws.first(Purpose::Loss), draws));
         let by_listed = self.listed.as_mut().is_some_and(|listed| listed.loses(now, packet.info));
+        // All three models have advanced above: a short circuit would leave one of them behind.
         by_model || by_trace || by_listed
     }
 
-    /// Places a packet among the others according to the reorder stage, and lets the packet propagate.
+    /// Places a packet among the packets under way according to the reorder stage, and lets the packet propagate.
     fn place(&mut self, now: Instant, packet: Carried<T>, outputs: &mut Outputs<T>) {
         if self.reorder.is_idle() {
             return self.propagate(now, packet, Travel::InOrder, outputs);
@@ -551,19 +559,20 @@ impl<T: Clone> Staged<T> {
         let draws = self.direct.draws.copy(packet.number, packet.copy);
         let mut delay = || {
             let traced = self.trace.as_ref().map_or(0, |trace| trace.at(now).0);
-            // Words have addresses, so a word that the delay does not read can be skipped without an effect on other words.
+            // Words have addresses, so an unread word can be skipped without an effect on further words.
             let word = if self.direct.delay.is_random() { draws.first(Purpose::Jitter) } else { 0 };
             let listed = self.listed.as_mut().map_or(0, |listed| listed.delay_nanos(now, packet.info));
             self.direct.delay.draw_nanos(now, word, draws).saturating_add(traced).saturating_add(listed)
         };
         let wanted = match travel {
             Travel::InOrder => now.saturating_add_nanos(delay()),
+            // A jump draws no delay, as in netem.
             Travel::AtOnce => now,
             Travel::Late(by) => now.saturating_add_nanos(delay()).saturating_add(by),
         };
         let until = self.direct.order.arrival(wanted);
         let last = self.layout[self.layout.len() - 1] == Stage::Propagation;
-        // Without a later stage, the owner of the line keeps the packet until it arrives.
+        // Without a later stage, the owner of the line keeps the packet until its arrival.
         if last || (self.bucket.is_none() && self.bottleneck.is_none() && self.slots.is_none()) {
             outputs.push(Output { packet, exit: Exit::Arrives(until) });
         } else {

@@ -1,4 +1,4 @@
-//! Configuration of a link: all impairments of one direction, in the order in which packets pass their stages.
+//! Configuration of a link: all impairments of one direction, in the order of the stages.
 
 use alloc::format;
 use alloc::string::String;
@@ -25,58 +25,58 @@ use crate::stages::reorder::Reorder;
 use crate::stages::slots::Slots;
 use crate::stages::{corruption, delay, loss, order, outage, path_trace, reorder, slots};
 
-/// Configuration of one directed link: its impairments, each checked when it was made.
+/// Configuration of one directed link: its impairments, each checked at its making.
 ///
 /// The default is the ideal link: no loss, no queue, no delay. Packets pass the stages in the order of the fields, unless `layout` says otherwise.
 #[derive(Clone, PartialEq, Default)]
 pub struct LinkConfig {
-    /// Largest packet that the link takes. `None` admits packets of any size.
+    /// Largest packet for the link. `None` admits packets of any size.
     pub mtu: Option<Bytes>,
-    /// Spans during which the link is down. A packet offered during a span is dropped; packets already on the way arrive.
+    /// Spans with the link down. A packet offered during a span is dropped; packets already on the way arrive.
     pub outages: Outages,
-    /// Model of loss. Loss stands before the queue, so that a lost packet uses no bandwidth.
+    /// Model of loss. Loss stands before the queue, so a lost packet uses no bandwidth.
     pub loss: Loss,
-    /// `true` if a packet that supports ECN is marked instead of lost.
+    /// `true` if an ECN-capable packet is marked instead of lost.
     pub marks_instead_of_loss: bool,
     /// Chance that a packet is sent twice. After this stage the copy passes all later stages independently of the original.
     pub duplication: Chance,
     /// Model of flipped bits. `None` flips no bit.
     pub corruption: Option<Corruption>,
-    /// Number of packets that may be inside the link, waiting and propagating together, when another packet is offered. `None` sets no limit.
+    /// Greatest number of packets inside the link, waiting and propagating together, at the offer of another packet. `None` sets no limit.
     pub limit: Option<u64>,
-    /// Bucket that limits bursts. `None` lets every burst pass.
+    /// Bucket against bursts. `None` lets every burst pass.
     pub token_bucket: Option<TokenBucket>,
-    /// Rate at which packets are serialised, and the queue before the serialiser. `None` means an unlimited rate, at which no packet waits.
+    /// Rate of serialisation, and the queue before the serialiser. `None` means an unlimited rate, without waiting.
     pub bottleneck: Option<Bottleneck>,
-    /// Slots in which the link sends. `None` means that the link sends at any time.
+    /// Slots for sending. Under `None` the link sends at any time.
     pub slots: Option<Slots>,
-    /// Packets that are put out of order on purpose.
+    /// Packets put out of order on purpose.
     pub reorder: Option<Reorder>,
     /// Recorded delay and loss, in addition to `delay` and `loss`.
     pub trace: Option<PathTrace>,
     /// Propagation delay with its jitter.
     pub delay: Delay,
-    /// Impairments that describe themselves. Their losses come after `loss`, and their delays are added to `delay`.
+    /// Self-describing impairments. Their losses come after `loss`, and their delays are added to `delay`.
     pub listed: Impairments,
-    /// Policy that says whether a packet may overtake another packet.
+    /// Policy of overtaking between packets.
     pub order: Order,
-    /// Order in which packets pass the stages.
+    /// Order of the stages on a packet's way.
     pub layout: Layout,
 }
 
-/// Order in which packets pass the stages.
+/// Order of the stages on a packet's way.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Layout {
     /// Order of the fields of [`LinkConfig`]: the network's impairments, then the queue, then propagation.
     #[default]
     Physical,
-    /// Order of `netem`: duplication comes before loss, and rate and slots come after the delay, so that packets queue after propagation.
+    /// Order of `netem`: duplication comes before loss, and rate and slots come after the delay, so packets queue after propagation.
     Netem,
 }
 
 impl fmt::Debug for LinkConfig {
-    /// Shows the listed impairments only if at least one is configured, because fingerprints of records are computed from this text and must not change when
-    /// the list grows.
+    /// Shows the listed impairments only if at least one is configured, because fingerprints of records are computed from this text and must not change with a
+    /// longer list.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut shown = f.debug_struct("LinkConfig");
         shown.field("mtu", &self.mtu).field("outages", &self.outages).field("loss", &self.loss);
@@ -109,27 +109,28 @@ impl LinkConfig {
             || self.reorder.is_some()
             || self.trace.is_some()
             || self.listed != Impairments::default()
+            // Of the disciplines only RED draws, for its drops and marks.
             || self.bottleneck.as_ref().is_some_and(|bottleneck| matches!(bottleneck.discipline, Discipline::Red(_)))
     }
 
     /// Returns whether the link only delays packets, every packet by the same span.
     #[must_use]
     pub fn is_constant_delay(&self) -> bool {
-        // A link with another order policy is excluded: after a live change to a shorter delay, later packets may overtake. The layout is ignored,
+        // A link with a different order policy is excluded: after a live change to a shorter delay, later packets may overtake. The layout is ignored,
         // because a link with one stage has no order of stages.
         *self == Self { layout: self.layout, delay: Delay::constant(self.delay.mean()), ..Self::default() }
     }
 
-    /// Returns whether a packet's fate is known as soon as the packet is offered, and no packet is copied. Such a link holds and counts no packet.
+    /// Returns whether a packet's fate is known at its offer, and no packet is copied. Such a link holds and counts no packet.
     pub(crate) fn is_direct(&self) -> bool {
         // Outages, loss, delay and order follow each other in the same order in both layouts, so either layout is accepted.
         let Self { layout, outages, loss, delay, order, .. } = self.clone();
         *self == Self { layout, outages, loss, delay, order, ..Self::default() }
     }
 
-    /// Returns the configuration without its bottleneck, and without a token bucket in which no packet of `load` waits.
+    /// Returns the configuration without its bottleneck, and without a token bucket if no packet of `load` waits there.
     fn without_queues(&self, load: Load) -> Self {
-        // After jitter, packets can be closer together than they were offered. In the layout of netem the bucket comes after jitter.
+        // After jitter, packets can be closer together than at their offer. In the layout of netem the bucket comes after jitter.
         let keeps_gaps = self.layout == Layout::Physical || self.delay.jitter().is_none();
         let token_bucket = self.token_bucket.filter(|bucket| !(keeps_gaps && bucket.lets_all_pass(load)));
         Self { bottleneck: None, token_bucket, ..self.clone() }
@@ -143,12 +144,13 @@ impl LinkConfig {
     /// Returns whether a packet of `load` can wait for the serialiser or for tokens.
     #[must_use]
     pub fn makes_wait(&self, load: Load) -> bool {
+        // In the layout of netem the gaps before the bottleneck are the gaps after the delay, so the load says nothing.
         let waits_for_line =
             self.bottleneck.as_ref().is_some_and(|bottleneck| self.layout == Layout::Netem || bottleneck.time_without_wait(load).is_none());
         waits_for_line || self.without_queues(load).token_bucket.is_some()
     }
 
-    /// Returns the span by which the link delays every packet of `load`, or `None` if the link does anything else. The span is the transmission time, if no
+    /// Returns the link's delay of every packet of `load`, or `None` if the link does more. The span is the transmission time, if no
     /// packet waits for a transmission, plus the propagation delay.
     #[must_use]
     pub fn constant_delay_of(&self, load: Load) -> Option<Duration> {
@@ -163,7 +165,7 @@ const MTU: [Key; 1] = [usual("mtu", Form::AnyOf(&[Form::Size, UNLIMITED]), "\"un
 const LIMIT: [Key; 1] =
     [usual("limit", Form::Like(&["1000 packets", "unlimited"]), "\"unlimited\"", "How many packets may be inside, waiting and propagating together")];
 
-/// Parameters of a link, grouped by stage, in the order in which `explain` lists them.
+/// Parameters of a link, grouped by stage, in the order of `explain`.
 pub const LINK_PARAMETERS: [&[Key]; 14] = [
     &delay::KEYS,
     &order::KEYS,

@@ -1,4 +1,4 @@
-//! Corruption: bits of a packet that are flipped on the way.
+//! Corruption: bits of a packet flipped on the way.
 
 use alloc::collections::BTreeSet;
 use alloc::format;
@@ -21,7 +21,7 @@ use crate::random::{PacketDraws, Purpose, unit};
 pub struct Corruption {
     /// Way of choosing bits.
     pub bits: Flips,
-    /// Bytes whose bits may be flipped, counted from the packet's begin. `None` means the whole packet. Bytes after the packet's end are ignored, and so are
+    /// Bytes with possibly flipped bits, counted from the packet's begin. `None` means the whole packet. Bytes after the packet's end are ignored, and so are
     /// bytes from 65,536 on, because no datagram is longer.
     pub within: Option<Range<u64>>,
     /// Treatment of a damaged packet by the receiver.
@@ -45,15 +45,15 @@ pub enum Flips {
 /// Treatment of a damaged packet by the receiver.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Checksum {
-    /// The receiver discards the packet on arrival, like a network stack whose checksum fails. Damage that a checksum misses is not modelled.
+    /// The receiver discards the packet on arrival, like a network stack with a failed checksum. Damage missed by a checksum is not modelled.
     #[default]
     Discards,
     /// The receiver takes the packet, because the checksum was computed after the damage or does not exist.
     Passes,
 }
 
-/// Number of bytes at the begin of a packet that can be damaged. A bound is needed because the size of a packet is a number without memory, but the damage to
-/// a packet is a list of bits.
+/// Number of bytes at the begin of a packet within reach of damage. A bound is needed because the size of a packet is a number without memory, but the damage
+/// to a packet is a list of bits.
 const LONGEST: u64 = 1 << 16;
 
 /// Stage with the configuration and the state of the chance of damage.
@@ -96,6 +96,7 @@ impl CorruptionStage {
             }
             Flips::Rate(rate) => each_with(count, rate, packet),
         };
+        // Drawn numbers count from the first allowed bit.
         Damage::of(bits.into_iter().map(|bit| first + bit).collect())
     }
 }
@@ -108,7 +109,7 @@ fn some_of(count: u64, wanted: u32, packet: PacketDraws) -> Vec<u64> {
     for last in count.saturating_sub(wanted.into())..count {
         // One word per chosen bit, whatever was chosen before.
         let candidate = below(last + 1, more.next_word());
-        // `last` is above all numbers chosen in earlier rounds, so it is new.
+        // `last` is above all numbers chosen in earlier rounds, so `last` is new.
         if !chosen.insert(candidate) {
             chosen.insert(last);
         }
@@ -121,7 +122,7 @@ fn below(bound: u64, word: u64) -> u64 {
     ((u128::from(bound) * u128::from(word)) >> 64) as u64
 }
 
-/// Returns the numbers below `count` of a choice that takes each number with probability `rate`. Gaps between chosen numbers are geometric, and are drawn by
+/// Returns the numbers below `count` of a choice of each number with probability `rate`. Gaps between chosen numbers are geometric, and are drawn by
 /// inversion.
 fn each_with(count: u64, rate: Probability, packet: PacketDraws) -> Vec<u64> {
     // At the rates 0 and 1 the logarithm below would be zero or infinite.
@@ -137,6 +138,7 @@ fn each_with(count: u64, rate: Probability, packet: PacketDraws) -> Vec<u64> {
     let mut next = 0_u64;
     loop {
         // 1 − u lies in (0, 1], so its logarithm is finite.
+        // Inversion of P(gap ≥ k) = (1 − rate)^k.
         let gap = libm::floor(libm::log(1.0 - unit(draws.next_word())) / log_of_whole);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative, and saturates far beyond any packet")]
         let gap = gap as u64;

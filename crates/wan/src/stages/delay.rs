@@ -1,4 +1,4 @@
-//! Propagation delay with jitter: configuration, checks, and the stage that draws the delay of each packet.
+//! Propagation delay with jitter: configuration, checks, and the stage with the delay of each packet.
 
 use alloc::boxed::Box;
 use alloc::format;
@@ -38,8 +38,8 @@ pub enum Correlation {
     None,
     /// Autocorrelation of the delays at lag one, whatever the time between packets. φ follows from the autocorrelation and the law.
     PerPacket(f64),
-    /// Correlation time τ, with φ = e^(−Δ/τ) for packets Δ apart. The chain is an Ornstein–Uhlenbeck process, and the speed at which the delay changes does
-    /// not depend on the number of packets. If τ is far above the spacing of packets, packets rarely overtake each other.
+    /// Correlation time τ, with φ = e^(−Δ/τ) for packets Δ apart. The chain is an Ornstein–Uhlenbeck process, and the speed of change of the delay does not
+    /// depend on the number of packets. If τ is far above the spacing of packets, packets rarely overtake each other.
     InTime(Duration),
 }
 
@@ -58,7 +58,7 @@ pub struct Delay {
     jitter: Option<Arc<Checked>>,
 }
 
-/// Checked jitter, with the law and the memory computed from it. Shared by all links with this delay, so that both are computed once.
+/// Checked jitter, with the resulting law and memory. Shared by all links with this delay, so both are computed once.
 #[derive(PartialEq, Debug)]
 struct Checked {
     jitter: Jitter,
@@ -74,7 +74,7 @@ enum Memory {
     InTime { tau_nanos: f64 },
 }
 
-/// Reason for which a delay is refused.
+/// Reason for the refusal of a delay.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum DelayError {
@@ -88,7 +88,7 @@ pub enum DelayError {
         sd: Duration,
         /// Floor.
         floor: Duration,
-        /// Largest deviation that is accepted.
+        /// Largest accepted deviation.
         largest: Duration,
     },
     /// The floor lies above the mean.
@@ -100,14 +100,14 @@ pub enum DelayError {
     },
     /// Delays with this law cannot have this correlation.
     Correlation {
-        /// Correlation that was asked for.
+        /// Correlation asked for.
         asked: f64,
         /// Least correlation of delays with this law.
         least: f64,
     },
     /// The correlation time is zero.
     NoTime,
-    /// The mean exceeds 292 years, the longest span in signed nanoseconds, or the deviation exceeds half of that.
+    /// The mean exceeds 292 years, the longest span in signed nanoseconds, or the deviation exceeds half of this span.
     TooLong,
 }
 
@@ -137,11 +137,11 @@ impl fmt::Display for DelayError {
 
 impl core::error::Error for DelayError {}
 
-/// Longest delay: the nanoseconds that an `i64` holds. A deviation may have half of it.
+/// Longest delay: the nanoseconds of an `i64`. A deviation may have half of this.
 const LONGEST: Duration = Duration::from_nanos(i64::MAX.unsigned_abs());
 
 impl Delay {
-    /// Returns a delay that is the same for all packets.
+    /// Returns the same delay for all packets.
     #[must_use]
     pub const fn constant(mean: Duration) -> Self {
         Self { mean, jitter: None }
@@ -151,7 +151,7 @@ impl Delay {
     ///
     /// # Errors
     ///
-    /// [`DelayError`] if the law does not stay above the floor and cannot be cut there, if it cannot have the correlation, or if the spans cannot be
+    /// [`DelayError`] if the law does not stay above the floor and cannot be cut there, if the law cannot have the correlation, or if the spans cannot be
     /// counted.
     pub fn with_jitter(mean: Duration, jitter: Jitter) -> Result<Self, DelayError> {
         if mean > LONGEST || jitter.sd > LONGEST / 2 {
@@ -170,6 +170,7 @@ impl Delay {
                 phi => Memory::PerPacket(phi),
             },
         };
+        // Without deviation there is nothing to draw, so the delay is constant.
         let jitters = !jitter.sd.is_zero();
         Ok(Self { mean, jitter: jitters.then(|| Arc::new(Checked { jitter, law, memory })) })
     }
@@ -216,7 +217,7 @@ fn explain(error: LawError, mean: Duration, jitter: &Jitter) -> DelayError {
     }
 }
 
-/// Delay stage, which draws the delay of each packet.
+/// Delay stage, with the draw of each packet's delay.
 #[derive(Clone, Debug)]
 pub(crate) struct DelayStage {
     mean_nanos: u64,
@@ -227,7 +228,7 @@ pub(crate) struct DelayStage {
 #[derive(Clone, Debug)]
 enum StageLaw {
     Constant,
-    /// Normal jitter without floor and without correlation: the most frequent law, for which the stage needs no shared data.
+    /// Normal jitter without floor and without correlation: the most frequent law, without need for shared data.
     Normal {
         sd_nanos: f64,
     },
@@ -245,7 +246,7 @@ struct Correlated {
 
 impl DelayStage {
     pub(crate) fn new(delay: &Delay) -> Self {
-        // The cheapest way of drawing that fits is chosen once, not at each packet.
+        // The cheapest fitting way of drawing is chosen once, not at each packet.
         let law = match &delay.jitter {
             None => StageLaw::Constant,
             Some(checked) => match (&checked.jitter, checked.memory) {
@@ -269,7 +270,7 @@ impl DelayStage {
     /// Sets the delay of later packets. A chain of correlated delays continues from its present value.
     pub(crate) fn reconfigure(&mut self, delay: &Delay) {
         let before = core::mem::replace(self, Self::new(delay));
-        // The chain is standard normal under every law, so that its value is valid for the new law too.
+        // The chain is standard normal under every law, so its value is valid for the new law too.
         if let (StageLaw::Correlated(before), StageLaw::Correlated(now)) = (before.law, &mut self.law) {
             now.chain = before.chain;
         }
@@ -298,13 +299,14 @@ impl DelayStage {
                     outside_the_core(word, || more.next_word())
                 });
                 let deviation = sd_nanos * normal;
+                // A large negative deviation ends at a delay of zero: the floor of this law.
                 self.mean_nanos.saturating_add_signed(nearest(deviation))
             }
             StageLaw::Independent(_) | StageLaw::Correlated(_) => self.draw_by_law(purpose, now, word, packet),
         }
     }
 
-    /// Returns a delay \[ns\] of the laws that are not drawn inline.
+    /// Returns a delay \[ns\] of the laws without inline draw.
     #[inline(never)]
     fn draw_by_law(&mut self, purpose: Purpose, now: Instant, word: u64, packet: PacketDraws) -> u64 {
         let mut more = packet.more(purpose);
@@ -319,6 +321,7 @@ impl DelayStage {
                     let phi = match checked.memory {
                         Memory::None => 0.0,
                         Memory::PerPacket(phi) => phi,
+                        // φ = e^(−Δ/τ) of an Ornstein–Uhlenbeck process, with Δ the time since the packet before.
                         Memory::InTime { tau_nanos } => libm::exp(-nanos(now.saturating_duration_since(at)) / tau_nanos),
                     };
                     phi * before + fresh_share(phi) * fresh
@@ -330,7 +333,7 @@ impl DelayStage {
     }
 }
 
-/// Law of correlated delays, for many links each of which keeps its own chain.
+/// Law of correlated delays, for many links with a chain each.
 #[derive(Clone, Debug)]
 pub(crate) struct CorrelatedDelays {
     marginal: Marginal,
@@ -350,7 +353,7 @@ impl CorrelatedDelays {
     pub(crate) fn new(delay: &Delay) -> Option<Self> {
         let checked = delay.jitter.as_ref()?;
         let Memory::PerPacket(phi) = checked.memory else { return None };
-        // A gamma law gets a form of its own, without the choice between laws at each packet.
+        // A gamma law gets a separate form, without the choice between laws at each packet.
         let marginal = checked.law.as_gamma().map_or_else(|| Marginal::Other(Arc::clone(checked)), Marginal::Gamma);
         Some(Self { marginal, phi, fresh_share: fresh_share(phi) })
     }
@@ -362,6 +365,7 @@ impl CorrelatedDelays {
             let mut more = packet.more(Purpose::Jitter);
             outside_the_core(word, || more.next_word())
         });
+        // The first value has the stationary law of the chain, so no start-up transient exists.
         *chain = if chain.is_nan() { fresh } else { self.phi * *chain + self.fresh_share * fresh };
         count(match &self.marginal {
             Marginal::Gamma(law) => law.at_normal(*chain),
@@ -369,7 +373,7 @@ impl CorrelatedDelays {
         })
     }
 
-    /// Returns the cubics that give most delays of several links at once, or `None` if the law has no cubics.
+    /// Returns the cubics for most delays of several links at once, or `None` if the law has no cubics.
     pub(crate) fn cubics(&self) -> Option<GammaCubics> {
         match &self.marginal {
             Marginal::Gamma(law) => law.cubics(),
@@ -377,7 +381,7 @@ impl CorrelatedDelays {
         }
     }
 
-    /// Returns the next values of several chains, given the packets' random words. A value is NaN for a first packet, and for the few packets that need
+    /// Returns the next values of several chains, given the packets' random words. A value is NaN for a first packet, and for the few packets with need for
     /// further random words.
     #[inline(always)]
     pub(crate) fn following<const N: usize>(&self, chains: &[f64; N], words: &[u64; N]) -> [f64; N] {
@@ -392,6 +396,7 @@ impl CorrelatedDelays {
 
 /// Returns √(1 − φ²), the factor of a fresh normal number in a chain of variance one.
 fn fresh_share(phi: f64) -> f64 {
+    // Written as a product, so no digits cancel for φ near 1.
     libm::sqrt((1.0 - phi) * (1.0 + phi))
 }
 
@@ -406,8 +411,8 @@ const SMALL: f64 = 2_251_799_813_685_248.0;
 
 /// Returns the nearest whole number, and of two equally near numbers the even number. Saturates beyond 2^63.
 ///
-/// Adding 1.5·2^52 leaves no bits for a fraction, so that the sum is rounded and its lower bits hold the whole number. Below 2^51 the result is that of
-/// `rint`, without the call to `libm`.
+/// Adding 1.5·2^52 leaves no bits for a fraction, so the sum is rounded and its lower bits hold the whole number. Below 2^51 the result is equal to `rint`,
+/// without the call to `libm`.
 #[inline]
 #[expect(clippy::cast_possible_truncation, reason = "saturates")]
 fn nearest(number: f64) -> i64 {
@@ -445,7 +450,7 @@ static JITTER_TABLE: Table = Table::of(&[&[
 const LAWS: [(&str, &str); 8] = words(&Distribution::CHOICES);
 
 impl Distribution {
-    /// Names of the laws that need no file, each with its value and its description.
+    /// Names of the laws without a file, each with its value and its description.
     pub const CHOICES: Choices<Self, 8> = [
         ("normal", Self::Normal, "Gaussian, cut off at the floor"),
         ("uniform", Self::Uniform, "equally likely between two ends"),
@@ -466,6 +471,7 @@ impl Delay {
     /// Returns the mean and the jitter in words.
     pub(crate) fn words(&self) -> String {
         let mean = Span(self.mean());
+        // A constant delay has no law to describe.
         let Some(Jitter { sd, distribution, floor, correlation }) = self.jitter() else { return mean.to_string() };
         let floor = if *floor == Duration::ZERO { String::new() } else { format!(", never below {}", Span(*floor)) };
         let memory = match correlation {

@@ -1,4 +1,4 @@
-//! Trait of impairments that describe themselves: parameters, words, figures, and the stage that carries the impairment out.
+//! Trait of self-describing impairments: parameters, words, figures, and the stage with the effect.
 //!
 //! An impairment of this kind is one file and one line in [the list](super::list). Readers of files, `--set`, live changes, schemas, `explain`, configured
 //! figures and the analysis take everything from this trait.
@@ -14,9 +14,9 @@ use crate::packet::PacketInfo;
 use crate::parameters::Key;
 use crate::random::Stream;
 
-/// Configuration of an impairment, checked when the configuration was made.
+/// Configuration of an impairment, checked at its making.
 pub(crate) trait Impairment: Clone + PartialEq + Debug {
-    /// Stage that carries the impairment out, with its state.
+    /// Stage with the effect of the impairment, with its state.
     type Stage: ImpairmentStage<Config = Self>;
 
     /// Key of the impairment in a table of link keys, with the default `"none"` and the form: a table of parameters, or `"none"`.
@@ -32,19 +32,19 @@ pub(crate) trait Impairment: Clone + PartialEq + Debug {
     /// Returns the impairment in words with its numbers, as one stage of a line.
     fn words(&self) -> String;
 
-    /// Returns mean and variance of the delay that the impairment adds to a packet in the long run.
+    /// Returns mean and variance of the impairment's addition to a packet's delay in the long run.
     fn extra_delay(&self) -> ExtraDelay;
 }
 
-/// Stage of an impairment. Random numbers of a stage are addressed by the number of an event and never by the number of a call, so that results do not depend
-/// on how often the stage is asked.
+/// Stage of an impairment. Random numbers of a stage are addressed by the number of an event and never by the number of a call, so results do not depend on the
+/// number of calls.
 pub(crate) trait ImpairmentStage: Clone + Debug {
     /// Configuration of the impairment.
     type Config;
 
-    /// Returns the stage for the configuration `config`, which holds from `now` on, or for no configuration. `before` is the previous stage. A stage may stay
-    /// although it has no configuration, so that no random number is drawn twice when a configuration comes back. `code` is the code of the impairment's
-    /// random numbers, for [`Purpose::Listed`](crate::random::Purpose::Listed).
+    /// Returns the stage for the configuration `config` from `now` on, or for no configuration. `before` is the previous stage. A stage may stay without a
+    /// configuration, so no random number is drawn twice if a configuration comes back. `code` is the code of the impairment's random numbers, for
+    /// [`Purpose::Listed`](crate::random::Purpose::Listed).
     fn reconfigured(before: Option<Self>, now: Instant, config: Option<&Self::Config>, draws: Stream, code: u8) -> Option<Self>;
 
     /// Returns whether a packet offered `now` is lost. The loss counts as [`DropCause::Loss`](crate::DropCause::Loss).
@@ -52,7 +52,7 @@ pub(crate) trait ImpairmentStage: Clone + Debug {
         false
     }
 
-    /// Returns the additional delay \[ns\] of a packet that begins to propagate `now`. `now` never decreases from call to call.
+    /// Returns the additional delay \[ns\] of a packet with its propagation beginning `now`. `now` never decreases from call to call.
     fn delay_nanos(&mut self, _now: Instant, _packet: PacketInfo) -> u64 {
         0
     }
@@ -67,7 +67,7 @@ pub struct ExtraDelay {
     pub variance: f64,
 }
 
-/// Reason for which values of parameters are refused.
+/// Reason for the refusal of values of parameters.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Refusal {
     /// Name of the refused parameter.
@@ -76,7 +76,7 @@ pub struct Refusal {
     pub message: String,
 }
 
-/// Value of a parameter, of the kind that the parameter's form names.
+/// Value of a parameter, of the kind of the parameter's form.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum ParameterValue {
     /// Value of [`Form::Duration`](crate::parameters::Form::Duration) and [`Form::PositiveDuration`](crate::parameters::Form::PositiveDuration).
@@ -100,7 +100,7 @@ pub enum ParameterValue {
 macro_rules! values_of_forms {
     ($($form:ident: $type:ty,)*) => {$(
         impl TryFrom<ParameterValue> for $type {
-            /// The refused value, which is of another form.
+            /// The refused value, of a different form.
             type Error = ParameterValue;
 
             fn try_from(value: ParameterValue) -> Result<Self, ParameterValue> {
@@ -120,7 +120,7 @@ values_of_forms! {
     Word: &'static str,
 }
 
-/// Values of parameters by key, defaults included. A parameter that has no default and is not given has no entry.
+/// Values of parameters by key, defaults included. A missing parameter without a default has no entry.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Values(pub Vec<(&'static str, ParameterValue)>);
 

@@ -1,7 +1,7 @@
-//! List of the impairments that describe themselves. One line adds an impairment: `code => field: module::Type`.
+//! List of the self-describing impairments. One line adds an impairment: `code => field: module::Type`.
 //!
 //! A code is part of the address of each random number, and so of every recorded result. A code therefore never changes and is never used twice. A code is
-//! even and at least 14, so that no other purpose shares its random words.
+//! even and at least 14, so no further purpose shares its random words.
 
 use alloc::boxed::Box;
 use alloc::string::String;
@@ -17,20 +17,20 @@ use crate::random::Stream;
 
 macro_rules! impairments {
     ($($code:literal => $field:ident: $type:path,)*) => {
-        /// Impairments of a link that describe themselves. By default no impairment is configured.
+        /// Self-describing impairments of a link. By default no impairment is configured.
         #[derive(Clone, PartialEq, Default)]
         pub struct Impairments {
             $($field: Option<$type>,)*
         }
 
         impl Impairments {
-            /// Keys of all impairments, in the order in which packets pass the impairments.
+            /// Keys of all impairments, in the order of the impairments on a packet's way.
             pub const KEYS: &[Key] = &[$(<$type as Impairment>::KEY,)*];
 
             /// Codes of the impairments' random numbers, in the order of [`KEYS`](Self::KEYS).
             pub(crate) const CODES: &[u8] = &[$($code,)*];
 
-            /// Sets the impairment with the key `key`, or removes the impairment if `values` is `None`. A key that no impairment has is ignored.
+            /// Sets the impairment with the key `key`, or removes the impairment if `values` is `None`. An unknown key is ignored.
             ///
             /// # Errors
             ///
@@ -61,7 +61,7 @@ macro_rules! impairments {
         }
 
         impl fmt::Debug for Impairments {
-            /// Shows only configured impairments, so that the text of a link does not change when the list grows.
+            /// Shows only configured impairments, so the text of a link does not change with a longer list.
             fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 let mut shown = f.debug_struct("Impairments");
                 $(if let Some(config) = &self.$field {
@@ -81,6 +81,7 @@ macro_rules! impairments {
         impl ImpairmentStages {
             /// Returns the stages with the configuration `config` from `now` on, or `None` if there were no stages and `config` is empty.
             pub(crate) fn reconfigured(before: Option<Box<Self>>, now: Instant, config: &Impairments, draws: Stream) -> Option<Box<Self>> {
+                // A link without such impairments needs no allocation.
                 if before.is_none() && *config == Impairments::default() {
                     return None;
                 }
@@ -89,8 +90,8 @@ macro_rules! impairments {
                 Some(stages)
             }
 
-            /// Returns whether any impairment loses the packet. Every impairment is asked even after a loss, so that the state of a stage does not depend on
-            /// other stages.
+            /// Returns whether any impairment loses the packet. Every impairment is asked even after a loss, so the state of a stage does not depend on further
+            /// stages.
             pub(crate) fn loses(&mut self, now: Instant, packet: PacketInfo) -> bool {
                 let mut lost = false;
                 $(lost |= self.$field.as_mut().is_some_and(|stage| stage.loses(now, packet));)*

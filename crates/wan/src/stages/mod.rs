@@ -1,6 +1,6 @@
-//! Stages of a link. Each file holds one impairment: its parameters with their checks, and the stage that keeps the impairment's state.
+//! Stages of a link. Each file holds one impairment: its parameters with their checks, and the stage with the impairment's state.
 //!
-//! [`config`] lists the stages in the order in which packets pass them.
+//! [`config`] lists the stages in their order on a packet's way.
 
 pub(crate) mod config;
 pub(crate) mod corruption;

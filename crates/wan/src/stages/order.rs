@@ -3,22 +3,22 @@
 use crate::parameters::{Choices, Form, Key, usual, words};
 use cohaptic_units::Instant;
 
-/// Order policy of a link. The policy is applied last: the stage sees arrival instants and can only postpone them.
+/// Order policy of a link. The policy is applied last: the stage sees arrival instants and can only postpone an arrival.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Order {
     /// A packet with a shorter delay overtakes. The marginal law of the delay is the configured law.
     #[default]
     AllowReordering,
-    /// No packet arrives before an earlier packet: Dₙ = max(aₙ + dₙ, Dₙ₋₁). Packets that must wait arrive later than the configured law says.
+    /// No packet arrives before an earlier packet: Dₙ = max(aₙ + dₙ, Dₙ₋₁). Waiting packets arrive later than by the configured law.
     InOrder,
 }
 
-/// Stage that applies the policy, with the latest arrival so far.
+/// Stage with the policy and the latest arrival so far.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct OrderStage {
     policy: Order,
-    /// Latest arrival so far. Tracked even while reordering is allowed, so that after a live change to `in-order` no packet overtakes the packets already on
-    /// the way.
+    /// Latest arrival so far. Tracked even while reordering is allowed, so after a live change to `in-order` no packet overtakes the packets already on the
+    /// way.
     latest: Instant,
 }
 
@@ -31,7 +31,7 @@ impl OrderStage {
         self.policy = policy;
     }
 
-    /// Returns the arrival that the policy allows for a packet that would arrive at `wanted`.
+    /// Returns the allowed arrival of a packet with the wanted arrival `wanted`.
     #[inline]
     pub(crate) fn arrival(&mut self, wanted: Instant) -> Instant {
         self.latest = self.latest.max(wanted);

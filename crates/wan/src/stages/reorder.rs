@@ -1,4 +1,4 @@
-//! Reordering: packets that are put out of order on purpose.
+//! Reordering: packets put out of order on purpose.
 
 use alloc::collections::VecDeque;
 use alloc::format;
@@ -15,30 +15,30 @@ use crate::laws::chance::{Chance, ChanceStage};
 use crate::packet::Carried;
 use crate::parameters::{Form, Key, MOST_OF_32_BITS, Table, optional, usual};
 
-/// Choice of packets that leave their place in the order, and the kind of displacement.
+/// Choice of packets for a displacement in the order, and the kind of displacement.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Reorder {
-    /// Chance that a packet leaves its place.
+    /// Chance of a packet's displacement.
     pub packets: Chance,
     /// Displacement of a chosen packet.
     pub how: Displacement,
 }
 
-/// Displacement of a packet that leaves its place.
+/// Displacement of a packet from its place.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Displacement {
-    /// The packet jumps ahead: it has no delay and overtakes the packets under way (netem's reordering). A packet may jump only if at least `gap` − 1
+    /// The packet jumps ahead: the packet has no delay and overtakes the packets under way (netem's reordering). A packet may jump only if at least `gap` − 1
     /// packets came since the last jump; with 1, any packet may.
     Jump {
         /// Least distance from a jump to the next jump, in packets.
         gap: NonZeroU32,
     },
-    /// The packet is held until a number of later packets has passed it. With 1, two neighbours change places. If too few packets pass, the packet continues
+    /// The packet is held until a number of later packets has passed. With 1, two neighbours change places. If too few packets pass, the packet continues
     /// after `at_most`.
     Behind {
-        /// Number of packets that pass the held packet.
+        /// Number of packets to pass the held packet.
         packets: NonZeroU32,
-        /// Longest time for which the packet is held.
+        /// Longest time of the hold.
         at_most: Duration,
     },
     /// The packet takes a time in addition to its delay.
@@ -61,21 +61,21 @@ pub(crate) enum Placed<T> {
     Held,
 }
 
-/// Stage with the packets that it holds.
+/// Stage with its held packets.
 #[derive(Clone, Debug)]
 pub(crate) struct ReorderStage<T> {
     config: Option<Reorder>,
     packets: Option<ChanceStage>,
-    /// Number of packets since the last packet that left its place.
+    /// Number of packets since the last displaced packet.
     since_jump: u32,
-    /// Held packets in the order in which they came. After a live change their deadlines may be in another order.
+    /// Held packets in the order of their offers. After a live change their deadlines may be in a different order.
     held: VecDeque<Held<T>>,
 }
 
 #[derive(Clone, Debug)]
 struct Held<T> {
     packet: Carried<T>,
-    /// Number of packets that must still pass; at least 1 while the packet is held.
+    /// Number of packets still to pass; at least 1 during the hold.
     passes: u32,
     deadline: Instant,
 }
@@ -85,24 +85,24 @@ impl<T> ReorderStage<T> {
         Self { config: None, packets: None, since_jump: 0, held: VecDeque::new() }
     }
 
-    /// Sets the configuration that holds for later packets. Held packets stay, and a correlated choice continues from the previous packet.
+    /// Sets the configuration of later packets. Held packets stay, and a correlated choice continues from the previous packet.
     pub(crate) fn configure(&mut self, config: Option<Reorder>) {
         self.packets = config.and_then(|config| ChanceStage::reconfigured(self.packets, config.packets));
         self.config = config;
     }
 
-    /// Places a packet. Held packets that waited for it to pass are appended to `released`, and follow it.
+    /// Places a packet. Held packets waiting for its passage are appended to `released`, and follow the packet.
     pub(crate) fn place(&mut self, now: Instant, packet: Carried<T>, word: impl FnOnce() -> u64, released: &mut Vec<Carried<T>>) -> Placed<T> {
         let Some(config) = self.config else {
             self.pass(released);
             return Placed::InOrder(packet);
         };
-        // As in netem, a packet that may not jump draws no number, and the correlation is between packets that may jump.
+        // As in netem, a packet without permission to jump draws no number, and the correlation is between permitted packets.
         let may = match config.how {
             Displacement::Jump { gap } => self.since_jump >= gap.get() - 1,
             Displacement::Behind { .. } | Displacement::Later { .. } => true,
         };
-        // `&&` is evaluated from the left: the word is drawn only for a packet that may leave its place.
+        // `&&` is evaluated from the left: the word is drawn only for a packet with permission to leave its place.
         let leaves = may && self.packets.as_mut().is_some_and(|packets| packets.happens(word()));
         // A held packet has not passed anything yet, so the function returns before counting it as passing.
         self.since_jump = if leaves { 0 } else { self.since_jump.saturating_add(1) };
@@ -130,7 +130,7 @@ impl<T> ReorderStage<T> {
         if self.held.is_empty() { None } else { self.held.iter().map(|held| held.deadline).min() }
     }
 
-    /// Appends the packets whose deadline has come to `released`.
+    /// Appends the packets with a due deadline to `released`.
     pub(crate) fn release(&mut self, now: Instant, released: &mut VecDeque<Carried<T>>) {
         self.take(|held| held.deadline <= now, |packet| released.push_back(packet));
     }
@@ -140,19 +140,19 @@ impl<T> ReorderStage<T> {
         core::mem::take(&mut self.held).into_iter().map(|held| held.packet)
     }
 
-    /// Counts a packet that has passed all held packets, and releases held packets that enough packets have passed.
+    /// Counts a packet after its passage of all held packets, and releases held packets with enough passed packets.
     fn pass(&mut self, released: &mut Vec<Carried<T>>) {
         if self.held.is_empty() {
             return;
         }
         for held in &mut self.held {
-            // At least 1 here: a count that reaches 0 is taken out below, and a packet is held with at least 1.
+            // At least 1 here: a count of 0 is taken out below, and a packet is held with at least 1.
             held.passes -= 1;
         }
         self.take(|held| held.passes == 0, |packet| released.push(packet));
     }
 
-    /// Moves the held packets that `which` selects to `to`, in order.
+    /// Moves the selected held packets to `to`, in order.
     fn take(&mut self, which: impl Fn(&Held<T>) -> bool, mut to: impl FnMut(Carried<T>)) {
         let mut place = 0;
         while place < self.held.len() {

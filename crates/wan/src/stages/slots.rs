@@ -1,4 +1,4 @@
-//! Slots: a line that sends only at some instants, and then all packets that have gathered (Wi-Fi aggregation, a modem's grants; netem's `slot`).
+//! Slots: a line with sending only at some instants, and then of all gathered packets (Wi-Fi aggregation, a modem's grants; netem's `slot`).
 
 use alloc::collections::VecDeque;
 use alloc::format;
@@ -18,23 +18,23 @@ use crate::random::{Purpose, Stream, unit};
 use crate::stages::delay::JITTER;
 use crate::stages::delay::{Delay, DelayStage};
 
-/// Instants at which slots open, and the number of packets and bytes that leave in a slot.
+/// Instants of opening slots, and the number of packets and bytes for a slot.
 ///
-/// A packet that is offered before the next slot opens waits for that slot. A packet that finds no coming slot opens the next slot, a gap after its own
-/// instant. When a slot's packets or bytes are used up, the next slot opens a gap later.
+/// A packet offered before the next slot waits for this slot. A packet without a coming slot opens the next slot, a gap after its offer. When a slot's packets
+/// or bytes are used up, the next slot opens a gap later.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Slots {
     gap: SlotGap,
-    /// Number of packets that leave in a slot. `None` sets no limit.
+    /// Number of packets for a slot. `None` sets no limit.
     pub packets: Option<NonZeroU64>,
-    /// Number of bytes that leave in a slot, including the whole packet that exceeds the number. `None` sets no limit.
+    /// Number of bytes for a slot, including the whole packet at the limit. `None` sets no limit.
     pub bytes: Option<NonZeroU64>,
 }
 
-/// Law of the gap from one slot to the next.
+/// Law of the gap from slot to slot.
 #[derive(Clone, PartialEq, Debug)]
 pub enum SlotGap {
-    /// Gap that is uniform between two spans.
+    /// Uniform gap between two spans.
     Between {
         /// Shortest gap.
         min: Duration,
@@ -48,9 +48,9 @@ pub enum SlotGap {
 /// Error: the longest gap is shorter than the shortest gap.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct SlotsError {
-    /// Shortest gap that was asked for.
+    /// Shortest gap asked for.
     pub min: Duration,
-    /// Longest gap that was asked for.
+    /// Longest gap asked for.
     pub max: Duration,
 }
 
@@ -64,7 +64,7 @@ impl fmt::Display for SlotsError {
 impl core::error::Error for SlotsError {}
 
 impl Slots {
-    /// Returns slots with gaps that are uniform between two spans, and without a limit on packets and bytes.
+    /// Returns slots with uniform gaps between two spans, and without a limit on packets and bytes.
     ///
     /// # Errors
     ///
@@ -76,29 +76,29 @@ impl Slots {
         Ok(Self { gap: SlotGap::Between { min, max }, packets: None, bytes: None })
     }
 
-    /// Returns slots with gaps that have the law of a delay, and without a limit on packets and bytes.
+    /// Returns slots with gaps from the law of a delay, and without a limit on packets and bytes.
     #[must_use]
     pub const fn drawn(gap: Delay) -> Self {
         Self { gap: SlotGap::Drawn(gap), packets: None, bytes: None }
     }
 
-    /// Returns the law of the gap from one slot to the next.
+    /// Returns the law of the gap from slot to slot.
     #[must_use]
     pub const fn gap(&self) -> &SlotGap {
         &self.gap
     }
 }
 
-/// Stage with the packets that wait for a slot.
+/// Stage with the packets waiting for a slot.
 #[derive(Clone, Debug)]
 pub(crate) struct SlotStage<T> {
     config: Slots,
-    /// Stage that draws the gaps of [`SlotGap::Drawn`]. `None` for uniform gaps.
+    /// Stage for the gaps of [`SlotGap::Drawn`]. `None` for uniform gaps.
     law: Option<DelayStage>,
     waiting: VecDeque<Carried<T>>,
     /// Instant of the next slot, or of the last slot if no slot is coming.
     opens: Instant,
-    /// Number of slots opened so far, which is the address of the next slot's random numbers.
+    /// Number of slots opened so far: the address of the next slot's random numbers.
     count: u64,
     packets_left: u64,
     bytes_left: u64,
@@ -113,9 +113,9 @@ impl<T> SlotStage<T> {
         Self { config, law, waiting: VecDeque::new(), opens: Instant::ZERO, count: 0, packets_left: 0, bytes_left: 0 }
     }
 
-    /// Sets the configuration that holds from the next slot on. A chain of correlated gaps continues from its present state.
+    /// Sets the configuration from the next slot on. A chain of correlated gaps continues from its present state.
     pub(crate) fn reconfigure(&mut self, config: Slots) {
-        // The slot that is coming keeps its instant; only later gaps follow the new law.
+        // The coming slot keeps its instant; only later gaps follow the new law.
         self.law = match (self.law.take(), &config.gap) {
             (_, SlotGap::Between { .. }) => None,
             (None, SlotGap::Drawn(delay)) => Some(DelayStage::new(delay)),
@@ -127,7 +127,7 @@ impl<T> SlotStage<T> {
         self.config = config;
     }
 
-    /// Takes a packet, which leaves with a slot.
+    /// Takes a packet for a slot.
     pub(crate) fn offer(&mut self, now: Instant, packet: Carried<T>, draws: Stream) {
         // A waiting packet implies a coming slot. Without a waiting packet, the last slot may lie in the past or be used up.
         if self.waiting.is_empty() && (self.count == 0 || self.opens < now || self.is_used_up()) {
@@ -136,12 +136,12 @@ impl<T> SlotStage<T> {
         self.waiting.push_back(packet);
     }
 
-    /// Returns the instant of the slot for which packets wait, or `None` if no packet waits.
+    /// Returns the instant of the awaited slot, or `None` if no packet waits.
     pub(crate) fn next_at(&self) -> Option<Instant> {
         (!self.waiting.is_empty()).then_some(self.opens)
     }
 
-    /// Appends the packets that leave with the slot that opens `now` to `released`.
+    /// Appends the packets of the slot opening `now` to `released`.
     pub(crate) fn release(&mut self, now: Instant, draws: Stream, released: &mut VecDeque<Carried<T>>) {
         while !self.is_used_up() {
             let Some(packet) = self.waiting.pop_front() else { return };
@@ -150,7 +150,7 @@ impl<T> SlotStage<T> {
             self.bytes_left = self.bytes_left.saturating_sub(packet.info.size.get().max(1));
             released.push_back(packet);
         }
-        // The slot is used up: packets that still wait leave with the next slot.
+        // The slot is used up: waiting packets leave with the next slot.
         self.open_next(now, draws);
     }
 
@@ -184,6 +184,7 @@ impl<T> SlotStage<T> {
         };
         self.count += 1;
         self.opens = now.saturating_add(gap);
+        // A slot without limits still counts down, from more than a run can send.
         self.packets_left = self.config.packets.map_or(u64::MAX, NonZeroU64::get);
         self.bytes_left = self.config.bytes.map_or(Bytes::new(u64::MAX).get(), NonZeroU64::get);
     }
