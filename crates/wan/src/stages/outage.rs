@@ -1,4 +1,4 @@
-//! Outages: spans during which a link takes no packet. Outages are scheduled, random, or begin when the link is idle.
+//! Outages: spans without acceptance of packets. Outages are scheduled, random, or begin at an idle link.
 
 use alloc::format;
 use alloc::string::String;
@@ -18,9 +18,9 @@ use crate::random::{Purpose, Stream};
 /// One outage. Packets offered at `from` or later, but before `to`, are dropped.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Outage {
-    /// First instant at which the link is down.
+    /// First instant with the link down.
     pub from: Instant,
-    /// First instant at which the link is up again.
+    /// First instant with the link up again.
     pub to: Instant,
 }
 
@@ -36,26 +36,26 @@ pub struct Outages {
 /// Random failures and repairs in turn. The link begins up.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct RandomOutages {
-    /// Law of the spans during which the link is up.
+    /// Law of the spans with the link up.
     pub up: Sojourn,
-    /// Law of the spans during which the link is down.
+    /// Law of the spans with the link down.
     pub down: Sojourn,
 }
 
-/// Outages of a link that goes down when nothing was sent for a while (a dial-up line, a sleeping radio), and comes up again after another while.
+/// Outages of a link after a while without packets (a dial-up line, a sleeping radio). The link comes up again after another while.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct IdleOutages {
-    /// Time without a packet after which the link goes down. A packet that an outage drops does not count as sent.
+    /// Time without a packet before the link goes down. A packet dropped by an outage does not count as sent.
     pub after: Duration,
     /// Length of each outage. If nothing is sent after an outage, the link goes down again `after` its end.
     pub down: Duration,
 }
 
-/// Reason for which outages are refused. The index counts from zero in the order given.
+/// Reason for the refusal of outages. The index counts from zero in the order given.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum OutagesError {
-    /// The outage ends before it begins, or at the instant at which it begins.
+    /// The outage ends before its begin, or at the instant of its begin.
     Empty {
         /// Index of the outage.
         index: usize,
@@ -73,7 +73,7 @@ pub enum OutagesError {
         /// End of the previous outage.
         ended: Instant,
     },
-    /// A span of zero length, or a law whose longest span is below its shortest span.
+    /// A span of zero length, or a law with the longest span below the shortest span.
     NoTime,
 }
 
@@ -103,6 +103,7 @@ impl Outages {
             if to <= from {
                 return Err(OutagesError::Empty { index, from, to });
             }
+            // Outages may touch: the end of one may be the begin of the next.
             if from < ended {
                 return Err(OutagesError::Overlap { index, from, ended });
             }
@@ -152,7 +153,7 @@ impl Outages {
     #[must_use]
     #[inline]
     pub(crate) fn scheduled_at(&self, now: Instant) -> bool {
-        // Outages are ordered and do not overlap, so only the first outage that ends after `now` can cover `now`.
+        // Outages are ordered and do not overlap, so only the first outage with an end after `now` can cover `now`.
         let next = self.scheduled.partition_point(|outage| outage.to <= now);
         self.scheduled.get(next).is_some_and(|outage| outage.from <= now)
     }
@@ -164,7 +165,7 @@ impl Outages {
     }
 }
 
-/// Stage that says whether the link is up.
+/// Stage with the answer whether the link is up.
 #[derive(Clone, Debug)]
 pub(crate) struct OutageStage {
     outages: Outages,
@@ -172,7 +173,7 @@ pub(crate) struct OutageStage {
     /// numbers.
     span: u64,
     span_ends: Instant,
-    /// Instant of the last packet that the link took, or the instant at which outages of the idle link were configured.
+    /// Instant of the last accepted packet, or the instant of configuring outages of the idle link.
     last_taken: Instant,
 }
 
@@ -182,20 +183,20 @@ impl OutageStage {
         Self::reconfigured(None, Instant::ZERO, outages, draws)
     }
 
-    /// Returns the stage with the outages `outages` from `now` on, or `None` if there was no stage and there are no outages. A link that fails at random
-    /// keeps its present span. A link that had no random failures begins up. A link that had no idle outages counts as used `now`.
+    /// Returns the stage with the outages `outages` from `now` on, or `None` if there was no stage and there are no outages. A link with random failures keeps
+    /// its present span. A link without random failures so far begins up. A link without idle outages so far counts as used `now`.
     pub(crate) fn reconfigured(before: Option<Self>, now: Instant, outages: Outages, draws: Stream) -> Option<Self> {
         if before.is_none() && outages.is_empty() {
             return None;
         }
         let begin = Self { outages: Outages::default(), span: 0, span_ends: Instant::MAX, last_taken: now };
         let mut stage = before.unwrap_or(begin);
-        // A link whose idle outages begin now has not been idle before.
+        // A link with idle outages from now on has not been idle before.
         if stage.outages.idle.is_none() {
             stage.last_taken = now;
         }
         if let (None, Some(random)) = (stage.outages.random, outages.random) {
-            // A link that failed at random before continues with the next even index, so that no span is drawn twice and the link begins up.
+            // A link with earlier random failures continues with the next even index, so no span is drawn twice and the link begins up.
             if stage.span_ends < Instant::MAX {
                 stage.span += 2 - stage.span % 2;
             }
@@ -205,13 +206,13 @@ impl OutageStage {
         Some(stage)
     }
 
-    /// Returns whether the link is down for a packet offered `now`, which is not before earlier calls' `now`. A packet that finds the link up counts as sent.
+    /// Returns whether the link is down for a packet offered `now`, not before earlier calls' `now`. A packet at a link that is up counts as sent.
     pub(crate) fn is_down(&mut self, now: Instant, draws: Stream) -> bool {
         let mut down = self.outages.scheduled_at(now);
         if let Some(random) = self.outages.random {
             while self.span_ends <= now {
                 self.span += 1;
-                // Spans up and down alternate, and each is drawn once, so that the spans do not depend on when packets ask.
+                // Spans up and down alternate, and each is drawn once, so the spans do not depend on the instants of packets.
                 let law = if self.span.is_multiple_of(2) { random.up } else { random.down };
                 self.span_ends = self.span_ends.saturating_add(drawn(law, draws, self.span));
                 // The sum saturates at the end of time. Without this exit a packet at the end of time would draw spans for ever.
@@ -222,7 +223,7 @@ impl OutageStage {
             down |= self.span % 2 == 1;
         }
         if let Some(IdleOutages { after, down: length }) = self.outages.idle {
-            // An idle link is up for `after` and down for `length`, again and again, since the last packet that the link took.
+            // An idle link is up for `after` and down for `length`, again and again, since the last accepted packet.
             let cycle = after.saturating_add(length).as_nanos();
             let idle = now.saturating_duration_since(self.last_taken).as_nanos();
             down |= idle % cycle >= after.as_nanos();

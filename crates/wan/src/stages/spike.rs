@@ -1,9 +1,9 @@
 //! Spikes of delay, as at a handover of a radio link: at random instants all packets become late, and the additional delay decays.
 //!
-//! Spikes begin at the instants s of a Poisson process of `rate`. A packet that begins to propagate at t is late by the sum of all spikes that have begun, Σ
+//! Spikes begin at the instants s of a Poisson process of `rate`. A packet with its propagation beginning at t is late by the sum of all begun spikes, Σ
 //! `height`·exp(−(t − s)/`decay`) over s ≤ t: shot noise with an exponential pulse. By Campbell's theorem (N. R. Campbell, Proc. Cambridge Phil. Soc. 15,
 //! 1909) the sum has the long-run mean `rate`·`height`·`decay` and the long-run variance `rate`·`height`²·`decay`/2. The process begins without spikes, so
-//! that the mean at t is smaller by a factor of 1 − exp(−t/`decay`).
+//! the mean at t is smaller by a factor of 1 − exp(−t/`decay`).
 //!
 //! The instants depend on the link's random numbers and not on the packets: the n-th gap has the random numbers of "packet" n.
 
@@ -23,11 +23,11 @@ use crate::stages::impairment::{ExtraDelay, Impairment, ImpairmentStage, Refusal
 /// Configuration of spikes of delay at random instants.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Spike {
-    /// Mean number of spikes that begin in a second \[1/s\]; from 0 to [`MOST`].
+    /// Mean number of spikes beginning in a second \[1/s\]; from 0 to [`MOST`].
     rate: f64,
-    /// Delay that each spike adds when it begins.
+    /// Additional delay of each spike at its begin.
     height: Duration,
-    /// Time in which a spike falls to 1/e; above zero.
+    /// Time of a spike's fall to 1/e; above zero.
     decay: Duration,
 }
 
@@ -53,7 +53,7 @@ impl Impairment for Spike {
     fn of(values: &Values) -> Result<Self, Refusal> {
         let (rate, height, decay) = (values.number("rate"), values.duration("height"), values.duration("decay"));
         let refuse = |key, message: String| Err(Refusal { key, message });
-        // A range contains no NaN, so that NaN is refused as well.
+        // A range contains no NaN, so NaN is refused as well.
         if !(0.0..=MOST).contains(&rate) {
             return refuse("rate", format!("{rate} is out of range: expected at most {MOST} spikes a second"));
         }
@@ -69,22 +69,23 @@ impl Impairment for Spike {
 
     fn extra_delay(&self) -> ExtraDelay {
         let (height, decay) = (self.height.as_secs_f64(), self.decay.as_secs_f64());
+        // Campbell's theorem: see the head of this file.
         ExtraDelay { mean: self.rate * height * decay, variance: self.rate * height * height * decay / 2.0 }
     }
 }
 
-/// Stage with the sum of the spikes that have begun, and the instant of the next spike.
+/// Stage with the sum of the begun spikes, and the instant of the next spike.
 #[derive(Clone, Debug)]
 pub(crate) struct SpikeStage {
     draws: Stream,
     code: u8,
     /// Present configuration. `None` while the link has no spikes.
     config: Option<Spike>,
-    /// Number of gaps drawn so far, which is the address of the next gap's random numbers.
+    /// Number of gaps drawn so far: the address of the next gap's random numbers.
     drawn: u64,
-    /// Instant at which the next spike begins, or the end of time if no spike will begin.
+    /// Begin of the next spike, or the end of time if no spike will begin.
     next: Instant,
-    /// Sum of all spikes \[ns\] at the instant `at` of the latest event, which is a spike or a change of the configuration.
+    /// Sum of all spikes \[ns\] at the instant `at` of the latest event: a spike or a change of the configuration.
     level: f64,
     at: Instant,
 }
@@ -92,8 +93,8 @@ pub(crate) struct SpikeStage {
 impl ImpairmentStage for SpikeStage {
     type Config = Spike;
 
-    /// Spikes that have begun continue from their present level with the new decay. If the rate changes, the next gap is drawn anew, which keeps the law
-    /// because exponential gaps have no memory. Without a configuration no packet is late.
+    /// Begun spikes continue from their present level with the new decay. If the rate changes, the next gap is drawn anew. This keeps the law, because
+    /// exponential gaps have no memory. Without a configuration no packet is late.
     fn reconfigured(before: Option<Self>, now: Instant, config: Option<&Spike>, draws: Stream, code: u8) -> Option<Self> {
         if before.is_none() && config.is_none() {
             return None;
@@ -110,7 +111,7 @@ impl ImpairmentStage for SpikeStage {
         if config.is_none() {
             stage.level = 0.0;
         }
-        // An exponential gap has no memory, so that a new gap may begin at the present instant.
+        // An exponential gap has no memory, so a new gap may begin at the present instant.
         if !same_rate {
             stage.next = now;
             stage.draw_next();
@@ -127,8 +128,7 @@ impl ImpairmentStage for SpikeStage {
 }
 
 impl SpikeStage {
-    /// Begins all spikes that are due at `now`. The level is computed at the instants of spikes only, so that rounding does not depend on the instants of
-    /// packets.
+    /// Begins all spikes due at `now`. The level is computed at the instants of spikes only, so rounding does not depend on the instants of packets.
     fn pass(&mut self, now: Instant) {
         while self.next <= now && self.next < Instant::MAX {
             let height = self.config.as_ref().map_or(0.0, |config| nanos(config.height));
@@ -138,13 +138,14 @@ impl SpikeStage {
         }
     }
 
-    /// Returns the sum of the spikes that have begun \[ns\] at the instant `now`, which is not before the latest event.
+    /// Returns the sum of the begun spikes \[ns\] at the instant `now`, not before the latest event.
     fn level_at(&self, now: Instant) -> f64 {
         let Some(config) = &self.config else { return 0.0 };
+        // A sum of exponential pulses with one decay decays as a whole, so one number stands for all spikes.
         self.level * libm::exp(-nanos(now.saturating_duration_since(self.at)) / nanos(config.decay))
     }
 
-    /// Draws the gap from the spike at `next` to the following spike, and moves `next` to that spike.
+    /// Draws the gap from the spike at `next` to the following spike, and moves `next` to this spike.
     fn draw_next(&mut self) {
         let rate = self.config.as_ref().map_or(0.0, |config| config.rate);
         if rate == 0.0 {
@@ -154,6 +155,7 @@ impl SpikeStage {
         let mut draws = self.draws.packet(self.drawn).draws(Purpose::Listed(self.code));
         self.drawn += 1;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "positive; saturates at 584 years")]
+        // Gaps of a Poisson process are exponential, with the mean 1/rate.
         let mean = Duration::from_nanos(libm::rint(1e9 / rate) as u64);
         self.next = self.next.saturating_add(Sojourn::Exponential(mean).draw(|| draws.next_word()));
     }

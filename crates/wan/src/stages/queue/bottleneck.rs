@@ -5,8 +5,8 @@
 //!             limit counts these    the packet in service is not counted
 //! ```
 //!
-//! At most R·t plus one packet leaves in any window t, because the service time is rounded up. A departure at an instant makes room for a packet that is
-//! offered at the same instant. If the rate changes while a packet is sent, the bits already sent stay sent, and only the remaining bits take the new rate.
+//! At most R·t plus one packet leaves in any window t, because the service time is rounded up. A departure at an instant makes room for a packet offered at the
+//! same instant. If the rate changes during a transmission, the bits already sent stay sent, and only the remaining bits take the new rate.
 
 use super::limit::words_of_limit;
 use alloc::collections::VecDeque;
@@ -33,7 +33,7 @@ use crate::parameters::{Form, Key, NONE, Table, UNLIMITED, optional, required, u
 pub struct Bottleneck {
     /// Speed of the serialiser.
     pub service: Service,
-    /// Bytes that are transmitted with a packet beyond its own bytes.
+    /// Bytes transmitted with a packet beyond the packet's bytes.
     pub framing: Framing,
     /// Limit of the queue. `None` sets no limit.
     pub limit: Option<QueueLimit>,
@@ -71,17 +71,18 @@ impl Bottleneck {
         Self { service: Service::Rate(rate), framing: Framing::default(), limit: None, discipline: Discipline::default() }
     }
 
-    /// Returns the transmission time of RED's mean packet \[s\], which is the unit of the decay of RED's average.
+    /// Returns the transmission time of RED's mean packet \[s\]: the unit of the decay of RED's average.
     pub(crate) fn time_of_mean_packet(&self, red: &Red) -> f64 {
         match &self.service {
             Service::Rate(rate) => rate.serialisation_time(self.framing.on_the_line(red.mean_packet())).as_secs_f64(),
             #[expect(clippy::cast_precision_loss, reason = "a decay")]
+            // An opportunity has a variable distance to the next one, so the mean rate of the recording stands for the rate.
             Service::Recorded(trace) => red.mean_packet().get() as f64 * 8.0 / trace.mean_rate(),
         }
     }
 
-    /// Returns the bits that a transmitter of constant rate has sent after a span, in 10⁻⁹ bit; 0 for a transmitter that follows a recording, which sends at
-    /// its opportunities.
+    /// Returns the bits sent by a transmitter of constant rate after a span, in 10⁻⁹ bit; 0 for a transmitter with a recording, because such a transmitter
+    /// sends at its opportunities.
     pub(super) fn bits_sent(&self, span: Duration) -> u128 {
         match &self.service {
             Service::Rate(rate) => rate.bits_sent(span),
@@ -89,8 +90,8 @@ impl Bottleneck {
         }
     }
 
-    /// Returns the time from `now` after which the transmitter will have sent a packet of which `left` bits remained at `since`, and `waiting` bits after it
-    /// (all in 10⁻⁹ bit): the wait of the newest packet.
+    /// Returns the time from `now` until the end of transmission of a packet with `left` bits remaining at `since`, and of `waiting` bits after the packet (all
+    /// in 10⁻⁹ bit): the wait of the newest packet.
     pub(super) fn time_to_send(&self, (since, left): (Instant, u128), waiting: u128, now: Instant) -> Duration {
         match &self.service {
             Service::Rate(rate) => {
@@ -98,6 +99,7 @@ impl Bottleneck {
                 rate.transmission_time(left.saturating_sub(sent) + waiting)
             }
             Service::Recorded(trace) => {
+                // Each opportunity sends a fixed number of bytes, and even an empty packet needs one opportunity.
                 let needed = (left + waiting).div_ceil(giga_bits(trace.bytes())).max(1);
                 let done = u64::try_from(needed).ok().and_then(|needed| trace.nth_after(now, needed));
                 done.unwrap_or(Instant::MAX).saturating_duration_since(now)
@@ -106,7 +108,8 @@ impl Bottleneck {
     }
 }
 
-/// Returns an idle span of the transmitter as a number of mean packets, each of which takes `mean_packet` \[s\]. Returns zero if a mean packet takes no time.
+/// Returns an idle span of the transmitter as a number of mean packets with the transmission time `mean_packet` \[s\] each. Returns zero if a mean packet takes
+/// no time.
 pub(crate) fn idle_packets(idle: Duration, mean_packet: f64) -> f64 {
     if mean_packet > 0.0 { idle.as_secs_f64() / mean_packet } else { 0.0 }
 }
@@ -121,17 +124,17 @@ pub(crate) fn giga_bits(bytes: Bytes) -> u128 {
 pub(crate) struct BottleneckStage<T> {
     config: Bottleneck,
     queue: Queue<T>,
-    /// Size of the latest packet that found the transmitter idle, with its transmission time. Cached, because the time is a division of 128 bits.
+    /// Size of the latest packet at an idle transmitter, with its transmission time. Cached, because the time is a division of 128 bits.
     latest_service: Option<(Bytes, Duration)>,
 }
 
-/// Packets of a stage, each with the instant at which it was offered.
+/// Packets of a stage, each with the instant of its offer.
 pub(crate) type Queue<T> = Fifo<(Instant, Carried<T>), Sums>;
 
 /// Sums over the waiting packets of a stage.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Sums {
-    /// Bytes, framing not counted. Wider than [`Bytes`], whose sum would saturate and then be wrong after a departure.
+    /// Bytes, framing not counted. Wider than [`Bytes`]: a sum of [`Bytes`] would saturate and then be wrong after a departure.
     bytes: u128,
     /// Bits to transmit, in 10⁻⁹ bit.
     bits: u128,
@@ -185,6 +188,7 @@ impl<T> Rules<(Instant, Carried<T>)> for Bottleneck {
     fn next(&self, now: Instant, left: u128) -> (Instant, u64) {
         match &self.service {
             Service::Rate(rate) => (now.saturating_add(rate.transmission_time(left)), 0),
+            // At the end of time a packet never leaves, and one opportunity is as good as many.
             Service::Recorded(trace) => trace.next_after(now).unwrap_or((Instant::MAX, 1)),
         }
     }
@@ -202,13 +206,12 @@ impl<T> BottleneckStage<T> {
         Self { config, queue, latest_service: None }
     }
 
-    /// Returns the departure of a packet of `size` that is offered `now` to an idle transmitter. Returns `None` if the transmitter is busy or follows a
-    /// recording, or if the discipline is RED, which draws random numbers even for an idle transmitter. No other discipline affects a packet that finds the
-    /// transmitter idle.
+    /// Returns the departure of a packet of `size` offered `now` to an idle transmitter. Returns `None` if the transmitter is busy or has a recording, or if
+    /// the discipline is RED, with random numbers even for an idle transmitter. No further discipline affects a packet at an idle transmitter.
     #[inline]
     pub(crate) fn departure_if_idle(&mut self, now: Instant, size: Bytes) -> Option<Instant> {
         let Service::Rate(rate) = &self.config.service else { return None };
-        // A waiting packet implies a packet in transmission, so that the queue is empty here.
+        // A waiting packet implies a packet in transmission, so the queue is empty here.
         if self.queue.on_line().is_some() || matches!(self.config.discipline, Discipline::Red(_)) {
             return None;
         }
@@ -223,18 +226,18 @@ impl<T> BottleneckStage<T> {
         Some(now.saturating_add(service))
     }
 
-    /// Takes a packet, which is then sent, waits, or is dropped into `outputs`; other packets may be dropped in its place. `word` gives the packet's random
-    /// word for queues.
+    /// Takes a packet. The packet is then sent, waits, or is dropped into `outputs`; older packets may be dropped in its place. `word` gives the packet's
+    /// random word for queues.
     pub(crate) fn offer(&mut self, now: Instant, packet: Carried<T>, word: impl FnOnce() -> u64, outputs: &mut Outputs<T>) {
         self.queue.offer(now, &self.config, (now, packet), word, |cause, packet| drop(outputs, now, cause, packet));
     }
 
-    /// Returns the instant at which [`BottleneckStage::release`] must be called next, or `None` if the transmitter is idle.
+    /// Returns the instant of the next call of [`BottleneckStage::release`], or `None` if the transmitter is idle.
     pub(crate) fn next_at(&self) -> Option<Instant> {
         self.queue.on_line().map(|on_line| on_line.next)
     }
 
-    /// Appends the packets that leave the bottleneck `now` to `released`, and dropped packets to `outputs`. `now` is the instant returned by
+    /// Appends the packets leaving the bottleneck `now` to `released`, and dropped packets to `outputs`. `now` is the instant returned by
     /// [`next_at`](Self::next_at).
     pub(crate) fn release(&mut self, now: Instant, released: &mut VecDeque<Carried<T>>, outputs: &mut Outputs<T>) {
         let Self { config, queue, .. } = self;
@@ -245,10 +248,11 @@ impl<T> BottleneckStage<T> {
             }
             Service::Recorded(trace) => trace,
         };
-        // The opportunities of this instant are shared by as many packets as fit. A budget that is left when the queue is empty is lost.
+        // The opportunities of this instant are shared by as many packets as fit. A rest of the budget behind an empty queue is lost.
         let opportunities = queue.on_line().map_or(0, |on_line| on_line.opportunities);
         let mut budget = giga_bits(trace.bytes()).saturating_mul(opportunities.into());
         while let Some(on_line) = queue.on_line_mut() {
+            // The packet is larger than the rest of the budget: the next opportunities send its remaining bits.
             if on_line.left > budget {
                 on_line.left -= budget;
                 break;
@@ -265,6 +269,7 @@ impl<T> BottleneckStage<T> {
 
     /// Changes rate, framing, limit and discipline; see [`Fifo::reconfigure`].
     pub(crate) fn reconfigure(&mut self, now: Instant, config: Bottleneck) {
+        // The transmission time in the cache belongs to the old rate and framing.
         self.queue.reconfigure(now, &self.config, &config);
         (self.config, self.latest_service) = (config, None);
     }

@@ -1,6 +1,6 @@
 //! CoDel, controlled delay (Nichols, Jacobson, McGregor & Iyengar, RFC 8289, 2018).
 //!
-//! A packet that leaves the queue after more than `target` is dropped if all other packets of the last `interval` waited longer as well. Further packets are
+//! A packet that leaves the queue after more than `target` is dropped if all further packets of the last `interval` waited longer as well. Further packets are
 //! then dropped at distances of interval/√1, interval/√2, interval/√3, …, until a packet waits less.
 
 use core::time::Duration;
@@ -11,13 +11,13 @@ use cohaptic_units::{Bytes, Instant};
 /// Parameters of CoDel.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct CoDel {
-    /// Wait that is always acceptable, usually 5 ms.
+    /// Always acceptable wait, usually 5 ms.
     pub target: Duration,
-    /// Time for which waits must exceed the target before a packet is dropped, usually 100 ms, about the longest round trip.
+    /// Time of waits above the target before a packet is dropped, usually 100 ms, about the longest round trip.
     pub interval: Duration,
-    /// Number of waiting bytes up to which no packet is dropped: one packet of the largest size.
+    /// Number of waiting bytes without drops: one packet of the largest size.
     pub mtu: Bytes,
-    /// `true` if a packet that supports ECN is marked instead of dropped.
+    /// `true` if an ECN-capable packet is marked instead of dropped.
     pub ecn: bool,
 }
 
@@ -31,13 +31,13 @@ impl Default for CoDel {
 /// Memory of the control law. Fields have the names of RFC 8289.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) struct CoDelState {
-    /// Instant at which waits will have exceeded the target for an interval, or `None` while waits are below the target.
+    /// Instant of the end of an interval with waits above the target, or `None` while waits are below the target.
     first_above: Option<Instant>,
     /// `true` if packets are being dropped by the control law.
     dropping: bool,
-    /// Instant from which the next packet is dropped.
+    /// Instant of the next drop.
     drop_next: Instant,
-    /// Number of packets dropped in this state of dropping, which sets the distance of drops.
+    /// Number of packets dropped in this state of dropping. Sets the distance of drops.
     count: u64,
     /// Value of `count` at the begin of the latest state of dropping.
     last_count: u64,
@@ -45,7 +45,7 @@ pub(crate) struct CoDelState {
     dropped: Dropped,
 }
 
-/// Kind of drop of the previous packet at this instant: the line of the pseudocode at which the packet was dropped.
+/// Kind of drop of the previous packet at this instant: the line of the drop in the pseudocode.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 enum Dropped {
     #[default]
@@ -57,7 +57,7 @@ enum Dropped {
     Again,
 }
 
-/// Verdict of CoDel about a packet that leaves the queue.
+/// Verdict of CoDel about a packet on its way out of the queue.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Verdict {
     Send,
@@ -68,12 +68,13 @@ pub(crate) enum Verdict {
 }
 
 impl CoDelState {
-    /// Decides about the packet that leaves the queue `now` after waiting for `sojourn`, while `left_bytes` wait after it. After [`Verdict::Drop`] the caller
-    /// asks about the next packet at the same instant. Follows the pseudocode of RFC 8289, section 5, with one packet per call.
+    /// Decides about the packet on its way out of the queue `now` after waiting for `sojourn`, with `left_bytes` waiting after the packet. After
+    /// [`Verdict::Drop`] the caller asks about the next packet at the same instant. Follows the pseudocode of RFC 8289, section 5, with one packet per call.
     pub(crate) fn verdict(&mut self, codel: &CoDel, now: Instant, sojourn: Duration, left_bytes: u128, ecn_capable: bool) -> Verdict {
-        // Called for every packet that leaves, dropped or not, because it tracks since when waits exceed the target.
+        // Called for every leaving packet, dropped or not, because the call tracks the begin of waits above the target.
         let ok_to_drop = self.should_drop(codel, now, sojourn, left_bytes);
         match core::mem::take(&mut self.dropped) {
+            // RFC 8289 sends the packet after the first drop without a further look at its wait.
             Dropped::Entering => return Verdict::Send,
             Dropped::Again if ok_to_drop => self.drop_next = control_law(self.drop_next, codel.interval, self.count),
             Dropped::Again | Dropped::Not => {}
@@ -81,6 +82,7 @@ impl CoDelState {
         // A mark replaces a drop, and the packet is sent: CoDel does not go on to the next packet.
         let marks = codel.ecn && ecn_capable;
         if self.dropping {
+            // A wait below the target ends the state of dropping.
             if !ok_to_drop {
                 self.dropping = false;
                 return Verdict::Send;
@@ -90,6 +92,7 @@ impl CoDelState {
             }
             self.count += 1;
             if marks {
+                // A mark ends the loop of the pseudocode, so the next instant is set here and not at the next packet.
                 self.drop_next = control_law(self.drop_next, codel.interval, self.count);
                 return Verdict::Mark;
             }
@@ -100,8 +103,8 @@ impl CoDelState {
             return Verdict::Send;
         }
         self.dropping = true;
-        // A queue that grew again soon after it was controlled continues with the rate of drops that controlled it.
-        // `count` is never below `last_count`: it grows while dropping, and both are set together.
+        // A queue that grew again soon after its control continues with the successful rate of drops. `count` is never below `last_count`: `count` grows while
+        // dropping, and both are set together.
         let since = self.count - self.last_count;
         let recently = now.saturating_duration_since(self.drop_next) < codel.interval.saturating_mul(16);
         self.count = if since > 1 && recently { since } else { 1 };
@@ -114,10 +117,10 @@ impl CoDelState {
         Verdict::Drop
     }
 
-    /// Returns whether waits have exceeded the target for an interval, and tracks since when they exceed it.
+    /// Returns whether waits have exceeded the target for an interval, and tracks the begin of the excess.
     fn should_drop(&mut self, codel: &CoDel, now: Instant, sojourn: Duration, left_bytes: u128) -> bool {
-        // A queue of at most one packet of the largest size cannot be shortened without leaving the transmitter idle. The packet after an
-        // empty queue finds no packet after it, and so ends a state of dropping, for which RFC 8289 looks at the empty queue.
+        // A queue of at most one packet of the largest size cannot be shortened without leaving the transmitter idle. The packet after an empty queue finds no
+        // packet after itself, and so ends a state of dropping. RFC 8289 looks at the empty queue instead.
         if sojourn < codel.target || left_bytes <= u128::from(codel.mtu.get()) {
             self.first_above = None;
             return false;
@@ -135,6 +138,7 @@ impl CoDelState {
 /// Returns the instant of the next drop, t + interval/√count.
 #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a time of some milliseconds")]
 fn control_law(t: Instant, interval: Duration, count: u64) -> Instant {
+    // More drops without success make the distance shorter: the rate of drops grows with the square root of their number.
     t.saturating_add(Duration::from_nanos(libm::rint(interval.as_nanos() as f64 / libm::sqrt(count as f64)) as u64))
 }
 

@@ -1,4 +1,4 @@
-//! Delivery trace: a line whose capacity was recorded as instants at which it can deliver a fixed number of bytes (the format of mahimahi; Netravali et al.,
+//! Delivery trace: a line with its capacity recorded as instants, each for a fixed number of bytes (the format of mahimahi; Netravali et al.,
 //! USENIX ATC 2015).
 
 use alloc::sync::Arc;
@@ -7,8 +7,8 @@ use core::fmt;
 
 use cohaptic_units::{Bytes, Instant};
 
-/// Opportunities to deliver. At each opportunity up to [`DeliveryTrace::bytes`] leave, of one packet or of several; a large packet needs several
-/// opportunities. Unused bytes are lost. A packet that is offered at the very instant of an opportunity waits for the next one.
+/// Opportunities to deliver. At each opportunity up to [`DeliveryTrace::bytes`] leave, of one packet or of several; a large packet needs several opportunities.
+/// Unused bytes are lost. A packet offered at the very instant of an opportunity waits for the next opportunity.
 ///
 /// The recording repeats for ever: after its last line the recording begins anew, with its end as the new zero.
 ///
@@ -21,7 +21,7 @@ pub struct DeliveryTrace {
     bytes: Bytes,
 }
 
-/// Reason for which a recording is refused. Lines count from 1.
+/// Reason for the refusal of a recording. Lines count from 1.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum DeliveryTraceError {
     /// A line is not a whole number of milliseconds, or is too large for an instant.
@@ -38,11 +38,11 @@ pub enum DeliveryTraceError {
         /// Time on the line above \[ms\].
         before: u64,
     },
-    /// The recording has no length, so that it cannot be repeated.
+    /// The recording has no length, so the recording cannot be repeated.
     NoLength,
     /// The recording has no line.
     Empty,
-    /// An opportunity has no bytes, so that no packet could ever leave.
+    /// An opportunity has no bytes, so no packet could ever leave.
     NoBytes,
 }
 
@@ -60,7 +60,7 @@ impl fmt::Display for DeliveryTraceError {
 
 impl core::error::Error for DeliveryTraceError {}
 
-/// Number of bytes that mahimahi lets leave at each opportunity. (The manual of mahimahi says 1500; a tunnel's header makes it 1504.)
+/// Number of bytes for each opportunity in mahimahi. (The manual of mahimahi says 1500; with a tunnel's header 1504.)
 pub const MAHIMAHI_BYTES: Bytes = Bytes::new(1504);
 
 impl DeliveryTrace {
@@ -88,6 +88,7 @@ impl DeliveryTrace {
     fn new(opportunities: Vec<u64>, bytes: Bytes) -> Result<Self, DeliveryTraceError> {
         match opportunities.last() {
             None => Err(DeliveryTraceError::Empty),
+            // A round of no length would repeat its opportunities without end at one instant.
             Some(0) => Err(DeliveryTraceError::NoLength),
             Some(_) if bytes == Bytes::ZERO => Err(DeliveryTraceError::NoBytes),
             Some(_) => Ok(Self { opportunities: opportunities.into(), bytes }),
@@ -110,13 +111,15 @@ impl DeliveryTrace {
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "a mean")]
     pub fn mean_rate(&self) -> f64 {
+        // The last opportunity is the length of a round.
         self.opportunities.len() as f64 * 8.0 * self.bytes.get() as f64 / (self.opportunities.last().copied().unwrap_or(1) as f64 / 1e9)
     }
 
-    /// Returns the instant of the first opportunity after `now`, and the number of opportunities at that instant, or `None` beyond the end of time.
+    /// Returns the instant of the first opportunity after `now`, and the number of opportunities at this instant, or `None` beyond the end of time.
     pub(crate) fn next_after(&self, now: Instant) -> Option<(Instant, u64)> {
         let first = self.first_after(now)?;
         let at = self.instant(first)?;
+        // Several opportunities can share an instant, even the last of a round and the first of the next round.
         let count = (first..).take_while(|index| self.instant(*index) == Some(at)).count();
         Some((at, count as u64))
     }

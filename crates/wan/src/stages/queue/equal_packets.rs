@@ -1,7 +1,7 @@
-//! Queue of packets of one size that drops the newest packet, without keeping packets: the departure of each packet, and whether there is room for it.
+//! Queue of packets of one size with drops of the newest packet, without keeping packets: the departure of each packet, and the question of room for a packet.
 //!
-//! A packet leaves at D(n) = max(a(n), D(n−1)) + S, where a is the instant at which it is offered and S its transmission time (Lindley 1952). Packets of one
-//! size leave at distances of S as long as the transmitter is busy, so that the latest departure tells the number of waiting packets.
+//! A packet leaves at D(n) = max(a(n), D(n−1)) + S, with a the instant of its offer and S its transmission time (Lindley 1952). Packets of one
+//! size leave at distances of S as long as the transmitter is busy, so the latest departure tells the number of waiting packets.
 
 use core::time::Duration;
 
@@ -15,7 +15,7 @@ use super::{Bottleneck, Discipline, QueueLimit, Service};
 pub(crate) struct EqualPackets {
     /// Transmission time of a packet \[ns\].
     service: u64,
-    /// Largest amount of work \[ns\] that an admitted packet may find. A packet that finds more is dropped.
+    /// Largest amount of work \[ns\] before an admitted packet. A packet behind more work is dropped.
     most: u64,
 }
 
@@ -37,10 +37,11 @@ impl EqualPackets {
         (service == 0 || most < END).then_some(Self { service, most })
     }
 
-    /// Returns the departure of a packet that is offered `now`, or `None` if there is no room for the packet. `departure` is the departure of the previous
-    /// packet, and becomes that of this packet.
+    /// Returns the departure of a packet offered `now`, or `None` if there is no room for the packet. `departure` is the departure of the previous packet, and
+    /// becomes the departure of this packet.
     #[inline(always)]
     pub(crate) fn offer(&self, now: Instant, departure: &mut Instant) -> Option<Instant> {
+        // Remaining work of the transmitter: zero if the latest packet has left.
         let work = departure.as_nanos().saturating_sub(now.as_nanos());
         if work > self.most {
             return None;
@@ -50,7 +51,7 @@ impl EqualPackets {
     }
 }
 
-/// Half of the time that an instant can count \[ns\].
+/// Half of the range of an instant \[ns\].
 const END: u64 = u64::MAX / 2;
 
 /// Rate of a transmitter, and the bits of a packet in transmission, in 10⁻⁹ bit.
@@ -66,11 +67,10 @@ impl Line {
         nanos(self.rate.transmission_time(self.bits))
     }
 
-    /// Returns the most work \[ns\] that a packet may find so that its turn comes within `wait`. More work never makes a turn earlier, so that bisection
-    /// finds the bound.
+    /// Returns the most work \[ns\] before a packet for a turn within `wait`. More work never makes a turn earlier, so bisection finds the bound.
     fn most_work(self, wait: Duration) -> u64 {
         let (mut holds, mut fails) = (0, self.service().max(1));
-        // Doubles the bracket until `fails` is too much work; `holds` always is not.
+        // Doubles the bracket until `fails` is too much work; `holds` never is.
         while self.turn(fails) <= wait {
             (holds, fails) = (fails, fails.saturating_mul(2));
             if fails >= END {
@@ -84,11 +84,11 @@ impl Line {
         holds
     }
 
-    /// Returns the wait of a packet that finds `work` \[ns\] before it. `work` is a sum of times that are each rounded up to nanoseconds. The wait is computed
-    /// from the sum of the bits and rounded once, as the stage that keeps packets does.
+    /// Returns the wait of a packet behind `work` \[ns\]. `work` is a sum of times, each rounded up to nanoseconds. The wait is computed from the sum of the
+    /// bits and rounded once, like the wait of the stage with packets.
     fn turn(self, work: u64) -> Duration {
         let service = self.service();
-        // A packet that takes no time to transmit leaves no work, so that no packet waits for it.
+        // A packet without transmission time leaves no work, so no packet waits.
         if service == 0 || work == 0 {
             return Duration::ZERO;
         }

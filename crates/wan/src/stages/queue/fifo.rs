@@ -1,8 +1,8 @@
-//! First-in-first-out queue before a transmitter: which packet waits, which is in transmission, and which is marked or dropped.
+//! First-in-first-out queue before a transmitter: choice of the packets to wait, to transmit, to mark and to drop.
 //!
-//! The queue serves packets of any type over any transmitter; [`Rules`] has what differs. A stage of a link keeps packets of any size, each boxed, over
+//! The queue serves packets of any type over any transmitter; [`Rules`] has the differences. A stage of a link keeps packets of any size, each boxed, over
 //! transmitters of constant rate or of recorded opportunities ([`BottleneckStage`](super::BottleneckStage)). A link of a large mesh keeps packets of one size
-//! over a transmitter of constant rate, whose size and transmission time are known beforehand and stored once for all links of a kind.
+//! over a transmitter of constant rate, with size and transmission time known beforehand and stored once for all links of a kind.
 
 use alloc::collections::VecDeque;
 use core::time::Duration;
@@ -15,14 +15,14 @@ use super::limit::{QueueLimit, Waiting};
 use super::red::{self, Red, RedState};
 use crate::fates::fate::DropCause;
 
-/// Packets of type `P` and the transmitter over which they go.
+/// Packets of type `P` and their transmitter.
 pub(crate) trait Rules<P> {
-    /// Sums over the waiting packets, as far as they do not follow from the number of packets.
+    /// Sums over the waiting packets, as far as not determined by the number of packets.
     type Sums: Default;
 
     fn bottleneck(&self) -> &Bottleneck;
 
-    /// Returns the instant at which a packet was offered.
+    /// Returns the instant of a packet's offer.
     fn offered(&self, packet: &P) -> Instant;
 
     /// Returns the size of a packet, framing not counted.
@@ -31,7 +31,7 @@ pub(crate) trait Rules<P> {
     /// Returns the bits to transmit for a packet, in 10⁻⁹ bit.
     fn bits(&self, packet: &P) -> u128;
 
-    /// Returns whether a packet is marked where another one would be dropped.
+    /// Returns whether a packet is marked in place of a drop.
     fn ecn_capable(&self, packet: &P) -> bool;
 
     fn mark(&self, packet: &mut P);
@@ -40,14 +40,14 @@ pub(crate) trait Rules<P> {
 
     fn remove(&self, sums: &mut Self::Sums, packet: &P);
 
-    /// Returns the bytes of `count` waiting packets, framing not counted, and the bits to transmit for them, in 10⁻⁹ bit.
+    /// Returns the bytes of `count` waiting packets, framing not counted, and the bits to transmit for these packets, in 10⁻⁹ bit.
     fn waiting(&self, sums: &Self::Sums, count: usize) -> (u128, u128);
 
     /// Returns the transmission time of RED's mean packet \[s\].
     fn mean_packet(&self, red: &Red) -> f64;
 
-    /// Returns the instant of the next event of a packet of which `left` bits (10⁻⁹ bit) are to be sent from `now` on: the departure of the packet, or, on
-    /// a transmitter that follows a recording, the next opportunity to send, with the number of opportunities at this instant.
+    /// Returns the instant of the next event of a packet with `left` bits (10⁻⁹ bit) to send from `now` on: the departure of the packet, or, on a transmitter
+    /// with a recording, the next opportunity to send, with the number of opportunities at this instant.
     fn next(&self, now: Instant, left: u128) -> (Instant, u64);
 }
 
@@ -67,17 +67,17 @@ pub(crate) struct Fifo<P, S> {
 #[derive(Clone, Debug)]
 pub(crate) struct OnLine<P> {
     pub(crate) packet: P,
-    /// Instant since which the remaining bits are sent at the present rate.
+    /// Begin of sending the remaining bits at the present rate.
     since: Instant,
-    /// Bits that remained at `since`, in 10⁻⁹ bit.
+    /// Remaining bits at `since`, in 10⁻⁹ bit.
     pub(crate) left: u128,
-    /// Instant of the next event, as [`Rules::next`] returns it.
+    /// Instant of the next event, from [`Rules::next`].
     pub(crate) next: Instant,
-    /// Number of opportunities at `next`. Used only for a transmitter that follows a recording.
+    /// Number of opportunities at `next`. Used only for a transmitter with a recording.
     pub(crate) opportunities: u64,
 }
 
-/// State that a discipline keeps between packets.
+/// State of a discipline between packets.
 #[derive(Clone, Debug)]
 enum DisciplineState {
     Nothing,
@@ -105,13 +105,13 @@ impl<P, S: Default> Fifo<P, S> {
         self.on_line.as_ref()
     }
 
-    /// Returns the packet in transmission, for a transmitter that sends by opportunities.
+    /// Returns the packet in transmission, for a transmitter with opportunities.
     pub(crate) fn on_line_mut(&mut self) -> &mut Option<OnLine<P>> {
         &mut self.on_line
     }
 
-    /// Takes a packet, which is then sent, waits, or is dropped; other packets may be dropped in its place. `word` gives the packet's random word for queues,
-    /// and is called by RED only. `dropped` takes each dropped packet.
+    /// Takes a packet. The packet is then sent, waits, or is dropped; older packets may be dropped in its place. `word` gives the packet's random word for
+    /// queues, and is called by RED only. `dropped` takes each dropped packet.
     #[inline(always)]
     pub(crate) fn offer<R: Rules<P, Sums = S>>(
         &mut self,
@@ -121,6 +121,7 @@ impl<P, S: Default> Fifo<P, S> {
         word: impl FnOnce() -> u64,
         mut dropped: impl FnMut(DropCause, P),
     ) {
+        // RED sees every offer, even at an idle transmitter, because its average moves with every packet.
         if let Discipline::Red(red) = &rules.bottleneck().discipline {
             match self.red_verdict(now, rules, red, &packet, word()) {
                 red::Verdict::Pass => {}
@@ -144,7 +145,7 @@ impl<P, S: Default> Fifo<P, S> {
         self.waiting.push_back(packet);
     }
 
-    /// Removes the packet that leaves the transmitter by `until`, and returns it with its instant. The next packet is in transmission afterwards. For a
+    /// Removes the packet leaving the transmitter by `until`, and returns it with its instant. The next packet is in transmission afterwards. For a
     /// transmitter of constant rate.
     #[inline(always)]
     pub(crate) fn leave<R: Rules<P, Sums = S>>(
@@ -154,6 +155,7 @@ impl<P, S: Default> Fifo<P, S> {
         mut dropped: impl FnMut(Instant, DropCause, P),
     ) -> Option<(Instant, P)> {
         let OnLine { packet, next, .. } = self.on_line.take_if(|on_line| on_line.next <= until)?;
+        // The next transmission begins at the departure, not at the later `until`.
         self.serve_next(next, rules, |cause, packet| dropped(next, cause, packet));
         Some((next, packet))
     }
@@ -167,9 +169,10 @@ impl<P, S: Default> Fifo<P, S> {
         }
     }
 
-    /// Begins to send `packet`, or the first packet after it that CoDel does not drop.
+    /// Begins to send `packet`, or the first packet after `packet` without a drop by CoDel.
     #[inline(always)]
     fn serve<R: Rules<P, Sums = S>>(&mut self, now: Instant, rules: &R, mut packet: P, mut dropped: impl FnMut(DropCause, P)) {
+        // CoDel decides at the exit of the queue, unlike all other disciplines.
         if let Discipline::CoDel(codel) = &rules.bottleneck().discipline {
             while let DisciplineState::CoDel(state) = &mut self.discipline {
                 let (sojourn, left) = (now.saturating_duration_since(rules.offered(&packet)), rules.waiting(&self.sums, self.waiting.len()).0);
@@ -193,7 +196,7 @@ impl<P, S: Default> Fifo<P, S> {
         self.on_line = Some(OnLine { packet, since: now, left, next, opportunities });
     }
 
-    /// Sets the next event of the packet in transmission, whose remaining bits are those at `now`.
+    /// Sets the next event of the packet in transmission, with the remaining bits of `now`.
     pub(crate) fn announce(&mut self, now: Instant, rules: &impl Rules<P, Sums = S>) {
         if let Some(on_line) = &mut self.on_line {
             on_line.since = now;
@@ -201,10 +204,11 @@ impl<P, S: Default> Fifo<P, S> {
         }
     }
 
-    /// Changes rate, framing, limit and discipline from those of `before` to those of `rules`. A waiting packet keeps its place even if a smaller limit is
+    /// Changes rate, framing, limit and discipline from `before` to `rules`. A waiting packet keeps its place even if a smaller limit is
     /// exceeded. The packet in transmission keeps the bits already sent.
     pub(crate) fn reconfigure<R: Rules<P, Sums = S>>(&mut self, now: Instant, before: &R, rules: &R) {
         if let Some(on_line) = &mut self.on_line {
+            // The bits sent at the old rate stay sent.
             on_line.left = on_line.left.saturating_sub(before.bottleneck().bits_sent(now.saturating_duration_since(on_line.since)));
         }
         // A new kind of discipline begins without memory. New parameters of the same kind keep the memory.
@@ -212,6 +216,7 @@ impl<P, S: Default> Fifo<P, S> {
         if core::mem::discriminant(old) != core::mem::discriminant(new) {
             self.discipline = DisciplineState::new(new);
         }
+        // The sums are made anew, because the new framing changes the bits of every waiting packet.
         self.sums = S::default();
         self.waiting.iter().for_each(|packet| rules.add(&mut self.sums, packet));
         self.announce(now, rules);
@@ -228,6 +233,7 @@ impl<P, S: Default> Fifo<P, S> {
         let on_line =
             on_line.map(|OnLine { packet, since, left, next, opportunities }| OnLine { packet: convert(packet), since, left, next, opportunities });
         let waiting: VecDeque<Q> = waiting.into_iter().map(convert).collect();
+        // The new rules may need no sums, or different sums.
         let mut sums = R::Sums::default();
         waiting.iter().for_each(|packet| rules.add(&mut sums, packet));
         Fifo { waiting, sums, on_line, idle_since, discipline }
@@ -239,7 +245,7 @@ impl<P, S: Default> Fifo<P, S> {
         let Some(limit) = bottleneck.limit else { return true };
         let (bytes, bits) = rules.waiting(&self.sums, self.waiting.len());
         let time = match (limit, &self.on_line) {
-            // The waiting time is that of the rest of the packet in transmission plus that of all waiting packets.
+            // The waiting time is the time of the rest of the packet in transmission and of all waiting packets.
             (QueueLimit::Time(_), Some(on_line)) => bottleneck.time_to_send((on_line.since, on_line.left), bits, now),
             _ => Duration::ZERO,
         };
@@ -249,7 +255,7 @@ impl<P, S: Default> Fifo<P, S> {
     /// Returns RED's verdict about an offered packet.
     fn red_verdict<R: Rules<P, Sums = S>>(&mut self, now: Instant, rules: &R, red: &Red, packet: &P, word: u64) -> red::Verdict {
         let idle = if self.on_line.is_none() { now.saturating_duration_since(self.idle_since) } else { Duration::ZERO };
-        // A packet that RED drops leaves the transmitter idle. Moving `idle_since` keeps the next packet from counting the same idle time again.
+        // A drop by RED leaves the transmitter idle. Moving `idle_since` keeps the next packet from counting the same idle time again.
         self.idle_since = now;
         let (bytes, _) = rules.waiting(&self.sums, self.waiting.len());
         let DisciplineState::Red(state) = &mut self.discipline else { return red::Verdict::Pass };

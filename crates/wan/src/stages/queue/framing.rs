@@ -1,4 +1,4 @@
-//! Framing: bytes that are transmitted with a packet beyond its own bytes.
+//! Framing: bytes transmitted with a packet beyond the packet's bytes.
 
 use crate::parameters::{Form, Table, required, usual};
 use alloc::format;
@@ -10,7 +10,7 @@ use cohaptic_units::Bytes;
 pub struct Framing {
     /// Bytes added to every packet, such as 28 for IPv4 and UDP. A negative number is subtracted, down to an empty packet.
     pub overhead: i32,
-    /// Cells of a fixed size in which packets are transmitted. `None` means that packets are sent whole.
+    /// Cells of a fixed size for packets in transmission. Under `None` packets are sent whole.
     pub cells: Option<Cells>,
 }
 
@@ -24,7 +24,7 @@ pub struct Cells {
 }
 
 impl Framing {
-    /// Returns the number of bytes that are transmitted for a packet of `size`.
+    /// Returns the number of transmitted bytes for a packet of `size`.
     #[must_use]
     pub fn on_the_line(&self, size: Bytes) -> Bytes {
         let packet = size.get().saturating_add_signed(self.overhead.into());
@@ -32,6 +32,7 @@ impl Framing {
             None => packet,
             Some(Cells { payload, overhead }) => {
                 let cell = u64::from(payload.get());
+                // The last cell is padded, so a part of a cell costs as much as a full cell.
                 packet.div_ceil(cell).saturating_mul(cell + u64::from(overhead))
             }
         })

@@ -8,14 +8,14 @@ use core::time::Duration;
 use crate::parameters::Form;
 use cohaptic_units::Bytes;
 
-/// Limit of the packets that wait in a queue. A packet in transmission does not count.
+/// Limit of the packets waiting in a queue. A packet in transmission does not count.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum QueueLimit {
-    /// Largest number of waiting packets. With 0, a packet that finds another packet in transmission is dropped.
+    /// Largest number of waiting packets. With 0, a packet behind another packet in transmission is dropped.
     Packets(u64),
     /// Largest number of bytes of all waiting packets, framing not counted.
     Bytes(Bytes),
-    /// Longest wait. A packet whose turn would come later at the present rate is dropped.
+    /// Longest wait. A packet with a later turn at the present rate is dropped.
     Time(Duration),
 }
 
@@ -23,9 +23,9 @@ pub enum QueueLimit {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Waiting {
     pub(crate) packets: u64,
-    /// Bytes of the waiting packets. Wider than [`Bytes`], whose sum would saturate and then be wrong after a departure.
+    /// Bytes of the waiting packets. Wider than [`Bytes`]: a sum of [`Bytes`] would saturate and then be wrong after a departure.
     pub(crate) bytes: u128,
-    /// Time after which the turn of another packet would come.
+    /// Time until the turn of another packet.
     pub(crate) time: Duration,
 }
 
@@ -34,6 +34,7 @@ impl QueueLimit {
     pub(crate) fn admits(self, waiting: Waiting, size: Bytes) -> bool {
         match self {
             Self::Packets(limit) => waiting.packets < limit,
+            // The new packet counts too, but not the packet in transmission.
             Self::Bytes(limit) => waiting.bytes + u128::from(size.get()) <= u128::from(limit.get()),
             Self::Time(limit) => waiting.time <= limit,
         }

@@ -1,4 +1,4 @@
-//! Load of a link. Under a load that a link carries easily no packet waits, and its queue need not be simulated.
+//! Load of a link. Under an easy load no packet waits, and the link's queue need not be simulated.
 
 use core::time::Duration;
 
@@ -7,7 +7,7 @@ use cohaptic_units::Bytes;
 use super::bottleneck::giga_bits;
 use super::{Bottleneck, Discipline, Service, TokenBucket};
 
-/// Packets of one size that are offered to a link at distances of at least `gap`. The program that offers the packets promises both; debug assertions check
+/// Packets of one size, offered to a link at distances of at least `gap`. The offering program promises both; debug assertions check
 /// the promise.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Load {
@@ -18,7 +18,7 @@ pub struct Load {
 }
 
 impl Load {
-    /// Returns a load of packets of `size`, several of which may be offered at once.
+    /// Returns a load of packets of `size`, with possibly several offers at once.
     #[must_use]
     pub(crate) const fn of(size: Bytes) -> Self {
         Self { size, gap: Duration::ZERO }
@@ -26,24 +26,26 @@ impl Load {
 }
 
 impl Bottleneck {
-    /// Returns the transmission time of each packet of the load, if each packet leaves before the next one is offered. No packet then waits, and no discipline
-    /// and no limit has any effect. Returns `None` if a packet may wait.
+    /// Returns the transmission time of each packet of the load, if each packet leaves before the offer of the next packet. No packet then waits, and no
+    /// discipline and no limit has any effect. Returns `None` if a packet may wait.
     pub(crate) fn time_without_wait(&self, load: Load) -> Option<Duration> {
         let Self { service: Service::Rate(rate), framing, limit: _, discipline } = self else { return None };
-        // Without waiting packets the average of RED is zero, which is not below a threshold of zero: RED then may drop packets.
+        // Without waiting packets the average of RED is zero, not below a threshold of zero: RED then may drop packets.
         if matches!(discipline, Discipline::Red(red) if red.min() == Bytes::ZERO) {
             return None;
         }
         let time = rate.transmission_time(giga_bits(framing.on_the_line(load.size)));
+        // A departure makes room for a simultaneous offer, so an equal time suffices.
         (time <= load.gap).then_some(time)
     }
 }
 
 impl TokenBucket {
-    /// Returns whether each packet of the load finds enough tokens, because the tokens that a packet takes come back before the next packet. The bucket
+    /// Returns whether each packet of the load finds enough tokens, because a packet's tokens come back before the next packet. The bucket
     /// begins full.
     pub(crate) fn lets_all_pass(&self, load: Load) -> bool {
         let needed = giga_bits(self.framing.on_the_line(load.size));
+        // Each packet's tokens come back within the gap, so every packet finds a full bucket.
         let buckets = [Some((self.rate, self.burst)), self.peak.map(|peak| (peak.rate, peak.burst))];
         buckets.into_iter().flatten().all(|(rate, burst)| needed <= giga_bits(burst) && needed <= rate.bits_sent(load.gap))
     }

@@ -4,8 +4,8 @@ use crate::parameters::{FRACTION, Form, Table, number, required, usual};
 use cohaptic_units::{Bytes, Probability};
 use core::fmt;
 
-/// Parameters of RED. The average queue decides about a packet that is offered: below `min` the packet passes, from `max` on the packet is dropped, and in
-/// between the packet is dropped with a probability that rises from zero to `max_probability`, with drops spread evenly over the packets.
+/// Parameters of RED. The average queue decides about an offered packet: below `min` the packet passes, from `max` on the packet is dropped, and in
+/// between the packet is dropped with a probability rising from zero to `max_probability`, with drops spread evenly over the packets.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Red {
     min: Bytes,
@@ -16,7 +16,7 @@ pub struct Red {
     ecn: bool,
 }
 
-/// Reason for which parameters of RED are refused.
+/// Reason for the refusal of parameters of RED.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum RedError {
     /// The lower threshold is not below the upper threshold.
@@ -26,7 +26,7 @@ pub enum RedError {
         /// Upper threshold.
         max: Bytes,
     },
-    /// The weight is not in (0, 1], so that the average would never move or would overshoot.
+    /// The weight is not in (0, 1]: the average would never move or would overshoot.
     Weight(f64),
     /// The mean packet has no bytes.
     MeanPacket,
@@ -45,9 +45,9 @@ impl fmt::Display for RedError {
 impl core::error::Error for RedError {}
 
 impl Red {
-    /// Returns checked parameters. `weight` is the weight of the newest queue length in the average, usually 0.002. `mean_packet` sets the decay of the
-    /// average while the transmitter is idle: a factor of (1−weight)^m in the time of m mean packets. With `ecn`, a packet that supports ECN is marked instead
-    /// of dropped while the average is below `max`.
+    /// Returns checked parameters. `weight` is the weight of the newest queue length in the average, usually 0.002. `mean_packet` sets the decay of the average
+    /// while the transmitter is idle: a factor of (1−weight)^m in the time of m mean packets. With `ecn`, an ECN-capable packet is marked instead of dropped
+    /// while the average is below `max`.
     ///
     /// # Errors
     ///
@@ -56,6 +56,7 @@ impl Red {
         if min >= max {
             return Err(RedError::Thresholds { min, max });
         }
+        // Written with a negation, so NaN is refused too.
         if !(weight > 0.0 && weight <= 1.0) {
             return Err(RedError::Weight(weight));
         }
@@ -65,17 +66,17 @@ impl Red {
         Ok(Self { min, max, max_probability, weight, mean_packet, ecn })
     }
 
-    /// Returns the average queue below which no packet is dropped.
+    /// Returns the lower threshold: no packet is dropped at a smaller average queue.
     pub(crate) const fn min(&self) -> Bytes {
         self.min
     }
 
-    /// Returns whether packets that support ECN are marked.
+    /// Returns whether ECN-capable packets are marked.
     pub(crate) const fn ecn(&self) -> bool {
         self.ecn
     }
 
-    /// Returns the size of the mean packet, whose transmission time is the unit of the decay while the transmitter is idle.
+    /// Returns the size of the mean packet. Its transmission time is the unit of the decay at an idle transmitter.
     #[must_use]
     pub(crate) const fn mean_packet(&self) -> Bytes {
         self.mean_packet
@@ -95,12 +96,12 @@ pub(crate) enum Verdict {
 pub(crate) struct RedState {
     /// Average of the waiting bytes.
     average: f64,
-    /// Number of packets that passed between the thresholds since the last packet that was dropped or marked.
+    /// Number of packets passed between the thresholds since the last drop or mark.
     count: f64,
 }
 
 impl RedState {
-    /// Decides about a packet that finds `queued` bytes waiting, after the transmitter was idle for the time of `idle_packets` mean packets. `word` is the
+    /// Decides about a packet behind `queued` waiting bytes, after an idle time of `idle_packets` mean packets. `word` is the
     /// packet's random word for queues.
     pub(crate) fn verdict(&mut self, red: &Red, queued: u128, idle_packets: f64, ecn_capable: bool, word: u64) -> Verdict {
         #[expect(clippy::cast_precision_loss, reason = "an average")]
@@ -114,11 +115,12 @@ impl RedState {
             self.count = 0.0;
             return Verdict::Pass;
         }
-        // Marks do not suffice above the upper threshold, so that every packet is dropped there, with ECN as well.
+        // Marks do not suffice above the upper threshold, so every packet is dropped there, with ECN as well.
         if self.average >= max {
             self.count = 0.0;
             return Verdict::Drop;
         }
+        // The paper's p_b, linear between the thresholds.
         let base = red.max_probability.get() * (self.average - min) / (max - min);
         // With this correction the gap between hits is uniform on 1 … 1/base (the paper's method 2).
         let left = 1.0 - self.count * base;

@@ -1,9 +1,9 @@
 //! Token bucket: a mean rate with bursts (the filter of `tc-tbf`).
 //!
 //! A bucket of B bytes fills at the rate R. The oldest waiting packet leaves as soon as the bucket holds its size, and takes its size from the bucket. For
-//! any departures i … k therefore sᵢ + … + sₖ ≤ B + R·(tₖ − tᵢ). With a peak bucket the same holds for the peak rate and its own, smaller size.
+//! any departures i … k therefore sᵢ + … + sₖ ≤ B + R·(tₖ − tᵢ). With a peak bucket the same holds for the peak rate and a smaller size.
 //!
-//! Unlike a serialiser, a bucket lets a packet pass at once while it has credit: it limits the amount of a burst, not its speed.
+//! Unlike a serialiser, a bucket with credit lets a packet pass at once: a bucket limits the amount of a burst, not its speed.
 
 use super::limit::words_of_limit;
 use alloc::collections::VecDeque;
@@ -24,13 +24,13 @@ use crate::parameters::{Form, Key, NONE, Table, optional, required, usual};
 /// Configuration of a token bucket and the queue before it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct TokenBucket {
-    /// Rate at which the bucket fills.
+    /// Rate of filling.
     pub rate: Rate,
-    /// Size of the bucket, which begins full. A packet that takes more can never leave and is dropped.
+    /// Size of the bucket. The bucket begins full. A packet beyond this size can never leave and is dropped.
     pub burst: Bytes,
-    /// Second bucket, which limits the speed of a burst.
+    /// Second bucket, against the speed of a burst.
     pub peak: Option<Peak>,
-    /// Bytes that a packet takes from the bucket beyond its own bytes.
+    /// Bytes taken from the bucket by a packet beyond the packet's bytes.
     pub framing: Framing,
     /// Limit of the queue. `None` sets no limit.
     pub limit: Option<QueueLimit>,
@@ -39,7 +39,7 @@ pub struct TokenBucket {
 /// Bucket of the peak rate.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Peak {
-    /// Rate at which the bucket fills.
+    /// Rate of filling.
     pub rate: Rate,
     /// Size of the bucket: at least one packet of the largest size.
     pub burst: Bytes,
@@ -48,9 +48,9 @@ pub struct Peak {
 /// State of a bucket. Amounts are in 10⁻⁹ bit.
 #[derive(Clone, Copy, Debug)]
 struct Bucket {
-    /// Rate at which tokens come.
+    /// Rate of new tokens.
     rate: Rate,
-    /// Greatest number of tokens that the bucket holds.
+    /// Greatest number of tokens in the bucket.
     size: u128,
     /// Tokens in the bucket at `since`; at most `size`.
     tokens: u128,
@@ -64,14 +64,16 @@ impl Bucket {
         Self { rate, size, tokens: size, since: now }
     }
 
-    /// Adds the tokens that came until `now`.
+    /// Adds the new tokens until `now`.
     fn fill(&mut self, now: Instant) {
+        // Tokens beyond the size of the bucket are lost.
+        // Whole amounts of 10⁻⁹ bit keep the sum of tokens exact over any number of packets.
         let came = self.rate.bits_sent(now.saturating_duration_since(self.since));
         self.tokens = self.tokens.saturating_add(came).min(self.size);
         self.since = self.since.max(now);
     }
 
-    /// Returns the instant from which the bucket holds `needed` tokens, if no packet takes tokens before. `needed` is at most the bucket's size.
+    /// Returns the first instant with `needed` tokens in the bucket, if no packet takes tokens before. `needed` is at most the bucket's size.
     fn holds_at(&self, needed: u128) -> Instant {
         self.since.saturating_add(self.rate.transmission_time(needed.saturating_sub(self.tokens)))
     }
@@ -84,7 +86,7 @@ pub(crate) struct TokenBucketStage<T> {
     mean: Bucket,
     peak: Option<Bucket>,
     waiting: VecDeque<Carried<T>>,
-    /// Bytes of the waiting packets, framing not counted. Wider than [`Bytes`], whose sum would saturate.
+    /// Bytes of the waiting packets, framing not counted. Wider than [`Bytes`], because a sum of [`Bytes`] would saturate.
     waiting_bytes: u128,
 }
 
@@ -96,7 +98,7 @@ impl<T> TokenBucketStage<T> {
         Self { config, mean, peak, waiting: VecDeque::new(), waiting_bytes: 0 }
     }
 
-    /// Takes a packet. Returns the packet if it may leave at once; otherwise the packet waits, or is dropped into `outputs`.
+    /// Takes a packet. Returns the packet if the packet may leave at once; otherwise the packet waits, or is dropped into `outputs`.
     pub(crate) fn offer(&mut self, now: Instant, packet: Carried<T>, outputs: &mut Outputs<T>) -> Option<Carried<T>> {
         let needed = self.needed(&packet);
         if needed > self.largest() {
@@ -124,24 +126,25 @@ impl<T> TokenBucketStage<T> {
     pub(crate) fn next_at(&self) -> Option<Instant> {
         let needed = self.needed(self.waiting.front()?);
         let mean = self.mean.holds_at(needed);
+        // A packet leaves when both buckets have enough, so the later instant counts.
         Some(self.peak.map_or(mean, |peak| mean.max(peak.holds_at(needed))))
     }
 
-    /// Returns the packet that leaves `now`, which is the instant returned by [`next_at`](Self::next_at).
+    /// Returns the packet leaving `now`. `now` is the instant returned by [`next_at`](Self::next_at).
     pub(crate) fn release(&mut self, now: Instant) -> Option<Carried<T>> {
         self.fill(now);
         let packet = self.waiting.pop_front()?;
         self.waiting_bytes -= u128::from(packet.info.size.get());
         let paid = self.pay(self.needed(&packet));
-        // No instant lies beyond the end of time, so a packet that would leave later leaves at the end, perhaps without enough tokens.
+        // No instant lies beyond the end of time, so a packet with a later departure leaves at the end, perhaps without enough tokens.
         debug_assert!(paid || now == Instant::MAX, "what waits fits into the buckets, and is released when they hold it");
         Some(packet)
     }
 
-    /// Changes rates, sizes and limit. Tokens that came until `now` stay, up to the size of the new bucket; a new peak bucket is full. A waiting packet that
-    /// is too large for the new buckets could never leave and is dropped.
+    /// Changes rates, sizes and limit. Tokens stay, up to the size of the new bucket; a new peak bucket is full. A waiting packet too large for the new buckets
+    /// could never leave and is dropped.
     pub(crate) fn reconfigure(&mut self, now: Instant, config: TokenBucket, outputs: &mut Outputs<T>) {
-        // Tokens that came before the change came at the old rates.
+        // Tokens before the change came at the old rates.
         self.fill(now);
         let change = |old: Bucket, rate, burst| {
             let size = giga_bits(burst);
@@ -169,17 +172,17 @@ impl<T> TokenBucketStage<T> {
         self.waiting.into_iter()
     }
 
-    /// Returns the tokens of the largest packet that can ever leave.
+    /// Returns the tokens of the largest packet with any chance to leave.
     fn largest(&self) -> u128 {
         self.peak.map_or(self.mean.size, |peak| peak.size.min(self.mean.size))
     }
 
-    /// Returns the tokens that a packet takes.
+    /// Returns the tokens for a packet.
     fn needed(&self, packet: &Carried<T>) -> u128 {
         giga_bits(self.config.framing.on_the_line(packet.info.size))
     }
 
-    /// Adds the tokens that came until `now` to both buckets.
+    /// Adds the new tokens until `now` to both buckets.
     fn fill(&mut self, now: Instant) {
         self.mean.fill(now);
         if let Some(peak) = &mut self.peak {
@@ -189,6 +192,7 @@ impl<T> TokenBucketStage<T> {
 
     /// Takes `needed` tokens from both buckets and returns true, or returns false if a bucket holds too few.
     fn pay(&mut self, needed: u128) -> bool {
+        // Both buckets are asked before either pays, so a refusal takes no tokens.
         let there = self.mean.tokens >= needed && self.peak.is_none_or(|peak| peak.tokens >= needed);
         if there {
             self.mean.tokens -= needed;
@@ -209,8 +213,8 @@ impl<T> TokenBucketStage<T> {
         limit.admits(Waiting { packets: self.waiting.len() as u64, bytes: self.waiting_bytes, time }, size)
     }
 
-    /// Returns the instant at which another packet of `size` would leave at the present rates. A packet needs no time to leave a bucket, so that this is also
-    /// the packet's turn.
+    /// Returns the instant of departure of another packet of `size` at the present rates. A packet needs no time to leave a bucket, so this is also the
+    /// packet's turn.
     fn turn_of(&self, size: Bytes) -> Instant {
         let (mut mean, mut peak) = (self.mean, self.peak);
         let mut turn = mean.since;
