@@ -10,14 +10,14 @@
 //!   taken from
 //! ```
 //!
-//! Events of a network come in bursts (all peers sample at a tick), whose arrivals lie close together and are often in order already. Each bucket is sorted
-//! only once, while a heap would sift every event. Neither the bucket of an event nor the form of the queue changes the order of events, which depends on
+//! Events of a network come in bursts (all peers sample at a tick). The arrivals lie close together and are often in order already. Each bucket is sorted
+//! only once, while a heap would sift every event. Neither the bucket of an event nor the form of the queue changes the order of events: the order depends on
 //! the keys alone.
 //!
 //! In the calendar an event stays in the slab where it was first stored. Buckets sort one word per event: the time since the beginning of the bucket, and the
 //! index in the slab. The events, of some 48 bytes, are moved only into and out of the slab.
 //!
-//! The width of the buckets adapts to the events, so that a bucket holds 4 to 16 events on average. With fewer events per bucket, searches for the next bucket
+//! The width of the buckets adapts to the events, so a bucket holds 4 to 16 events on average. With fewer events per bucket, searches for the next bucket
 //! cost more; with more events, sorting costs more.
 
 use alloc::collections::{BinaryHeap, VecDeque};
@@ -30,7 +30,7 @@ use crate::ring::Ring;
 
 /// Event of a queue, with its instant and its key.
 pub trait Event {
-    /// Key that orders events: first by instant, then by a fixed rule that breaks ties.
+    /// Key for the order of events: first by instant, then by a fixed rule for ties.
     type Key: Ord;
 
     /// Returns the instant of the event.
@@ -47,19 +47,19 @@ pub struct EventQueue<E> {
     ordered: Ring<E>,
     /// Whether the queue is a ring (all events in `ordered`) or a calendar (all events in `slab`).
     in_order: bool,
-    /// Events of the calendar. Each event keeps its index until it is taken.
+    /// Events of the calendar. Each event keeps its index until its removal.
     slab: Slab<E>,
-    /// Events in order, from which the next events are taken: the events of the current bucket, and events pushed later into this bucket or an earlier one.
+    /// Events in order, with the next events to take: the events of the current bucket, and events pushed later into this bucket or an earlier bucket.
     front: VecDeque<Entry>,
     /// Number of the current bucket: its instant divided by the width. Every event in `ring` and in `far` lies in a later bucket.
     current: u64,
-    /// Unsorted buckets after the current one, indexed by [`slot`]. Fewer than `RING` consecutive buckets are in use, so that no two share a slot.
+    /// Unsorted buckets after the current bucket, indexed by [`slot`]. Fewer than `RING` consecutive buckets are in use, so no two share a slot.
     ring: Vec<Vec<Packed>>,
-    /// Bits of the slots in `ring` that are not empty: slot i is bit i mod 64 of word i / 64.
+    /// Bits of the occupied slots in `ring`: slot i is bit i mod 64 of word i / 64.
     occupied: [u64; RING / 64],
     /// Memory of emptied buckets for reuse. The queue then touches memory in proportion to its events, and not to the number of slots.
     spare: Vec<Vec<Packed>>,
-    /// Events at least `RING` buckets after the current one.
+    /// Events at least `RING` buckets after the current bucket.
     far: BinaryHeap<Reverse<Entry>>,
     /// Lower bound of the instants of all events in `ring` and `far`. Ticks before this instant need no search for the next bucket.
     quiet_until: Instant,
@@ -79,13 +79,13 @@ type Packed = u64;
 
 /// Number of slots, a power of two. With the widths below, the slots span 134 ms to 34 s.
 const RING: usize = 8192;
-/// Allowed exponents of the width. At most 32, so that a time within a bucket fits into half a word.
+/// Allowed exponents of the width. At most 32, so a time within a bucket fits into half a word.
 const WIDTHS: core::ops::RangeInclusive<u32> = 14..=22;
 /// Initial exponent of the width: buckets of 131 µs.
 const FIRST_WIDTH: u32 = 17;
 /// Number of buckets brought to the front between two checks of the width.
 const LOOK_EVERY: u32 = 1024;
-/// Average number of events per bucket for which the width stays the same.
+/// Average number of events per bucket without a change of the width.
 const RIGHT_FILL: core::ops::RangeInclusive<u64> = 4..=16;
 
 impl<E: Event> Default for EventQueue<E> {
@@ -136,7 +136,7 @@ impl<E: Event> EventQueue<E> {
                 self.ordered.push(|| event);
                 return;
             }
-            // The event comes before the last one in the ring.
+            // The event comes before the last event in the ring.
             self.become_calendar();
         }
         self.push_calendar(event);
@@ -149,7 +149,7 @@ impl<E: Event> EventQueue<E> {
         self.ordered.back()
     }
 
-    /// Adds an event at the instant `at`. `make` constructs the event in its final place, so that no large value is moved. `follows` tells whether the key of
+    /// Adds an event at the instant `at`. `make` constructs the event in its final place, so no large value is moved. `follows` tells whether the key of
     /// the event is at least the key of [`EventQueue::last_in_order`].
     #[inline(always)]
     pub(crate) fn push_made(&mut self, at: Instant, follows: bool, make: impl FnOnce() -> E) {
@@ -174,6 +174,7 @@ impl<E: Event> EventQueue<E> {
             self.len -= 1;
             return self.ordered.pop();
         }
+        // The front is tried first, because a search for the next bucket is needed once per bucket only.
         if self.front.front().is_none_or(|first| first.0 > now) && !self.advance(now) {
             return None;
         }
@@ -185,7 +186,7 @@ impl<E: Event> EventQueue<E> {
     }
 
     /// Removes the first event if its instant is at most `now`, and returns the answer of `take` for the event. `take` is called at one place for both forms of
-    /// the queue, so that the compiler inlines `take` and reads only the fields of the event that `take` uses.
+    /// the queue, so the compiler inlines `take` and reads only the used fields of the event.
     #[inline(always)]
     pub(crate) fn take_due<T>(&mut self, now: Instant, take: impl FnOnce(E) -> T) -> Option<T> {
         let place = if self.in_order {
@@ -220,12 +221,14 @@ impl<E: Event> EventQueue<E> {
         if self.in_order {
             return self.ordered.front().map(Event::at);
         }
+        // Front, ring and far hold events in this order of time, so the first event found decides.
         if let Some(first) = self.front.front() {
             return Some(first.0);
         }
         let Some(bucket) = self.next_occupied() else {
             return self.far.peek().map(|Reverse(first)| first.0);
         };
+        // A bucket is unsorted until its time comes, so its minimum is searched.
         self.ring[slot(bucket)].iter().min().map(|first| self.unpack(bucket, *first).0)
     }
 
@@ -252,7 +255,7 @@ impl<E: Event> EventQueue<E> {
 
     #[inline]
     fn push_entry(&mut self, entry: Entry) {
-        // Past events and events of the current bucket go to the front, which is sorted. Later buckets stay unsorted until their time comes.
+        // Past events and events of the current bucket go to the sorted front. Later buckets stay unsorted until their time comes.
         let bucket = self.bucket_of(entry.0);
         if bucket <= self.current {
             return self.push_front(entry);
@@ -280,7 +283,7 @@ impl<E: Event> EventQueue<E> {
         (Instant::from_nanos((bucket << self.width) + (packed >> 32)), place_of(packed))
     }
 
-    /// Brings the next bucket to the front if the front is empty and the bucket has begun at `now`. Returns whether the front begins with an event that is due.
+    /// Brings the next bucket to the front if the front is empty and the bucket has begun at `now`. Returns whether the front begins with a due event.
     fn advance(&mut self, now: Instant) -> bool {
         let present = self.bucket_of(now);
         while self.front.is_empty() && self.len > 0 {
@@ -295,13 +298,13 @@ impl<E: Event> EventQueue<E> {
             self.bring_to_front(next);
         }
         if self.front.is_empty() {
-            // No event lies in the present bucket or before it, so the ring may begin here. Events pushed next then find all slots free for the time ahead.
+            // No event lies in the present bucket or before, so the ring may begin here. Events pushed next then find all slots free for the time ahead.
             self.move_to(self.current.max(present));
         }
         self.front.front().is_some_and(|first| first.0 <= now)
     }
 
-    /// Sorts a bucket into the front, which must be empty, and makes the bucket the current one. If the first event is in `far`, the slot is empty, and
+    /// Sorts a bucket into the empty front, and makes the bucket the current bucket. If the first event is in `far`, the slot is empty, and
     /// `move_to` pulls the events out of `far`.
     fn bring_to_front(&mut self, bucket: u64) {
         let place = slot(bucket);
@@ -311,12 +314,12 @@ impl<E: Event> EventQueue<E> {
         let mut few = [0; FEW];
         let sorted = sort(&mut events, &mut few);
         if sorted.windows(2).any(|pair| pair[0] >> 32 == pair[1] >> 32) {
-            // Words sort by instant and then by index in the slab. Keys are read from the slab only if two instants are equal, which is rare.
+            // Words sort by instant and then by index in the slab. Keys are read from the slab only in the rare case of two equal instants.
             sorted.sort_unstable_by_key(|packed| self.slab.key(place_of(*packed)));
         }
         let start = bucket << self.width;
         self.front.extend(sorted.iter().map(|&packed| (Instant::from_nanos(start + (packed >> 32)), place_of(packed))));
-        // Buckets that never held an event have no memory to keep.
+        // Buckets without any event so far have no memory to keep.
         events.clear();
         if events.capacity() > 0 {
             self.spare.push(events);
@@ -351,17 +354,18 @@ impl<E: Event> EventQueue<E> {
         }
         entries.extend(core::mem::take(&mut self.far).into_iter().map(|Reverse(entry)| entry));
         self.width = width;
-        // The earliest bucket becomes the current bucket, so that `push_entry` sorts the events of the bucket into the front.
+        // The earliest bucket becomes the current bucket, so `push_entry` sorts the events of the bucket into the front.
         self.current = entries.iter().map(|entry| self.bucket_of(entry.0)).min().unwrap_or(0);
         for entry in entries {
             self.push_entry(entry);
         }
     }
 
-    /// Makes a bucket the current one, and moves events from `far` that are now within reach to the ring or to the front.
+    /// Makes a bucket the current bucket, and moves events from `far` now within reach to the ring or to the front.
     fn move_to(&mut self, bucket: u64) {
         self.current = bucket;
         while let Some(Reverse(first)) = self.far.peek() {
+            // `far` is ordered by instant, so the first event out of reach ends the search.
             if self.bucket_of(first.0).saturating_sub(self.current) >= RING as u64 {
                 break;
             }
@@ -403,7 +407,7 @@ impl<E: Event> EventQueue<E> {
         let start = self.current + 1;
         let (word, bit) = (slot(start) / 64, slot(start) % 64);
         let words = self.occupied.len();
-        // The first word is tested twice: first its upper bits, and last its lower bits, which belong to the latest buckets of the ring.
+        // The first word is tested twice: first its upper bits, and last its lower bits for the latest buckets of the ring.
         for step in 0..=words {
             let index = (word + step) % words;
             let mask = match step {
@@ -435,13 +439,14 @@ fn place_of(packed: Packed) -> u32 {
 }
 
 /// Sorts distinct words. At most [`FEW`] words are sorted into `few` by counting: the number of smaller words is the index of a word. No branch then depends on
-/// the order of the words, which a processor cannot predict.
+/// the order of the words. A processor cannot predict this order.
 fn sort<'a>(words: &'a mut [Packed], few: &'a mut [Packed; FEW]) -> &'a mut [Packed] {
     if words.len() > FEW {
         words.sort_unstable();
         return words;
     }
     for word in &*words {
+        // Words are distinct, because each has a different index in the slab, so no two ranks are equal.
         let rank: usize = words.iter().map(|other| usize::from(other < word)).sum();
         few[rank] = *word;
     }
@@ -466,8 +471,8 @@ impl<E: Event> Slab<E> {
     fn store(&mut self, make: impl FnOnce() -> E) -> u32 {
         let place = self.free.pop().unwrap_or_else(|| self.grow());
         let stored = &mut self.places[place as usize];
-        // Always true: only free indices are handed out. The test tells the compiler that the assignment drops no old event, so that the event can be
-        // constructed in its place.
+        // Always true: only free indices are handed out. With the test the compiler knows of no old event to drop, so the event can be constructed in its
+        // place.
         if stored.is_none() {
             *stored = Some(make());
         }

@@ -13,12 +13,12 @@ use alloc::vec::Vec;
 pub struct Table {
     /// Groups of keys, in the order of the reference. Several tables can share a group.
     pub groups: &'static [&'static [Key]],
-    /// Function that returns further keys, made by a registry while the program runs. These keys come after the keys of the groups.
+    /// Function with further keys, made by a registry while the program runs. These keys come after the keys of the groups.
     pub made: Option<fn() -> &'static [Key]>,
-    /// Form of the value under any other name, or `None` if other names are unknown keys.
+    /// Form of the value under any further name, or `None` if further names are unknown keys.
     pub others: Option<&'static Form>,
-    /// `true` if the table is laid over another table. A missing key then has the value of the other table, and the default only if that table lacks the key
-    /// too.
+    /// `true` if the table is laid over another table. A missing key then has the value of the table below, and the default only if the table below lacks the
+    /// key too.
     pub is_laid_over: bool,
 }
 
@@ -29,13 +29,13 @@ impl Table {
         Self { groups, made: None, others: None, is_laid_over: false }
     }
 
-    /// Declares a table with groups of keys that is laid over another table.
+    /// Declares a table with groups of keys, laid over another table.
     #[must_use]
     pub const fn over(groups: &'static [&'static [Key]]) -> Self {
         Self { is_laid_over: true, ..Self::of(groups) }
     }
 
-    /// Declares a table with groups of keys and with names chosen by the file, whose values have the form `others`.
+    /// Declares a table with groups of keys and with names chosen by the file, for values of the form `others`.
     #[must_use]
     pub const fn with_others(groups: &'static [&'static [Key]], others: &'static Form) -> Self {
         Self { others: Some(others), ..Self::of(groups) }
@@ -70,6 +70,7 @@ impl Table {
 
     /// Returns the form of the value under a name of this table.
     fn form_of(&self, name: &str) -> Option<&'static Form> {
+        // A declared key wins over the form of names chosen by the file.
         self.key(name).map(|key| &key.form).or(self.others)
     }
 
@@ -89,7 +90,7 @@ impl Table {
 ///
 /// # Panics
 ///
-/// If `M` is not the number of all groups; in a constant, that fails to compile.
+/// If `M` is not the number of all groups; a constant then fails to compile.
 #[must_use]
 pub const fn joined<const M: usize>(parts: &[&[&'static [Key]]]) -> [&'static [Key]; M] {
     // Loops instead of iterators, because iterators cannot run in a constant.
@@ -166,7 +167,7 @@ pub enum Need {
 pub enum Form {
     /// Any text.
     Text,
-    /// The name of a file, relative to the folder of the file that names it.
+    /// The name of a file, relative to the folder of the naming file.
     File,
     /// `true` or `false`.
     Boolean,
@@ -188,7 +189,7 @@ pub enum Form {
     Size,
     /// A number from 0 to 1, or a text with a percent sign.
     Probability,
-    /// A text of some other form, with examples.
+    /// A text of some further form, with examples.
     Like(&'static [&'static str]),
     /// One of a few words.
     Words(Words),
@@ -205,13 +206,14 @@ pub enum Form {
 /// Words of a choice, each with its meaning.
 pub type Words = &'static [(&'static str, &'static str)];
 
-/// Words of a choice, each with its value and its meaning: the declaration of a [`Form::Words`] from which a reader takes the values too.
+/// Words of a choice, each with its value and its meaning: the declaration of a [`Form::Words`], with the values for a reader.
 pub type Choices<T, const N: usize> = [(&'static str, T, &'static str); N];
 
 /// Returns the words of choices with their meanings, without the values.
 #[must_use]
 pub const fn words<T, const N: usize>(choices: &Choices<T, N>) -> [(&'static str, &'static str); N] {
     let mut words = [("", ""); N];
+    // A loop with an index, because iterators cannot run in a constant.
     let mut place = 0;
     while place < N {
         words[place] = (choices[place].0, choices[place].2);
@@ -279,13 +281,13 @@ impl Form {
     }
 }
 
-/// Declares a key that must be given.
+/// Declares a required key.
 #[must_use]
 pub const fn required(name: &'static str, form: Form, about: &'static str) -> Key {
     Key { name, about, need: Need::Required, form, expected: "" }
 }
 
-/// Declares a key that must be given in the table, or in a table for all such tables.
+/// Declares a key required in the table, or in a table for all such tables.
 #[must_use]
 pub const fn somewhere(name: &'static str, form: Form, about: &'static str) -> Key {
     Key { name, about, need: Need::RequiredSomewhere, form, expected: "" }
@@ -297,7 +299,7 @@ pub const fn usual(name: &'static str, form: Form, default: &'static str, about:
     Key { name, about, need: Need::Default(default), form, expected: "" }
 }
 
-/// Declares a key that may be left out.
+/// Declares an optional key.
 #[must_use]
 pub const fn optional(name: &'static str, form: Form, about: &'static str) -> Key {
     Key { name, about, need: Need::Optional, form, expected: "" }
@@ -408,9 +410,9 @@ pub(crate) const FRACTION: Quantity = Quantity { range: Range::Fraction, unit: "
 /// Correlation from −1 to below 1.
 pub(crate) const CORRELATION: Quantity = Quantity { range: Range::Correlation, unit: "" };
 
-/// Word that removes the table that the key is laid over.
+/// Word for the removal of the table below the key.
 pub(crate) const NONE: Form = Form::Words(&[("none", "takes away what it is laid over")]);
-/// Word that removes the limit that the key is laid over.
+/// Word for the removal of the limit below the key.
 pub(crate) const UNLIMITED: Form = Form::Words(&[("unlimited", "takes away the limit that it is laid over")]);
 /// Largest integer of TOML.
 pub(crate) const MOST: u64 = i64::MAX.unsigned_abs();

@@ -1,15 +1,15 @@
 //! Random numbers by address: counter-based draws without generator state.
 //!
-//! A draw is a pure function of (seed, link, packet, copy, purpose). No impairment can advance the generator of another impairment, because no generator
-//! state exists. Adding a link, a peer or an impairment, or changing one parameter, leaves all other draws the same. Two runs that differ in one parameter
-//! share all other randomness (common random numbers).
+//! A draw is a pure function of (seed, link, packet, copy, purpose). No impairment can advance the generator of another impairment, because no generator state
+//! exists. An additional link, peer or impairment, or a changed parameter, leaves all further draws the same. Two runs with a difference in one parameter share
+//! all further randomness (common random numbers).
 //!
 //! The function is Philox-2×64 with 7 rounds (Salmon, Moraes, Dror & Shaw, *Parallel Random Numbers: As Easy as 1, 2, 3*, SC11, 2011): the key comes from
 //! (seed, link), the counter from (packet, copy, purpose, block). The authors found 6 rounds enough for every test of BigCrush. The tests of this module
 //! compare with the published vectors.
 //!
-//! A block has two words. The first words of two purposes share a block (loss with jitter, duplication with corruption), because a link that needs one of
-//! the two words often needs the other word too, and then computes one block only. Further words of a purpose lie in blocks of that purpose alone.
+//! A block has two words. The first words of two purposes share a block (loss with jitter, duplication with corruption), because a link with need for one of
+//! the two words often needs the second word too, and then computes one block only. Further words of a purpose lie in blocks of this purpose alone.
 
 use core::convert::Infallible;
 
@@ -34,11 +34,11 @@ pub enum Purpose {
     InitialState,
     /// Loss of a packet on a recorded path.
     TraceLoss,
-    /// Durations for which a link is up and down in turn. The n-th span has the draws of packet n.
+    /// Durations of up and down in turn. The n-th span has the draws of packet n.
     Outage,
     /// Instants and next states of a modulator. The n-th change has the draws of packet n.
     Modulation,
-    /// Instants at which slots open. The n-th slot has the draws of packet n.
+    /// Instants of opening slots. The n-th slot has the draws of packet n.
     Slot,
     /// Process of an impairment of [the list](crate::Impairments), by its code. The n-th event has the draws of packet n.
     Listed(u8),
@@ -75,8 +75,8 @@ impl Stream {
     /// Returns the stream of a link. `label` names the link. Equal seeds and labels give equal streams.
     #[must_use]
     pub fn new(seed: u64, label: &[u8]) -> Self {
-        // Seed, length and words of the label are absorbed one by one, each with its position, by the function that makes the draws. The length tells
-        // labels apart that differ only in zeros at the end of the last word.
+        // Seed, length and words of the label are absorbed one by one, each with its position, by the function of the draws. The length distinguishes labels
+        // with a difference only in zeros at the end of the last word.
         let mut key = philox(seed, 0, 0)[0];
         let mut position = 1;
         let mut absorb = |word: u64| {
@@ -118,7 +118,7 @@ pub struct PacketDraws {
 }
 
 impl PacketDraws {
-    /// Returns the first words for [`Purpose::Loss`] and [`Purpose::Jitter`], which share a block.
+    /// Returns the first words for [`Purpose::Loss`] and [`Purpose::Jitter`]. Both share a block.
     #[must_use]
     #[inline]
     pub const fn loss_and_jitter(self) -> [u64; 2] {
@@ -130,6 +130,7 @@ impl PacketDraws {
     #[inline]
     pub const fn first(self, purpose: Purpose) -> u64 {
         let code = purpose.code();
+        // Neighbouring codes share a block: an even code has its first word, an odd code its second.
         self.block(0, code / 2)[(code % 2) as usize]
     }
 
@@ -146,7 +147,7 @@ impl PacketDraws {
     }
 
     /// Computes a block. In block 0, `whose` is the number of a pair of purposes; in all later blocks, `whose` is the code of one purpose. Codes and copies
-    /// are below 256, so that the parts of the counter do not overlap.
+    /// are below 256, so the parts of the counter do not overlap.
     #[inline]
     const fn block(self, block: u64, whose: u64) -> [u64; 2] {
         philox(self.number, block << 16 | (self.copy as u64) << 8 | whose, self.key)
@@ -155,14 +156,14 @@ impl PacketDraws {
 
 /// Unlimited sequence of random numbers of one packet for one purpose.
 ///
-/// Implements the generator trait that `rand_distr` takes.
+/// Implements the generator trait of `rand_distr`.
 #[derive(Clone, Copy, Debug)]
 pub struct Draws {
     packet: PacketDraws,
     purpose: Purpose,
     /// Next block to compute.
     block: u64,
-    /// Second word of the latest block, if not yet returned. Never a word of block 0, whose second word belongs to another purpose.
+    /// Second word of the latest block, if not yet returned. Never a word of block 0: its second word belongs to another purpose.
     spare: Option<u64>,
 }
 
@@ -174,6 +175,7 @@ impl Draws {
             return word;
         }
         if self.block == 0 {
+            // In block 0 only the first word of this purpose counts, so nothing is spare.
             self.block = 1;
             return self.packet.first(self.purpose);
         }
@@ -196,6 +198,7 @@ impl Draws {
 #[expect(clippy::cast_precision_loss, reason = "53 bits are exact in an f64")]
 pub fn unit(word: u64) -> f64 {
     const TWO_POW_MINUS_53: f64 = 1.0 / 9_007_199_254_740_992.0;
+    // Multiplication by a power of two is exact, so the result is below 1 for every word.
     (word >> 11) as f64 * TWO_POW_MINUS_53
 }
 
@@ -221,12 +224,12 @@ impl TryRng for Draws {
 }
 
 /// Computes Philox-2×64-7: two words of output from two words of counter and one word of key.
-/// Computes Philox-2×64 with a number of rounds. The tests also check the published vectors of 10 rounds.
 #[inline]
 const fn philox(counter: u64, high: u64, key: u64) -> [u64; 2] {
     philox_rounds(counter, high, key, 7)
 }
 
+/// Computes Philox-2×64 with a number of rounds. The tests also check the published vectors of 10 rounds.
 #[inline]
 #[expect(clippy::cast_possible_truncation, reason = "the two halves of a 128-bit product")]
 const fn philox_rounds(counter: u64, high: u64, key: u64, rounds: u32) -> [u64; 2] {
@@ -236,7 +239,7 @@ const fn philox_rounds(counter: u64, high: u64, key: u64, rounds: u32) -> [u64; 
     let mut round = 0;
     while round < rounds {
         let product = left as u128 * MULTIPLIER as u128;
-        // The upper half of the product is mixed with the key and the other word, and the lower half becomes the other word.
+        // The upper half of the product is mixed with the key and the right word, and the lower half becomes the right word.
         left = (product >> 64) as u64 ^ key ^ right;
         right = product as u64;
         // A Weyl sequence gives each round another key.

@@ -1,8 +1,8 @@
-//! Ring buffer whose values are constructed in their place.
+//! Ring buffer with values constructed in their place.
 
 use alloc::vec::Vec;
 
-/// First-in, first-out queue in a ring buffer, which grows by doubling and never shrinks.
+/// First-in, first-out queue in a ring buffer. The buffer grows by doubling and never shrinks.
 ///
 /// Unlike [`VecDeque`](alloc::collections::VecDeque), the ring constructs a value in its place, and can drop a value or take it apart in its place. A large
 /// value is then not written to the stack first and moved as a whole afterwards.
@@ -18,7 +18,7 @@ use alloc::vec::Vec;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Ring<T> {
-    /// Slots of the ring: none, or a power of two, so that a mask wraps an index. Exactly the `len` slots from `first` on, wrapped, are `Some`.
+    /// Slots of the ring: none, or a power of two, so a mask wraps an index. Exactly the `len` slots from `first` on, wrapped, are `Some`.
     places: Vec<Option<T>>,
     /// Index of the slot of the first value.
     first: usize,
@@ -67,7 +67,7 @@ impl<T> Ring<T> {
         self.places[(self.first + last) & (self.places.len() - 1)].as_ref()
     }
 
-    /// Adds a value after the last one. `make` constructs the value.
+    /// Adds a value after the last value. `make` constructs the value.
     #[inline(always)]
     pub fn push(&mut self, make: impl FnOnce() -> T) {
         if self.len == self.places.len() {
@@ -75,8 +75,8 @@ impl<T> Ring<T> {
         }
         let place = (self.first + self.len) & (self.places.len() - 1);
         let place = &mut self.places[place];
-        // Always true: after `grow` the slot after the last value is free. The test tells the compiler that the assignment drops no old value, so that the
-        // value can be constructed in the slot.
+        // Always true: after `grow` the slot after the last value is free. With the test the compiler knows of no old value to drop, so the value can be
+        // constructed in the slot.
         if place.is_none() {
             *place = Some(make());
             self.len += 1;
@@ -125,7 +125,7 @@ impl<T> Ring<T> {
         }
     }
 
-    /// Moves the beginning of the ring past the first slot, whose value was or will be taken. The ring must not be empty.
+    /// Moves the beginning of the ring past the first slot. Its value was or will be taken. The ring must not be empty.
     #[inline(always)]
     fn pass(&mut self) {
         self.first = (self.first + 1) & (self.places.len() - 1);
@@ -136,7 +136,7 @@ impl<T> Ring<T> {
     #[cold]
     #[inline(never)]
     fn grow(&mut self) {
-        // The values are rotated to begin at slot 0, so that the new slots lie after the last value.
+        // The values are rotated to begin at slot 0, so the new slots lie after the last value.
         self.places.rotate_left(self.first);
         self.first = 0;
         let places = (2 * self.places.len()).max(4);

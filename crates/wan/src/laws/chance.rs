@@ -1,4 +1,4 @@
-//! Events that happen to packets with a probability, independently or in runs.
+//! Events of packets with a probability, independently or in runs.
 
 use crate::parameters::{CORRELATION, Form, Key, Table, number, optional, usual};
 use alloc::format;
@@ -21,7 +21,7 @@ pub struct Chance {
 pub struct ChanceError {
     /// Probability of the events.
     pub probability: Probability,
-    /// Correlation that was asked for.
+    /// Correlation asked for.
     pub correlation: f64,
     /// Least correlation of events with this probability.
     pub least: f64,
@@ -40,22 +40,24 @@ impl fmt::Display for ChanceError {
 impl core::error::Error for ChanceError {}
 
 impl Chance {
-    /// Returns a chance whose answers are independent.
+    /// Returns a chance with independent answers.
     #[must_use]
     pub const fn independent(probability: Probability) -> Self {
         Self { probability, correlation: 0.0 }
     }
 
-    /// Returns a chance whose answers have the autocorrelation `correlation` at lag one.
+    /// Returns a chance with the autocorrelation `correlation` of the answers at lag one.
     ///
     /// # Errors
     ///
-    /// [`ChanceError`] if the correlation is 1 or more, is not a number, or is more negative than events of that probability can have, which is
-    /// −min(p/(1−p), (1−p)/p).
+    /// [`ChanceError`] if the correlation is 1 or more, is not a number, or is more negative than possible for events of this probability, −min(p/(1−p),
+    /// (1−p)/p).
     pub fn correlated(probability: Probability, correlation: f64) -> Result<Self, ChanceError> {
         let p = probability.get();
         let (small, large) = if p < 0.5 { (p, 1.0 - p) } else { (1.0 - p, p) };
+        // P(yes | no) = p(1−ρ) and P(no | yes) = (1−p)(1−ρ) must stay at most 1.
         let least = -small / large;
+        // NaN fails both comparisons and is refused.
         if correlation >= least && correlation < 1.0 {
             Ok(Self { probability, correlation })
         } else {
@@ -82,7 +84,7 @@ impl Chance {
     }
 }
 
-/// Stage that answers for each packet, with the previous answer.
+/// Stage with an answer for each packet, and the previous answer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ChanceStage {
     chance: Chance,
@@ -96,7 +98,7 @@ impl ChanceStage {
         (!chance.is_never()).then_some(Self { chance, before: None })
     }
 
-    /// Returns the stage for the chance `chance`, which continues from the previous answer, or `None` if the answer is always no.
+    /// Returns the stage for the chance `chance`, continued from the previous answer, or `None` if the answer is always no.
     pub(crate) fn reconfigured(before: Option<Self>, chance: Chance) -> Option<Self> {
         Some(Self { before: before.and_then(|stage| stage.before), ..Self::new(chance)? })
     }
@@ -104,13 +106,14 @@ impl ChanceStage {
     /// Answers for the next packet, given the packet's random word.
     pub(crate) fn happens(&mut self, word: u64) -> bool {
         let (p, rho) = (self.chance.probability.get(), self.chance.correlation);
+        // DAR(1): for ρ ≥ 0 the previous answer is repeated with probability ρ, else a new answer is drawn.
         let yes = match self.before {
             _ if rho == 0.0 => p,
             None => p,
             Some(true) => p + rho * (1.0 - p),
             Some(false) => p * (1.0 - rho),
         };
-        // Rounding can lead slightly outside of 0 to 1, which `Probability` refuses.
+        // Rounding can lead slightly outside of 0 to 1, and `Probability` refuses such numbers.
         let happens = Probability::new(yes.clamp(0.0, 1.0)).unwrap_or_default().happens(word);
         self.before = Some(happens);
         happens
@@ -119,10 +122,10 @@ impl ChanceStage {
 
 /// Parameter of copies.
 pub(crate) const KEYS: [Key; 1] = [usual("duplicate", CHANCE, "0", "Probability that a packet is sent twice")];
-/// Form of an event that happens to packets with a probability.
+/// Form of an event of packets with a probability.
 pub(crate) const CHANCE: Form = Form::AnyOf(&[Form::Probability, Form::Table(&CHANCE_TABLE)]);
 static CHANCE_TABLE: Table = Table::of(&[&CHANCES]);
-/// Keys of a chance, for tables that have further keys.
+/// Keys of a chance, for tables with further keys.
 pub(crate) const CHANCES: [Key; 2] = [
     optional("probability", Form::Probability, "The fraction of packets that it happens to"),
     usual("correlation", number(CORRELATION), "0", "Correlation of what happens to a packet with what happened to the one before"),

@@ -13,7 +13,7 @@ use crate::random::unit;
 pub enum Sojourn {
     /// Constant span.
     Fixed(Duration),
-    /// Exponential law with this mean, which has no memory.
+    /// Exponential law with this mean, without memory.
     Exponential(Duration),
     /// Uniform law between the shortest and the longest span.
     Uniform(Duration, Duration),
@@ -53,6 +53,7 @@ impl Sojourn {
             Self::Fixed(span) => return span.max(Duration::from_nanos(1)),
             Self::Exponential(mean) => nanos(mean) * exponential(),
             Self::Uniform(from, to) => nanos(from) + (nanos(to) - nanos(from)) * unit(word()),
+            // Each stage has the mean of the whole divided by the number of stages.
             Self::Erlang(mean, stages) => nanos(mean) / f64::from(stages) * (0..stages).map(|_| exponential()).sum::<f64>(),
         };
         // A span of zero would let chains of states change endlessly at one instant.

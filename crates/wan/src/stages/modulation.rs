@@ -1,7 +1,7 @@
-//! Modulation: links whose configuration changes by chance. A chain of states in continuous time selects one of several whole configurations.
+//! Modulation: links with a configuration changing by chance. A chain of states in continuous time selects one of several whole configurations.
 //!
-//! Examples are a Wi-Fi cell that is busy or not, a phone that changes cells, and a route that flaps. The sequence of states is a function of the seed and the
-//! name of the modulator, so that links with the same modulator change at the same instants without sharing state.
+//! Examples are a busy or idle Wi-Fi cell, a phone on its way between cells, and a flapping route. The sequence of states is a function of the seed and the
+//! name of the modulator, so links with the same modulator change at the same instants without sharing state.
 
 use alloc::string::String;
 use alloc::sync::Arc;
@@ -26,13 +26,13 @@ pub struct Modulator {
 /// State of a modulator.
 #[derive(Clone, PartialEq, Debug)]
 pub struct ModulatorState {
-    /// Law of the length of a stay. `None` means that the state lasts for ever.
+    /// Law of the length of a stay. Under `None` the state lasts for ever.
     pub sojourn: Option<Sojourn>,
     /// Weights of the next states, indexed by state. A weight is finite and not negative; the weight of the state itself is 0.
     pub next: Vec<f64>,
 }
 
-/// Reason for which a modulator is refused. States count from 0.
+/// Reason for the refusal of a modulator. States count from 0.
 #[derive(Clone, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum ModulatorError {
@@ -51,7 +51,7 @@ pub enum ModulatorError {
     Weight {
         /// Index of the state.
         state: usize,
-        /// Index of the state that would follow.
+        /// Index of the would-be next state.
         next: usize,
         /// Refused weight or rate.
         value: f64,
@@ -104,7 +104,7 @@ impl Modulator {
         if states.is_empty() {
             return Err(ModulatorError::NoStates);
         }
-        // A state that follows itself would end without a change, so that its own weight must be 0.
+        // A state followed by itself would end without a change, so its weight after itself must be 0.
         for (place, state) in states.iter().enumerate() {
             if state.next.len() != states.len() {
                 return Err(ModulatorError::Size { state: place, found: state.next.len(), expected: states.len() });
@@ -114,6 +114,7 @@ impl Modulator {
                     return Err(ModulatorError::Weight { state: place, next, value });
                 }
             }
+            // A state that lasts for ever needs no next state.
             if state.sojourn.is_some_and(|sojourn| !sojourn.is_sound() || state.next.iter().all(|weight| *weight == 0.0)) {
                 return Err(ModulatorError::Ends { state: place });
             }
@@ -121,8 +122,8 @@ impl Modulator {
         Ok(Self { name: name.into(), states: states.into() })
     }
 
-    /// Returns a Markov chain with the rates of going from each state (row) to each other state (column) \[1/s\]. Numbers on the diagonal are ignored. A
-    /// state whose rates are all zero lasts for ever.
+    /// Returns a Markov chain with the rates of going from each state (row) to each different state (column) \[1/s\]. Numbers on the diagonal are ignored. A
+    /// state with all rates zero lasts for ever.
     ///
     /// # Errors
     ///
@@ -142,7 +143,7 @@ impl Modulator {
         Self::new(name, rates.iter().enumerate().map(state).collect())
     }
 
-    /// Returns the name, which is with the seed the address of the modulator's random numbers.
+    /// Returns the name: with the seed, the address of the modulator's random numbers.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
@@ -196,7 +197,7 @@ impl Modulator {
     }
 }
 
-/// Configurations of a link that follows a modulator.
+/// Configurations of a link with a modulator.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Modulated {
     modulator: Modulator,
@@ -204,7 +205,7 @@ pub struct Modulated {
 }
 
 impl Modulated {
-    /// Returns a link that has the n-th configuration while the modulator is in its n-th state. A change of state is a live change: packets in propagation
+    /// Returns a link with the n-th configuration while the modulator is in its n-th state. A change of state is a live change: packets in propagation
     /// keep their delay, and a packet in transmission keeps the bits already sent.
     ///
     /// # Errors
@@ -241,14 +242,14 @@ impl Modulated {
     }
 }
 
-/// Sequence of a modulator's states as one link follows it.
+/// Sequence of a modulator's states, as followed by one link.
 #[derive(Clone, Debug)]
 pub(crate) struct ModulationStage {
     modulated: Modulated,
     draws: Stream,
     /// Index of the present state.
     state: usize,
-    /// Number of changes so far, which is the address of the present stay's random numbers.
+    /// Number of changes so far: the address of the present stay's random numbers.
     changes: u64,
     /// End of the present state, or the end of time if the state lasts for ever.
     until: Instant,
@@ -260,7 +261,7 @@ impl ModulationStage {
         let draws = Stream::new(seed, alloc::format!("modulator {}", modulated.modulator.name).as_bytes());
         let mut stage = Self { modulated, draws, state: 0, changes: 0, until: Instant::ZERO };
         stage.until = stage.end_of_state(Instant::ZERO);
-        // A link that joins later walks through the same states from the begin of time, so that it changes with all other links of the modulator.
+        // A later link walks through the same states from the begin of time, so the link changes with all further links of the modulator.
         while stage.next_change().is_some_and(|at| at <= now) {
             stage.change();
         }
@@ -277,7 +278,7 @@ impl ModulationStage {
         let weights = &self.modulated.modulator.states[self.state].next;
         let total: f64 = weights.iter().sum();
         let mut left = unit(self.draws.packet(self.changes).first(Purpose::Modulation)) * total;
-        // Subtracting may leave a remainder by rounding, so that no state is chosen. The last state with a weight is chosen then.
+        // Subtracting may leave a remainder by rounding, so no state is chosen. The last state with a weight is chosen then.
         let last = weights.iter().rposition(|weight| *weight > 0.0).unwrap_or(self.state);
         let next = weights.iter().position(|weight| {
             left -= weight;
@@ -293,7 +294,7 @@ impl ModulationStage {
         &self.modulated.configs[self.state]
     }
 
-    /// Returns the end of the present state, which begins at `begin`.
+    /// Returns the end of the present state with the begin `begin`.
     fn end_of_state(&self, begin: Instant) -> Instant {
         let Some(sojourn) = self.modulated.modulator.states[self.state].sojourn else { return Instant::MAX };
         // The first word at this address chooses the state after this stay, so the length takes the following words.

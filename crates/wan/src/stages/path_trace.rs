@@ -17,7 +17,7 @@ use cohaptic_units::{Instant, Probability};
 pub struct PathTrace {
     rows: Arc<[Row]>,
     between: Between,
-    /// `true` if the recording begins anew at the instant of its last row, whose delay and loss then never hold.
+    /// `true` if the recording begins anew at the instant of its last row. Delay and loss of this row then never hold.
     repeats: bool,
 }
 
@@ -38,7 +38,7 @@ struct Row {
     loss: Probability,
 }
 
-/// Reason for which a recording is refused. Lines count from 1.
+/// Reason for the refusal of a recording. Lines count from 1.
 #[derive(Clone, PartialEq, Debug)]
 pub enum PathTraceError {
     /// The text is not a table of delays.
@@ -104,6 +104,7 @@ impl PathTrace {
     pub fn from_first(self) -> Result<Self, PathTraceError> {
         let first = self.first();
         let rows: Arc<[Row]> =
+            // Rows before the first row do not exist, so no difference saturates.
             self.rows.iter().map(|row| Row { at: Instant::ZERO.saturating_add(row.at.saturating_duration_since(first)), ..*row }).collect();
         let has_length = rows.last().is_some_and(|last| last.at > Instant::ZERO);
         if self.repeats && !has_length { Err(PathTraceError::NoLength) } else { Ok(Self { rows, ..self }) }
@@ -112,7 +113,7 @@ impl PathTrace {
     /// Returns the delay \[ns\] and the probability of loss at `now`.
     pub(crate) fn at(&self, now: Instant) -> (u64, Probability) {
         let end = self.rows.last().map_or(Instant::ZERO, |last| last.at);
-        // `parse` refuses a repeating recording whose last row is at zero, for which the remainder would be undefined.
+        // `parse` refuses a repeating recording with its last row at zero: the remainder would be undefined.
         let now = if self.repeats { Instant::from_nanos(now.as_nanos() % end.as_nanos()) } else { now };
         let next = self.rows.partition_point(|row| row.at <= now);
         // A checked recording has at least one row. Before the first row `next` is 0, and the first row holds.
@@ -146,6 +147,7 @@ impl PathTrace {
     /// Returns the recording without chance: a probability of loss below one becomes zero.
     #[must_use]
     pub fn without_chance(&self) -> Self {
+        // A certain loss draws nothing, so such a row stays.
         let certain = |row: &Row| Row { loss: if row.loss == Probability::ONE { row.loss } else { Probability::ZERO }, ..*row };
         Self { rows: self.rows.iter().map(certain).collect(), ..self.clone() }
     }
@@ -166,7 +168,7 @@ fn row(row: &DelayRow, above: Option<&Row>) -> Result<Row, PathTraceError> {
     let nanos = |column, time: Attoseconds| time.nanos().filter(|nanos| *nanos <= MOST).ok_or_else(|| refused(column, "a time from 0 to 9e9 s"));
     let at = Instant::from_nanos(nanos("t", row.sent)?);
     let Some(delay) = row.delay else {
-        // The row is a lost packet, which has no delay of its own. The delay of the row above stays, so that `Lines` can interpolate.
+        // The row is a lost packet without a delay. The delay of the row above stays, so `Lines` can interpolate.
         return Ok(Row { at, delay_nanos: above.map_or(0, |above| above.delay_nanos), loss: Probability::ONE });
     };
     let loss = match row.loss.as_str() {

@@ -1,31 +1,33 @@
 //! Standard normal numbers by the ziggurat method (Marsaglia & Tsang 2000).
 //!
 //! The density exp(−x²/2) is covered with 256 layers of equal area. One random word chooses a layer and a point in the layer; in 98.8 % of the cases the
-//! point certainly lies under the density. Only `libm` is called, so that a draw is the same on every platform.
+//! point certainly lies under the density. Only `libm` is called, so a draw is the same on every platform.
 
 mod tables;
 
 use crate::random::unit;
 use tables::{F, R, X};
 
-/// Returns a standard normal number for a uniform word. `more` gives further uniform words, which are rarely needed.
+/// Returns a standard normal number for a uniform word. `more` gives further uniform words, rarely needed.
 #[must_use]
 #[inline]
 pub fn standard_normal(word: u64, more: impl FnMut() -> u64) -> f64 {
     in_the_core(word).unwrap_or_else(|| outside_the_core(word, more))
 }
 
-/// Returns a standard normal number for a uniform word, or `None` in the 1.2 % of cases in which further words are needed.
+/// Returns a standard normal number for a uniform word, or `None` in the 1.2 % of cases with need for further words.
 #[inline(always)]
 pub(crate) fn in_the_core(word: u64) -> Option<f64> {
     let (layer, size) = point(word);
+    // X[layer + 1] is the end of the layer above: a point below it lies under the density with certainty.
     (size < X[layer + 1]).then(|| signed(word, size))
 }
 
-/// Returns the number of [`in_the_core`], or NaN instead of `None`. Two positive numbers compare like their bits, so that the comparison needs no branch.
+/// Returns the number of [`in_the_core`], or NaN instead of `None`. Two positive numbers compare like their bits, so the comparison needs no branch.
 #[inline(always)]
 pub(crate) fn in_the_core_or_nan(word: u64) -> f64 {
     let (layer, size) = point(word);
+    // The sign bit of the difference is set for a smaller size; negated and spread, all bits are set outside of the core, a NaN.
     let is_outside = !(size.to_bits().wrapping_sub(X[layer + 1].to_bits()).cast_signed() >> 63);
     f64::from_bits(signed(word, size).to_bits() | is_outside.cast_unsigned())
 }
@@ -34,16 +36,17 @@ pub(crate) fn in_the_core_or_nan(word: u64) -> f64 {
 #[inline]
 fn point(word: u64) -> (usize, f64) {
     let layer = usize::from(word.to_le_bytes()[0]);
+    // Layer from bits 0 to 7, sign from bit 8, distance from bits 11 to 63.
     (layer, unit(word) * X[layer])
 }
 
-/// Returns `size` with the sign that the word chooses. The sign is random, so that a branch on it could not be predicted; the bit is moved instead.
+/// Returns `size` with the sign chosen by the word. The sign is random, so a branch could not be predicted; the bit is moved instead.
 #[inline]
 fn signed(word: u64, size: f64) -> f64 {
     f64::from_bits(size.to_bits() | (word & 0x100) << 55)
 }
 
-/// Returns a standard normal number for a word whose point is not certainly under the density, but in a wedge or in the tail. Draws further points from
+/// Returns a standard normal number for a word with its point not certainly under the density, but in a wedge or in the tail. Draws further points from
 /// `more` until a point lies under the density.
 #[cold]
 pub(crate) fn outside_the_core(mut word: u64, mut more: impl FnMut() -> u64) -> f64 {
@@ -56,10 +59,12 @@ pub(crate) fn outside_the_core(mut word: u64, mut more: impl FnMut() -> u64) -> 
         if layer == 0 {
             return signed(word, tail(&mut more));
         }
+        // A uniform height within the layer; the point counts if the height lies under the density.
         let height = F[layer] + (F[layer + 1] - F[layer]) * unit(more());
         if height < libm::exp(-0.5 * size * size) {
             return signed(word, size);
         }
+        // The rejected point is replaced by a new one with a new layer, as the method demands.
         word = more();
     }
 }
@@ -68,6 +73,7 @@ pub(crate) fn outside_the_core(mut word: u64, mut more: impl FnMut() -> u64) -> 
 fn tail(more: &mut impl FnMut() -> u64) -> f64 {
     loop {
         // 1 − u lies in (0, 1], so its logarithm is finite.
+        // Exponential majorant of the tail with the rate R.
         let beyond = -libm::log(1.0 - unit(more())) / R;
         let height = -libm::log(1.0 - unit(more()));
         if 2.0 * height > beyond * beyond {

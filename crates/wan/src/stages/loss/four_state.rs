@@ -16,7 +16,7 @@ use core::fmt;
 
 use cohaptic_units::Probability;
 
-/// Parameters of the chain: `pij` is the probability that a packet moves the chain from state i to state j.
+/// Parameters of the chain: `pij` is the probability of a packet's move of the chain from state i to state j.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct FourState {
     p13: Probability,
@@ -26,7 +26,7 @@ pub struct FourState {
     p14: Probability,
 }
 
-/// Reason for which a four-state model is refused.
+/// Reason for the refusal of a four-state model.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum FourStateError {
@@ -44,7 +44,7 @@ pub enum FourStateError {
         /// Probability of moving to a packet received within the burst.
         p32: Probability,
     },
-    /// No chain has these [`Bursts`]. The text says why.
+    /// No chain has these [`Bursts`]. The text gives the reason.
     Bursts(&'static str),
 }
 
@@ -60,7 +60,7 @@ impl fmt::Display for FourStateError {
 
 impl core::error::Error for FourStateError {}
 
-/// Four-state model given by observable quantities: the parameters of Salsano et al., which tc calls GI.
+/// Four-state model given by observable quantities: the parameters of Salsano et al., called GI by tc.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Bursts {
     /// Mean fraction of packets lost.
@@ -108,7 +108,7 @@ impl FourState {
     pub fn from_bursts(bursts: Bursts) -> Result<Self, FourStateError> {
         let Bursts { loss, length, density, isolated, good_run } = bursts;
         let unit = 0.0..1.0;
-        // NaN fails every comparison, so that NaN is refused here.
+        // NaN fails every comparison, so NaN is refused here.
         let within = (unit.contains(&loss) && unit.contains(&isolated) && density > 0.0 && density <= 1.0 && length >= 1.0 && good_run >= 1.0)
             && isolated <= loss
             && loss < density;
@@ -128,8 +128,8 @@ impl FourState {
         )
     }
 
-    /// Returns the probability that a packet moves the chain from a state (row) to a state (column). A packet that moves the chain to the third or fourth
-    /// state is lost. The states are, in order: gap, received within a burst, lost within a burst, isolated loss (states 1 to 4).
+    /// Returns the probability of a packet's move of the chain from a state (row) to a state (column). A packet with a move to the third or fourth state is
+    /// lost. The states are, in order: gap, received within a burst, lost within a burst, isolated loss (states 1 to 4).
     #[must_use]
     pub fn transitions(&self) -> [[f64; 4]; 4] {
         let [p13, p31, p32, p23, p14] = [self.p13, self.p31, self.p32, self.p23, self.p14].map(Probability::get);
@@ -141,8 +141,7 @@ impl FourState {
         ]
     }
 
-    /// Returns the long-run fraction of packets in each state, 1 to 4, for a chain that starts in the gap. A chain that reaches a state without exit stays
-    /// there.
+    /// Returns the long-run fraction of packets in each state, 1 to 4, for a chain with its start in the gap. A chain in a state without exit stays there.
     #[must_use]
     pub fn stationary(&self) -> [f64; 4] {
         let [p13, p31, p32, p23, p14] = [self.p13, self.p31, self.p32, self.p23, self.p14].map(Probability::get);
@@ -151,7 +150,7 @@ impl FourState {
             let gap = 1.0 / (1.0 + p14);
             return [gap, 0.0, 0.0, gap * p14];
         }
-        // The chain cannot leave the state "received within a burst" once it is there.
+        // The chain cannot leave the state "received within a burst" once there.
         if p32 > 0.0 && p23 == 0.0 {
             return [0.0, 1.0, 0.0, 0.0];
         }
@@ -161,6 +160,7 @@ impl FourState {
             let lost = 1.0 / (1.0 + received);
             return [0.0, lost * received, lost, 0.0];
         }
+        // In the stationary law the flows between neighbouring states balance: gap·p13 = lost·p31 and lost·p32 = received·p23.
         let ratio = p13 / p31;
         let gap = 1.0 / (1.0 + p14 + ratio * (1.0 + received));
         [gap, gap * ratio * received, gap * ratio, gap * p14]
@@ -187,7 +187,7 @@ impl FourState {
         }
     }
 
-    /// Moves the chain by one packet, and returns whether that packet is lost. `unit` is uniform on [0, 1).
+    /// Moves the chain by one packet, and returns whether this packet is lost. `unit` is uniform on [0, 1).
     pub(crate) fn loses(&self, state: &mut State, unit: f64) -> bool {
         // One uniform number selects among at most three ways: [0, first), [first, first + second), and the rest.
         let pick = |first: Probability, to_first, second: Probability, to_second, otherwise| {

@@ -8,7 +8,7 @@
 //!             r
 //! ```
 //!
-//! Each packet draws a transition and then its loss. As in the Linux kernel, the probability of loss is that of the state *before* the transition.
+//! Each packet draws a transition and then its loss. As in the Linux kernel, the state *before* the transition decides the probability of loss.
 
 use cohaptic_units::Probability;
 
@@ -19,9 +19,9 @@ pub struct GilbertElliott {
     pub p: Probability,
     /// Probability of going from bad to good, per packet. The mean stay in the bad state is 1/r packets.
     pub r: Probability,
-    /// Probability that a packet gets through in the bad state. The usual value is 0: every packet is lost.
+    /// Probability of a packet's passage in the bad state. The usual value is 0: every packet is lost.
     pub h: Probability,
-    /// Probability that a packet gets through in the good state. The usual value is 1: no packet is lost.
+    /// Probability of a packet's passage in the good state. The usual value is 1: no packet is lost.
     pub k: Probability,
 }
 
@@ -33,7 +33,7 @@ pub(crate) enum State {
 }
 
 impl GilbertElliott {
-    /// Returns the long-run fraction of packets lost, ((1−k)·r + (1−h)·p) / (p + r), or `None` if p = r = 0, where the chain never moves.
+    /// Returns the long-run fraction of packets lost, ((1−k)·r + (1−h)·p) / (p + r), or `None` if p = r = 0: the chain never moves.
     #[must_use]
     pub fn mean_loss(&self) -> Option<f64> {
         let [p, r, h, k] = [self.p, self.r, self.h, self.k].map(Probability::get);
@@ -50,6 +50,7 @@ impl GilbertElliott {
         let [p, r, h, k] = [self.p, self.r, self.h, self.k].map(Probability::get);
         let mean = self.mean_loss().filter(|&mean| mean > 0.0 && mean < 1.0)?;
         let spread = (1.0 - h) - (1.0 - k);
+        // πB·πG, written with one division by (p + r)².
         let stationary = p * r / ((p + r) * (p + r));
         Some(spread * spread * stationary / (mean * (1.0 - mean)) * libm::pow(1.0 - p - r, f64::from(lag)))
     }
@@ -61,11 +62,11 @@ impl GilbertElliott {
         if bad.happens(bits) { State::Bad } else { State::Good }
     }
 
-    /// Moves the chain by one packet, and returns whether that packet is lost. Mostly the loss is certain in both states; the word for the loss is then not
+    /// Moves the chain by one packet, and returns whether this packet is lost. Mostly the loss is certain in both states; the word for the loss is then not
     /// drawn.
     #[inline(always)]
     pub(crate) fn loses(&self, state: &mut State, transition: u64, loss: impl FnOnce() -> u64) -> bool {
-        // The transition always takes its word, and the loss takes a second word only if it is not certain.
+        // The transition always takes its word, and the loss takes a second word only if the loss is not certain.
         let before = *state;
         *state = match before {
             State::Good if self.p.happens(transition) => State::Bad,

@@ -14,9 +14,9 @@ use cohaptic_units::{Instant, Probability};
 pub struct GilbertElliottInTime {
     good: Duration,
     bad: Duration,
-    /// Probability that a packet gets through while the link is bad. The usual value is 0.
+    /// Probability of a packet's passage while the link is bad. The usual value is 0.
     pub h: Probability,
-    /// Probability that a packet gets through while the link is good. The usual value is 1.
+    /// Probability of a packet's passage while the link is good. The usual value is 1.
     pub k: Probability,
 }
 
@@ -40,7 +40,7 @@ pub(crate) struct Seen {
 }
 
 impl GilbertElliottInTime {
-    /// Returns a link that is good and bad for exponential times with the means `good` and `bad`.
+    /// Returns a link with good and bad states for exponential times with the means `good` and `bad`.
     ///
     /// # Errors
     ///
@@ -58,7 +58,7 @@ impl GilbertElliottInTime {
         (self.good, self.bad)
     }
 
-    /// Returns the fraction of time during which the link is bad, πB.
+    /// Returns the fraction of time in the bad state, πB.
     #[must_use]
     pub fn bad_fraction(&self) -> f64 {
         let (good, bad) = (self.good.as_secs_f64(), self.bad.as_secs_f64());
@@ -87,7 +87,7 @@ impl GilbertElliottInTime {
                 if before.bad { stationary + (1.0 - stationary) * memory } else { stationary * -libm::expm1(-rate * gap) }
             }
         };
-        // Rounding can lead a little outside of 0 to 1, which `Probability` refuses.
+        // Rounding can lead a little outside of 0 to 1, and `Probability` refuses such numbers.
         let bad = Probability::new(bad.clamp(0.0, 1.0)).unwrap_or_default().happens(transition);
         *seen = Some(Seen { bad, at: now });
         let gets_through = if bad { self.h } else { self.k };

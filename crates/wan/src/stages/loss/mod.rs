@@ -31,15 +31,15 @@ pub enum Loss {
     /// No packet is lost, and no random number is drawn.
     #[default]
     None,
-    /// Every packet is lost with the same probability, independently of other packets.
+    /// Every packet is lost with the same probability, independently of all further packets.
     Independent(Probability),
-    /// A packet is lost more likely if the previous packet was lost. Mean and autocorrelation of losses are exactly the configured ones.
+    /// A packet is lost more likely if the previous packet was lost. Mean and autocorrelation of losses are exactly as configured.
     Correlated(Chance),
     /// Losses come in bursts: a Markov chain of a good and a bad state.
     GilbertElliott(GilbertElliott),
     /// Losses come in bursts with a mean length in seconds, not in packets: a chain of a good and a bad state in continuous time.
     GilbertElliottInTime(GilbertElliottInTime),
-    /// Losses come in bursts that include received packets, and single packets are lost between bursts.
+    /// Losses come in bursts with received packets inside, and single packets are lost between bursts.
     FourState(FourState),
     /// Losses are chosen packets or chosen spans of time. No random number is drawn.
     Pattern(Pattern),
@@ -63,8 +63,8 @@ impl Loss {
     /// Returns the mean number of packets lost in a row, or `None` if the number has no simple law: for losses with other causes in between, and for chosen
     /// losses.
     ///
-    /// The number is 1/(1−p) for independent losses, 1/((1−ρ)(1−p)) for correlated losses, and 1/r for a Gilbert–Elliott chain that loses every packet in the
-    /// bad state and no packet in the good state.
+    /// The number is 1/(1−p) for independent losses, 1/((1−ρ)(1−p)) for correlated losses, and 1/r for a Gilbert–Elliott chain with the loss of every packet in
+    /// the bad state and of no packet in the good state.
     #[must_use]
     pub fn mean_run(&self) -> Option<f64> {
         let run = match self {
@@ -73,6 +73,7 @@ impl Loss {
             Self::GilbertElliott(chain) if (chain.h, chain.k) == (Probability::ZERO, Probability::ONE) => 1.0 / chain.r.get(),
             Self::None | Self::GilbertElliott(_) | Self::GilbertElliottInTime(_) | Self::FourState(_) | Self::Pattern(_) => return None,
         };
+        // Without losses, or with nothing but losses, no run has a mean length.
         (run.is_finite() && self.mean().is_some_and(|mean| mean > 0.0)).then_some(run)
     }
 
@@ -82,6 +83,7 @@ impl Loss {
         self.mean().filter(|mean| *mean > 0.0 && *mean < 1.0)?;
         match self {
             Self::Independent(_) => Some(if lag == 0 { 1.0 } else { 0.0 }),
+            // The chain of losses has two states with the eigenvalue ρ, so the autocorrelation is ρᵏ.
             Self::Correlated(chance) => Some(libm::pow(chance.correlation(), f64::from(lag))),
             Self::GilbertElliott(chain) => chain.autocorrelation(lag),
             Self::None | Self::GilbertElliottInTime(_) | Self::FourState(_) | Self::Pattern(_) => None,
@@ -103,7 +105,7 @@ pub(crate) enum LossStage {
     WithMemory(Box<Remembering>),
 }
 
-/// Models whose decision depends on more than the packet's first random word.
+/// Models with a decision from more than the packet's first random word.
 #[derive(Clone, Debug)]
 pub(crate) enum Remembering {
     Correlated(Option<ChanceStage>),
@@ -114,18 +116,19 @@ pub(crate) enum Remembering {
 }
 
 impl LossStage {
-    /// Returns the stage for a model, or `None` if the model loses nothing. `initial` is the random word that selects the initial state of a chain.
+    /// Returns the stage for a model, or `None` if the model loses nothing. `initial` is the random word for the initial state of a chain.
     pub(crate) fn new(loss: Loss, initial: u64) -> Option<Self> {
         Self::reconfigured(None, loss, initial)
     }
 
     /// Returns the stage with the model `loss`. A chain stays in its state if the previous model is of the same kind.
     pub(crate) fn reconfigured(before: Option<Self>, loss: Loss, initial: u64) -> Option<Self> {
-        // Independent loss has no state that could continue.
+        // Independent loss has no state to continue.
         let before = match before {
             Some(Self::WithMemory(before)) => Some(*before),
             Some(Self::Independent(_)) | None => None,
         };
+        // A chain of the same kind goes on from its state, with the new probabilities.
         let stage = match (before, loss) {
             (_, Loss::None) => return None,
             (_, Loss::Independent(probability)) => return Some(Self::Independent(probability)),
@@ -156,7 +159,9 @@ impl Remembering {
     fn loses(&mut self, now: Instant, number: u64, word: u64, packet: PacketDraws) -> bool {
         match self {
             Self::Correlated(chance) => chance.as_mut().is_some_and(|chance| chance.happens(word)),
+            // The second word is drawn only for a loss that is uncertain within a state.
             Self::GilbertElliott(chain, state) => chain.loses(state, word, || packet.more(Purpose::Loss).next_word()),
+            // The first word moves the chain, and the second word decides about the loss in the new state.
             Self::InTime(chain, seen) => chain.loses(seen, now, word, packet.more(Purpose::Loss).next_word()),
             Self::FourState(chain, state) => chain.loses(state, unit(word)),
             Self::Pattern(pattern) => pattern.covers(number, now),

@@ -16,7 +16,7 @@ pub struct Pattern {
     counts: Counts,
 }
 
-/// Unit in which a pattern counts.
+/// Unit of a pattern's counts.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Counts {
     /// Packets offered to the link, from 0.
@@ -25,10 +25,10 @@ pub enum Counts {
     Nanoseconds,
 }
 
-/// Reason for which a pattern is refused.
+/// Reason for the refusal of a pattern.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum PatternError {
-    /// A span ends before it begins, or at its begin.
+    /// A span ends before its begin, or at its begin.
     Empty {
         /// Index of the span, from 0.
         index: usize,
@@ -71,7 +71,7 @@ impl Pattern {
         Self::new(packets, every, Counts::Packets)
     }
 
-    /// Returns a pattern of all packets offered in the given spans, whose start is included and whose end is not. The pattern repeats after `every`, if
+    /// Returns a pattern of all packets offered in the given spans, from the start included to the end excluded. The pattern repeats after `every`, if
     /// `every` is given.
     ///
     /// # Errors
@@ -88,11 +88,13 @@ impl Pattern {
             if span.start >= span.end {
                 return Err(PatternError::Empty { index });
             }
+            // Spans may touch: the end is not part of a span.
             if span.start < end {
                 return Err(PatternError::Order { index });
             }
             end = span.end;
         }
+        // A span beyond the period would overlap the spans of the next period.
         if let Some(period) = period.filter(|period| *period < end || *period == 0) {
             return Err(PatternError::Period { period, end });
         }
@@ -111,7 +113,7 @@ impl Pattern {
         self.period
     }
 
-    /// Returns the long-run fraction of the unit that the pattern covers, or `None` for a pattern without a period, whose fraction tends to zero.
+    /// Returns the covered long-run fraction of the unit, or `None` for a pattern without a period. Its fraction tends to zero.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "a fraction")]
     pub fn mean_loss(&self) -> Option<f64> {
@@ -119,7 +121,7 @@ impl Pattern {
         self.period.map(|period| lost as f64 / period as f64)
     }
 
-    /// Returns the longest run that the pattern covers without a gap, in the unit of the pattern, or `None` if the pattern covers everything from some place
+    /// Returns the longest covered run without a gap, in the unit of the pattern, or `None` if the pattern covers everything from some place
     /// on.
     #[must_use]
     pub fn longest_run(&self) -> Option<u64> {
@@ -128,6 +130,7 @@ impl Pattern {
         let again = self.period.into_iter().flat_map(|period| self.spans.iter().map(move |span| span.start + period..span.end + period));
         let (mut longest, mut run, mut end) = (0, 0, None);
         for span in once.chain(again) {
+            // Spans that touch form one run.
             run = if end == Some(span.start) { run } else { 0 } + (span.end - span.start);
             longest = longest.max(run);
             end = Some(span.end);
@@ -137,7 +140,7 @@ impl Pattern {
         (!covers_all).then_some(longest)
     }
 
-    /// Returns whether the pattern covers the packet `number` offered at `now`. A pattern looks at one of both only, depending on its unit.
+    /// Returns whether the pattern covers the packet `number` offered at `now`. A pattern looks at only one of both, depending on its unit.
     #[must_use]
     pub(crate) fn covers(&self, number: u64, now: Instant) -> bool {
         let counted = match self.counts {
@@ -145,7 +148,7 @@ impl Pattern {
             Counts::Nanoseconds => now.as_nanos(),
         };
         let place = self.period.map_or(counted, |period| counted % period);
-        // Spans are ordered and do not overlap, so only the first span that ends after `place` can cover `place`.
+        // Spans are ordered and do not overlap, so only the first span with an end after `place` can cover `place`.
         let next = self.spans.partition_point(|span| span.end <= place);
         self.spans.get(next).is_some_and(|span| span.start <= place)
     }
