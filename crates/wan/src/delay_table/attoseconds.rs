@@ -1,4 +1,4 @@
-//! Times in whole attoseconds, which keep all digits of a text.
+//! Times in whole attoseconds, with all digits of a text.
 
 /// Attoseconds in a second, as an exponent of ten.
 const DIGITS: i32 = 18;
@@ -24,7 +24,7 @@ impl Attoseconds {
         if whole.len() + fraction.len() == 0 || !whole.bytes().chain(fraction.bytes()).all(|byte| byte.is_ascii_digit()) {
             return None;
         }
-        // Exponent of the digit before `whole`, with the attosecond as unit. The loop lowers it by one before each digit.
+        // Exponent of the digit before `whole`, with the attosecond as unit. The loop lowers the exponent by one before each digit.
         let mut place = exponent.checked_add(unit + DIGITS)?.checked_add(i32::try_from(whole.len()).ok()?)?;
         let mut value: i128 = 0;
         for digit in whole.bytes().chain(fraction.bytes()) {

@@ -4,13 +4,13 @@
 //!
 //! | column | is |
 //! | --- | --- |
-//! | `t` or `sent` | time at which the packet was sent |
+//! | `t` or `sent` | time of sending of the packet |
 //! | `delay` | one-way delay of the packet |
-//! | `arrived` | instead of `delay`: time at which the packet arrived, by the same clock |
+//! | `arrived` | instead of `delay`: time of arrival of the packet, by the same clock |
 //! | `lost` | optional: 1 if the packet was lost, 0 or empty if not |
 //!
 //! Times are in seconds, or in the unit at the end of the column's name: `_s`, `_ms`, `_us`, `_ns`. A packet whose delay or arrival is empty, `NaN`, `NA` or −1
-//! was lost. Digits down to 10⁻¹⁸ s are exact, so that times may be counted from 1970. Rows must be in the order of sending; equal times are allowed. A byte
+//! was lost. Digits down to 10⁻¹⁸ s are exact, so times may be counted from 1970. Rows must be in the order of sending; equal times are allowed. A byte
 //! order mark, blank lines and lines that begin with # are skipped. Cells may be in double quotes. The column `loss` is passed on as text.
 
 mod attoseconds;
@@ -31,7 +31,7 @@ pub struct DelayRow {
     pub sent: Attoseconds,
     /// Delay, or `None` for a lost packet. Can be negative if the clocks of both ends are offset.
     pub delay: Option<Attoseconds>,
-    /// Text in the column `loss`, which a replay reads as a probability. Empty without such a column.
+    /// Text in the column `loss`, a probability for a replay. Empty without such a column.
     pub loss: String,
 }
 
@@ -121,7 +121,7 @@ pub fn read(text: &str) -> Result<Vec<DelayRow>, DelayTableError> {
             return Err(DelayTableError::TimeGoesBack { line, back_s });
         }
         let is_lost = columns.lost.as_ref().map_or(Ok(false), |column| row.flag(column))?;
-        // The end of a lost packet is read too, so that a faulty cell is found in any row.
+        // The end of a lost packet is read too, so a faulty cell is found in any row.
         let end = row.end(&columns.end)?;
         let delay = match end {
             Some(end) if columns.end_is_instant => Some(end.since(sent).ok_or_else(|| row.cell(&columns.end, "a time within 10^20 s of the other"))?),
@@ -172,7 +172,7 @@ struct Column {
     unit: i32,
 }
 
-/// Columns that are read.
+/// Columns in use.
 struct Columns {
     sent: Column,
     /// Column `delay` or `arrived`.
@@ -184,7 +184,7 @@ struct Columns {
 }
 
 impl Columns {
-    /// Finds the columns in the header, which stands in the line `line`.
+    /// Finds the columns in the header, in the line `line`.
     fn find(line: usize, header: &[String]) -> Result<Self, DelayTableError> {
         let refused = || DelayTableError::Columns { line, found: header.join(",") };
         let only = |names: &[&str]| {

@@ -10,7 +10,7 @@ use super::{Empirical, Law, LawError, pareto_normal};
 
 /// Function ρ(φ) of a law.
 enum Transfer {
-    /// ρ = φ: a normal law that is not cut, or a law whose delays do not vary and so have no correlation.
+    /// ρ = φ: an uncut normal law, or a law of constant delays, without correlation.
     Identity,
     /// ρ = 6/π·asin(φ/2) (Pearson 1907).
     Uniform,
@@ -26,12 +26,13 @@ impl Transfer {
         match self {
             Self::Identity => phi,
             Self::Uniform => 6.0 / core::f64::consts::PI * libm::asin(0.5 * phi),
+            // `expm1` keeps the digits for small variances.
             Self::LogNormal { variance } => libm::expm1(phi * variance) / libm::expm1(*variance),
             Self::Series(series) => series.at(phi),
         }
     }
 
-    /// Returns φ for a ρ that the law can have. ρ(φ) increases, since g increases: its derivative is E[g′(X)·g′(Y)] (Price 1958).
+    /// Returns φ for a possible ρ of the law. ρ(φ) increases, because g increases: its derivative is E[g′(X)·g′(Y)] (Price 1958).
     fn inverse(&self, rho: f64) -> f64 {
         match self {
             Self::Identity => rho,
@@ -42,9 +43,9 @@ impl Transfer {
     }
 }
 
-/// Cut \[standard deviations\] below which a normal law counts as uncut. A draw falls below this cut with a probability of at most 10⁻²³.
+/// Bound \[standard deviations\] of cuts: below, a normal law counts as uncut. A draw falls below this cut with a probability of at most 10⁻²³.
 const UNCUT: f64 = -10.0;
-/// Largest number of knots between whose kinks an empirical law is integrated. If there are more knots, only some are used.
+/// Largest number of knots for the integration of an empirical law, with a kink at each knot. Of more knots only some are used.
 const MOST_KNOTS: usize = 4096;
 
 impl Law {
@@ -53,13 +54,13 @@ impl Law {
     ///
     /// The normal, uniform and lognormal laws have closed forms. Other laws use Hermite coefficients, computed anew at each call, which takes milliseconds.
     /// The error is below 10⁻⁹ for smooth laws (10⁻⁷ if the deviation is above ten times the mean), 10⁻⁵ for cut laws, tables and empirical laws, and 10⁻³
-    /// for empirical laws of more than 4096 values, only some of which are used. A constant has ρ = φ.
+    /// for empirical laws of more than 4096 values, because only some values are used. A constant has ρ = φ.
     #[must_use]
     pub fn correlation(&self, phi: f64) -> f64 {
         self.transfer().at(phi.clamp(-1.0, 1.0))
     }
 
-    /// Returns φ, the correlation of the standard normals whose delays have the correlation `rho`: the inverse of [`correlation`](Self::correlation).
+    /// Returns φ, the correlation of the standard normals for delays with the correlation `rho`: the inverse of [`correlation`](Self::correlation).
     ///
     /// # Errors
     ///
@@ -69,6 +70,7 @@ impl Law {
             return Err(LawError::NotACorrelation { found: rho });
         }
         let transfer = self.transfer();
+        // Delays at z and −z are as opposite as the law allows.
         let least = transfer.at(-1.0);
         // The least correlation itself is accepted in spite of rounding.
         if rho < least - 1e-12 {
@@ -80,6 +82,7 @@ impl Law {
     /// Returns the function ρ(φ) of this law.
     fn transfer(&self) -> Transfer {
         let cut = self.cut();
+        // A law cut as a whole has constant delays.
         if self.fit.delivered.sd == 0.0 {
             return Transfer::Identity;
         }
@@ -91,6 +94,7 @@ impl Law {
             Standard::LogNormal { sigma } => Transfer::LogNormal { variance: sigma * sigma },
             Standard::Table(_) => Transfer::Series(Series::of_jumps(&self.jumps(cut))),
             Standard::Laplace => {
+                // The kink of the cut, and the kink of the Laplace law at its centre.
                 let cut_at = Tail::Below(0.5 * libm::exp(cut * core::f64::consts::SQRT_2)).normal();
                 self.series([cut_at, 0.0].into_iter())
             }
@@ -105,7 +109,7 @@ impl Law {
         (self.asked.floor - self.fit.origin) / self.fit.scale
     }
 
-    /// Returns the function of a law that is smooth except at the standard normal numbers `breaks`, in ascending order.
+    /// Returns the function of a smooth law with kinks at the standard normal numbers `breaks`, in ascending order.
     fn series(&self, breaks: impl Iterator<Item = f64>) -> Transfer {
         let (cut, scale) = (self.cut(), self.fit.scale);
         let mean = (self.fit.delivered.mean - self.fit.origin) / scale;
@@ -120,8 +124,10 @@ impl Law {
         let entries = table.entries();
         let pairs = entries.windows(2).zip(1..);
         pairs
+            // Equal neighbours have no jump between them, and a jump below the cut is cut away.
             .filter(|(pair, _): &(&[i16], usize)| pair[0] != pair[1] && f64::from(pair[1]) > cut)
             .map(|(pair, index)| {
+                // A jump across the cut begins at the cut.
                 let height = (f64::from(pair[1]) - f64::from(pair[0]).max(cut)) * unit;
                 (Tail::of_probability(ratio(index, entries.len())).normal(), height)
             })
@@ -132,6 +138,7 @@ impl Law {
 /// Returns the standard normal numbers of the inner knots, or of every n-th knot if there are more than [`MOST_KNOTS`].
 fn knots(values: &Empirical) -> Vec<f64> {
     let cells = values.knots().len() - 1;
+    // Fewer knots bound the time; the kinks between are then integrated as if smooth.
     let stride = cells.div_ceil(MOST_KNOTS);
     (1..cells).step_by(stride).map(|i| Tail::of_probability(ratio(i, cells)).normal()).collect()
 }

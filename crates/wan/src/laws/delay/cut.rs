@@ -1,4 +1,4 @@
-//! Mean and standard deviation of a law cut at a floor: moments of max(X, c), where X has mean 0, standard deviation 1 and no least value.
+//! Mean and standard deviation of a law cut at a floor: moments of max(X, c), for X with mean 0, standard deviation 1 and no least value.
 
 use super::special::normal;
 
@@ -10,7 +10,7 @@ pub(super) struct Moments {
 }
 
 impl Moments {
-    /// Moments of a law that is not cut.
+    /// Moments of an uncut law.
     pub(super) const STANDARD: Self = Self { mean: 0.0, sd: 1.0 };
 }
 

@@ -1,9 +1,9 @@
 //! Tables of quantiles in the format of netem's `.dist` files.
 //!
-//! A `.dist` file lists N integers, 8192·F⁻¹(i/N) of a law with mean 0 and standard deviation 1, where `#` begins a comment. netem draws an entry at random,
-//! each with the same probability, and delays by mean + sd·entry/8192. [`Distribution::Table`](super::Distribution::Table) does exactly the same. An entry's
-//! size is limited to 32767, which is 4 standard deviations. For a law that interpolates between the entries, make an [`Empirical`](super::Empirical) from
-//! the entries.
+//! A `.dist` file lists N integers, 8192·F⁻¹(i/N) of a law with mean 0 and standard deviation 1, with `#` at the begin of a comment. netem draws an entry at
+//! random, each with the same probability, and delays by mean + sd·entry/8192. [`Distribution::Table`](super::Distribution::Table) does exactly the same. An
+//! entry's size is limited to 32767, 4 standard deviations. For a law with interpolation between the entries, make an [`Empirical`](super::Empirical) from the
+//! entries.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -17,7 +17,7 @@ pub struct DistTable {
     entries: Vec<i16>,
 }
 
-/// Reason for which a text is not a table. Lines and columns count from 1, columns in characters.
+/// Reason for the refusal of a text as a table. Lines and columns count from 1, columns in characters.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum DistTableError {
     /// A word is not an integer.
@@ -69,12 +69,12 @@ impl fmt::Display for DistTableError {
 impl core::error::Error for DistTableError {}
 
 impl DistTable {
-    /// Largest number of entries that `tc` accepts.
+    /// Largest number of entries for `tc`.
     pub const MOST: usize = 16_384;
     /// Entry of one standard deviation.
     pub(crate) const ONE_DEVIATION: f64 = 8192.0;
 
-    /// Reads a `.dist` file: integers as C's `strtol` reads them in base 0, separated by white space. `#` begins a comment up to the end of the line.
+    /// Reads a `.dist` file: integers in the forms of C's `strtol` in base 0, separated by white space. `#` begins a comment up to the end of the line.
     ///
     /// # Errors
     ///
@@ -137,6 +137,7 @@ pub(crate) fn entries(text: &str) -> Result<Vec<i16>, DistTableError> {
     let mut entries = Vec::new();
     for (number, content) in text.lines().enumerate() {
         let line = number + 1;
+        // A comment may follow entries on the same line.
         let content = content.split('#').next().unwrap_or_default();
         for (column, word) in words(content) {
             let shown = || word.chars().take(24).collect();
@@ -162,12 +163,13 @@ fn words(line: &str) -> impl Iterator<Item = (usize, &str)> {
     })
 }
 
-/// Returns the whole word as `strtol` in base 0 reads it, or `None` if the word is not an integer. Numbers outside of an `i64` saturate.
+/// Returns the whole word as read by `strtol` in base 0, or `None` if the word is not an integer. Numbers outside of an `i64` saturate.
 fn integer(word: &str) -> Option<i64> {
     let (negative, digits) = match word.strip_prefix('-') {
         Some(digits) => (true, digits),
         None => (false, word.strip_prefix('+').unwrap_or(word)),
     };
+    // Base 0 of `strtol`: 0x for hexadecimal, a leading 0 for octal, and a single 0 is zero.
     let (radix, digits) = match (digits.strip_prefix("0x").or_else(|| digits.strip_prefix("0X")), digits.strip_prefix('0')) {
         (Some(hex), _) => (16, hex),
         (None, Some(octal)) if !octal.is_empty() => (8, octal),
@@ -176,6 +178,7 @@ fn integer(word: &str) -> Option<i64> {
     if digits.is_empty() {
         return None;
     }
+    // Saturation is enough: a saturated number is out of the range of an entry.
     let size = digits.chars().try_fold(0_i64, |value, c| {
         let digit = c.to_digit(radix)?;
         Some(value.saturating_mul(i64::from(radix)).saturating_add(i64::from(digit)))

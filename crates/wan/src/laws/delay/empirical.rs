@@ -5,11 +5,11 @@ use core::fmt;
 
 use super::tail::Tail;
 
-/// Law given by its quantiles at 0, 1/(n − 1), …, 1, with linear interpolation between them.
+/// Law given by its quantiles at 0, 1/(n − 1), …, 1, with linear interpolation in between.
 ///
 /// For a sample the law is the piecewise linear quantile function through the order statistics (Hyndman & Fan 1996, definition 7). [`mean`](Self::mean) and
-/// [`sd`](Self::sd) are moments of the interpolated law. A [`Law`](super::Law) with exactly these moments has the values unchanged; a law with other moments
-/// has the values shifted and stretched.
+/// [`sd`](Self::sd) are moments of the interpolated law. A [`Law`](super::Law) with exactly these moments has the values unchanged; a law with different
+/// moments has the values shifted and stretched.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Empirical {
     knots: Vec<f64>,
@@ -17,7 +17,7 @@ pub struct Empirical {
     sd: f64,
 }
 
-/// Reason for which values are not a law.
+/// Reason for the refusal of values as a law.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum EmpiricalError {
     /// There are fewer than two values, or more than [`Empirical::MOST`].
@@ -32,7 +32,7 @@ pub enum EmpiricalError {
         /// Refused value.
         found: f64,
     },
-    /// All values are equal, so that they cannot be stretched to a deviation.
+    /// All values are equal, without a deviation to stretch.
     Constant {
         /// Common value.
         value: f64,
@@ -66,6 +66,7 @@ impl Empirical {
         if !(2..=Self::MOST).contains(&values.len()) {
             return Err(EmpiricalError::Count { found: values.len() });
         }
+        // Squares of numbers below 10^150 stay finite, also as a sum of 2^20 squares.
         if let Some((index, &found)) = values.iter().enumerate().find(|(_, value)| value.is_nan() || value.abs() >= 1e150) {
             return Err(EmpiricalError::NotANumber { index, found });
         }
@@ -97,7 +98,7 @@ impl Empirical {
 
     /// Returns the interpolated value at a place of the law.
     pub(super) fn at(&self, place: Tail) -> f64 {
-        // Cells are counted from the end whose probability is given, so that both tails keep their digits.
+        // Cells are counted from the end of the given probability, so both tails keep their digits.
         let last = self.knots.len() - 1;
         match place {
             Tail::Below(p) => {
@@ -115,6 +116,7 @@ impl Empirical {
     pub(super) fn tails(&self, x: f64) -> (f64, f64) {
         let upper = self.knots.partition_point(|&knot| knot <= x);
         let last = self.knots.len() - 1;
+        // Below the first and above the last value one of both neighbours is missing.
         let (Some(&left), Some(&right)) = (upper.checked_sub(1).and_then(|i| self.knots.get(i)), self.knots.get(upper)) else {
             return if upper == 0 { (0.0, 1.0) } else { (1.0, 0.0) };
         };
@@ -124,7 +126,7 @@ impl Empirical {
     }
 }
 
-/// Returns the cell of `cells` equal cells in which the probability `p` lies, and the position in the cell from 0 to 1.
+/// Returns the cell of the probability `p` among `cells` equal cells, and the position in the cell from 0 to 1.
 fn split(p: f64, cells: usize) -> (usize, f64) {
     let position = p * real(cells);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a position is neither negative nor above 2^20; a NaN becomes 0")]
@@ -132,8 +134,8 @@ fn split(p: f64, cells: usize) -> (usize, f64) {
     (cell, position - real(cell))
 }
 
-/// Returns mean and standard deviation of the law that is uniform between neighbouring knots: each cell has the mean (a + b)/2 and the mean square (a² + ab +
-/// b²)/3.
+/// Returns mean and standard deviation of the law with uniform parts between neighbouring knots: each cell has the mean (a + b)/2 and the mean square (a² + ab
+/// + b²)/3.
 fn moments(knots: &[f64]) -> (f64, f64) {
     let cells = real(knots.len() - 1);
     // Differences from a value in the middle keep the digits of narrow laws.

@@ -1,10 +1,10 @@
-//! Reasons for which a law is refused.
+//! Reasons for the refusal of a law.
 
 use core::fmt;
 
 use cohaptic_units::print::SixDigits;
 
-/// Reason for which a law, or a correlation of a law, is refused. Numbers are in the caller's unit.
+/// Reason for the refusal of a law or of a correlation of a law. Numbers are in the caller's unit.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum LawError {
@@ -20,9 +20,9 @@ pub enum LawError {
         /// Refused standard deviation.
         sd: f64,
     },
-    /// The mean is below the floor, which no delay can be.
+    /// The mean is below the floor, impossible for a delay.
     FloorAboveMean {
-        /// Mean that was asked for.
+        /// Mean asked for.
         mean: f64,
         /// Floor, zero unless another floor was given.
         floor: f64,
@@ -31,25 +31,25 @@ pub enum LawError {
     ReachesBelowFloor {
         /// Name of the law.
         law: &'static str,
-        /// Mean that was asked for.
+        /// Mean asked for.
         mean: f64,
-        /// Standard deviation that was asked for.
+        /// Standard deviation asked for.
         sd: f64,
-        /// Least value that the law would have.
+        /// Least value of the law.
         least: f64,
         /// Floor, zero unless another floor was given.
         floor: f64,
-        /// Largest standard deviation with which this law stays above the floor.
+        /// Largest standard deviation for this law above the floor.
         largest_sd: f64,
     },
-    /// The deviation of a law that begins at the floor is too large for its mean. Nearly every draw would be the floor, and no run would be long enough to
+    /// The deviation of a law with its begin at the floor is too large for its mean. Nearly every draw would be the floor, and no run would be long enough to
     /// reach the mean.
     TooVaried {
         /// Name of the law.
         law: &'static str,
         /// Mean minus floor.
         above_floor: f64,
-        /// Standard deviation that was asked for.
+        /// Standard deviation asked for.
         sd: f64,
         /// Largest standard deviation: [`MAX_VARIATION`](super::MAX_VARIATION) times the mean above the floor.
         largest_sd: f64,
@@ -61,7 +61,7 @@ pub enum LawError {
     },
     /// Two variables with this law cannot be so negatively correlated. Unless the law is symmetric, its least correlation is above −1.
     TooNegative {
-        /// Correlation that was asked for.
+        /// Correlation asked for.
         asked: f64,
         /// Least correlation of this law, between a delay at z and a delay at −z.
         least: f64,

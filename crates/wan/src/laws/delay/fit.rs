@@ -10,7 +10,7 @@ use super::special::root;
 use super::standard::Standard;
 use super::{DistTable, Distribution, MAX_VARIATION, pareto_normal};
 
-/// Law as it is drawn, max(floor, origin + scale·X), and the moments of the draws.
+/// Law of the draws, max(floor, origin + scale·X), and the moments of the draws.
 #[derive(Clone, Debug)]
 pub(super) struct Fit {
     pub(super) standard: Standard,
@@ -19,7 +19,7 @@ pub(super) struct Fit {
     pub(super) delivered: Moments,
 }
 
-/// Moments and floor that were asked for. `sd` is not negative, `mean` is at or above `floor`, and all are finite.
+/// Moments and floor asked for. `sd` is not negative, `mean` is at or above `floor`, and all are finite.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Asked {
     pub(super) mean: f64,
@@ -27,7 +27,7 @@ pub(super) struct Asked {
     pub(super) floor: f64,
 }
 
-/// Standard deviation of the Pareto law of tail index 3 on [1, ∞), whose variance is 3/4 and whose mean is 3/2.
+/// Standard deviation of the Pareto law of tail index 3 on [1, ∞), with the variance 3/4 and the mean 3/2.
 const PARETO_SD: f64 = 0.866_025_403_784_438_6;
 const PARETO_MEAN: f64 = 1.5;
 
@@ -47,10 +47,12 @@ pub(super) fn fit(distribution: &Distribution, asked: Asked) -> Result<Fit, LawE
         Distribution::Pareto => asked.bounded("Pareto", Standard::Pareto, PARETO_MEAN, PARETO_SD),
         Distribution::Empirical(values) => asked.bounded("empirical", Standard::Empirical(Arc::clone(values)), values.mean(), values.sd()),
         Distribution::LogNormal => {
+            // σ² = ln(1 + CV²), and the mean of e^(σz) is e^(σ²/2).
             let variance = libm::log1p(asked.squared_variation("lognormal")?);
             Ok(asked.begin_at_the_floor(Standard::LogNormal { sigma: libm::sqrt(variance) }, libm::exp(0.5 * variance)))
         }
         Distribution::Gamma => {
+            // A gamma law of scale 1 has mean a and variance a, so CV² = 1/a.
             let shape = 1.0 / asked.squared_variation("gamma")?;
             if shape > NORMAL_SHAPE {
                 return Ok(asked.cut(Standard::Normal, cut::normal));
@@ -59,13 +61,14 @@ pub(super) fn fit(distribution: &Distribution, asked: Asked) -> Result<Fit, LawE
         }
         Distribution::Weibull => {
             let inverse_shape = inverse_weibull_shape(libm::sqrt(asked.squared_variation("Weibull")?));
+            // The mean of a Weibull law of scale 1 is Γ(1 + 1/k).
             Ok(asked.begin_at_the_floor(Standard::Weibull { inverse_shape }, libm::tgamma(1.0 + inverse_shape)))
         }
     }
 }
 
-/// Shape from which a gamma law is drawn as a normal law. The mean is 10⁹ deviations above the floor, and the two laws differ by less than an `f64` of the
-/// mean resolves.
+/// Shape bound of the gamma law: from here on the law is drawn as a normal law. The mean is 10⁹ deviations above the floor, and the two laws differ by less
+/// than an `f64` of the mean resolves.
 const NORMAL_SHAPE: f64 = 1e18;
 
 impl Asked {
@@ -82,7 +85,7 @@ impl Asked {
         Fit { standard, origin: self.mean - scale * mean, scale, delivered }
     }
 
-    /// Returns the fit of a table. As in netem, entries are scaled without regard to the table's own mean and deviation.
+    /// Returns the fit of a table. As in netem, entries are scaled without regard to the mean and the deviation of the table.
     fn table(self, table: &Arc<DistTable>) -> Fit {
         let scale = self.sd / DistTable::ONE_DEVIATION;
         let (mean, sd) = table.moments((self.floor - self.mean) / scale);
@@ -90,13 +93,14 @@ impl Asked {
         Fit { standard: Standard::Table(Arc::clone(table)), origin: self.mean, scale, delivered }
     }
 
-    /// Returns the fit of X with the given mean and deviation and a least value, which must not fall below the floor.
+    /// Returns the fit of X with the given mean and deviation and a least value. The least value must not fall below the floor.
     fn bounded(self, law: &'static str, standard: Standard, mean: f64, sd: f64) -> Result<Fit, LawError> {
         let fit = self.standardised(standard, mean, sd, |_| Moments::STANDARD);
+        // Distance of the least value from the mean, in deviations.
         let below_mean = (mean - fit.standard.at(super::tail::Tail::Below(0.0))) / sd;
         let Self { mean, sd, floor } = self;
         let least = mean - sd * below_mean;
-        // The tolerance accepts a law that begins at the floor except for rounding.
+        // The tolerance accepts a law with its begin at the floor except for rounding.
         if floor - least > 1e-12 * (mean.abs() + sd) {
             return Err(LawError::ReachesBelowFloor { law, mean, sd, least, floor, largest_sd: (mean - floor) / below_mean });
         }
@@ -111,19 +115,19 @@ impl Asked {
             return Err(LawError::TooVaried { law, above_floor, sd: self.sd, largest_sd });
         }
         let variation = self.sd / above_floor;
-        // A square that underflows to zero would give an infinite shape. The least positive number stands for it.
+        // An underflow of the square to zero would give an infinite shape. The least positive number stands for the square.
         Ok((variation * variation).max(f64::MIN_POSITIVE))
     }
 
-    /// Returns the fit of X ≥ 0 with the given mean, whose form already has the right ratio of deviation to mean.
+    /// Returns the fit of X ≥ 0 with the given mean, for a form with the right ratio of deviation to mean.
     fn begin_at_the_floor(self, standard: Standard, mean: f64) -> Fit {
         let delivered = Moments { mean: self.mean, sd: self.sd };
         Fit { standard, origin: self.floor, scale: (self.mean - self.floor) / mean, delivered }
     }
 }
 
-/// Returns 1/k of the Weibull law whose standard deviation is `variation` times its mean, for 0 < variation ≤ 100: 1 + CV² = Γ(1 + 2/k)/Γ(1 + 1/k)². The
-/// right side increases with 1/k from 1 without bound, so that there is exactly one solution.
+/// Returns 1/k of the Weibull law with a standard deviation of `variation` times its mean, for 0 < variation ≤ 100: 1 + CV² = Γ(1 + 2/k)/Γ(1 + 1/k)². The
+/// right side increases with 1/k from 1 without bound, so there is exactly one solution.
 fn inverse_weibull_shape(variation: f64) -> f64 {
     let target = libm::log1p(variation * variation);
     // The logarithm of the right side is π²/6·t² for small t and below 2·ln 2·t for large t. The bracket of the root holds both estimates.

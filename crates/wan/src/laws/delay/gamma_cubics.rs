@@ -17,7 +17,7 @@ const ROUNDING: f64 = 1e-12;
 const NEEDED: f64 = 3.0;
 /// Number of cells. A power of two, because a cell's number is taken from the lower bits of a sum.
 const CELLS: usize = 2048;
-/// 1.5·2^52. A number of either sign that is added to it leaves no bits for a fraction.
+/// 1.5·2^52. The sum with a number of either sign leaves no bits for a fraction.
 const ROOM: f64 = 6_755_399_441_055_744.0;
 
 /// Delays \[ns\] of a law by four terms.
@@ -30,11 +30,11 @@ pub(crate) struct GammaCubics {
 }
 
 impl GammaCubics {
-    /// Mark of a delay that four terms do not give.
+    /// Mark of a delay beyond four terms.
     pub(crate) const UNKNOWN: u64 = u64::MAX;
 
     /// Returns the cubics of a law, or `None` if most delays of the law do not follow from four terms, because the delays are too long or vary too much.
-    /// Takes the widest cells that are accurate enough.
+    /// Takes the widest cells with enough accuracy.
     pub(super) fn new(law: &GammaLaw) -> Option<Self> {
         [1, 2, 4, 8, 16].into_iter().find_map(|parts| Self::of_parts(law, parts))
     }
@@ -45,8 +45,10 @@ impl GammaCubics {
         let mut cells = vec![[f64::NAN; 4]; CELLS];
         for (cell, (terms, left)) in law.map.series().enumerate() {
             for part in 0..parts {
+                // Centre of the part in the coordinates of the cell, from −1 to 1.
                 let at = (2.0 * f64::from(part) + 1.0) / whole - 1.0;
                 let cubic = cubic(law, terms, (at, 2.0 / whole));
+                // A missing cubic in the usual range would make the slow way the usual way.
                 if cubic.is_none() && (left + f64::from(part) / (whole * DENSITY)).abs() <= NEEDED {
                     return None;
                 }
@@ -56,7 +58,7 @@ impl GammaCubics {
         Some(Self { cells: cells.into_boxed_slice().try_into().ok()?, density: whole * DENSITY })
     }
 
-    /// Returns the delays of several numbers, or [`GammaCubics::UNKNOWN`] for the few delays that need the whole series, and for NaN.
+    /// Returns the delays of several numbers, or [`GammaCubics::UNKNOWN`] for the few delays with need for the whole series, and for NaN.
     #[inline(always)]
     pub(crate) fn nanos<const N: usize>(&self, z: &[f64; N]) -> [u64; N] {
         let (mut places, mut offsets) = ([0; N], [0.0; N]);
@@ -96,7 +98,7 @@ fn cubic(law: &GammaLaw, mut terms: [f64; TERMS], (at, width): (f64, f64)) -> Op
         unit *= width;
     }
     terms[0] += law.origin;
-    // |t| is at most ½, so that term k contributes at most |term|/2^k.
+    // |t| is at most ½, so term k contributes at most |term|/2^k.
     let most = |terms: &[f64], mut share: f64| {
         terms.iter().fold(0.0, |sum, term| {
             share *= 0.5;

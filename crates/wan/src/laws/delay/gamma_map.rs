@@ -18,7 +18,7 @@ pub(super) const DENSITY: f64 = 8.0;
 const CELLS: u32 = 128;
 /// Number of Taylor coefficients of a cell.
 pub(super) const TERMS: usize = 12;
-/// Number of terms that are computed only to bound the error of the others.
+/// Number of terms computed only to bound the error of the kept terms.
 const WITNESSES: usize = 2;
 /// Largest sum of the omitted terms, relative to x.
 const TOLERANCE: f64 = 1e-14;
@@ -30,8 +30,8 @@ pub(super) struct GammaMap {
     cells: Box<[Cell; CELLS as usize]>,
 }
 
-/// Taylor coefficients in units of half a cell, or NaN where the series is not accurate enough. Array k, for k from 0 to 3, holds the terms k, k + 4 and
-/// k + 8, so that vector instructions add three sums at once.
+/// Taylor coefficients in units of half a cell, or NaN without an accurate series. Array k, for k from 0 to 3, holds the terms k, k + 4 and
+/// k + 8, so vector instructions add three sums at once.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 struct Cell([[f64; 4]; 4]);
@@ -62,6 +62,7 @@ impl GammaMap {
         if position >= 0.0
             && let Some(terms) = self.cells.get(cell.cast_unsigned() as usize)
         {
+            // Half a cell is the unit of t, so t goes from −1 to 1 over the cell.
             let x = terms.sum(2.0 * (position - f64::from(cell)) - 1.0);
             if !x.is_nan() {
                 return x;
@@ -70,7 +71,7 @@ impl GammaMap {
         self.exactly(z)
     }
 
-    /// Returns the terms of each cell, which are NaN where the series is not accurate enough, and the cell's left edge.
+    /// Returns the terms of each cell, NaN without an accurate series, and the cell's left edge.
     pub(super) fn series(&self) -> impl Iterator<Item = ([f64; TERMS], f64)> {
         self.cells.iter().zip(0..).map(|(cell, number)| (cell.terms(), f64::from(number) / DENSITY - RANGE))
     }
@@ -88,7 +89,7 @@ impl Cell {
     /// Cell without a series.
     const NONE: Self = Self([[f64::NAN; 4]; 4]);
 
-    /// Returns a cell with the given terms, which are in ascending order of powers.
+    /// Returns a cell with the given terms, in ascending order of powers.
     fn new(terms: &[f64; TERMS]) -> Self {
         Self(core::array::from_fn(|k| [terms[k], terms[k + 4], terms[k + 8], 0.0]))
     }
@@ -98,7 +99,7 @@ impl Cell {
         core::array::from_fn(|term| self.0[term % 4][term / 4])
     }
 
-    /// Returns Σ terms·tᵏ for t from −1 to 1, added in pairs and pairs of pairs, which has half the latency of Horner's rule.
+    /// Returns Σ terms·tᵏ for t from −1 to 1, added in pairs and pairs of pairs, with half the latency of Horner's rule.
     #[inline(always)]
     fn sum(&self, t: f64) -> f64 {
         let Self([first, second, third, fourth]) = self;
@@ -116,6 +117,7 @@ fn taylor(a: f64, z: f64) -> Option<[f64; TERMS]> {
     let first = gamma_inverse::inverse(a, Tail::of_normal(z), z);
     let slope = gamma::incomplete(a, first).slope;
     let (mut x, mut v, mut s) = ([0.0; ALL], [0.0; ALL], [0.0; ALL]);
+    // v = φ(z)/(x^a·e^(−x)/Γ(a)), as at the head of this file.
     (x[0], v[0]) = (first, normal::density(z) / slope);
     // s = −z + (x − a)·v.
     let mut excess = x;
@@ -131,13 +133,15 @@ fn taylor(a: f64, z: f64) -> Option<[f64; TERMS]> {
             1 => s[1] -= half,
             _ => {}
         }
+        // t is in units of half a cell, so each derivative brings a factor `half`.
         x[n + 1] = half / order * product(&x, &v, n);
         excess[n + 1] = x[n + 1];
         v[n + 1] = half / order * product(&v, &s, n);
     }
     let mut terms = [0.0; TERMS];
     terms.copy_from_slice(&x[..TERMS]);
+    // At t = −1 the increasing series is least, so the bound is relative to the smallest x of the cell.
     let witnesses: f64 = x[TERMS..].iter().map(|term| term.abs()).sum();
-    // NaN fails the comparison, so that a series with NaN is refused.
+    // NaN fails the comparison, so a series with NaN is refused.
     (witnesses <= TOLERANCE * Cell::new(&terms).sum(-1.0)).then_some(terms)
 }

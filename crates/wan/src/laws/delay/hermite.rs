@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 
 use super::special::{normal, quadrature};
 
-/// Decay of the squares of the coefficients of a function that is not smooth.
+/// Decay of the squares of the coefficients of a rough function.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Roughness {
     /// Decay like k^(−5/2).
@@ -36,13 +36,13 @@ const PANEL: f64 = 0.125;
 const ORDERS: usize = 256;
 
 impl Series {
-    /// Returns the series of g, which has mean 0 and variance 1 and is smooth except for kinks at `breaks`, in ascending order.
+    /// Returns the series of g, with mean 0 and variance 1, smooth except for kinks at `breaks`, in ascending order.
     pub(super) fn of_function(g: impl Fn(f64) -> f64, breaks: impl Iterator<Item = f64>) -> Self {
         let mut coefficients = vec![0.0; ORDERS];
         let recurrence = Recurrence::new(ORDERS);
         let mut low = ENDS.0;
         for end in breaks.chain([ENDS.1]) {
-            // A break outside of the ends is moved to the nearer end, where it adds no range of its own.
+            // A break outside of the ends is moved to the nearer end, without an additional range.
             let end = end.clamp(low, ENDS.1);
             while low < end {
                 let high = if end - low > PANEL { low + PANEL } else { end };
@@ -56,7 +56,7 @@ impl Series {
         Self::new(coefficients.iter().skip(1).map(|c| c * c).collect(), Roughness::Kinks)
     }
 
-    /// Returns the series of max(z, cut), divided by its standard deviation. The second derivative of g is a pulse at the cut, so that c(k) = φ(cut)·he(k −
+    /// Returns the series of max(z, cut), divided by its standard deviation. The second derivative of g is a pulse at the cut, so c(k) = φ(cut)·he(k −
     /// 2)/√(k·(k − 1)).
     pub(super) fn of_cut_normal(cut: f64, sd: f64) -> Self {
         let orders = 4096;
@@ -96,7 +96,7 @@ impl Series {
         // The remainder is divided into odd and even orders in the same ratio as the last half of the squares.
         let last_half = squares[squares.len() / 2..].chunks_exact(2).fold([0.0, 0.0], |[a, b], pair| [a + pair[0], b + pair[1]]);
         let [first, second] = last_half.map(|part| if part == 0.0 { 0.0 } else { part / (last_half[0] + last_half[1]) });
-        // Order 1 has index 0, so that an even index is an odd order.
+        // Order 1 has index 0, so an even index is an odd order.
         let odd_first = (squares.len() / 2).is_multiple_of(2);
         let rest = if odd_first { [rest * first, rest * second] } else { [rest * second, rest * first] };
         Self { squares, rest, roughness }
@@ -109,19 +109,21 @@ impl Series {
             power *= phi;
             order += 1.0;
             sum += square * power;
-            // All squares add up to 1, so the orders that remain add at most 10⁻¹⁸.
+            // All squares add up to 1, so the remaining orders add at most 10⁻¹⁸.
             if power.abs() < 1e-18 {
                 return sum;
             }
         }
         let left = share_left(-order * libm::log(phi.abs()), self.roughness);
         let [odd, even] = self.rest;
+        // Odd powers of a negative φ are negative.
         sum + left * (even + libm::copysign(odd, phi))
     }
 }
 
 /// Returns ∫ k^(−s)·e^(−ck) over k > 1, divided by the same integral without the exponential.
 fn share_left(c: f64, roughness: Roughness) -> f64 {
+    // √c·Γ(½, c), by `erfc`. Both integrals follow by parts.
     let root = libm::sqrt(core::f64::consts::PI * c) * libm::erfc(libm::sqrt(c));
     match roughness {
         Roughness::Jumps => libm::exp(-c) - root,

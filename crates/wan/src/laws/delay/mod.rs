@@ -5,12 +5,12 @@
 //! correlated in time and have exactly this marginal law (a Gaussian copula): with z(n) = φ·z(n − 1) + √(1 − φ²)·ε(n), the delays `at_normal(z(n))` have the
 //! lag-one correlation ρ if φ is [`Law::gaussian_correlation`] of ρ.
 //!
-//! Numbers are `f64` in the unit in which the caller counts delays.
+//! Numbers are `f64` in the caller's unit of delays.
 //!
 //! # What happens at the floor
 //!
-//! No delay is below the floor, which is zero unless another floor is given. Mean µ and standard deviation σ are exactly the given ones, except for a law
-//! that is *cut*; [`Law::mean`] and [`Law::sd`] then return the moments of the delays that are drawn.
+//! No delay is below the floor, which is zero unless another floor is given. Mean µ and standard deviation σ are exactly as given, except for a *cut* law;
+//! [`Law::mean`] and [`Law::sd`] then return the moments of the drawn delays.
 //!
 //! | law | a delay is | at the floor f |
 //! | --- | --- | --- |
@@ -29,7 +29,7 @@
 //! # Accuracy
 //!
 //! Quantiles agree with a reference of 40 digits to 10⁻¹² of their value between the probabilities 10⁻¹² and 1 − 10⁻¹² (tests). Standard normal
-//! numbers beyond ±37.5, a probability of 5·10⁻³⁰⁸, count as ±37.5, so that every delay is finite.
+//! numbers beyond ±37.5, a probability of 5·10⁻³⁰⁸, count as ±37.5, so every delay is finite.
 //!
 //! ```
 //! use cohaptic_wan::law::{Distribution, Law};

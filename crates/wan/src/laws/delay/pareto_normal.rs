@@ -6,7 +6,7 @@
 use super::cut::Moments;
 use super::special::{normal, quadrature, root};
 
-/// Mean of Q: the mean of (1 − U)^(−1/3), which is ∫ q^(−1/3) dq, plus the mean of Φ⁻¹(U)/4, which is zero.
+/// Mean of Q: the mean of (1 − U)^(−1/3), ∫ q^(−1/3) dq, plus the mean of Φ⁻¹(U)/4, zero.
 pub(super) const MEAN: f64 = 1.5;
 
 /// Standard deviation of Q, √(1/16 + 3/4 + ½·E[Z·X]), where E[Z·X] = ∫ z·Φ(−z)^(−1/3)·φ(z) dz = 0.587470748478335… (40 digits of mpmath).
@@ -22,15 +22,17 @@ pub(super) fn normal_of(x: f64) -> f64 {
     root::increasing(|z| at(z, normal::below(-z)) - x, -38.0, 37.0)
 }
 
-/// Returns the moments of max((Q − MEAN)/SD, c) for c ≤ 0: the moments without a cut, plus the part that the cut adds below the z with Q = c.
+/// Returns the moments of max((Q − MEAN)/SD, c) for c ≤ 0: the moments without a cut, plus the addition of the cut below the z with Q = c.
 pub(super) fn cut_moments(cut: f64) -> Moments {
     let end = normal_of(MEAN + SD * cut);
     let begin = -38.0;
+    // The cut lies below every drawn value.
     if end <= begin {
         return Moments::STANDARD;
     }
     let standard = |z: f64| (at(z, normal::below(-z)) - MEAN) / SD;
     let mean = quadrature::integral(begin, end, |z| (cut - standard(z)) * normal::density(z));
+    // c² − s² as a product, so no digits cancel near the cut.
     let square = quadrature::integral(begin, end, |z| (cut - standard(z)) * (cut + standard(z)) * normal::density(z));
     Moments { mean, sd: libm::sqrt(1.0 + (square - mean * mean)) }
 }

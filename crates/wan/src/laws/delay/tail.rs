@@ -1,8 +1,8 @@
-//! Place in a law: the probability on its shorter side, so that both tails are resolved.
+//! Place in a law: the probability on its shorter side, so both tails are resolved.
 
 use super::special::normal;
 
-/// Place in a law, given by the smaller of the probabilities below and above it, so that rounding cuts neither tail.
+/// Place in a law, given by the smaller of the probabilities below and above, so rounding cuts neither tail.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Tail {
     /// Probability below the place, at most ½.
@@ -17,16 +17,17 @@ impl Tail {
         if z < 0.0 { Self::Below(normal::below(z)) } else { Self::Above(normal::below(-z)) }
     }
 
-    /// Returns the place of the probability `p`, which must lie in (0, 1).
+    /// Returns the place of the probability `p`, in (0, 1).
     pub(super) fn of_probability(p: f64) -> Self {
         // For p ≥ ½ the difference is exact.
         if p < 0.5 { Self::Below(p) } else { Self::Above(1.0 - p) }
     }
 
-    /// Returns the place of a uniform word. The top bit is the side, and the other bits are (k + ½)·2⁻⁶⁴ from the end, so that the ends of a law are resolved
-    /// to 3·10⁻²⁰.
+    /// Returns the place of a uniform word. The top bit is the side, and the other bits are (k + ½)·2⁻⁶⁴ from the end, so the ends of a law are resolved to
+    /// 3·10⁻²⁰.
     #[inline]
     pub(super) fn of_word(word: u64) -> Self {
+        // The complement of an upper word counts from the upper end.
         if word >> 63 == 0 { Self::Below(from_the_end(word)) } else { Self::Above(from_the_end(!word)) }
     }
 
@@ -46,7 +47,7 @@ impl Tail {
         }
     }
 
-    /// Returns the logarithm of the probability above this place, accurate also where the probability is nearly 1.
+    /// Returns the logarithm of the probability above this place, accurate also for a probability of nearly 1.
     pub(super) fn log_above(self) -> f64 {
         match self {
             Self::Below(p) => libm::log1p(-p),

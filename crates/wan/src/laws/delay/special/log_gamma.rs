@@ -2,11 +2,13 @@
 
 /// Returns ln Γ(1 + a) for a > −1. The relative error is about 10⁻¹⁶ also for small a, where `lgamma(1 + a)` loses digits by rounding its argument.
 pub(in crate::laws::delay) fn log_gamma_1p(a: f64) -> f64 {
+    // ln Γ(1 + a) = −γ·a + Σ ζ(k)·(−a)^k/k (DLMF 5.7.3).
     if a.abs() > 0.125 { libm::lgamma(1.0 + a) } else { -EULER * a + series(a, |_| 1.0) }
 }
 
 /// Returns ln Γ(1 + 2t) − 2·ln Γ(1 + t) for t > 0, which is ln(1 + CV²) of a Weibull law of shape 1/t. The terms linear in t cancel in the series.
 pub(in crate::laws::delay) fn log_gamma_ratio(t: f64) -> f64 {
+    // f(2^k) = 2^k − 2 joins both series, so the terms linear in t are never computed.
     if t > 0.125 { libm::lgamma(1.0 + 2.0 * t) - 2.0 * libm::lgamma(1.0 + t) } else { series(t, |two_to_k| two_to_k - 2.0) }
 }
 
@@ -15,6 +17,7 @@ pub(in crate::laws::delay) fn log_gamma_ratio(t: f64) -> f64 {
 fn series(a: f64, factor: impl Fn(f64) -> f64) -> f64 {
     let (mut power, mut two_to_k, mut k, mut sum) = (-a, 2.0, 1.0, 0.0);
     for zeta in ZETA {
+        // `power` becomes (−a)^k.
         (power, two_to_k, k) = (-a * power, 2.0 * two_to_k, k + 1.0);
         sum += zeta * power * factor(two_to_k) / k;
     }

@@ -12,6 +12,7 @@ pub(in crate::laws::delay) fn density(z: f64) -> f64 {
 
 /// Returns Φ(z), the probability below z. The relative error grows like z²·2⁻⁵³, the error of the squared argument in the exponent.
 pub(in crate::laws::delay) fn below(z: f64) -> f64 {
+    // `erfc` is accurate in the far tail, where 1 − Φ would lose all digits.
     0.5 * libm::erfc(-z * FRAC_1_SQRT_2)
 }
 
@@ -22,12 +23,14 @@ pub(in crate::laws::delay) fn inverse_below(p: f64) -> f64 {
         let r = 0.180_625 - centred * centred;
         return centred * ratio(r, &CENTRE);
     }
+    // In the tails the quantile grows like √(−2·ln p), so r is the variable of the approximation.
     let r = libm::sqrt(-libm::log(p));
     if r <= 5.0 {
         -ratio(r - 1.6, &MIDDLE)
     } else if r.is_finite() {
         -ratio(r - 5.0, &FAR)
     } else {
+        // p = 0 has no finite quantile.
         f64::NEG_INFINITY
     }
 }

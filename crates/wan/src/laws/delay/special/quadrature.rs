@@ -13,6 +13,7 @@ const NODES: [(f64, f64); 5] = [
 pub(in crate::laws::delay) fn panel(low: f64, high: f64, mut at: impl FnMut(f64, f64)) {
     let (centre, half) = (0.5 * (low + high), 0.5 * (high - low));
     for (node, weight) in NODES {
+        // Each node stands for two, because the rule is symmetric.
         at(centre - half * node, half * weight);
         at(centre + half * node, half * weight);
     }
@@ -20,6 +21,7 @@ pub(in crate::laws::delay) fn panel(low: f64, high: f64, mut at: impl FnMut(f64,
 
 /// Returns ∫ f from `low` to `high`, in panels of width 1 at most.
 pub(in crate::laws::delay) fn integral(low: f64, high: f64, f: impl Fn(f64) -> f64) -> f64 {
+    // Equal panels, so the last panel is not a thin rest.
     let panels = libm::ceil(high - low).max(1.0);
     let width = (high - low) / panels;
     let (mut sum, mut i) = (0.0, 0.0);

@@ -10,10 +10,13 @@ pub(in crate::laws::delay) fn increasing(f: impl Fn(f64) -> f64, mut low: f64, m
     if at_high <= 0.0 {
         return high;
     }
+    // Secant steps may creep towards one end, so bisection is enforced after a poor step.
     let mut bisect = false;
+    // At least every second step halves the bracket, so 200 steps reach the last digit.
     for _ in 0..200 {
         let width = high - low;
         let middle = low + 0.5 * width;
+        // No number lies between the ends.
         if middle <= low || middle >= high {
             break;
         }
@@ -25,7 +28,7 @@ pub(in crate::laws::delay) fn increasing(f: impl Fn(f64) -> f64, mut low: f64, m
         }
         if value < 0.0 {
             (low, at_low) = (next, value);
-            // Illinois (Dowell & Jarratt 1971): the value at an end that stays is halved, so that the next secant moves that end.
+            // Illinois (Dowell & Jarratt 1971): the value at an end that stays is halved, so the next secant moves this end.
             at_high *= 0.5;
         } else {
             (high, at_high) = (next, value);
@@ -34,5 +37,6 @@ pub(in crate::laws::delay) fn increasing(f: impl Fn(f64) -> f64, mut low: f64, m
         // After a step that has not halved the bracket, the next step bisects.
         bisect = high - low > 0.5 * width;
     }
+    // Of both neighbours of the zero, the end with the smaller value is nearer.
     if -at_low < at_high { low } else { high }
 }

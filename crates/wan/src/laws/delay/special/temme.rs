@@ -4,13 +4,14 @@
 //! d(k, n) = (−1)^k·g(k)·d(0, n) + (n + 2)·d(k − 1, n + 2), where λ − 1 = Σ α(n)·ηⁿ inverts ½η² = λ − 1 − ln λ and g(k) are Stirling's
 //! coefficients. Computed in rational numbers; terms below 2·10⁻¹⁹·50^k are left out. For a ≥ 50 and |η| ≤ 1 the error of the sum was 2·10⁻¹⁷.
 
-/// Least shape a for which the expansion is used.
+/// Least shape a for the expansion.
 pub(super) const LEAST_SHAPE: f64 = 50.0;
-/// Largest |η| for which the expansion is used.
+/// Largest |η| for the expansion.
 pub(super) const LARGEST_ETA: f64 = 1.0;
 
 /// Returns Σ C_k(η)·a^(−k).
 pub(super) fn sum(a: f64, eta: f64) -> f64 {
+    // Horner's rule in η within a row, and in 1/a over the rows.
     let polynomial = |row: &&[f64]| row.iter().rev().fold(0.0, |sum, c| sum * eta + c);
     D.iter().rev().map(polynomial).fold(0.0, |sum, c| sum / a + c)
 }
