@@ -1,11 +1,11 @@
 //! A wide-area network emulated as pure state machines.
 //!
-//! Use this crate if a program of yours wants delays, losses, queues or reordering, in virtual time or by a clock of its own.
+//! Use this crate if your program wants delays, losses, queues or reordering, in virtual time or by its clock.
 //!
 //! A [`Link`] takes packets in at an instant and gives them back later, twice, damaged, or not at all: it is a chain of impairments (outage, loss,
 //! duplication, corruption, a token bucket, a bottleneck with a finite queue, slots, reordering, propagation delay with jitter, an order policy), each in a
 //! file of its own. A [`LinkModel`] is one such chain, several in turn, a recording, or Linux's netem to the bit. A [`Network`] is directed links and shared
-//! access lines between N nodes over one event queue. Every packet has a [`Fate`], and every fate a counter, so that at every instant
+//! access lines between N nodes over one event queue. Every packet has a [`Fate`], and every fate a counter, so at every instant
 //!
 //! ```text
 //! offered + duplicated = delivered + dropped (by cause) + in flight

@@ -1,4 +1,4 @@
-//! Packets inside a link: the facts that a link needs, the packet between two stages, and the outputs of the stages.
+//! Packets inside a link: the facts for a link, the packet between two stages, and the outputs of the stages.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -8,12 +8,12 @@ use cohaptic_units::{Bytes, Instant};
 use crate::fates::damage::Damage;
 use crate::fates::fate::DropCause;
 
-/// Facts about a packet that a link needs. A [`Bytes`] converts to a packet of that size without ECN.
+/// Facts about a packet for a link. A [`Bytes`] converts to a packet of this size without ECN.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
 pub struct PacketInfo {
     /// Size of the packet.
     pub size: Bytes,
-    /// `true` if both ends understand explicit congestion notification (RFC 3168). An active queue marks such a packet where it would drop any other packet.
+    /// `true` if both ends understand explicit congestion notification (RFC 3168). An active queue marks such a packet in place of a drop.
     pub ecn_capable: bool,
 }
 
@@ -23,7 +23,7 @@ impl From<Bytes> for PacketInfo {
     }
 }
 
-/// Packet on its way from stage to stage. Boxed, so that each stage passes an address on and does not copy the hundred bytes of the packet.
+/// Packet on its way from stage to stage. Boxed, so each stage passes an address on and does not copy the hundred bytes of the packet.
 pub(crate) type Carried<T> = Box<Packet<T>>;
 
 /// Packet between two stages of one link.
@@ -31,7 +31,7 @@ pub(crate) type Carried<T> = Box<Packet<T>>;
 pub(crate) struct Packet<T> {
     /// Number of the packet on this link, part of the address of its random draws.
     pub(crate) number: u64,
-    /// 0 for the packet itself, 1 for the copy that this link made.
+    /// 0 for the packet itself, 1 for the copy made by this link.
     pub(crate) copy: u8,
     pub(crate) info: PacketInfo,
     /// `true` if an earlier line on the path marked the packet.
@@ -45,7 +45,7 @@ pub(crate) struct Packet<T> {
 }
 
 impl<T> Packet<T> {
-    /// Returns a packet that enters a line. `marks` are the marks of earlier lines on the path.
+    /// Returns a packet at its entry into a line. `marks` are the marks of earlier lines on the path.
     pub(crate) fn new(number: u64, info: PacketInfo, marks: Marks, item: T) -> Carried<T> {
         Box::new(Self { number, copy: 0, info, was_marked: marks.congestion, was_damaged: marks.damage.is_some(), marks, item })
     }
@@ -64,12 +64,12 @@ pub(crate) struct Marks {
     pub(crate) congestion: bool,
     /// Flipped bits.
     pub(crate) damage: Option<Damage>,
-    /// `true` if the checksum of the receiver will find the damage, so that the packet is dropped on arrival.
+    /// `true` if the checksum of the receiver will find the damage, so the packet is dropped on arrival.
     pub(crate) discarded_on_arrival: bool,
 }
 
 impl Marks {
-    /// Adds damage to a packet that an earlier line may have damaged already. `is_discarded` tells whether a checksum will find the damage.
+    /// Adds damage to a packet, possibly damaged by an earlier line already. `is_discarded` tells whether a checksum will find the damage.
     pub(crate) fn damage(&mut self, damage: Option<Damage>, is_discarded: bool) {
         self.damage = match (self.damage.take(), damage) {
             (Some(before), Some(damage)) => before.and(&damage),

@@ -9,7 +9,7 @@ pub struct Damage(Arc<[u64]>);
 
 impl Damage {
     /// Returns the indices of the flipped bits in ascending order. Bit 0 is the lowest bit of the first byte. Empty if the bits are unknown, as in the replay
-    /// of a log, which records only that a packet was damaged.
+    /// of a log, because a log records only the fact of damage.
     #[must_use]
     pub fn bits(&self) -> &[u64] {
         &self.0
@@ -38,6 +38,7 @@ impl Damage {
     /// Returns the damage of two flips in turn, or `None` if all bits are whole again: a bit flipped twice is whole. If the bits of one damage are unknown,
     /// the bits of the result are unknown too.
     pub(crate) fn and(self, other: &Self) -> Option<Self> {
+        // Unknown bits may cancel or not, so nothing about the result is known.
         if self.0.is_empty() || other.0.is_empty() {
             return Some(Self::unknown());
         }

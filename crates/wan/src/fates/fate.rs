@@ -7,9 +7,9 @@ use cohaptic_units::Instant;
 pub enum DropCause {
     /// A predicate of the program dropped the packet.
     Filter,
-    /// The packet was larger than the link takes, or than a token bucket can ever hold.
+    /// The packet was too large for the link, or for a token bucket at any time.
     Mtu,
-    /// The link was down when the packet was offered.
+    /// The link was down at the offer of the packet.
     Outage,
     /// The loss model dropped the packet.
     Loss,
@@ -23,7 +23,7 @@ pub enum DropCause {
     CoDel,
     /// Bits of the packet were flipped, and the receiver's checksum detected the damage.
     Checksum,
-    /// The log that the link replays has ended.
+    /// The replayed log has ended.
     EndOfLog,
 }
 
@@ -83,7 +83,7 @@ impl Fate {
         }
     }
 
-    /// Returns whether the fate is final, which means that the packet has left the link: delivered or dropped.
+    /// Returns whether the fate is final: the packet has left the link, delivered or dropped.
     #[must_use]
     pub const fn is_end(self) -> bool {
         match self {

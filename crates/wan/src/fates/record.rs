@@ -16,11 +16,11 @@ pub struct PacketRecord<L = ()> {
     pub path: L,
     /// Number of the packet on its link or path, from 0. A copy has the number of its packet.
     pub sequence: u64,
-    /// Number of the copy. 0 is the packet itself, and copies that a link made are counted from 1. In a network, a copy made by the uplink differs from its
+    /// Number of the copy. 0 is the packet itself, and copies made by a link are counted from 1. In a network, a copy made by the uplink differs from its
     /// packet in the lowest bit, a copy made by the link in the second bit, and a copy made by the downlink in the third bit. With [`Fate::Duplicated`] the
-    /// number is that of the new copy.
+    /// number is the number of the new copy.
     pub copy: u8,
-    /// Instant at which the packet was offered to the link, or to the network.
+    /// Instant of the packet's offer to the link, or to the network.
     pub offered: Instant,
     /// Instant of the arrival or of the drop, or, with [`Fate::Duplicated`], of the copy.
     pub at: Instant,
@@ -35,7 +35,7 @@ pub struct PacketRecord<L = ()> {
 }
 
 impl<L> PacketRecord<L> {
-    /// Returns the record without the path: a row of the fate log of that path.
+    /// Returns the record without the path: a row of the fate log of this path.
     #[must_use]
     pub fn without_path(self) -> PacketRecord {
         let Self { path: _, sequence, copy, offered, at, size, fate, marked, damaged } = self;
@@ -43,12 +43,12 @@ impl<L> PacketRecord<L> {
     }
 }
 
-/// Fate of one packet, or the copying of a packet: the record, whose [fields are those of the event](Deref), with the payload.
+/// Fate of one packet, or the copying of a packet: the record with the payload. The [fields of the record are fields of the event](Deref).
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct PacketEvent<P, L = ()> {
     /// Record of the fate.
     pub record: PacketRecord<L>,
-    /// Payload of the packet as it was offered, before `damage`.
+    /// Payload of the packet as offered, before `damage`.
     pub payload: P,
     /// Flipped bits. [`Damage::apply`] flips the bits of a payload.
     pub damage: Option<Damage>,

@@ -13,17 +13,17 @@ pub struct LinkStats {
     pub(crate) seldom: Seldom,
 }
 
-/// Counters that every packet changes. Separate from the other counters, so that the links of a large mesh touch little memory.
+/// Counters changed by every packet. Separate from the seldom counters, so the links of a large mesh touch little memory.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) struct Flow {
     pub(crate) offered: u64,
     pub(crate) delivered: u64,
-    /// Sum of the delays of delivered packets \[ns\]. Wider than 64 bits, so that the sum of long runs does not overflow.
+    /// Sum of the delays of delivered packets \[ns\]. Wider than 64 bits, so the sum of long runs does not overflow.
     pub(crate) delay_nanos: u128,
 }
 
 impl Flow {
-    /// Counts a packet that was offered at `entered` and leaves the far end at `at`.
+    /// Counts a packet with the offer at `entered` and the departure from the far end at `at`.
     #[inline(always)]
     pub(crate) fn deliver(&mut self, entered: Instant, at: Instant) {
         self.delivered += 1;
@@ -38,14 +38,14 @@ impl Flow {
         }
     }
 
-    /// Takes back the count of a packet that [`Flow::deliver`] counted with the same instants.
+    /// Takes back the count of a packet from [`Flow::deliver`] with the same instants.
     pub(crate) fn forget(&mut self, entered: Instant, at: Instant) {
         self.delivered -= 1;
         self.delay_nanos -= u128::from(at.as_nanos() - entered.as_nanos());
     }
 }
 
-/// Counters that only some packets change.
+/// Counters changed by few packets.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) struct Seldom {
     pub(crate) duplicated: u64,
@@ -66,7 +66,7 @@ impl Seldom {
 }
 
 impl LinkStats {
-    /// Returns counters that were counted elsewhere: offered packets, delivered packets, the sum of the delays of delivered packets \[ns\], and dropped
+    /// Returns counters counted elsewhere: offered packets, delivered packets, the sum of the delays of delivered packets \[ns\], and dropped
     /// packets per cause. Equal causes are added.
     #[must_use]
     pub fn counted(offered: u64, delivered: u64, delay_nanos: u128, dropped: impl IntoIterator<Item = (DropCause, u64)>) -> Self {
@@ -77,7 +77,7 @@ impl LinkStats {
         stats
     }
 
-    /// Adds the counters of `links` links, each of which has the counters `each`.
+    /// Adds the counters of `links` links with the counters `each`.
     pub fn add(&mut self, each: &Self, links: u64) {
         let Self { flow, seldom } = self;
         flow.offered += each.flow.offered * links;
@@ -97,27 +97,27 @@ impl LinkStats {
         self.flow.offered
     }
 
-    /// Returns the number of copies that the link made.
+    /// Returns the number of copies made by the link.
     #[must_use]
     pub const fn duplicated(&self) -> u64 {
         self.seldom.duplicated
     }
 
-    /// Returns the number of packets that left the far end, copies included.
+    /// Returns the number of packets beyond the far end, copies included.
     #[must_use]
     pub const fn delivered(&self) -> u64 {
         self.flow.delivered
     }
 
-    /// Returns the number of packets, copies included, that left the stages of this link with a mark (congestion experienced). In a network, packets that an
-    /// earlier line had marked are not counted.
+    /// Returns the number of packets, copies included, with a mark (congestion experienced) after the stages of this link. In a network, packets marked by an
+    /// earlier line are not counted.
     #[must_use]
     pub const fn marked(&self) -> u64 {
         self.seldom.marked
     }
 
-    /// Returns the number of packets, copies included, that left the stages of this link with flipped bits, whether or not the receiver's checksum discards
-    /// them. In a network, packets that an earlier line had damaged are not counted, nor are damaged packets that a later stage dropped.
+    /// Returns the number of packets, copies included, with flipped bits after the stages of this link, discarded by the receiver's checksum or not. In a
+    /// network, packets damaged by an earlier line are not counted, nor damaged packets dropped by a later stage.
     #[must_use]
     pub const fn damaged(&self) -> u64 {
         self.seldom.damaged

@@ -9,12 +9,12 @@ use cohaptic_units::Spot;
 
 use super::Contradiction;
 
-/// Why words cannot be read as a netem, and which word is at fault.
+/// Reason for the refusal of words as a netem, with the faulty word.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct NetemError {
     /// Kind of the fault.
     pub kind: NetemErrorKind,
-    /// Byte range of the faulty word in the text that was read.
+    /// Byte range of the faulty word in the read text.
     pub span: Range<usize>,
 }
 
@@ -31,21 +31,21 @@ impl core::error::Error for NetemError {}
 #[derive(Clone, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum NetemErrorKind {
-    /// A word where an option was expected.
+    /// A word in place of an option.
     UnknownWord {
         /// The unknown word.
         word: String,
     },
-    /// A word that is not a value of its option.
+    /// A word without meaning as a value of its option.
     Value {
         /// Name of the option.
         option: &'static str,
         /// The refused word.
         word: String,
-        /// Description of the values that the option takes.
+        /// Description of the option's values.
         expected: &'static str,
     },
-    /// A number without a unit that another notation, or another version of `tc`, reads differently. Zero means the same everywhere and needs no unit.
+    /// A number without a unit, with a different meaning in another notation or in another version of `tc`. Zero means the same everywhere and needs no unit.
     NoUnit {
         /// Name of the option.
         option: &'static str,
@@ -54,19 +54,19 @@ pub enum NetemErrorKind {
         /// The reading of each notation, and the words to write instead.
         readings: String,
     },
-    /// The end of the words, where an option still needs a value.
+    /// The end of the words, with a value of an option missing.
     Missing {
         /// Name of the option.
         option: &'static str,
-        /// Description of the values that the option takes.
+        /// Description of the option's values.
         expected: &'static str,
     },
-    /// An option that was given before. `tc` would use the last values, and earlier values where the last are incomplete.
+    /// An option that was given before. `tc` would use the last values, and earlier values if the last are incomplete.
     Repeated {
         /// Name of the option.
         option: &'static str,
     },
-    /// Options that contradict each other.
+    /// Contradicting options.
     Contradiction(Contradiction),
 }
 
@@ -95,25 +95,26 @@ impl From<Contradiction> for NetemErrorKind {
 }
 
 impl NetemError {
-    /// Returns the line of `input` that contains the faulty word, with carets under the word and a description of the values expected.
+    /// Returns the line of `input` with the faulty word, with carets under the word and a description of the values expected.
     ///
     /// ```text
     /// delay 24ms loss 250%
     ///                 ^^^^ expected a percentage from 0 to 100
     /// ```
     ///
-    /// `input` must be the text that was read. With another text the carets stand elsewhere, or at the end.
+    /// `input` must be the read text. With another text the carets stand elsewhere, or at the end.
     #[must_use]
     pub fn excerpt(&self, input: &str) -> String {
         let Spot { line, marked } = Spot::of(input, self.span.clone());
-        // Tabs are kept, so that the caret stands below the word whatever the width of a tab.
+        // Tabs are kept, so the caret stands below the word whatever the width of a tab.
         let indent: String = input[line.start..marked.start].chars().map(|c| if c == '\t' { '\t' } else { ' ' }).collect();
+        // A missing word has no length, but still needs a mark.
         let carets = "^".repeat(input[marked].chars().count().max(1));
         let line = input[line].trim_end_matches('\r');
         format!("{line}\n{indent}{carets} {}", self.advice())
     }
 
-    /// Returns a description of the values expected, without the faulty word, which the excerpt shows already.
+    /// Returns a description of the values expected, without the faulty word, because the excerpt shows the word already.
     fn advice(&self) -> String {
         match &self.kind {
             NetemErrorKind::Value { expected, .. } => format!("expected {expected}"),

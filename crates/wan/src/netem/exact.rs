@@ -1,4 +1,4 @@
-//! The link that does exactly what the words say.
+//! The link with exactly the behaviour of the words.
 //!
 //! Each option becomes the stage of the same name, in netem's order ([`Layout::Netem`]). No time is rounded to ticks, and no sum wraps around.
 //! `docs/netem.md` gives the meaning word by word, and the kernel's behaviour beside it.
@@ -21,14 +21,13 @@ use crate::stages::queue::{Bottleneck, Cells, Framing};
 use crate::stages::reorder::{Displacement, Reorder};
 use crate::stages::slots::Slots;
 
-/// Why words that `tc` accepts describe an impossible link.
+/// Reason for the refusal of accepted words of `tc`: the link is impossible.
 #[derive(Clone, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum ExactError {
-    /// Options that contradict each other.
+    /// Contradicting options.
     Contradiction(Contradiction),
-    /// A law with a smallest value, which would be below zero. netem sends a packet at once if its time lies in the past, which is another law with another
-    /// mean.
+    /// A law with a smallest value below zero. netem sends a packet at once if its time lies in the past: another law with another mean.
     BelowZero {
         /// Name of the option.
         option: &'static str,
@@ -38,17 +37,17 @@ pub enum ExactError {
         mean: Duration,
         /// Jitter: half the width if the law is uniform, else the standard deviation.
         jitter: Duration,
-        /// Largest jitter for which the law does not begin below zero.
+        /// Largest jitter for a law without values below zero.
         largest: Duration,
     },
-    /// A delay or a gap between slots that the law cannot have.
+    /// A delay or a gap between slots, impossible for the law.
     Delay {
         /// Name of the option.
         option: &'static str,
         /// Why the delay is impossible.
         reason: DelayError,
     },
-    /// A correlation that events of this probability cannot have.
+    /// A correlation, impossible for events of this probability.
     Chance {
         /// Name of the option.
         option: &'static str,
@@ -57,9 +56,9 @@ pub enum ExactError {
     },
     /// A four-state chain with impossible probabilities.
     State(FourStateError),
-    /// A table that the caller does not have.
+    /// A table unknown to the caller.
     NoTable(TableName),
-    /// A rate that does not fit into 64 bits of bits per second.
+    /// A rate too large for 64 bits of bits per second.
     Rate {
         /// Requested rate \[bytes/s\].
         bytes_per_sec: u64,
@@ -120,18 +119,17 @@ impl ExactError {
     }
 }
 
-/// Function that finds the table of a distribution, or `None`.
+/// Function with the table of a distribution, or `None`.
 type Tables<'a> = &'a mut dyn FnMut(&TableName) -> Option<Arc<DistTable>>;
 
 impl Netem {
-    /// Returns the link that does what the words say. `tables` finds the distributions that are not built in.
+    /// Returns the link with the behaviour of the words. `tables` finds the distributions that are not built in.
     ///
-    /// In contrast to the kernel, any number of packets is held without `limit`, and `seed` is ignored, since every link has random numbers of its own.
+    /// In contrast to the kernel, any number of packets is held without `limit`, and `seed` is ignored, because every link has separate random numbers.
     ///
     /// # Errors
     ///
-    /// [`ExactError`] if the words describe an impossible link: a uniform or Pareto delay that reaches below zero, a correlation that the law cannot have, or
-    /// a table that is missing.
+    /// [`ExactError`] if the words describe an impossible link: a uniform or Pareto delay below zero, a correlation impossible for the law, or a missing table.
     pub fn to_link_config(&self, tables: &mut dyn FnMut(&TableName) -> Option<Arc<DistTable>>) -> Result<LinkConfig, ExactError> {
         self.check()?;
         let corrupted = self.corrupt.map_or_else(|| Ok(Chance::default()), |spec| chance("corrupt", spec))?;
@@ -139,7 +137,7 @@ impl Netem {
             loss: self.loss.as_ref().map_or(Ok(Loss::None), loss)?,
             marks_instead_of_loss: self.ecn,
             duplication: self.duplicate.map_or_else(|| Ok(Chance::default()), |spec| chance("duplicate", spec))?,
-            // As in the kernel, checksums are complete before a bit flips, so that receivers discard the packet.
+            // As in the kernel, checksums are complete before a bit flips, so receivers discard the packet.
             corruption: (!corrupted.is_never()).then_some(Corruption {
                 bits: Flips::Bits { packets: corrupted, count: 1 },
                 within: None,
@@ -159,6 +157,7 @@ impl Netem {
         let Some(spec) = &self.slot else { return Ok(None) };
         let mut slots = match &spec.gap {
             SlotGap::Range { min, max } => {
+                // A single time is a range of no width.
                 let max = max.unwrap_or(*min);
                 Slots::new(*min, max).map_err(|_| Contradiction::SlotRange)?
             }
@@ -175,6 +174,7 @@ impl Netem {
     fn reordering(&self) -> Result<Option<Reorder>, ExactError> {
         let Some(spec) = &self.reorder else { return Ok(None) };
         let packets = chance("reorder", spec.chance)?;
+        // Without a gap, every packet may jump.
         let gap = spec.gap.unwrap_or(core::num::NonZeroU32::MIN);
         Ok((!packets.is_never()).then_some(Reorder { packets, how: Displacement::Jump { gap } }))
     }
@@ -190,6 +190,7 @@ fn loss(spec: &LossSpec) -> Result<Loss, ExactError> {
         LossSpec::Random(spec) => {
             let chance = chance("loss", *spec)?;
             match chance.correlation() {
+                // Without correlation the cheaper model has the same law.
                 _ if chance.is_never() => Loss::None,
                 0.0 => Loss::Independent(chance.probability()),
                 _ => Loss::Correlated(chance),
@@ -210,13 +211,14 @@ fn four_state(spec: &StateSpec) -> Result<FourState, ExactError> {
 
 fn gilbert_elliott(spec: &GemodelSpec) -> GilbertElliott {
     let [p, r, loss_in_bad, loss_in_good] = spec.probabilities();
-    // The words give the fractions lost, the model takes the fractions that get through.
+    // The words give the fractions lost, the model takes the fractions received.
     let [p, r, h, k] = [p, r, 1.0 - loss_in_bad, 1.0 - loss_in_good].map(probability);
     GilbertElliott { p, r, h, k }
 }
 
 fn delay(spec: &DelaySpec, tables: Tables<'_>) -> Result<Delay, ExactError> {
     match &spec.jitter {
+        // `tc` accepts a jitter of zero: a constant delay.
         Some(jitter) if !jitter.time.is_zero() => with_jitter("delay", spec.time, jitter, tables),
         _ => Ok(Delay::constant(spec.time)),
     }
@@ -224,6 +226,7 @@ fn delay(spec: &DelaySpec, tables: Tables<'_>) -> Result<Delay, ExactError> {
 
 fn with_jitter(option: &'static str, mean: Duration, spec: &JitterSpec, tables: Tables<'_>) -> Result<Delay, ExactError> {
     let (distribution, sd) = match &spec.distribution {
+        // The words give half the width of a uniform law, and all further laws have the deviation.
         None | Some(Distribution::Uniform) => (crate::laws::delay::Distribution::Uniform, deviation_of_half_width(spec.time)),
         Some(Distribution::Normal) => (crate::laws::delay::Distribution::Normal, spec.time),
         Some(Distribution::Pareto) => (crate::laws::delay::Distribution::Pareto, spec.time),
@@ -237,7 +240,7 @@ fn with_jitter(option: &'static str, mean: Duration, spec: &JitterSpec, tables: 
     let jitter = Jitter { correlation, ..Jitter::new(sd, distribution) };
     Delay::with_jitter(mean, jitter).map_err(|reason| match reason {
         DelayError::ReachesBelowFloor { law, largest, .. } => {
-            // In the unit of the words: for a uniform law half its width, which may be at most the mean.
+            // In the unit of the words: for a uniform law half its width, at most the mean.
             let largest = if matches!(spec.distribution, None | Some(Distribution::Uniform)) { mean } else { largest };
             ExactError::BelowZero { option, law, mean, jitter: spec.time, largest }
         }
@@ -247,8 +250,8 @@ fn with_jitter(option: &'static str, mean: Duration, spec: &JitterSpec, tables: 
     })
 }
 
-/// Returns the standard deviation of a uniform law, 1/√3 of the half-width, rounded down to a nanosecond. Rounding down keeps a law valid that begins exactly
-/// at zero.
+/// Returns the standard deviation of a uniform law, 1/√3 of the half-width, rounded down to a nanosecond. Rounding down keeps a law with its begin exactly at
+/// zero valid.
 fn deviation_of_half_width(half_width: Duration) -> Duration {
     #[expect(
         clippy::cast_precision_loss,
@@ -262,6 +265,7 @@ fn deviation_of_half_width(half_width: Duration) -> Duration {
 
 fn bottleneck(spec: &RateSpec) -> Result<Bottleneck, ExactError> {
     let bytes_per_sec = spec.bytes_per_sec.get();
+    // `tc` counts bytes per second, and the model bits.
     let rate = bytes_per_sec.checked_mul(8).and_then(Rate::bits_per_sec).ok_or(ExactError::Rate { bytes_per_sec })?;
     let mut framing = Framing::default();
     if let Some(spec) = &spec.framing {

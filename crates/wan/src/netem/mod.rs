@@ -1,10 +1,10 @@
-//! The words of `tc-netem`, and the links that they describe: as written, and as the Linux kernel behaves.
+//! The words of `tc-netem`, and the described links: as written, and with the behaviour of the Linux kernel.
 //!
 //! The module has three parts:
 //!
 //! - [`Netem`]: the options in the words. [`Netem::parse`] reads words as `tc` of iproute2 6.6 does (without `tc qdisc … netem`), refuses nonsense with
 //!   [an error that points at the word](NetemError::excerpt), and `Display` prints words that read back to the same value.
-//! - [`Netem::to_link_config`]: a link that does exactly what the words say.
+//! - [`Netem::to_link_config`]: a link with exactly the behaviour of the words.
 //! - [`kernel`]: the behaviour of Linux 6.6 with the same words, draw for draw. The kernel often differs from the words: `loss 1% 25%` loses 0.00015 %.
 //!
 //! ```

@@ -1,7 +1,7 @@
-//! Numbers with units, as `tc` reads them.
+//! Numbers with units, as read by `tc`.
 //!
-//! A number is the longest prefix that C's `strtod` reads as a decimal (sign, point, exponent), and the rest of the word is the unit. Units ignore case.
-//! Hexadecimal floats, `inf` and `nan`, which `strtod` reads too, are refused. Integers are read like `strtol` does: octal after `0`, hexadecimal after `0x`.
+//! A number is the longest prefix in the decimal form of C's `strtod` (sign, point, exponent), and the rest of the word is the unit. Units ignore case.
+//! Hexadecimal floats, `inf` and `nan`, valid for `strtod`, are refused. Integers are read like `strtol` does: octal after `0`, hexadecimal after `0x`.
 
 use alloc::format;
 use alloc::string::String;
@@ -13,7 +13,7 @@ use super::Percent;
 /// A number and the unit after the number.
 struct Number<'a> {
     value: f64,
-    /// The value if it was written as a plain integer, which is exact also where `value` is rounded; else `None`.
+    /// The value of a plain integer, exact even if `value` is rounded; else `None`.
     integer: Option<u128>,
     unit: &'a str,
 }
@@ -29,6 +29,7 @@ fn number(text: &str) -> Option<Number<'_>> {
     if bytes.get(end) == Some(&b'.') {
         let decimals = digits_from(end + 1);
         digits += decimals;
+        // A point without any digit is no number.
         if digits > 0 {
             end += 1 + decimals;
         }
@@ -38,7 +39,7 @@ fn number(text: &str) -> Option<Number<'_>> {
     }
     let is_integer = end == sign + whole;
     let mut is_plain = is_integer;
-    // As in `strtod`, an `e` belongs to the number only if digits follow. Otherwise the unit begins with it.
+    // As in `strtod`, an `e` belongs to the number only if digits follow. Otherwise the unit begins with the `e`.
     if matches!(bytes.get(end), Some(b'e' | b'E')) {
         let sign = usize::from(matches!(bytes.get(end + 1), Some(b'+' | b'-')));
         let exponent = digits_from((end + 1 + sign).min(bytes.len()));
@@ -61,6 +62,7 @@ impl Number<'_> {
 
     /// Returns the number times `scale`: as an integer if the number was written as one and the product fits, else as a real number.
     fn times(&self, scale: u64) -> Scaled {
+        // An integer product keeps every nanosecond and every bit; only fractions go through a real number.
         let product = self.integer.and_then(|integer| integer.checked_mul(u128::from(scale)));
         product.map_or_else(|| Scaled::Real(self.value * real(scale)), Scaled::Integer)
     }
@@ -75,12 +77,12 @@ enum Scaled {
 /// Returns the readings of a number without unit in each notation, and the words to write instead. Returns `None` for a number with a unit, for zero, and for
 /// a word that is no number.
 ///
-/// `tc` changed the default unit of a delay between versions, and a scene reads a number as a fraction where `tc` reads a percentage.
+/// `tc` changed the default unit of a delay between versions, and a scene reads a number as a fraction, but `tc` as a percentage.
 pub(super) fn without_unit(text: &str, kind: Plain) -> Option<String> {
     let number = number(text).filter(|number| number.unit.is_empty() && number.value != 0.0)?;
     Some(match kind {
         Plain::Percentage => {
-            // Rounding to binary makes the digits of the product after the twelfth, which are cut off.
+            // Rounding to binary makes the digits of the product after the twelfth. These digits are cut off.
             let fraction = libm::rint(number.value * 1e12) / 1e10;
             format!("tc reads {text} %, a scene would read the fraction {text}, which is {fraction} %: expected {text}%")
         }
@@ -107,10 +109,10 @@ fn real(scale: u64) -> f64 {
     scale as f64
 }
 
-/// 2³², whose square is 2⁶⁴.
+/// 2³², with the square 2⁶⁴.
 const TWO_POW_32: f64 = 4_294_967_296.0;
 
-/// Returns the integer part of a value, or `None` if that is outside of 0..2⁶⁴.
+/// Returns the integer part of a value, or `None` outside of 0..2⁶⁴.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to be in 0..2^64; the fraction is cut off as in C")]
 fn truncated(value: f64) -> Option<u64> {
     (0.0..TWO_POW_32 * TWO_POW_32).contains(&value).then_some(value as u64)
@@ -133,7 +135,7 @@ pub(super) fn time(text: &str) -> Option<Duration> {
         ("us", US),
         ("usec", US),
         ("usecs", US),
-        // The micro sign and the Greek letter mu, neither of which `tc` reads.
+        // The micro sign and the Greek letter mu, unknown to `tc`.
         ("\u{b5}s", US),
         ("\u{3bc}s", US),
         ("ns", 1),
@@ -193,11 +195,12 @@ pub(super) fn rate(text: &str) -> Option<NonZeroU64> {
     NonZeroU64::new(bytes)
 }
 
-/// Reads a size in bytes, or a count of packets, since `tc` reads `limit` like a size. Prefixes are binary.
+/// Reads a size in bytes, or a count of packets, because `tc` reads `limit` like a size. Prefixes are binary.
 pub(super) fn size(text: &str) -> Option<u32> {
     const KI: u64 = 1 << 10;
     let units = [
         ("", 1),
+        // In sizes `tc` takes k as 1024.
         ("b", 1),
         ("k", KI),
         ("kb", KI),

@@ -1,7 +1,7 @@
 //! Reading of words into [`Netem`].
 //!
-//! An option may be shortened as in `tc`: a word means the first option in the order of [`KEYWORDS`] that begins with the word. An optional value is read if
-//! the next word begins with a digit (or with a minus, where an overhead may be negative).
+//! An option may be shortened as in `tc`: a word means the first option in the order of [`KEYWORDS`] with this word as its begin. An optional value is read if
+//! the next word begins with a digit (or with a minus, for a possibly negative overhead).
 
 use alloc::string::ToString;
 use alloc::vec::Vec;
@@ -16,10 +16,10 @@ use super::{
     Percent, RateSpec, ReorderSpec, SlotGap, SlotSpec, StateSpec,
 };
 
-/// Full name of an option, which is also its name in messages.
+/// Full name of an option, also in messages.
 type Keyword = &'static str;
 
-/// Words for options in the order in which `tc` compares them, and the option of each. So `l` is `limit`, `d` is `delay`, `r` is `reorder`, and `s` is
+/// Words for options in the order of the comparisons of `tc`, and the option of each. So `l` is `limit`, `d` is `delay`, `r` is `reorder`, and `s` is
 /// `seed`.
 const KEYWORDS: [(&str, Keyword); 14] = [
     ("limit", "limit"),
@@ -58,7 +58,7 @@ impl Netem {
     ///
     /// # Errors
     ///
-    /// [`NetemError`], which points at the faulty word.
+    /// [`NetemError`], with the place of the faulty word.
     pub fn parse(input: &str) -> Result<Self, NetemError> {
         let mut parser =
             Parser { words: words(input).peekable(), last: 0..0, seen: Vec::new(), netem: Self::default(), distribution: None, gap: None };
@@ -86,7 +86,7 @@ fn words(input: &str) -> impl Iterator<Item = Word<'_>> {
     })
 }
 
-/// A word to which the error of a contradiction can point.
+/// A word for the error of a contradiction to point at.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Place {
     Option(Keyword),
@@ -97,14 +97,14 @@ enum Place {
 
 struct Parser<'a, W: Iterator<Item = Word<'a>>> {
     words: Peekable<W>,
-    /// Byte range of the word that was read last.
+    /// Byte range of the latest word read.
     last: Range<usize>,
-    /// Words to which the error of a contradiction can point, with their byte ranges.
+    /// Words for the error of a contradiction to point at, with their byte ranges.
     seen: Vec<(Place, Range<usize>)>,
     netem: Netem,
-    /// Value of `distribution`, which may be given before the delay that it belongs to.
+    /// Value of `distribution`, possibly given before its delay.
     distribution: Option<Distribution>,
-    /// Value of `gap`, which may be given before the `reorder` that it belongs to.
+    /// Value of `gap`, possibly given before its `reorder`.
     gap: Option<NonZeroU32>,
 }
 
@@ -113,7 +113,7 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
         let Some(&(_, option)) = KEYWORDS.iter().find(|(name, _)| name.starts_with(word.text)) else {
             return Err(NetemError { kind: NetemErrorKind::UnknownWord { word: word.text.to_string() }, span: word.span });
         };
-        // Synonyms have one name in `KEYWORDS`, so that `drop` after `loss` is a repetition too.
+        // Synonyms have one name in `KEYWORDS`, so `drop` after `loss` is a repetition too.
         if self.seen.iter().any(|(place, _)| *place == Place::Option(option)) {
             return Err(NetemError { kind: NetemErrorKind::Repeated { option }, span: word.span });
         }
@@ -131,14 +131,15 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
             "duplicate" => self.netem.duplicate = Some(self.chance(option)?),
             "distribution" => self.distribution = Some(self.value(option, NAME, Distribution::named)?),
             "rate" => self.netem.rate = Some(self.rate()?),
-            // `slot`, the only option that is left in the table.
+            // `slot`, the only option left in the table.
             _ => self.netem.slot = Some(self.slot()?),
         }
         Ok(())
     }
 
-    /// Moves values into the options that they belong to, and checks the whole.
+    /// Moves values into their options, and checks the whole.
     fn finish(mut self) -> Result<Netem, NetemError> {
+        // `distribution` and `gap` may stand anywhere in the words, so their options are known only now.
         if let Some(distribution) = self.distribution.take() {
             match self.netem.delay.as_mut().and_then(|delay| delay.jitter.as_mut()) {
                 Some(jitter) => jitter.distribution = Some(distribution),
@@ -157,6 +158,7 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
 
     fn delay(&mut self) -> Result<DelaySpec, NetemError> {
         let mut delay = DelaySpec { time: self.time("delay", TIME, Plain::Delay)?, jitter: None };
+        // A second time without a word before is the jitter.
         if self.number_follows() {
             let jitter = self.time("delay", TIME, Plain::Delay)?;
             delay.jitter = Some(JitterSpec { time: jitter, correlation: self.optional_percent("delay")?, distribution: None });
@@ -170,6 +172,7 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
     }
 
     fn loss(&mut self) -> Result<LossSpec, NetemError> {
+        // `random` is the usual model and may be left out.
         match self.words.peek().map(|word| word.text) {
             Some("state") => {
                 self.skip();
@@ -189,12 +192,13 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
         }
     }
 
-    /// Reads the first probability, which is required, and further probabilities as long as numbers follow.
+    /// Reads the first probability, required, and further probabilities as long as numbers follow.
     fn probabilities<const N: usize>(&mut self) -> Result<[Option<Percent>; N], NetemError> {
         let mut said = [None; N];
         said[0] = Some(self.percent("loss")?);
         for (index, percent) in said.iter_mut().enumerate().skip(1) {
             *percent = self.optional_percent("loss")?;
+            // A probability can be given only after all probabilities before it.
             if percent.is_none() {
                 break;
             }
@@ -209,7 +213,7 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
         let framing = match self.optional_signed("rate", OVERHEAD, overhead)? {
             None => None,
             Some(bytes) => {
-                // A minus here would be the overhead of a cell whose size was not given. The reader of the size refuses it.
+                // A minus here would be the overhead of a cell without a size. The reader of the size refuses the minus.
                 let cell = match self.optional_signed("rate", CELL, count)? {
                     None => None,
                     Some(size) => Some(CellSpec { size, overhead: self.optional_signed("rate", OVERHEAD, overhead)? }),
@@ -236,7 +240,7 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
         };
         let mut slot = SlotSpec { gap, packets: None, bytes: None };
         while let Some(word) = self.words.peek() {
-            // The empty word does not occur, so that a prefix has at least one letter.
+            // The empty word does not occur, so a prefix has at least one letter.
             let budget = ["packets", "bytes"].into_iter().find(|name| name.starts_with(word.text));
             let Some(option) = budget else { break };
             let said = if option == "packets" { slot.packets } else { slot.bytes };
@@ -244,6 +248,7 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
                 return Err(NetemError { kind: NetemErrorKind::Repeated { option }, span: word.span.clone() });
             }
             self.skip();
+            // The kernel counts both budgets in signed 32 bits.
             let countable = |count: NonZeroU32| (count.get() <= i32::MAX.unsigned_abs()).then_some(count);
             if option == "packets" {
                 slot.packets = Some(self.value("packets", SLOT_COUNT, |text| count(text).and_then(countable))?);
@@ -254,7 +259,7 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
         Ok(slot)
     }
 
-    /// Reads the next word with `read`. The error is one of a missing value at the end of the words, and one of a wrong value if `read` returns `None`.
+    /// Reads the next word with `read`. At the end of the words the error is a missing value, and after `None` from `read` a wrong value.
     fn value<V>(&mut self, option: Keyword, expected: &'static str, read: impl Fn(&str) -> Option<V>) -> Result<V, NetemError> {
         let Some(word) = self.words.next() else {
             return Err(NetemError { kind: NetemErrorKind::Missing { option, expected }, span: self.last.clone() });
@@ -278,7 +283,7 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
         if self.number_follows() { self.percent(option).map(Some) } else { Ok(None) }
     }
 
-    /// Reads the next word like `value`, and refuses a number without unit where notations differ.
+    /// Reads the next word like `value`, and refuses a number without unit if notations differ.
     fn with_unit<V>(&mut self, option: Keyword, expected: &'static str, kind: Plain, read: impl Fn(&str) -> Option<V>) -> Result<V, NetemError> {
         let text = self.words.peek().map_or("", |word| word.text);
         let value = self.value(option, expected, read)?;
@@ -286,7 +291,7 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
         number::without_unit(text, kind).map_or(Ok(value), |readings| Err(no_unit(readings)))
     }
 
-    /// Returns whether the next word begins with a digit, as optional values do.
+    /// Returns whether the next word begins with a digit, like optional values.
     fn number_follows(&mut self) -> bool {
         self.words.peek().is_some_and(|word| word.text.starts_with(|c: char| c.is_ascii_digit()))
     }
@@ -318,7 +323,7 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
             Contradiction::WaysOutOfState3 => &[Place::Probability(2)],
             Contradiction::SlotRange => &[Place::SlotMax],
             Contradiction::SlotWithoutJitter => &[Place::SlotJitter],
-            // The parser refuses these values word by word, so that no text leads here.
+            // The parser refuses these values word by word, so no text leads here.
             Contradiction::ProbabilitySkipped | Contradiction::SlotTooLarge | Contradiction::TimeTooLong => &[],
         };
         let at = self.seen.iter().find(|(place, _)| places.contains(place));

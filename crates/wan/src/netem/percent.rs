@@ -6,7 +6,7 @@ use cohaptic_units::Probability;
 
 /// A percentage from 0 to 100.
 ///
-/// The number is kept as written, since `tc` divides by a hundred in binary: not every fraction can be written as a percentage.
+/// The number is kept as written, because `tc` divides by a hundred in binary: not every fraction can be written as a percentage.
 #[derive(Clone, Copy, PartialEq, PartialOrd, Debug, Default)]
 pub struct Percent(f64);
 
@@ -20,7 +20,7 @@ impl Percent {
     /// Makes a percentage. Returns `None` unless `percent` lies in 0..=100.
     #[must_use]
     pub fn new(percent: f64) -> Option<Self> {
-        // The sum turns −0 into 0, so that equal values print equally.
+        // The sum turns −0 into 0, so equal values print equally.
         (0.0..=100.0).contains(&percent).then_some(Self(percent + 0.0))
     }
 
@@ -42,13 +42,13 @@ impl Percent {
         Probability::new(self.fraction()).unwrap_or(Probability::ONE)
     }
 
-    /// Returns the number that `tc` hands to the kernel for p: rint(p·(2³² − 1)), ties to even.
+    /// Returns the number from `tc` to the kernel for p: rint(p·(2³² − 1)), ties to even.
     #[must_use]
     pub(crate) fn as_u32(self) -> u32 {
         scaled(self.fraction())
     }
 
-    /// Returns the number that `tc` hands to the kernel for 1 − p, where the complement is the default of another probability: rint((1 − p)·(2³² − 1)).
+    /// Returns the number from `tc` to the kernel for 1 − p, for a complement as the default of another probability: rint((1 − p)·(2³² − 1)).
     #[must_use]
     pub(crate) fn complement_as_u32(self) -> u32 {
         scaled(1.0 - self.fraction())

@@ -1,4 +1,4 @@
-//! Printing of [`Netem`] as words that read back to the same value.
+//! Printing of [`Netem`] as words, with the same value after reading.
 
 use core::fmt;
 use core::num::NonZeroU64;
@@ -29,6 +29,7 @@ impl fmt::Display for Netem {
             words.chance("duplicate", duplicate)?;
         }
         if let Some(reorder) = &self.reorder {
+            // `gap` follows `reorder`, because a gap alone is refused.
             words.chance("reorder", &reorder.chance)?;
             if let Some(gap) = reorder.gap {
                 words.put(format_args!("gap {gap}"))?;
@@ -47,7 +48,7 @@ impl fmt::Display for Netem {
     }
 }
 
-/// Prints words with spaces between them.
+/// Prints words with spaces in between.
 struct Words<'f, 'a> {
     f: &'f mut fmt::Formatter<'a>,
     separator: &'static str,
@@ -60,7 +61,7 @@ impl Words<'_, '_> {
         Ok(())
     }
 
-    /// Prints percentages that are given. No given percentage follows a missing one, so that the words read back in order.
+    /// Prints the given percentages. No given percentage follows a missing percentage, so the words read back in order.
     fn put_all(&mut self, percentages: &[Option<Percent>]) -> fmt::Result {
         percentages.iter().flatten().try_for_each(|percent| self.put(percent))
     }
@@ -129,19 +130,20 @@ impl Words<'_, '_> {
     }
 }
 
-/// Prints a time as an integer of the largest unit that needs no fraction.
+/// Prints a time as an integer of the largest unit without a fraction.
 struct Time(Duration);
 
 impl fmt::Display for Time {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let nanos = self.0.as_nanos();
+        // Zero is a multiple of every unit and prints as seconds: `tc` reads zero alike in all units.
         let units = [(1_000_000_000, "s"), (1_000_000, "ms"), (1_000, "us")];
         let (scale, unit) = units.into_iter().find(|(scale, _)| nanos.is_multiple_of(*scale)).unwrap_or((1, "ns"));
         write!(f, "{}{unit}", nanos / scale)
     }
 }
 
-/// Prints a rate as an integer of the largest unit that needs no fraction.
+/// Prints a rate as an integer of the largest unit without a fraction.
 struct Bits(NonZeroU64);
 
 impl fmt::Display for Bits {

@@ -11,11 +11,11 @@ use super::{DelaySpec, GemodelSpec, LossSpec, Netem, Percent, SlotGap, SlotSpec,
 pub enum Contradiction {
     /// `reorder` without a delay: no waiting packet can be overtaken.
     ReorderWithoutDelay,
-    /// `gap` without `reorder`, of which the gap chooses the candidates.
+    /// `gap` without `reorder`: the gap chooses the candidates of `reorder`.
     GapWithoutReorder,
-    /// `ecn` without a loss, in whose place packets are marked.
+    /// `ecn` without a loss: the marks stand in place of losses.
     EcnWithoutLoss,
-    /// `distribution` without a jitter, of which the distribution is the law.
+    /// `distribution` without a jitter: the distribution is the law of the jitter.
     DistributionWithoutJitter,
     /// p13 + p14 of the four-state chain is above 1.
     WaysOutOfState1,
@@ -69,15 +69,15 @@ impl Contradiction {
     }
 }
 
-/// Tolerance for sums of probabilities: decimal percentages that sum to 100 may be larger after rounding to binary.
+/// Tolerance for sums of probabilities: decimal percentages with the sum 100 may be larger after rounding to binary.
 const SLACK: f64 = 1e-9;
 
 impl Netem {
-    /// Checks that no options contradict each other. Every value that [`Netem::parse`] returns passes.
+    /// Checks for contradictions between options. Every value of [`Netem::parse`] passes.
     ///
     /// # Errors
     ///
-    /// The first [`Contradiction`] in the order in which the options are checked: delay, loss, `ecn`, `reorder`, `slot`.
+    /// The first [`Contradiction`] in the order of the checks: delay, loss, `ecn`, `reorder`, `slot`.
     pub fn check(&self) -> Result<(), Contradiction> {
         self.delay.as_ref().map_or(Ok(()), check_delay)?;
         match &self.loss {
@@ -128,6 +128,7 @@ fn check_delay(delay: &DelaySpec) -> Result<(), Contradiction> {
 
 fn check_state(state: &StateSpec) -> Result<(), Contradiction> {
     check_order(&[state.p31, state.p32, state.p23, state.p14])?;
+    // p23 is the only way out of state 2 and needs no sum.
     let [p13, p31, p32, _, p14] = state.probabilities();
     if p13 + p14 > 1.0 + SLACK {
         return Err(Contradiction::WaysOutOfState1);
@@ -140,6 +141,7 @@ fn check_gemodel(model: &GemodelSpec) -> Result<(), Contradiction> {
 }
 
 fn check_order(said: &[Option<Percent>]) -> Result<(), Contradiction> {
+    // A given probability after a missing probability has no words in `tc`.
     let in_order = said.windows(2).all(|pair| pair[0].is_some() || pair[1].is_none());
     if in_order { Ok(()) } else { Err(Contradiction::ProbabilitySkipped) }
 }

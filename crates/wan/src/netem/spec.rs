@@ -6,9 +6,9 @@ use core::time::Duration;
 
 use super::Percent;
 
-/// The options of one netem, as they were written. An option that was not written is `None`.
+/// The options of one netem, as written. A missing option is `None`.
 ///
-/// [`Netem::parse`] makes only values that pass [`Netem::check`]. Check a value that is made in another way.
+/// [`Netem::parse`] makes only values valid for [`Netem::check`]. Check a value from another source.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Netem {
     /// `limit`: number of packets held at most, packets in propagation included. The kernel's default is 1000.
@@ -17,7 +17,7 @@ pub struct Netem {
     pub delay: Option<DelaySpec>,
     /// `loss`: the model of loss.
     pub loss: Option<LossSpec>,
-    /// `ecn`: marks packets that can carry a congestion mark, instead of losing them.
+    /// `ecn`: marks ECN-capable packets instead of losing these packets.
     pub ecn: bool,
     /// `corrupt`: flips one bit of a packet.
     pub corrupt: Option<ChanceSpec>,
@@ -45,7 +45,7 @@ pub struct DelaySpec {
 /// `JITTER [CORRELATION]`, and `distribution NAME`.
 #[derive(Clone, PartialEq, Debug)]
 pub struct JitterSpec {
-    /// Half the width of a uniform distribution, or the standard deviation of any other.
+    /// Half the width of a uniform distribution, or the standard deviation of any further distribution.
     pub time: Duration,
     /// Correlation of a packet's delay with the delay of the packet before.
     pub correlation: Option<Percent>,
@@ -56,7 +56,7 @@ pub struct JitterSpec {
 /// The law of jitter or of the gaps between slots.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Distribution {
-    /// `uniform`: the law if no other is named. The manual lists the name, for which `tc` finds no file.
+    /// `uniform`: the law without a name. The manual lists the name, but `tc` finds no file.
     Uniform,
     /// `normal`.
     Normal,
@@ -94,7 +94,7 @@ impl Distribution {
     }
 }
 
-/// The name of a distribution that is read from a file: one word, and not the name of a built-in distribution.
+/// The name of a distribution from a file: one word, and not the name of a built-in distribution.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub struct TableName(String);
 
@@ -117,7 +117,7 @@ impl TableName {
 /// `PERCENT [CORRELATION]`: the share of packets, and the correlation of neighbouring packets.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ChanceSpec {
-    /// Share of packets that are affected.
+    /// Share of affected packets.
     pub percent: Percent,
     /// Requested correlation of neighbouring packets.
     pub correlation: Option<Percent>,
@@ -152,7 +152,7 @@ pub struct StateSpec {
 }
 
 impl StateSpec {
-    /// Returns \[p13, p31, p32, p23, p14\] as fractions, with defaults where a probability is not given.
+    /// Returns \[p13, p31, p32, p23, p14\] as fractions, with defaults for missing probabilities.
     #[must_use]
     pub(crate) fn probabilities(&self) -> [f64; 5] {
         let or = |said: Option<Percent>, default: f64| said.map_or(default, Percent::fraction);
@@ -175,7 +175,7 @@ pub struct GemodelSpec {
 }
 
 impl GemodelSpec {
-    /// Returns \[p, r, 1 − h, 1 − k\] as fractions, with defaults where a probability is not given.
+    /// Returns \[p, r, 1 − h, 1 − k\] as fractions, with defaults for missing probabilities.
     #[must_use]
     pub(crate) fn probabilities(&self) -> [f64; 4] {
         let or = |said: Option<Percent>, default: f64| said.map_or(default, Percent::fraction);
@@ -187,7 +187,7 @@ impl GemodelSpec {
 /// `reorder PERCENT [CORRELATION] [gap DISTANCE]`.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ReorderSpec {
-    /// Share of the candidate packets that are sent at once.
+    /// Share of the candidate packets sent at once.
     pub chance: ChanceSpec,
     /// Distance of candidate packets: with gap n, at least n − 1 packets are delayed before the next candidate. Default: 1, every packet is a candidate.
     pub gap: Option<NonZeroU32>,
@@ -207,7 +207,7 @@ pub struct RateSpec {
 pub struct FramingSpec {
     /// Bytes added to the length of each packet; may be negative.
     pub overhead: i32,
-    /// Cells into which packets are cut; `None` if they are not cut.
+    /// Cells of a packet; `None` for whole packets.
     pub cell: Option<CellSpec>,
 }
 
@@ -223,22 +223,22 @@ pub struct CellSpec {
 /// `slot { MIN [MAX] | distribution NAME DELAY JITTER } [packets N] [bytes N]`.
 #[derive(Clone, PartialEq, Debug)]
 pub struct SlotSpec {
-    /// Time from one slot to the next.
+    /// Time from slot to slot.
     pub gap: SlotGap,
-    /// Number of packets that leave in one slot, at most. Default: no limit.
+    /// Number of packets for a slot, at most. Default: no limit.
     pub packets: Option<NonZeroU32>,
-    /// Number of bytes that leave in one slot. The packet that uses up the last byte still leaves. Default: no limit.
+    /// Number of bytes for a slot. The packet with the last byte still leaves. Default: no limit.
     pub bytes: Option<NonZeroU32>,
 }
 
-/// The time from one slot to the next.
+/// The time from slot to slot.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum SlotGap {
     /// `MIN [MAX]`: uniform between the two times.
     Range {
         /// Shortest time.
         min: Duration,
-        /// Longest time; `None` if it is the same as the shortest.
+        /// Longest time; `None` if equal to the shortest.
         max: Option<Duration>,
     },
     /// `distribution NAME DELAY JITTER`.

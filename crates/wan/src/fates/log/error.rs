@@ -1,4 +1,4 @@
-//! Reasons for which a fate log is refused.
+//! Reasons for the refusal of a fate log.
 
 use alloc::string::String;
 use core::fmt;
@@ -8,7 +8,7 @@ use cohaptic_units::Instant;
 use super::row::FateRow;
 use crate::fates::fate::DropCause;
 
-/// Reason for which a text or a list of records is not a complete fate log. Lines are counted from 1, and the header is line 1.
+/// Reason for the refusal of a text or of a list of records as a complete fate log. Lines are counted from 1, and the header is line 1.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum FateLogError {
     /// The first line is not the header.
@@ -41,7 +41,7 @@ pub enum FateLogError {
         /// Text of the cell.
         found: String,
     },
-    /// A packet has no row, but a later packet has one.
+    /// A packet has no row, but a later packet has a row.
     Missing {
         /// Number of the packet without a row.
         sequence: u64,
@@ -54,18 +54,18 @@ pub enum FateLogError {
     OfferedBefore {
         /// Line of the packet.
         line: u64,
-        /// Instant at which the packet was offered.
+        /// Instant of the packet's offer.
         offered: Instant,
         /// Line of the previous packet.
         earlier_line: u64,
-        /// Instant at which the previous packet was offered.
+        /// Instant of the previous packet's offer.
         earlier: Instant,
     },
-    /// A fate of a packet lies before the packet was offered, or an arrival has two different instants.
+    /// A fate of a packet lies before the packet's offer, or an arrival has two different instants.
     ImpossibleTime {
         /// Number of the line.
         line: u64,
-        /// Instant at which the packet was offered.
+        /// Instant of the packet's offer.
         offered: Instant,
         /// Instant of the row.
         at: Instant,
@@ -74,7 +74,7 @@ pub enum FateLogError {
     Contradiction {
         /// Number of the packet.
         sequence: u64,
-        /// Line of the row that differs.
+        /// Line of the different row.
         line: u64,
         /// Line of the packet's first row.
         other_line: u64,
@@ -141,7 +141,7 @@ impl fmt::Display for FateLogError {
 
 impl core::error::Error for FateLogError {}
 
-/// Names that the column `fate` may hold, for messages.
+/// Names for the column `fate`, for messages.
 struct FateNames;
 
 impl fmt::Display for FateNames {

@@ -2,7 +2,7 @@
 
 use crate::netem::{CellSpec, FramingSpec, RateSpec};
 
-/// A rate, and the overhead that is added to a packet's length.
+/// A rate, and the overhead added to a packet's length.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Airtime {
     bytes_per_sec: u64,

@@ -1,4 +1,4 @@
-//! The distribution tables that iproute2 ships, computed.
+//! The distribution tables of iproute2, computed.
 
 use alloc::boxed::Box;
 use core::f64::consts::SQRT_2;
@@ -17,7 +17,7 @@ pub(super) fn pareto() -> Box<[i16]> {
 }
 
 pub(super) fn pareto_normal() -> Box<[i16]> {
-    // The lowest normal entry enters the sum before it is clamped, and the division rounds towards zero.
+    // The lowest normal entry enters the sum before its clamping, and the division rounds towards zero.
     (0..ENTRIES).map(|rank| clamped((normal_entry(rank) + 3 * pareto_entry(rank)) / 4)).collect()
 }
 
@@ -27,7 +27,7 @@ fn normal_entry(rank: i32) -> i32 {
     let point = |index: i32| -10.0 + f64::from(index) * STEP;
     let target = (4.0 * f64::from(rank) + 0.5) / 16_384.0;
     let is_below = |index: i32| 0.5 + 0.5 * libm::erf(point(index) / SQRT_2) < target;
-    // Φ(−10) is below every target and Φ(10) above, so that the search keeps a grid point on either side.
+    // Φ(−10) is below every target and Φ(10) above, so the search keeps a grid point on either side.
     let (mut below, mut above) = (0, 400_000);
     while above - below > 1 {
         let middle = i32::midpoint(below, above);
@@ -43,7 +43,7 @@ fn normal_entry(rank: i32) -> i32 {
 fn pareto_entry(rank: i32) -> i32 {
     let survival = 1.0 - f64::from(rank) / f64::from(ENTRIES);
     let value = (libm::pow(survival, -1.0 / 3.0) - 1.5) * 4.0 / 3.0;
-    // The highest ranks do not fit into 16 bits, and are cut before they enter `pareto_normal`.
+    // The highest ranks do not fit into 16 bits, and are cut before `pareto_normal`.
     rounded(value * f64::from(TABLE_SCALE)).min(i32::from(i16::MAX))
 }
 

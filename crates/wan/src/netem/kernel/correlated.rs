@@ -1,4 +1,4 @@
-//! The kernel's correlated random numbers, and the delays made from them.
+//! The kernel's correlated random numbers, and the resulting delays.
 
 use super::built_in::TABLE_SCALE;
 use super::prng::{Prng, Unseeded};
@@ -14,7 +14,7 @@ pub(super) struct Correlated {
 }
 
 impl Correlated {
-    /// Makes a sequence whose first value comes from `unseeded`.
+    /// Makes a sequence with the first value from `unseeded`.
     pub(super) fn new(rho: u32, unseeded: &mut Unseeded) -> Self {
         Self { rho, last: unseeded.next_u32() }
     }
@@ -38,10 +38,10 @@ impl Correlated {
     }
 }
 
-/// Returns a time around `mean` \[ns\] made from 32 random bits, which are not drawn if `sigma` is 0.
+/// Returns a time around `mean` \[ns\] made from 32 random bits. The bits are not drawn if `sigma` is 0.
 ///
-/// Without a table the time is uniform on mean ± sigma, apart from the bias of the remainder. With a table the time is mean + sigma·entry/8192, where the
-/// remainder of sigma by 8192 is multiplied and rounded separately, as in the kernel. The time may be below zero.
+/// Without a table the time is uniform on mean ± sigma, apart from the bias of the remainder. With a table the time is mean + sigma·entry/8192, with the
+/// remainder of sigma by 8192 multiplied and rounded separately, as in the kernel. The time may be below zero.
 pub(super) fn distributed(mean: i64, sigma: i32, draw: impl FnOnce() -> u32, table: Option<&Table>) -> i64 {
     if sigma == 0 {
         return mean;
@@ -54,7 +54,7 @@ pub(super) fn distributed(mean: i64, sigma: i32, draw: impl FnOnce() -> u32, tab
     let entry = table.entry(random);
     let scale = i64::from(TABLE_SCALE);
     let product = i64::from(sigma % TABLE_SCALE) * entry;
-    // The division below truncates, so that half a step away from zero makes it round half away from zero.
+    // The division below truncates, so half a step away from zero makes a rounding of halves away from zero.
     let rounded = if product >= 0 { product + scale / 2 } else { product - scale / 2 };
     (rounded / scale + i64::from(sigma / TABLE_SCALE) * entry).wrapping_add(mean)
 }

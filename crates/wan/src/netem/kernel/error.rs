@@ -1,11 +1,11 @@
-//! Why no qdisc can be made of a netem.
+//! Reasons for the refusal of a netem as a qdisc.
 
 use core::fmt;
 use core::time::Duration;
 
 use crate::netem::{Contradiction, TableName};
 
-/// Why no qdisc can be made of a netem.
+/// Reason for the refusal of a netem as a qdisc.
 #[derive(Clone, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum QdiscError {
@@ -16,7 +16,7 @@ pub enum QdiscError {
         /// Name of the distribution.
         name: TableName,
     },
-    /// A delay that does not fit into the 2³² ticks of 64 ns of `tc`.
+    /// A delay beyond the 2³² ticks of 64 ns of `tc`.
     DelayTooLong {
         /// The delay or the jitter.
         delay: Duration,

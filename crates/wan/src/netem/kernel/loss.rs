@@ -12,7 +12,7 @@ pub(super) enum LossModel {
     GilbertElliott { chain: GilbertElliott, bad: bool },
 }
 
-/// State of the four-state chain: the fate of the packet for which the chain moved last.
+/// State of the four-state chain: the fate of the packet of the chain's latest move.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum State {
     /// State 1.
@@ -47,10 +47,10 @@ impl FourState {
         }
     }
 
-    /// Moves the chain by one packet, and returns whether the packet is lost: whether the new state is a lost one, except at bounds.
+    /// Moves the chain by one packet, and returns whether the packet is lost: whether the new state is a loss, except at bounds.
     ///
-    /// A draw that equals a bound belongs to neither side: the state stays, and the packet passes, in state 3 too. Sums of probabilities wrap around at 2³²:
-    /// two probabilities that sum to 1 and are both rounded up switch each other off.
+    /// A draw equal to a bound belongs to neither side: the state stays, and the packet passes, in state 3 too. Sums of probabilities wrap around at 2³²:
+    /// two probabilities with the sum 1, both rounded up, switch each other off.
     fn loses(&self, state: &mut State, random: u32) -> bool {
         let next = match *state {
             State::ReceivedInGap => {
@@ -91,9 +91,9 @@ impl FourState {
 pub(super) struct GilbertElliott {
     pub(super) p: u32,
     pub(super) r: u32,
-    /// Probability that a packet passes in the bad state.
+    /// Probability of a packet's passage in the bad state.
     pub(super) h: u32,
-    /// Probability that a packet is lost in the good state, 1 − k.
+    /// Probability of a packet's loss in the good state, 1 − k.
     pub(super) k1: u32,
 }
 
@@ -102,7 +102,7 @@ impl GilbertElliott {
         Self {
             p: said.p.as_u32(),
             r: said.r.map_or_else(|| said.p.complement_as_u32(), Percent::as_u32),
-            // The words give the share lost in the bad state, and the kernel holds the share that passes.
+            // The words give the share lost in the bad state, and the kernel holds the share received.
             h: said.loss_in_bad.map_or(0, |loss| u32::MAX - loss.as_u32()),
             k1: said.loss_in_good.map_or(0, Percent::as_u32),
         }
@@ -125,6 +125,7 @@ impl LossModel {
     /// Makes the model in its initial state: state 1 of the four-state chain, or the good state.
     pub(super) fn new(said: Option<&LossSpec>, unseeded: &mut Unseeded) -> Self {
         match said {
+            // The sequence draws its first value even without a loss, so later sequences are the same with and without a random loss.
             None => Self::Random { probability: 0, sequence: Correlated::new(0, unseeded) },
             Some(LossSpec::Random(chance)) => Self::Random {
                 probability: chance.percent.as_u32(),

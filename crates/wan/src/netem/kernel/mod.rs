@@ -1,8 +1,8 @@
 //! The behaviour of Linux 6.6 with a netem (`net/sched/sch_netem.c`), draw for draw.
 //!
 //! A [`Qdisc`] is the queueing discipline on a device of infinite speed, without a child and at the root. Offer packets with [`Qdisc::enqueue`], and take
-//! packets that leave with [`Qdisc::dequeue`]. With the same `seed` its decisions are those of the kernel, except for values that the kernel does not draw
-//! from its seeded generator (below). The code was written anew from formulas and facts, and contains no code of the kernel.
+//! leaving packets with [`Qdisc::dequeue`]. With the same `seed` the decisions are the decisions of the kernel, except for values from the kernel's unseeded
+//! generator (below). The code was written anew from formulas and facts, and contains no code of the kernel.
 //!
 //! # The way of a packet
 //!
@@ -30,7 +30,7 @@
 //!
 //! # Parts left out
 //!
-//! Segmentation offload (each packet is a single one), a child or parent qdisc, a device that is slow or stops, and timers that are late.
+//! Segmentation offload (each packet is a single packet), a child or parent qdisc, a slow or stopping device, and late timers.
 
 mod airtime;
 mod built_in;

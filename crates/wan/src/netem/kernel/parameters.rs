@@ -1,4 +1,4 @@
-//! The numbers that `tc` computes from the words and the kernel holds.
+//! The numbers in the kernel, computed by `tc` from the words.
 
 use core::num::NonZeroU32;
 use core::time::Duration;
@@ -25,7 +25,7 @@ pub(super) struct Parameters {
     pub(super) correlations: Correlations,
 }
 
-/// Correlations in 1/2³², except for that of loss.
+/// Correlations in 1/2³², except for the correlation of loss.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Correlations {
     pub(super) delay: u32,
@@ -78,7 +78,7 @@ impl Correlations {
     }
 }
 
-/// Returns a time in nanoseconds, which is below 2⁶³ in a checked netem.
+/// Returns a time in nanoseconds, below 2⁶³ in a checked netem.
 pub(super) fn nanos(span: Duration) -> i64 {
     i64::try_from(span.as_nanos()).unwrap_or(i64::MAX)
 }

@@ -1,4 +1,4 @@
-//! The kernel's seeded generator, and a generator for values that the kernel does not seed.
+//! The kernel's seeded generator, and a generator for values without the kernel's seed.
 
 /// Four combined linear feedback shift registers with a period of about 2¹¹³ (L'Ecuyer 1999, LFSR113), seeded as by netem: without a warm-up.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -6,11 +6,11 @@ pub struct Prng {
     registers: [u32; 4],
 }
 
-/// Constants of each register: the mask of the bits that a step keeps, the two shifts of the feedback, and the shift of the kept bits.
+/// Constants of each register: the mask of the bits kept by a step, the two shifts of the feedback, and the shift of the kept bits.
 const STEPS: [(u32, u32, u32, u32); 4] = [(!1, 6, 13, 18), (!7, 2, 27, 2), (!15, 13, 21, 7), (!127, 3, 12, 13)];
 
 impl Prng {
-    /// Makes the generator that `seed SEED` gives.
+    /// Makes the generator of `seed SEED`.
     #[must_use]
     pub const fn new(seed: u64) -> Self {
         #[expect(clippy::cast_possible_truncation, reason = "the seed is folded into 32 bits")]
@@ -31,7 +31,7 @@ impl Prng {
     }
 }
 
-/// Returns `value`, raised if needed so that the register has a bit among the bits that its step keeps.
+/// Returns `value`, raised if needed, so the register has a bit among the bits kept by its step.
 const fn at_least(value: u32, least: u32) -> u32 {
     if value < least { value + least } else { value }
 }

@@ -31,9 +31,9 @@ pub struct Qdisc<T> {
     duplicate_sequence: Correlated,
     corrupt_sequence: Correlated,
     reorder_sequence: Correlated,
-    /// Number of packets delayed since the last one was reordered.
+    /// Number of packets delayed since the last reordering.
     counter: u32,
-    /// Packets that leave at once, and the times at which they came \[ns\]. The packet that came last leaves first.
+    /// Packets without delay, and the times of their arrival \[ns\]. The newest packet leaves first.
     reordered: Vec<(i64, Packet<T>)>,
     line: TimeFifo<Packet<T>>,
 }
@@ -48,7 +48,7 @@ struct Packet<T> {
     corrupted: Option<FlippedBit>,
 }
 
-/// An event of a packet in the call that offers the packet.
+/// An event of a packet in the call of its offer.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Output<T> {
     /// A copy of the packet was made. Packet and copy go on separately, and the events of the copy come first.
@@ -73,20 +73,20 @@ pub enum DropReason {
     Limit,
 }
 
-/// A packet that leaves the qdisc.
+/// A packet on its way out of the qdisc.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Dequeued<T> {
-    /// The packet, as it was offered.
+    /// The packet, as offered.
     pub item: T,
-    /// Length of the packet as it was offered \[bytes\].
+    /// Length of the packet as offered \[bytes\].
     pub size: u32,
     /// 0 for the packet, 1 for its copy.
     pub copy: u8,
     /// `true` if the packet was marked instead of lost. The kernel counts the mark as a drop.
     pub marked: bool,
-    /// The flipped bit, or `None`. The kernel completes checksums before it flips the bit, so a host that verifies checksums drops the packet.
+    /// The flipped bit, or `None`. The kernel completes checksums before it flips the bit, so a host with verification of checksums drops the packet.
     pub corrupted: Option<FlippedBit>,
-    /// `true` if the packet left before packets that were waiting.
+    /// `true` if the packet left before waiting packets.
     pub reordered: bool,
 }
 
@@ -100,8 +100,8 @@ pub struct FlippedBit {
 }
 
 impl<T> Qdisc<T> {
-    /// Makes the qdisc in its state right after `tc` has added it, at [`Instant::ZERO`]. `seed` seeds the values that the kernel draws from its unseeded
-    /// generator, and also the seeded generator if the words have no `seed`.
+    /// Makes the qdisc in its state right after `tc` has added the qdisc, at [`Instant::ZERO`]. `seed` seeds the values from the kernel's unseeded generator,
+    /// and also the seeded generator if the words have no `seed`.
     ///
     /// # Errors
     ///
@@ -137,7 +137,7 @@ impl<T> Qdisc<T> {
                 Slots::new(slot, table)
             }
         };
-        // The sequences draw their first values in the order of the fields below, which decides their values for a given seed.
+        // The sequences draw their first values in the order of the fields below. This order decides their values for a given seed.
         let mut unseeded = Unseeded::new(seed);
         let correlations = parameters.correlations;
         Ok(Self {
@@ -169,10 +169,9 @@ impl<T> Qdisc<T> {
         self.len() == 0
     }
 
-    /// Returns the instant at which [`dequeue`](Self::dequeue) must be called next, or `None` if no packet is held. The instant may change with every call.
+    /// Returns the instant of the next call of [`dequeue`](Self::dequeue), or `None` if no packet is held. The instant may change with every call.
     ///
-    /// No packet leaves before this instant. With slots a packet may leave later: the call then finds that another slot has to open, and the instant moves
-    /// on.
+    /// No packet leaves before this instant. With slots a packet may leave later: the call then opens another slot first, and the instant moves on.
     #[must_use]
     pub fn next_at(&self) -> Option<Instant> {
         let time = match self.reordered.last() {
@@ -183,16 +182,16 @@ impl<T> Qdisc<T> {
         Some(Instant::from_nanos(u64::try_from(time).unwrap_or(0)))
     }
 
-    /// Removes and returns a packet that leaves at `now`, or returns `None` if no further packet leaves.
+    /// Removes and returns a packet with its departure at `now`, or returns `None` if no further packet leaves.
     pub fn dequeue(&mut self, now: Instant) -> Option<Dequeued<T>> {
-        // Reordered packets leave before all others, and use no slot.
+        // Reordered packets leave before all further packets, and use no slot.
         if let Some((_, packet)) = self.reordered.pop() {
             return Some(packet.leave(true));
         }
         let now = nanos(now);
         let time = self.line.first_time()?;
         if let Some(slots) = &mut self.slots {
-            // A slot that opened before the packet's time is over, and another slot has to open first.
+            // A slot from before the packet's time is over, and another slot has to open first.
             if slots.next < time {
                 slots.advance(now, &mut self.prng, &mut self.unseeded);
             }
@@ -214,14 +213,15 @@ impl<T> Qdisc<T> {
 }
 
 impl<T: Clone> Qdisc<T> {
-    /// Offers a packet of `size` bytes. The size **includes** the 14 bytes of the Ethernet header, which the kernel counts (an overhead of −14 in `rate`
-    /// subtracts them again). `ect` says whether the packet can carry a congestion mark. `out` is called for each event of the packet in this call.
+    /// Offers a packet of `size` bytes. The size **includes** the 14 bytes of the Ethernet header, as counted by the kernel (an overhead of −14 in `rate`
+    /// subtracts these bytes again). `ect` says whether the packet can carry a congestion mark. `out` is called for each event of the packet in this call.
     pub fn enqueue(&mut self, now: Instant, size: u32, ect: bool, item: T, out: &mut impl FnMut(Output<T>)) {
         let packet = Packet { item, size, copy: 0, ect, marked: false, corrupted: None };
         self.admit(nanos(now), packet, out);
     }
 
     fn admit(&mut self, now: i64, mut packet: Packet<T>, out: &mut impl FnMut(Output<T>)) {
+        // A copy is not copied again, and draws no number for the question.
         let is_original = packet.copy == 0;
         let mut copies = 1;
         if is_original && self.duplicate_sequence.happens(self.parameters.duplicate, &mut self.prng) {
@@ -239,13 +239,14 @@ impl<T: Clone> Qdisc<T> {
             return out(Output::Dropped { item: packet.item, copy: packet.copy, reason: DropReason::Loss });
         }
         if copies == 2 {
-            // The copy goes first through all steps, so that its draws come before the packet's remaining draws.
+            // The copy goes first through all steps, so its draws come before the packet's remaining draws.
             out(Output::Duplicated);
             self.admit(now, Packet { copy: 1, ..packet.clone() }, out);
         }
         if self.corrupt_sequence.happens(self.parameters.corrupt, &mut self.prng) {
             packet.corrupted = flip(packet.size, &mut self.unseeded);
         }
+        // The kernel counts the packets in propagation too.
         if self.len() >= self.parameters.limit as usize {
             return out(Output::Dropped { item: packet.item, copy: packet.copy, reason: DropReason::Limit });
         }
@@ -269,11 +270,12 @@ impl<T: Clone> Qdisc<T> {
         let Parameters { latency, jitter, airtime, .. } = self.parameters;
         let delay = distributed(latency, jitter, || self.delay_sequence.next(&mut self.prng), self.table.as_ref());
         let Some(airtime) = airtime else { return now.saturating_add(delay) };
-        // The packet that was reordered first counts as well. Only a copy of the packet offered can be in the list here, since the driver empties the list
-        // after each offer.
+        // The first reordered packet counts as well. Only a copy of the offered packet can be in the list here, because the driver empties the list after each
+        // offer.
         let reordered = self.reordered.first().map(|(time, _)| *time);
         let ready = match self.line.last_time().max(reordered) {
             None => now.saturating_add(delay),
+            // The transmission begins at the later of now + delay and the latest time to leave.
             Some(last) => last.saturating_add(delay.wrapping_sub(last.wrapping_sub(now)).max(0)),
         };
         ready.saturating_add(airtime.of(size).cast_signed())

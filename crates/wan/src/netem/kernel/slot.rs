@@ -1,4 +1,4 @@
-//! Slots: the times at which packets may leave.
+//! Slots: the times of possible departures.
 
 use core::num::NonZeroU32;
 
@@ -14,7 +14,7 @@ pub(super) struct Slots {
     gap: Gap,
     packets: i32,
     bytes: i32,
-    /// Time at which the current slot opens, or opened \[ns\].
+    /// Opening time of the current slot \[ns\].
     pub(super) next: i64,
     packets_left: i32,
     bytes_left: i32,
@@ -27,8 +27,7 @@ enum Gap {
 }
 
 impl Slots {
-    /// Makes the slots in their initial state, in which the first slot is open. Returns `None` if all times of a range are zero, which the kernel takes for
-    /// no slots.
+    /// Makes the slots in their initial state, with the first slot open. Returns `None` if all times of a range are zero: no slots for the kernel.
     pub(super) fn new(said: &SlotSpec, table: Option<Table>) -> Option<Self> {
         let gap = match &said.gap {
             SlotGap::Range { min, max } => {
@@ -40,13 +39,13 @@ impl Slots {
             }
             SlotGap::Drawn { delay, jitter, .. } => Gap::Drawn { mean: nanos(*delay), sigma: sigma(nanos(*jitter)), table },
         };
-        // The kernel reads a missing budget as the largest one.
+        // The kernel reads a missing budget as the largest budget.
         let count = |said: Option<NonZeroU32>| said.map_or(i32::MAX, |count| i32::try_from(count.get()).unwrap_or(i32::MAX));
         let (packets, bytes) = (count(said.packets), count(said.bytes));
         Some(Self { gap, packets, bytes, next: 0, packets_left: packets, bytes_left: bytes })
     }
 
-    /// Moves on to the next slot, whose gap is counted from `now` \[ns\].
+    /// Moves on to the next slot, with its gap counted from `now` \[ns\].
     ///
     /// The width of a range is multiplied by 32 random bits in 64 bits. For widths above 2³¹ ns (2.1 s) the product can wrap around, and the slot then lies
     /// in the past, as in the kernel.
