@@ -1,8 +1,7 @@
 //! The kernel's correlated random numbers, and the resulting delays.
 
-use super::built_in::TABLE_SCALE;
 use super::prng::{Prng, Unseeded};
-use super::table::Table;
+use super::table::{TABLE_SCALE, Table};
 
 /// A sequence of correlated random numbers: xₙ = (uₙ·(2³² − ρ′) + xₙ₋₁·ρ′) ≫ 32, with ρ′ = ρ + 1 and ρ the 32 bits of the correlation; xₙ = uₙ if ρ is 0.
 ///

@@ -33,9 +33,7 @@
 //! Segmentation offload (each packet is a single packet), a child or parent qdisc, a slow or stopping device, and late timers.
 
 mod airtime;
-mod built_in;
 mod correlated;
-mod error;
 mod loss;
 mod parameters;
 mod prng;
@@ -44,7 +42,7 @@ mod slot;
 mod table;
 mod time_fifo;
 
-pub use error::QdiscError;
+pub use parameters::QdiscError;
 pub use prng::Prng;
 pub use qdisc::{Dequeued, DropReason, FlippedBit, Output, Qdisc};
 pub use table::Table;

@@ -1,11 +1,11 @@
-//! The numbers in the kernel, computed by `tc` from the words.
+//! The numbers in the kernel, computed by `tc` from the words, and the reasons for the refusal of words.
 
+use core::fmt;
 use core::num::NonZeroU32;
 use core::time::Duration;
 
 use super::airtime::Airtime;
-use super::error::QdiscError;
-use crate::netem::{ChanceSpec, LossSpec, Netem, Percent};
+use crate::netem::{ChanceSpec, Contradiction, LossSpec, Netem, Percent, TableName};
 
 /// The kernel's parameters of a netem, except for the loss model, the tables and the slots.
 #[derive(Clone, Debug)]
@@ -94,6 +94,48 @@ fn through_ticks(span: Duration) -> Result<i64, QdiscError> {
     match u32::try_from(ticks) {
         Ok(ticks) => Ok(i64::from(ticks) << 6),
         Err(_) => Err(QdiscError::DelayTooLong { delay: span }),
+    }
+}
+
+/// Reason for the refusal of a netem as a qdisc.
+#[derive(Clone, PartialEq, Eq, Debug)]
+#[non_exhaustive]
+pub enum QdiscError {
+    /// The options contradict each other.
+    Contradiction(Contradiction),
+    /// A distribution has no table.
+    UnknownTable {
+        /// Name of the distribution.
+        name: TableName,
+    },
+    /// A delay beyond the 2³² ticks of 64 ns of `tc`.
+    DelayTooLong {
+        /// The delay or the jitter.
+        delay: Duration,
+    },
+}
+
+impl fmt::Display for QdiscError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Contradiction(error) => fmt::Display::fmt(error, f),
+            Self::UnknownTable { name } => write!(
+                f,
+                "no table for the distribution \"{}\": expected uniform, normal, pareto, paretonormal or a table that was given",
+                name.as_str()
+            ),
+            Self::DelayTooLong { delay } => {
+                write!(f, "a delay of {}: expected less than 274.877907s, which is what 32 bits of ticks hold", cohaptic_units::print::Span(*delay))
+            }
+        }
+    }
+}
+
+impl core::error::Error for QdiscError {}
+
+impl From<Contradiction> for QdiscError {
+    fn from(error: Contradiction) -> Self {
+        Self::Contradiction(error)
     }
 }
 

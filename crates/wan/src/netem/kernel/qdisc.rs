@@ -5,9 +5,8 @@ use alloc::vec::Vec;
 use cohaptic_units::Instant;
 
 use super::correlated::{Correlated, distributed};
-use super::error::QdiscError;
 use super::loss::LossModel;
-use super::parameters::Parameters;
+use super::parameters::{Parameters, QdiscError};
 use super::prng::{Prng, Unseeded};
 use super::slot::Slots;
 use super::table::Table;
