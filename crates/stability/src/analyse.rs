@@ -66,8 +66,8 @@ fn on_topology(scene: &Scene, topology: &Topology, method: Method, watch: &dyn W
     }
 }
 
-/// [`analyse_watched`] about the rest that the constant forces and torques of the hands, and their arms, leave the object at: copies are then some way apart, and a
-/// turn changes the moment of the forces. An object that does not turn moves about it as it does without.
+/// [`analyse_watched`] about the rest that the constant forces and torques of the hands, and their arms, leave the object at: copies are then some way apart,
+/// and a turn changes the moment of the forces. An object that does not turn moves about it as it does without.
 ///
 /// # Errors
 ///
@@ -76,9 +76,9 @@ pub fn analyse_loaded(scene: &Scene, method: Method, watch: &dyn Watch) -> Resul
     if scene.rotation.is_some() { turning::analyse_loaded(scene, watch) } else { analyse_watched(scene, method, watch) }
 }
 
-/// [`analyse_watched`] about the steady spin that constant torques of the hands drive about one axis of the world, near the attitude in which the object begins, and near
-/// its angular velocity if it has one. The samples that copies hold are behind by their age, which brakes; the rate is the one at which torques make up for that and for
-/// the damping.
+/// [`analyse_watched`] about the steady spin that constant torques of the hands drive about one axis of the world, near the attitude in which the object
+/// begins, and near its angular velocity if it has one. The samples that copies hold are behind by their age, which brakes; the rate is the one at which
+/// torques make up for that and for the damping.
 ///
 /// # Errors
 ///

@@ -1,8 +1,8 @@
 //! The frame of a scene, event by event, for crates that need more of a frame than its matrix: `cohaptic-proofs`.
 //!
-//! A scene is split into pieces that move apart ([`pieces`]), each of these into combinations of open and closed contacts ([`pairs`]), and each combination into
-//! classes of equal peers ([`Structure`]). A class is one [`Node`]; what the nodes do and hear in a frame is a [`Timetable`], and both together are a [`Lifted`]
-//! system.
+//! A scene is split into pieces that move apart ([`pieces`]), each of these into combinations of open and closed contacts ([`pairs`]), and each combination
+//! into classes of equal peers ([`Structure`]). A class is one [`Node`]; what the nodes do and hear in a frame is a [`Timetable`], and both together are a
+//! [`Lifted`] system.
 
 pub use crate::analysis::notes;
 pub use crate::combinations::{Combination, pairs};

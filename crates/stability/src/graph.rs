@@ -164,8 +164,8 @@ fn of_piece(piece: &Piece<'_>, graph: &Graph, network: &NominalNetwork, watch: &
     Ok(ContactMode { motion: piece.motion.clone(), contacts: String::new(), radius, parts, rigid_modes, dimension, frame: timetable.frame })
 }
 
-/// Returns the node of each of the equal peers. `degree` is the number or total weight of the heard peers of each peer, or `None` if not all
-/// peers have the same degree.
+/// Returns the node of each of the equal peers. `degree` is the number or total weight of the heard peers of each peer, or `None` if not all peers have the
+/// same degree.
 ///
 /// # Errors
 ///

@@ -2,11 +2,10 @@
 //!
 //! Use this crate if you ask from Rust for which gains and delays a scene is stable, and how stiff or heavy it feels.
 //!
-//! One frame of a linear scene, from one common sampling to the next, multiplies its state by a constant matrix, the *monodromy matrix*. The scene is
-//! stable if and only if every eigenvalue of that matrix is inside the unit circle, once the motion of everything together is left out: space has no
-//! origin. This crate builds that matrix from the same plants and strategies that the simulator steps (lifting: Araki & Yamamoto 1986; Rakhsha &
-//! Constantinescu 2015, Section 3), reduces it where peers are alike, and says how sure it is of the answer. The crate `cohaptic-proofs` stands above it and has
-//! verdicts on sets of scenes.
+//! One frame of a linear scene, from one common sampling to the next, multiplies its state by a constant matrix, the *monodromy matrix*. The scene is stable if
+//! and only if every eigenvalue of that matrix is inside the unit circle, once the motion of everything together is left out: space has no origin. This crate
+//! builds that matrix from the same plants and strategies that the simulator steps (lifting: Araki & Yamamoto 1986; Rakhsha & Constantinescu 2015, Section 3),
+//! reduces it where peers are alike, and says how sure it is of the answer. The crate `cohaptic-proofs` stands above it and has verdicts on sets of scenes.
 //!
 //! ```
 //! use cohaptic_scene::Scene;

@@ -123,8 +123,7 @@ pub struct LinearLaw {
 }
 
 impl LawRow {
-    /// Returns the row of the parts of `form` without the memory; `None` if `form` is not linear, has a constant, or changes when everything is
-    /// moved alike.
+    /// Returns the row of the parts of `form` without the memory; `None` if `form` is not linear, has a constant, or changes when everything is moved alike.
     #[expect(clippy::float_cmp, reason = "what moves with everything has equal gains for both ends to the bit")]
     fn of(form: &Form) -> Option<Self> {
         let Form { constant, by: [stiffness, damping, mean_position, mean_velocity, past_stiffness, past_damping, lead, _], is_linear } = *form;

@@ -34,7 +34,8 @@ pub struct Monodromy {
 ///
 /// # Errors
 ///
-/// [`AnalysisError`] as for [`crate::analyse`], and [`AnalysisError::SeveralModes`] if the scene is not linear because of one-sided contacts. Walls are left out.
+/// [`AnalysisError`] as for [`crate::analyse`], and [`AnalysisError::SeveralModes`] if the scene is not linear because of one-sided contacts. Walls are left
+/// out.
 pub fn monodromy(scene: &Scene) -> Result<Monodromy, AnalysisError> {
     pushed(scene, Trust::Linear, &FromScene)
 }

@@ -130,8 +130,8 @@ const LARGE: usize = 500;
 /// Largest number of signals for an unrequested determinant. With few signals the determinant is small.
 const FEW: usize = 32;
 
-/// Largest number of signals for a requested determinant. The determinant's matrix has a row and a column per signal.
-/// With drifting clocks a frame can last minutes and have 50,000 signals. The matrix would then take 40 GB.
+/// Largest number of signals for a requested determinant. The determinant's matrix has a row and a column per signal. With drifting clocks a frame can last
+/// minutes and have 50,000 signals. The matrix would then take 40 GB.
 const MOST_SIGNALS: usize = 1024;
 
 /// Computes the radius of a lifted system and returns the part of the scene described by the system.
@@ -179,8 +179,7 @@ pub fn alone(structure: &Structure, scene: &Scene, class: usize, axes: usize) ->
     })
 }
 
-/// Returns the radius and the number of states of a loose device. The states are the velocity and, if an arm ties the device to ground, the
-/// position.
+/// Returns the radius and the number of states of a loose device. The states are the velocity and, if an arm ties the device to ground, the position.
 pub(crate) fn loose_device(structure: &Structure, scene: &Scene, class: usize) -> (Radius, usize) {
     let place = structure.classes[class][0];
     let (short, long) = scene.peers[place].clock.spans();

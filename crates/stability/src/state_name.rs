@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-/// A state of a scene. Positions are in metres, relative to a copy ([`Monodromy::relative`](crate::Monodromy::relative)) where nothing ties them to ground; velocities are multiplied by
-/// a common time, forces by a compliance, waves by the root of a time over a mass, times the time between samples.
+/// A state of a scene. Positions are in metres, relative to a copy ([`Monodromy::relative`](crate::Monodromy::relative)) where nothing ties them to ground;
+/// velocities are multiplied by a common time, forces by a compliance, waves by the root of a time over a mass, times the time between samples.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct StateName {
     /// Peer to which the state belongs, as an index of [`Scene::peers`](cohaptic_scene::Scene::peers).
@@ -39,13 +39,13 @@ pub enum StateKind {
     /// Velocity of the copy at an earlier sampling.
     SampleVelocity {
         axis: usize,
-        /// See above.
+        /// Number of samplings back: 1 for the last sample before the frame.
         age: usize,
     },
     /// The force that a server computed for a client at an earlier sampling.
     SampleForce {
         axis: usize,
-        /// See above.
+        /// Number of samplings back: 1 for the last sample before the frame.
         age: usize,
         /// The place of the client.
         receiver: usize,
@@ -53,7 +53,7 @@ pub enum StateKind {
     /// The wave that was sent to a peer at an earlier sampling.
     SampleWave {
         axis: usize,
-        /// See above.
+        /// Number of samplings back: 1 for the last sample before the frame.
         age: usize,
         /// The place of that peer.
         receiver: usize,

@@ -7,8 +7,8 @@
 use crate::factorisation::orthogonal_complement;
 use crate::{Matrix, StateKind, StateName};
 
-/// A row whose part apart from other rows is shorter than this, relative to the largest entry, counts as spanned by them: far above rounding, and far below the share of
-/// one tick in a wave. The error covers such parts.
+/// A row whose part apart from other rows is shorter than this, relative to the largest entry, counts as spanned by them: far above rounding, and far below the
+/// share of one tick in a wave. The error covers such parts.
 const NOTHING: f64 = 1e-9;
 
 /// Returns the part of a matrix in which a body feels every state, and the error that the reduction adds to the entries. `forces` has the contribution of each

@@ -304,8 +304,8 @@ impl<E: Event> EventQueue<E> {
         self.front.front().is_some_and(|first| first.0 <= now)
     }
 
-    /// Sorts a bucket into the empty front, and makes the bucket the current bucket. If the first event is in `far`, the slot is empty, and
-    /// `move_to` pulls the events out of `far`.
+    /// Sorts a bucket into the empty front, and makes the bucket the current bucket. If the first event is in `far`, the slot is empty, and `move_to` pulls the
+    /// events out of `far`.
     fn bring_to_front(&mut self, bucket: u64) {
         let place = slot(bucket);
         self.occupied[place / 64] &= !(1 << (place % 64));

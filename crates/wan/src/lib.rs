@@ -11,8 +11,8 @@
 //! offered + duplicated = delivered + dropped (by cause) + in flight
 //! ```
 //!
-//! Time is an argument: nothing here reads a clock, opens a socket, or draws a random number that has no address (see [`random`]). Equal seeds
-//! and equal calls give equal answers on every platform. This crate does not know what travels in the packets.
+//! Time is an argument: nothing here reads a clock, opens a socket, or draws a random number that has no address (see [`random`]). Equal seeds and equal calls
+//! give equal answers on every platform. This crate does not know what travels in the packets.
 //!
 //! Read [`LinkConfig`] first, then [`Link`]. [`netem`] reads the words of `tc-netem`.
 //!

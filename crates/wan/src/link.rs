@@ -21,8 +21,8 @@ use crate::packet::{Marks, Outputs, PacketInfo};
 /// State machine of a directed link. Packets enter with [`Link::handle_packet`]; packets and their fates come out with [`Link::poll_event`].
 ///
 /// The driver passes packets in, asks [`Link::poll_timeout`] for the next deadline, calls [`Link::handle_timeout`] at that instant, and drains
-/// [`Link::poll_event`] until it returns `None`. A late driver changes no fate, because every event carries its instant. The answer of
-/// `poll_timeout` can change after `handle_packet`, `handle_timeout` and `set_model`.
+/// [`Link::poll_event`] until it returns `None`. A late driver changes no fate, because every event carries its instant. The answer of `poll_timeout` can
+/// change after `handle_packet`, `handle_timeout` and `set_model`.
 ///
 /// At equal instants a packet leaves a queue before the next packet is offered to the queue, and events come in the order of (instant, sequence, copy).
 #[derive(Clone)]

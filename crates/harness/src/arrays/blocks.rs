@@ -43,8 +43,8 @@ pub(super) struct Blocks {
     walls: Option<Vec<Option<Enclosure>>>,
     /// Lanes of running runs. Lanes of ended runs are not checked for finite numbers.
     pub(super) goes_on: Mask,
-    /// Least and greatest positions along the axis in computation \[m\]. A field, not local variables of the loop over blocks, because the
-    /// compiler vectorises this form only.
+    /// Least and greatest positions along the axis in computation \[m\]. A field, not local variables of the loop over blocks, because the compiler vectorises
+    /// this form only.
     extremes: [Lanes; 2],
 }
 

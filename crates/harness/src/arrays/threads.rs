@@ -1,8 +1,7 @@
 //! One run on several threads, or with groups of peers on one thread. Results equal the results of all peers together, to the bit.
 //!
 //! Each thread moves some of the peers, and has the links to its peers with the samples in flight. Peers act on each other by their samples alone, so threads
-//! need to meet only at ticks of sending, to exchange the samples. The fate of a packet is drawn at a separate address, so any thread can draw
-//! the fate.
+//! need to meet only at ticks of sending, to exchange the samples. The fate of a packet is drawn at a separate address, so any thread can draw the fate.
 //!
 //! For the same reason a thread need not move all its peers tick by tick. A thread computes one group of peers from one meeting to the next, then the next
 //! group, so the held samples of a group stay in the cache.

@@ -84,7 +84,7 @@ fn push_counters(row: &mut Vec<u8>, stats: &LinkStats) {
     row.push(b'\n');
 }
 
-/// Text of as many columns with the count 0 as a row can have in sequence.
+/// Text of the longest possible run of columns with the count 0.
 const ZEROS: [u8; 2 * (DropCause::ALL.len() + 4)] = {
     let mut zeros = [b'0'; 2 * (DropCause::ALL.len() + 4)];
     let mut at = 0;

@@ -1,9 +1,9 @@
 //! Boxes of numbers: lifted systems with step matrices multi-affine between the corners of a box.
 //!
-//! The gains of a node are numbers of the box themselves. A body enters by the coefficients of its step map. For a free body, m·a = f −
-//! b·v, each coefficient is monotone in m and in b, so the values at the ends of the box enclose the coefficient. If several coefficients vary, each becomes a
-//! separate number, and the numbers together enclose more than the box. If the damping b stays, a constant force f has the final velocity f/b. Then two
-//! coefficients follow from the other two: e₁₁ + b·g₁ = 0 and e₀₁ + b·g₀ = h.
+//! The gains of a node are numbers of the box themselves. A body enters by the coefficients of its step map. For a free body, m·a = f − b·v, each coefficient
+//! is monotone in m and in b, so the values at the ends of the box enclose the coefficient. If several coefficients vary, each becomes a separate number, and
+//! the numbers together enclose more than the box. If the damping b stays, a constant force f has the final velocity f/b. Then two coefficients follow from the
+//! other two: e₁₁ + b·g₁ = 0 and e₀₁ + b·g₀ = h.
 
 use std::borrow::Cow;
 
@@ -313,8 +313,8 @@ fn ranges(bodies: &[Body]) -> Result<[(f64, f64); 6], ProofError> {
 /// Coefficients affine in one number: the place of each coefficient, and `true` if the coefficient falls while the number grows.
 type Together = &'static [(usize, bool)];
 
-/// Returns the varying coefficients, grouped by their common number. If damping over mass stays, both effects of a force form one group. If
-/// the damping stays, each effect of a velocity forms a group with the effect of a force in the same row.
+/// Returns the varying coefficients, grouped by their common number. If damping over mass stays, both effects of a force form one group. If the damping stays,
+/// each effect of a velocity forms a group with the effect of a force in the same row.
 fn together(ranges: &[(f64, f64); 6], bodies: &[Body]) -> Vec<Together> {
     let varies = |place: usize| ranges[place].0 < ranges[place].1;
     let groups: &[Together] = if !varies(1) && !varies(3) {

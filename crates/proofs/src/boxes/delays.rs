@@ -1,7 +1,7 @@
 //! A delay of links as a key. The range of the key falls into stretches with one frame each.
 //!
-//! A sample comes into force at the first tick at or after its arrival. A longer delay makes the tick no earlier, and makes no age in a law
-//! smaller. So if the frames of two delays have the same events, held samples and laws, the frame of every delay between the two has the same too: a
+//! A sample comes into force at the first tick at or after its arrival. A longer delay makes the tick no earlier, and makes no age in a law smaller. So if the
+//! frames of two delays have the same events, held samples and laws, the frame of every delay between the two has the same too: a
 //! *stretch* of delays is one scene. Delays are whole nanoseconds, and two stretches are neighbours if no whole nanosecond lies between them.
 
 use cohaptic_scene::Scene;

@@ -72,8 +72,8 @@ pub(super) fn decide(span: &StepSpan) -> Option<Decision> {
     Some(Decision { proven, witness: Witness { coordinates: near.coordinates, weights, circle } })
 }
 
-/// Returns the certificate of the differences between the members of a class at a single point of the numbers, or `None` if these are not proven stable. `members` are places in the scene,
-/// `weight` is the weight with which a difference hears itself, and velocities are multiplied by `time` \[s\].
+/// Returns the certificate of the differences between the members of a class at a single point of the numbers, or `None` if these are not proven stable.
+/// `members` are places in the scene, `weight` is the weight with which a difference hears itself, and velocities are multiplied by `time` \[s\].
 pub(crate) fn stable_difference(members: &[usize], node: &Node, weight: f64, timetable: &Timetable, time: f64) -> Option<PartCertificate> {
     let nodes = vec![node.clone()];
     // One point is a box without width: no number varies.

@@ -2,9 +2,9 @@
 //!
 //! Averages of classes and differences within a class do not mix (`structure`), and only numbers in them depend on N: the mass of a copy, m or m/N; gains,
 //! multiplied by 1, 2/N, N − 1, 4(N − 1)/N² or 4(N − 1)²/N²; and the weights. Of F peers in the other classes, with ν = 1/(N − 1), a class of n is heard with
-//! weight nν, itself with (n − 1)ν, and the growing class with 1 − (F − 1)ν, itself with 1 − Fν; differences hear themselves with −ν. So the heard force has two terms:
-//! a gain times a constant, and a gain times ν times another constant. Each of these factors is monotone in N from 2 on, so the factors at the ends of a span of
-//! numbers enclose the factors between.
+//! weight nν, itself with (n − 1)ν, and the growing class with 1 − (F − 1)ν, itself with 1 − Fν; differences hear themselves with −ν. So the heard force has
+//! two terms: a gain times a constant, and a gain times ν times another constant. Each of these factors is monotone in N from 2 on, so the factors at the ends
+//! of a span of numbers enclose the factors between.
 //!
 //! Without damping of the object a copy of the mass m/N moves by N times a force, and nothing else of the copy depends on N. Forces may then be counted in
 //! newtons divided by N: gains are N times as large, copies have the mass m, devices have N times their mass, and the motion is the same. If gains shrink

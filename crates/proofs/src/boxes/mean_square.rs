@@ -1,8 +1,8 @@
 //! Every number of equal peers in the mean square, over equal links with independent losses.
 //!
-//! A delivery with the probability p = 1 − q turns the sample held, h, into q·h + p·u + ξ, with a noise ξ of variance p·q·σ², σ² = E(u − h)²,
-//! independent from link to link. So the second moments of N equal peers are the second moments of three kinds of motion, coupled only
-//! by σ² (see [`Symmetric`] for other coordinates of the same moments):
+//! A delivery with the probability p = 1 − q turns the sample held, h, into q·h + p·u + ξ, with a noise ξ of variance p·q·σ², σ² = E(u − h)², independent from
+//! link to link. So the second moments of N equal peers are the second moments of three kinds of motion, coupled only by σ² (see [`Symmetric`] for other
+//! coordinates of the same moments):
 //!
 //! ```text
 //! C    of √N times the mean over the peers of (a, h)        h ← q·h + p·u,                              noise ν·p·q·σ²

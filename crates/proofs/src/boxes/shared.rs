@@ -59,8 +59,8 @@ impl SharedProof {
         (self.beginnings.len() as u64) << (self.depth * self.keys)
     }
 
-    /// Decides every unknown piece of the given blocks, and every larger piece around such a block. Runs on all threads of the current thread
-    /// pool. `done` is called with each completely known block.
+    /// Decides every unknown piece of the given blocks, and every larger piece around such a block. Runs on all threads of the current thread pool. `done` is
+    /// called with each completely known block.
     ///
     /// # Errors
     ///

@@ -19,8 +19,8 @@ pub(super) struct Asked {
     groups: Vec<Group>,
     /// Parts with contacts: the frame, the group of each contact of the frame, and whether the part is about differences of equal peers.
     pub(super) frames: Vec<(ContactFrame, Vec<usize>, bool)>,
-    /// Indexed as `frames`: the class of the differences (`None`: the averages), and the number of sample values of earlier frames in the
-    /// states, indexed by class of the part.
+    /// Indexed as `frames`: the class of the differences (`None`: the averages), and the number of sample values of earlier frames in the states, indexed by
+    /// class of the part.
     pub(super) parts: Vec<(Option<usize>, Vec<usize>)>,
     pub(super) sampling: Sampling,
     /// Factor of velocities in the states \[s\].

@@ -26,8 +26,8 @@
 //!
 //! (a) to (d) hold at walls on both sides of an axis too, with δ the position of the copy, b = p − δ + (the place of the wall), and f and p below zero at the
 //! lower end: −b is the position, cut off at the ends, which is largest or smallest where f and p are not zero. Copies i and j have the same walls, so
-//! p_i·(b_j − b_i) >= 0 too, and f_i·(b_j − b_i) >= 0.
-//! Where an arm ties the scene, depths are measured from its rest, and if no contact presses there, p·(δ − p) >= 0 and f·(δ − p) >= 0.
+//! p_i·(b_j − b_i) >= 0 too, and f_i·(b_j − b_i) >= 0. Where an arm ties the scene, depths are measured from its rest, and if no contact presses there,
+//! p·(δ − p) >= 0 and f·(δ − p) >= 0.
 //!
 //! *Equal peers.* Rows and contacts are the same for n equal peers, and the sum over the peers of products u_i·v_i is n·ū·v̄ plus the sum of the products of
 //! the differences from the average. So the inequality splits as a frame does ([`Structure`]), into one for the averages and one for the differences, with

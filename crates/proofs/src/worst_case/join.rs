@@ -48,8 +48,7 @@ pub(super) fn iterate(component: &Component<'_>, rounds: usize, watch: &dyn Watc
 }
 
 /// Returns units of the state's entries, powers of two on a diagonal matrix, in which the rows and columns of all matrices together are of similar size
-/// (Osborne
-/// 1960). Powers of two change no digit of the matrices.
+/// (Osborne 1960). Powers of two change no digit of the matrices.
 fn balance(component: &Component<'_>) -> Matrix {
     const SWEEPS: u32 = 40;
     let size = component.size;

@@ -4,8 +4,8 @@
 //! searched one by one. A shape P is kept as an upper triangle R with P = RᵀR. In the coordinates z = R·x of its ends an edge is the matrix X = R_to A
 //! R_from⁻¹, and the smallest rate of the shapes is the largest ‖X‖₂.
 //!
-//! The first shapes come from an iteration with a few factorisations a round at any size ([`join`](super::join)). If the number of unknowns
-//! allows, Newton's method on a barrier improves these shapes ([`barrier`](super::barrier)).
+//! The first shapes come from an iteration with a few factorisations a round at any size ([`join`](super::join)). If the number of unknowns allows, Newton's
+//! method on a barrier improves these shapes ([`barrier`](super::barrier)).
 
 use cohaptic_stability::{Matrix, Watch};
 
@@ -27,8 +27,8 @@ pub(super) struct Found {
     pub shapes: Vec<Matrix>,
 }
 
-/// Returns the best found shapes, for matrices with entries near 1; `None` if the watch ends the search. Nodes without an edge on a cycle keep
-/// the identity, since no edge constrains their shape.
+/// Returns the best found shapes, for matrices with entries near 1; `None` if the watch ends the search. Nodes without an edge on a cycle keep the identity,
+/// since no edge constrains their shape.
 pub(super) fn search(automaton: &Automaton, accuracy: f64, watch: &dyn Watch) -> Option<Found> {
     let mut found = Found { rate: 0.0, shapes: vec![Matrix::identity(automaton.size()); automaton.pattern().nodes()] };
     for component in components(automaton) {

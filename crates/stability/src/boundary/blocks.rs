@@ -42,8 +42,8 @@ impl Boundary {
         (0..values.len().saturating_sub(1)).step_by(INTERVALS).map(block).collect()
     }
 
-    /// Searches blocks on all threads of the calling pool. `found` is called with each unknown value and its radius, and `done`
-    /// with the index of each completely searched block; the watch has stopped the other searches.
+    /// Searches blocks on all threads of the calling pool. `found` is called with each unknown value and its radius, and `done` with the index of each
+    /// completely searched block; the watch has stopped the other searches.
     ///
     /// # Errors
     ///

@@ -98,8 +98,7 @@ enum End {
     Stopped,
 }
 
-/// Computes the cells of the values `first`, and then, pass after pass, of the middles of halved intervals. `look` returns `None` if
-/// the search is to stop.
+/// Computes the cells of the values `first`, and then, pass after pass, of the middles of halved intervals. `look` returns `None` if the search is to stop.
 fn go_on<E: Send>(
     first: Vec<f64>,
     range: &KeyRange,
@@ -193,12 +192,11 @@ impl Boundary {
         Self::searched(range, options, known, radius, progress, || watch.stops())
     }
 
-    /// Finds every crossing of any function `radius` over a range. Values are computed on all threads of the calling pool; the result does not
-    /// depend on the number of threads.
+    /// Finds every crossing of any function `radius` over a range. Values are computed on all threads of the calling pool; the result does not depend on the
+    /// number of threads.
     ///
-    /// `known` are values computed before, such as [`Boundary::known`] of a stopped search; unneeded values are left out of the
-    /// result. `progress` is called after each value with the number of values so far. `stop` is called before each value; if it returns `true` the search ends
-    /// with the values so far.
+    /// `known` are values computed before, such as [`Boundary::known`] of a stopped search; unneeded values are left out of the result. `progress` is called
+    /// after each value with the number of values so far. `stop` is called before each value; if it returns `true` the search ends with the values so far.
     ///
     /// # Errors
     ///

@@ -21,8 +21,8 @@ impl DelayedLoop {
     /// lower end). Both counts hold for all such loops and include the rounding of the evaluation; see [`DelayedLoop::roots_outside`]. The distances of the
     /// circles begin with the first-order sensitivity |A⁻¹|·|F/F'| of the root and grow threefold until the counts succeed.
     ///
-    /// If |z|^−j overflows at all roots, far inside, the interval reaches from 0 to the smallest radius of a count. The error is
-    /// infinite if no count succeeded.
+    /// If |z|^−j overflows at all roots, far inside, the interval reaches from 0 to the smallest radius of a count. The error is infinite if no count
+    /// succeeded.
     #[must_use]
     pub fn bounded_radius(&self, perturbation: f64) -> Radius {
         self.bounded_radius_watched(perturbation, &Unwatched).unwrap_or(Radius::UNKNOWN)

@@ -36,7 +36,8 @@ impl Graph {
             Self::Ring { .. } if is_pair => 0.0,
             // −1/(N − 1) is rounded once.
             Self::Complete => f64::EPSILON,
-            // An angle below 2π is off by four roundings, a cosine by at most its angle's error and one rounding, and a mean of cosines by a rounding per term and a final rounding.
+            // An angle below 2π is off by four roundings, a cosine by at most its angle's error and one rounding, and a mean of cosines by a rounding per term
+            // and a final rounding.
             Self::Ring { neighbours } => (32.0 + real(*neighbours)) * f64::EPSILON,
         };
         let other = |(eigenvalue, _): &(Eigenvalue, usize)| if let Eigenvalue::Other(value) = eigenvalue { Some(*value) } else { None };
@@ -66,9 +67,9 @@ fn merged(mut intervals: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
 /// Returns an interval for each eigenvalue of D⁻¹W except the largest `ones` eigenvalues, known to be 1. The matrix A = D^−½·W·D^−½ has the same eigenvalues,
 /// is symmetric and has norm 1. If the computation fails, the single interval [−1, 1] stands for all eigenvalues.
 ///
-/// Let U and the diagonal Λ be the computed eigenvectors and eigenvalues of A, let ε = ‖UᵀU − 1‖ < 1, and let U = Q·H with Q orthogonal. Then
-/// ‖U − Q‖ = ‖H − 1‖ ≤ ε, since each singular value σ of U has |σ − 1| ≤ |σ² − 1|. So ‖QᵀAQ − Λ‖ = ‖AQ − QΛ‖ ≤ ‖AU − UΛ‖ + ε·(1 + ‖Λ‖), and each
-/// eigenvalue of A differs by at most this bound from the eigenvalue of Λ at the same place in rising order (Weyl 1912).
+/// Let U and the diagonal Λ be the computed eigenvectors and eigenvalues of A, let ε = ‖UᵀU − 1‖ < 1, and let U = Q·H with Q orthogonal. Then ‖U − Q‖ = ‖H − 1‖
+/// ≤ ε, since each singular value σ of U has |σ − 1| ≤ |σ² − 1|. So ‖QᵀAQ − Λ‖ = ‖AQ − QΛ‖ ≤ ‖AU − UΛ‖ + ε·(1 + ‖Λ‖), and each eigenvalue of A differs by at
+/// most this bound from the eigenvalue of Λ at the same place in rising order (Weyl 1912).
 fn of_weights(weights: &Matrix, ones: usize) -> Vec<[f64; 2]> {
     let size = weights.rows();
     let unknown = || vec![[-1.0, 1.0]; usize::from(size > ones)];

@@ -1,8 +1,7 @@
 //! Bound of the rounding errors of a frame, close even for fast growing disturbances.
 //!
-//! With T the matrix of a tick, the computed rows ẑ obey ẑ⁺ = T·ẑ + r. Each operation rounds the added terms, so r is at most u·|T|·s row by
-//! row, where s holds the sums of absolute values of the computed rows and |T| the absolute values of the terms of a tick. Hence two recursions over the same
-//! events,
+//! With T the matrix of a tick, the computed rows ẑ obey ẑ⁺ = T·ẑ + r. Each operation rounds the added terms, so r is at most u·|T|·s row by row, where s holds
+//! the sums of absolute values of the computed rows and |T| the absolute values of the terms of a tick. Hence two recursions over the same events,
 //!
 //! ```text
 //! s⁺ = |T|·s        e⁺ = |T|·e + u·|T|·s

@@ -1,8 +1,8 @@
 //! Arrivals on a link with dependent losses. The link's chain knows the number of the held sample, and the state of the losses at the held sample.
 //!
 //! A chain of losses gives each sample a state. The probability of a loss follows from the sample's own state, and this state from the state of the sample
-//! before. The delays of arriving samples are independent. Let b be the newest arrived sample, or the oldest sample still under way
-//! if the latter is newer, and s the state of b. Then (b, s) is a Markov chain, even if samples overtake each other:
+//! before. The delays of arriving samples are independent. Let b be the newest arrived sample, or the oldest sample still under way if the latter is newer, and
+//! s the state of b. Then (b, s) is a Markov chain, even if samples overtake each other:
 //!
 //! - No sample after b has arrived. Given s, the states of the samples after b do not depend on the history of samples before b, because the chain
 //!   of losses is a Markov chain. So the probabilities of the arrivals at a tick follow from the prior law of these samples, given no arrival of any of these

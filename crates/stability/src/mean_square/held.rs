@@ -1,11 +1,11 @@
 //! Part of a held sample without a force on the receiver.
 //!
-//! A held sample is a position and a velocity, and only KT·x + BT·v exerts a force. The other combination, w, changes no other state, and only the next
-//! sample changes w. So the operator on the second moment is block triangular: a block for the moments without w, and a block for the moments with w. E w²
-//! is multiplied by the probability of no arrival. In the long run this probability is a factor q per frame, the spectral radius of the moves of the link's
-//! chain without an arrival. By the inequality of Cauchy and Schwarz the moment of w with another w, or with a state with a force, grows no
-//! faster than the faster of the two. So the radius of the whole is the largest of the radius without w and of all q. A link of constant delay overwrites
-//! the held sample in every frame, so for such a link q = 0.
+//! A held sample is a position and a velocity, and only KT·x + BT·v exerts a force. The other combination, w, changes no other state, and only the next sample
+//! changes w. So the operator on the second moment is block triangular: a block for the moments without w, and a block for the moments with w. E w² is
+//! multiplied by the probability of no arrival. In the long run this probability is a factor q per frame, the spectral radius of the moves of the link's chain
+//! without an arrival. By the inequality of Cauchy and Schwarz the moment of w with another w, or with a state with a force, grows no faster than the faster of
+//! the two. So the radius of the whole is the largest of the radius without w and of all q. A link of constant delay overwrites the held sample in every frame,
+//! so for such a link q = 0.
 
 use super::arrivals::Outcome;
 use crate::{Matrix, Radius, spectrum};

@@ -6,9 +6,8 @@
 //! - If Y is positive definite, then L(Y) < γY, and L maps the interval −Y ≤ X ≤ Y into γ' times itself for a γ' < γ: **ρ < γ**.
 //! - If γ > ρ, then Y = Σ L^k(γY − L(Y))/γ^(k+1) is positive definite. So if Y is not positive definite, **γ ≤ ρ**.
 //!
-//! Both bounds are decided by signs alone, whatever the origin of Y and the condition of the eigenvectors of L. In the Krylov
-//! space of a fixed positive definite E, Y is the element with γY − L(Y) nearest to E. The space is the same for every γ, so one Arnoldi factorisation serves
-//! all γ.
+//! Both bounds are decided by signs alone, whatever the origin of Y and the condition of the eigenvectors of L. In the Krylov space of a fixed positive
+//! definite E, Y is the element with γY − L(Y) nearest to E. The space is the same for every γ, so one Arnoldi factorisation serves all γ.
 //!
 //! # Rounding
 //!

@@ -57,8 +57,8 @@ fn losses_that_are_chosen_make_a_pattern_by_the_number_of_the_sample() {
     assert_eq!(*never.timing(0, 1), pattern(&[None]));
 }
 
-/// A sample that finds no slot waits 10 ms for the slot that it opens. The next sample, 8 ms later, waits 2 ms for the same slot. The sample after that opens the
-/// next slot.
+/// A sample that finds no slot waits 10 ms for the slot that it opens. The next sample, 8 ms later, waits 2 ms for the same slot. The sample after that opens
+/// the next slot.
 #[test]
 fn slots_take_every_other_sample_along() {
     let slots = network("link = { slots = { min = \"10ms\", max = \"10ms\" } }", &[]);

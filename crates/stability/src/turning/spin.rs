@@ -1,10 +1,10 @@
 //! Steady spin: all copies turn at one rate about one axis of the world, driven by torques of the hands along that axis.
 //!
-//! Samples are held, so a copy is drawn towards old attitudes. With KR the coordination brakes a spin ω by about
-//! KR·sin(ω·age), and a spin is steady only if hands make up for this braking and for the damping. The motion repeats if seen from axes turning with the
-//! spin, and moving along its axis if the motion is a screw: after a frame of T the state is the same but turned by ω·T. With Φ the frame of real peers
-//! ([`super::peers`]), the steady motion is a zero of Φ(z) minus z turned by ω·T, and the slope of Φ there describes small motions. Displacements of
-//! everything together and the turn of everything about the axis are removed from this slope.
+//! Samples are held, so a copy is drawn towards old attitudes. With KR the coordination brakes a spin ω by about KR·sin(ω·age), and a spin is steady only if
+//! hands make up for this braking and for the damping. The motion repeats if seen from axes turning with the spin, and moving along its axis if the motion is a
+//! screw: after a frame of T the state is the same but turned by ω·T. With Φ the frame of real peers ([`super::peers`]), the steady motion is a zero of Φ(z)
+//! minus z turned by ω·T, and the slope of Φ there describes small motions. Displacements of everything together and the turn of everything about the axis are
+//! removed from this slope.
 
 use cohaptic_peer::rotation::{Attitude, Triple};
 use cohaptic_peer::{Hand, Signal};

@@ -66,8 +66,8 @@ impl Seldom {
 }
 
 impl LinkStats {
-    /// Returns counters counted elsewhere: offered packets, delivered packets, the sum of the delays of delivered packets \[ns\], and dropped
-    /// packets per cause. Equal causes are added.
+    /// Returns counters counted elsewhere: offered packets, delivered packets, the sum of the delays of delivered packets \[ns\], and dropped packets per
+    /// cause. Equal causes are added.
     #[must_use]
     pub fn counted(offered: u64, delivered: u64, delay_nanos: u128, dropped: impl IntoIterator<Item = (DropCause, u64)>) -> Self {
         let mut stats = Self { flow: Flow { offered, delivered, delay_nanos }, seldom: Seldom::default() };

@@ -150,8 +150,8 @@ impl LinkConfig {
         waits_for_line || self.without_queues(load).token_bucket.is_some()
     }
 
-    /// Returns the link's delay of every packet of `load`, or `None` if the link does more. The span is the transmission time, if no
-    /// packet waits for a transmission, plus the propagation delay.
+    /// Returns the link's delay of every packet of `load`, or `None` if the link does more. The span is the transmission time, if no packet waits for a
+    /// transmission, plus the propagation delay.
     #[must_use]
     pub fn constant_delay_of(&self, load: Load) -> Option<Duration> {
         let line = self.bottleneck.as_ref().map_or(Some(Duration::ZERO), |bottleneck| bottleneck.time_without_wait(load))?;

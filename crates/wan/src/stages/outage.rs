@@ -296,9 +296,8 @@ mod tests {
         assert!(matches!(Outages::new(vec![outage(10, 20), outage(15, 30)]), Err(OutagesError::Overlap { index: 1, .. })));
     }
 
-    /// The link is up for 30 ms and down for 10 ms on average, and is observed every 0.1 ms for 1000 s: it is down for a quarter of the time. Over about 25
-    /// 000 cycles the fraction has a relative
-    /// standard error of √(1/25 000)·√2·0.75 (both spans exponential): 0.0017 of 0.25.
+    /// The link is up for 30 ms and down for 10 ms on average, and is observed every 0.1 ms for 1000 s: it is down for a quarter of the time. Over about 25 000
+    /// cycles the fraction has a relative standard error of √(1/25 000)·√2·0.75 (both spans exponential): 0.0017 of 0.25.
     #[test]
     fn random_failures_take_their_share() {
         let millis = Duration::from_millis;

@@ -122,8 +122,8 @@ impl<const A: usize, const L: usize> Broadcast<A, L> {
         }
     }
 
-    /// Returns the instant and the velocity of each held sample of a peer in a run, in the order of the peer. `sent` returns the instant of
-    /// sending of the sample with a sequence number of a sender.
+    /// Returns the instant and the velocity of each held sample of a peer in a run, in the order of the peer. `sent` returns the instant of sending of the
+    /// sample with a sequence number of a sender.
     pub(in crate::arrays) fn moving(&self, (peer, run): (usize, usize), sent: impl Fn(usize, u64) -> Instant) -> impl Iterator<Item = Moving<A>> {
         (0..self.peers).filter(move |sender| *sender != peer).map(move |sender| Moving {
             sent: self.arrived[sender].checked_sub(1).map_or(Instant::ZERO, |newest| sent(sender, newest)),

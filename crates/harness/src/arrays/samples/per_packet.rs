@@ -44,8 +44,8 @@ pub(in crate::arrays) struct PerPacket<const A: usize, const L: usize> {
     in_flight: InFlight<A>,
     /// Samples held, indexed by axis, then ordered by receiver and sender. Each receiver has whole quads, and the last quad may be padded.
     held: [Vec<Quad<L>>; A],
-    /// Sums of the held samples, indexed by receiver; `None` if the mean of the receiver is not exact. Empty if no mean is exact. Exact means
-    /// are computed in single runs only.
+    /// Sums of the held samples, indexed by receiver; `None` if the mean of the receiver is not exact. Empty if no mean is exact. Exact means are computed in
+    /// single runs only.
     sums: Vec<Option<ExactMeans<A>>>,
     /// Least sequence number newer than the held sample, indexed by place, then run. 0 as long as no sample has arrived.
     next: Vec<u64>,
@@ -233,8 +233,8 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
         }
     }
 
-    /// Returns the instant and the velocity of each held sample of a peer in a run, in the order of the peer. `sent` returns the instant of
-    /// sending of the sample with a sequence number of a sender.
+    /// Returns the instant and the velocity of each held sample of a peer in a run, in the order of the peer. `sent` returns the instant of sending of the
+    /// sample with a sequence number of a sender.
     pub(in crate::arrays) fn moving(&self, (peer, run): (usize, usize), sent: impl Fn(usize, u64) -> Instant) -> impl Iterator<Item = Moving<A>> {
         self.rows.held(peer).map(move |place| {
             let sender = self.rows.sender(peer, self.rows.column_of(peer, place));
@@ -311,8 +311,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
     /// Takes in arrived samples.
     ///
     /// The order among links does not matter: of each link the newest sample stays, and sums of samples are exact. Samples are therefore taken in unsorted,
-    /// from receiver to receiver. Samples of links with overtaking come last, sorted, because their order decides which
-    /// samples are stale.
+    /// from receiver to receiver. Samples of links with overtaking come last, sorted, because their order decides which samples are stale.
     #[inline(never)]
     fn take_in(&mut self, mut bucket: Bucket<A>) {
         // Mark the links first: the samples of marked links in `in_order` must wait for the sorted pass too.

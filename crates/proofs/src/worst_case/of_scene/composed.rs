@@ -9,8 +9,7 @@
 //! ```
 //!
 //! The first two are by the triangle inequality, δ's entries each at a row of at most that size. Each entry is a sum of one term of s and a product for each k,
-//! in any order: γ for as many operations
-//! (Higham 2002, Section 3.1), and a smallest number for each underflowing product.
+//! in any order: γ for as many operations (Higham 2002, Section 3.1), and a smallest number for each underflowing product.
 //!
 //! The combination heard by a receiver, H = w·S + e − c/(N − 1), has w·S rounded once and w itself once: 3·u·|w|·‖S‖ is more. The other entries of H stand
 //! alone, and 1/(N − 1) rounds once.
@@ -35,8 +34,7 @@ impl Composed {
     }
 
     /// Returns the composition of a row of a frame with an error of at most `frame_error`. The row has the coefficients of `states` states, then of the samples
-    /// heard.
-    /// `heard` has the rows of these samples over `unknowns` unknowns; `None` is a sample not heard yet and adds nothing.
+    /// heard. `heard` has the rows of these samples over `unknowns` unknowns; `None` is a sample not heard yet and adds nothing.
     pub(super) fn of(row: &[f64], states: usize, heard: &[Option<&Self>], unknowns: usize, frame_error: f64) -> Self {
         let mut entries = row[..states].to_vec();
         entries.resize(unknowns, 0.0);

@@ -1,8 +1,8 @@
 //! Bounds for links with independent losses and delays, at any number of equal peers.
 //!
 //! Every link has the same states and steps. Let e be the difference between the samples of a link at a receiver and the samples of a link that delivers each
-//! sample as soon as possible, one entry per stretch of ticks with the same sample. The difference e is a combination of the steps v from
-//! sample to sample of the sender. For each state c of a link, let Q_c be a quadratic form of these steps, and let S be a quadratic form of e and v with
+//! sample as soon as possible, one entry per stretch of ticks with the same sample. The difference e is a combination of the steps v from sample to sample of
+//! the sender. For each state c of a link, let Q_c be a quadratic form of these steps, and let S be a quadratic form of e and v with
 //!
 //! ```text
 //! Q_next(v after) + S(e, v) <= ρ²·Q_c(v before)         for everything that a link in the state c may do,

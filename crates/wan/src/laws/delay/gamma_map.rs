@@ -30,8 +30,8 @@ pub(super) struct GammaMap {
     cells: Box<[Cell; CELLS as usize]>,
 }
 
-/// Taylor coefficients in units of half a cell, or NaN without an accurate series. Array k, for k from 0 to 3, holds the terms k, k + 4 and
-/// k + 8, so vector instructions add three sums at once.
+/// Taylor coefficients in units of half a cell, or NaN without an accurate series. Array k, for k from 0 to 3, holds the terms k, k + 4 and k + 8, so vector
+/// instructions add three sums at once.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 struct Cell([[f64; 4]; 4]);

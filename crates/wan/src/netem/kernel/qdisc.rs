@@ -83,7 +83,7 @@ pub struct Dequeued<T> {
     pub copy: u8,
     /// `true` if the packet was marked instead of lost. The kernel counts the mark as a drop.
     pub marked: bool,
-    /// The flipped bit, or `None`. The kernel completes checksums before it flips the bit, so a host with verification of checksums drops the packet.
+    /// The flipped bit, or `None`. The kernel completes checksums before the flip of the bit, so a host with verification of checksums drops the packet.
     pub corrupted: Option<FlippedBit>,
     /// `true` if the packet left before waiting packets.
     pub reordered: bool,

@@ -101,8 +101,7 @@ impl<T: Clone> SteppedLinks<T> {
         self.links.push(link);
     }
 
-    /// Returns the index of the model's kind in `kinds`, adding a new kind. Returns `None` if [`QueuedKind::new`]
-    /// does so for the model, or if `kinds` is full.
+    /// Returns the index of the model's kind in `kinds`, adding a new kind. Returns `None` if [`QueuedKind::new`] does so for the model, or if `kinds` is full.
     fn kind(&mut self, model: &LinkModel) -> Option<u8> {
         let place = match self.kinds.iter().position(|(other, _)| other == model) {
             Some(place) => place,

@@ -121,8 +121,7 @@ impl Pattern {
         self.period.map(|period| lost as f64 / period as f64)
     }
 
-    /// Returns the longest covered run without a gap, in the unit of the pattern, or `None` if the pattern covers everything from some place
-    /// on.
+    /// Returns the longest covered run without a gap, in the unit of the pattern, or `None` if the pattern covers everything from some place on.
     #[must_use]
     pub fn longest_run(&self) -> Option<u64> {
         let once = self.spans.iter().cloned();

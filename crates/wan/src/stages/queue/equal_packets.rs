@@ -1,7 +1,7 @@
 //! Queue of packets of one size with drops of the newest packet, without keeping packets: the departure of each packet, and the question of room for a packet.
 //!
-//! A packet leaves at D(n) = max(a(n), D(n−1)) + S, with a the instant of its offer and S its transmission time (Lindley 1952). Packets of one
-//! size leave at distances of S as long as the transmitter is busy, so the latest departure tells the number of waiting packets.
+//! A packet leaves at D(n) = max(a(n), D(n−1)) + S, with a the instant of its offer and S its transmission time (Lindley 1952). Packets of one size leave at
+//! distances of S as long as the transmitter is busy, so the latest departure tells the number of waiting packets.
 
 use core::time::Duration;
 

@@ -204,8 +204,8 @@ impl<P, S: Default> Fifo<P, S> {
         }
     }
 
-    /// Changes rate, framing, limit and discipline from `before` to `rules`. A waiting packet keeps its place even if a smaller limit is
-    /// exceeded. The packet in transmission keeps the bits already sent.
+    /// Changes rate, framing, limit and discipline from `before` to `rules`. A waiting packet keeps its place even if a smaller limit is exceeded. The packet
+    /// in transmission keeps the bits already sent.
     pub(crate) fn reconfigure<R: Rules<P, Sums = S>>(&mut self, now: Instant, before: &R, rules: &R) {
         if let Some(on_line) = &mut self.on_line {
             // The bits sent at the old rate stay sent.

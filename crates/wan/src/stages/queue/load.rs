@@ -7,8 +7,7 @@ use cohaptic_units::Bytes;
 use super::bottleneck::giga_bits;
 use super::{Bottleneck, Discipline, Service, TokenBucket};
 
-/// Packets of one size, offered to a link at distances of at least `gap`. The offering program promises both; debug assertions check
-/// the promise.
+/// Packets of one size, offered to a link at distances of at least `gap`. The offering program promises both; debug assertions check the promise.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Load {
     /// Size of each packet.
@@ -41,8 +40,7 @@ impl Bottleneck {
 }
 
 impl TokenBucket {
-    /// Returns whether each packet of the load finds enough tokens, because a packet's tokens come back before the next packet. The bucket
-    /// begins full.
+    /// Returns whether each packet of the load finds enough tokens: the bucket begins full, and a packet's tokens come back before the next packet.
     pub(crate) fn lets_all_pass(&self, load: Load) -> bool {
         let needed = giga_bits(self.framing.on_the_line(load.size));
         // Each packet's tokens come back within the gap, so every packet finds a full bucket.

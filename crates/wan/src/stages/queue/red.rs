@@ -101,8 +101,7 @@ pub(crate) struct RedState {
 }
 
 impl RedState {
-    /// Decides about a packet behind `queued` waiting bytes, after an idle time of `idle_packets` mean packets. `word` is the
-    /// packet's random word for queues.
+    /// Decides about a packet behind `queued` waiting bytes, after an idle time of `idle_packets` mean packets. `word` is the packet's random word for queues.
     pub(crate) fn verdict(&mut self, red: &Red, queued: u128, idle_packets: f64, ecn_capable: bool, word: u64) -> Verdict {
         #[expect(clippy::cast_precision_loss, reason = "an average")]
         let queued = queued as f64;
