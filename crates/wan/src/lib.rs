@@ -1,6 +1,6 @@
 //! A wide-area network emulated as pure state machines.
 //!
-//! Use this crate if your program wants delays, losses, queues or reordering, in virtual time or by its clock.
+//! Use this crate if a program of yours wants delays, losses, queues or reordering, in virtual time or by a clock of its own.
 //!
 //! A [`Link`] takes packets in at an instant and gives them back later, twice, damaged, or not at all: it is a chain of impairments (outage, loss,
 //! duplication, corruption, a token bucket, a bottleneck with a finite queue, slots, reordering, propagation delay with jitter, an order policy), each in a

@@ -1,4 +1,4 @@
-//! Packets inside a link: the facts for a link, the packet between two stages, and the outputs of the stages.
+//! Packets inside a link: the facts that a link needs, the packet between two stages, and the outputs of the stages.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -8,7 +8,7 @@ use cohaptic_units::{Bytes, Instant};
 use crate::fates::damage::Damage;
 use crate::fates::fate::DropCause;
 
-/// Facts about a packet for a link. A [`Bytes`] converts to a packet of this size without ECN.
+/// Facts about a packet that a link needs. A [`Bytes`] converts to a packet of this size without ECN.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
 pub struct PacketInfo {
     /// Size of the packet.

@@ -410,9 +410,9 @@ pub(crate) const FRACTION: Quantity = Quantity { range: Range::Fraction, unit: "
 /// Correlation from −1 to below 1.
 pub(crate) const CORRELATION: Quantity = Quantity { range: Range::Correlation, unit: "" };
 
-/// Word for the removal of the table below the key.
+/// Word that removes the table below the key.
 pub(crate) const NONE: Form = Form::Words(&[("none", "takes away what it is laid over")]);
-/// Word for the removal of the limit below the key.
+/// Word that removes the limit below the key.
 pub(crate) const UNLIMITED: Form = Form::Words(&[("unlimited", "takes away the limit that it is laid over")]);
 /// Largest integer of TOML.
 pub(crate) const MOST: u64 = i64::MAX.unsigned_abs();

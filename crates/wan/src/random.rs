@@ -8,8 +8,8 @@
 //! (seed, link), the counter from (packet, copy, purpose, block). The authors found 6 rounds enough for every test of BigCrush. The tests of this module
 //! compare with the published vectors.
 //!
-//! A block has two words. The first words of two purposes share a block (loss with jitter, duplication with corruption), because a link with need for one of
-//! the two words often needs the second word too, and then computes one block only. Further words of a purpose lie in blocks of this purpose alone.
+//! A block has two words. The first words of two purposes share a block (loss with jitter, duplication with corruption), because a link that needs one of the
+//! two words often needs the second word too, and then computes one block only. Further words of a purpose lie in blocks of this purpose alone.
 
 use core::convert::Infallible;
 

@@ -172,7 +172,7 @@ struct Column {
     unit: i32,
 }
 
-/// Columns in use.
+/// Columns that are read.
 struct Columns {
     sent: Column,
     /// Column `delay` or `arrived`.

@@ -1,4 +1,4 @@
-//! Events of packets with a probability, independently or in runs.
+//! Events that happen to packets with a probability, independently or in runs.
 
 use crate::parameters::{CORRELATION, Form, Key, Table, number, optional, usual};
 use alloc::format;
@@ -122,7 +122,7 @@ impl ChanceStage {
 
 /// Parameter of copies.
 pub(crate) const KEYS: [Key; 1] = [usual("duplicate", CHANCE, "0", "Probability that a packet is sent twice")];
-/// Form of an event of packets with a probability.
+/// Form of an event that happens to packets with a probability.
 pub(crate) const CHANCE: Form = Form::AnyOf(&[Form::Probability, Form::Table(&CHANCE_TABLE)]);
 static CHANCE_TABLE: Table = Table::of(&[&CHANCES]);
 /// Keys of a chance, for tables with further keys.

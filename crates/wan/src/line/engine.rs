@@ -97,7 +97,7 @@ impl<T: Clone> Engine<T> {
         }
     }
 
-    /// Returns the instant of the next call of [`Engine::pass`], if no wake at or before this instant was announced. For an owner with a list of announced
+    /// Returns the instant of the next call of [`Engine::pass`], if no wake at or before this instant was announced. For an owner that keeps announced
     /// instants.
     pub(crate) fn announce(&mut self) -> Option<Instant> {
         let next = self.next_at()?;

@@ -43,7 +43,7 @@ struct Rare<P> {
     seldom: Seldom,
 }
 
-/// The owner's side of a line: takes the packets out of the line's engine.
+/// The owner's side of a line: takes the packets that come out of the line's engine.
 pub(crate) trait Sink<T> {
     /// Takes a packet in propagation until its arrival at `at`. `copy` is the packet's copy number, 0 for the packet itself.
     fn arrives(&mut self, at: Instant, packet: T, copy: u8, marks: Marks);
@@ -143,7 +143,7 @@ impl<P, T: Clone> Line<P, T> {
         self.pipeline.engine()?.offer_at_once(now, number, info, until)
     }
 
-    /// Wakes the engine at `at`, and hands on the packets at the exit.
+    /// Wakes the engine at `at`, and hands on the packets that come out.
     pub(crate) fn wake(&mut self, at: Instant, outputs: &mut Outputs<T>, sink: &mut impl Sink<T>) {
         if let Some(engine) = self.pipeline.engine() {
             // The next wake can be announced again from now on, even for the same instant.
@@ -168,35 +168,35 @@ impl<P, T: Clone> Line<P, T> {
         self.come_out(outputs, sink);
     }
 
-    /// Counts the arrival at `at` of a packet with the entry `entered` into the line.
+    /// Counts the arrival at `at` of a packet that entered the line at `entered`.
     #[inline(always)]
     pub(crate) fn deliver(&mut self, entered: Instant, at: Instant) {
         self.flow.deliver(entered, at);
     }
 
-    /// Returns the counters touched by every packet, for an owner with separate counting of arrivals.
+    /// Returns the counters touched by every packet, for an owner that counts arrivals itself.
     pub(crate) const fn flow(&mut self) -> &mut Flow {
         &mut self.flow
     }
 
-    /// Returns whether packets may enter an engine, with need for wakes.
+    /// Returns whether packets may enter an engine. An engine must be woken.
     #[inline]
     pub(crate) const fn has_engine(&self) -> bool {
         matches!(self.pipeline, Pipeline::Engine(_))
     }
 
-    /// Returns the instant of the engine's next wake, for an owner with a question before every step.
+    /// Returns the instant of the engine's next wake, for an owner that asks before every step.
     #[inline]
     pub(crate) fn next_wake(&self) -> Option<Instant> {
         self.pipeline.next_wake()
     }
 
-    /// Returns the instant of the engine's next wake if not announced yet, for an owner with a list of announced instants.
+    /// Returns the instant of the engine's next wake if not announced yet, for an owner that keeps announced instants.
     pub(crate) fn announce(&mut self) -> Option<Instant> {
         self.pipeline.engine()?.announce()
     }
 
-    /// Hands the packets at the exit of the engine to `sink`, and counts marks, damage, drops and copies.
+    /// Hands the packets that came out of the engine to `sink`, and counts marks, damage, drops and copies.
     fn come_out(&mut self, outputs: &mut Outputs<T>, sink: &mut impl Sink<T>) {
         for output in outputs.drain(..) {
             let Packet { copy, was_marked, was_damaged, marks, item, .. } = *output.packet;

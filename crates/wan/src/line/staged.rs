@@ -85,7 +85,7 @@ pub(crate) struct Staged<T> {
     limit: Option<u64>,
     bucket: Option<Box<TokenBucketStage<T>>>,
     bottleneck: Option<BottleneckStage<T>>,
-    /// Whether the line has a bottleneck in the physical layout, and no further stage with waiting, copies, marks or damage. See
+    /// Whether the line has a bottleneck in the physical layout, and no other stage that keeps, copies, marks or damages packets. See
     /// [`Staged::offer_at_once`].
     is_plain: bool,
     slots: Option<Box<SlotStage<T>>>,
@@ -134,7 +134,7 @@ impl Route {
         route
     }
 
-    /// Returns the configured stages with the ability to keep a packet: all stages after the limit.
+    /// Returns the configured stages that can keep a packet: all stages after the limit.
     fn keeping(&self) -> &[Stage] {
         &self.stages[usize::from(self.keeping)..usize::from(self.count)]
     }

@@ -31,12 +31,12 @@ impl core::error::Error for NetemError {}
 #[derive(Clone, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum NetemErrorKind {
-    /// A word in place of an option.
+    /// An unknown word in place of an option.
     UnknownWord {
         /// The unknown word.
         word: String,
     },
-    /// A word without meaning as a value of its option.
+    /// A word that is no value of its option.
     Value {
         /// Name of the option.
         option: &'static str,

@@ -21,7 +21,7 @@ use crate::stages::queue::{Bottleneck, Cells, Framing};
 use crate::stages::reorder::{Displacement, Reorder};
 use crate::stages::slots::Slots;
 
-/// Reason for the refusal of accepted words of `tc`: the link is impossible.
+/// Reason for the refusal of words that `tc` accepts: an impossible link.
 #[derive(Clone, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum ExactError {

@@ -1,6 +1,6 @@
 //! Reading of words into [`Netem`].
 //!
-//! An option may be shortened as in `tc`: a word means the first option in the order of [`KEYWORDS`] with this word as its begin. An optional value is read if
+//! An option may be shortened as in `tc`: a word means the first option in the order of [`KEYWORDS`] that begins with the word. An optional value is read if
 //! the next word begins with a digit (or with a minus, for a possibly negative overhead).
 
 use alloc::string::ToString;

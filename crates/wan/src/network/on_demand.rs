@@ -21,7 +21,7 @@ impl OnDemand {
         Self { model: Arc::new(model), places: Places::new() }
     }
 
-    /// Returns the model of a link before its making.
+    /// Returns the model of a link that is to be made.
     pub(super) fn model(&self, path: Path) -> LinkModel {
         if path.from == path.to { LinkModel::default() } else { (self.model)(path.from, path.to) }
     }
@@ -61,7 +61,7 @@ impl Places {
         Self { slots: alloc::vec![FREE; 16], len: 0 }
     }
 
-    /// Returns the index of the slot with `number`, or of the free slot for its insertion.
+    /// Returns the index of the slot with `number`, or of the free slot for `number`.
     #[inline(always)]
     fn slot(&self, number: u32) -> usize {
         let mask = self.slots.len() - 1;

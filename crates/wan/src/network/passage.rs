@@ -107,8 +107,8 @@ impl<P: Clone> Network<P> {
         self.offer(now, LineId::Link(link), words, || InNetwork { sequence, offered: now, entered: now, path, size, payload });
     }
 
-    /// Offers a packet to a line. `words` holds the first random words of the packet if they were drawn before. `packet` is called only in the branch with need
-    /// for the packet, so a packet in mere propagation is written once, into the event queue.
+    /// Offers a packet to a line. `words` holds the first random words of the packet if they were drawn before. `packet` is called only in the branch that
+    /// needs the packet, so a packet in mere propagation is written once, into the event queue.
     #[inline(always)]
     pub(super) fn offer(&mut self, now: Instant, line: LineId, words: Option<Words>, packet: impl FnOnce() -> InNetwork<P>) {
         if self.has_filters {

@@ -25,7 +25,7 @@ use crate::stages::reorder::Reorder;
 use crate::stages::slots::Slots;
 use crate::stages::{corruption, delay, loss, order, outage, path_trace, reorder, slots};
 
-/// Configuration of one directed link: its impairments, each checked at its making.
+/// Configuration of one directed link: its impairments, each checked when made.
 ///
 /// The default is the ideal link: no loss, no queue, no delay. Packets pass the stages in the order of the fields, unless `layout` says otherwise.
 #[derive(Clone, PartialEq, Default)]

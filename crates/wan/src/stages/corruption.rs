@@ -21,7 +21,7 @@ use crate::random::{PacketDraws, Purpose, unit};
 pub struct Corruption {
     /// Way of choosing bits.
     pub bits: Flips,
-    /// Bytes with possibly flipped bits, counted from the packet's begin. `None` means the whole packet. Bytes after the packet's end are ignored, and so are
+    /// Bytes whose bits may be flipped, counted from the packet's begin. `None` means the whole packet. Bytes after the packet's end are ignored, and so are
     /// bytes from 65,536 on, because no datagram is longer.
     pub within: Option<Range<u64>>,
     /// Treatment of a damaged packet by the receiver.

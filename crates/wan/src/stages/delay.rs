@@ -381,8 +381,8 @@ impl CorrelatedDelays {
         }
     }
 
-    /// Returns the next values of several chains, given the packets' random words. A value is NaN for a first packet, and for the few packets with need for
-    /// further random words.
+    /// Returns the next values of several chains, given the packets' random words. A value is NaN for a first packet, and for the few packets that need further
+    /// random words.
     #[inline(always)]
     pub(crate) fn following<const N: usize>(&self, chains: &[f64; N], words: &[u64; N]) -> [f64; N] {
         // A loop instead of `map`: the compiler does not inline `map` of an array here, and a call prevents vector instructions.

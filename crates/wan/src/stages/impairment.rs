@@ -14,7 +14,7 @@ use crate::packet::PacketInfo;
 use crate::parameters::Key;
 use crate::random::Stream;
 
-/// Configuration of an impairment, checked at its making.
+/// Configuration of an impairment, checked when made.
 pub(crate) trait Impairment: Clone + PartialEq + Debug {
     /// Stage with the effect of the impairment, with its state.
     type Stage: ImpairmentStage<Config = Self>;

@@ -51,7 +51,7 @@ pub enum ModulatorError {
     Weight {
         /// Index of the state.
         state: usize,
-        /// Index of the would-be next state.
+        /// Index of the state that would follow.
         next: usize,
         /// Refused weight or rate.
         value: f64,

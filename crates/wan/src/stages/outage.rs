@@ -1,4 +1,4 @@
-//! Outages: spans without acceptance of packets. Outages are scheduled, random, or begin at an idle link.
+//! Outages: spans during which a link takes no packet. Outages are scheduled, random, or begin at an idle link.
 
 use alloc::format;
 use alloc::string::String;

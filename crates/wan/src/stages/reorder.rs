@@ -97,12 +97,12 @@ impl<T> ReorderStage<T> {
             self.pass(released);
             return Placed::InOrder(packet);
         };
-        // As in netem, a packet without permission to jump draws no number, and the correlation is between permitted packets.
+        // As in netem, a packet that may not jump draws no number, and the correlation is between packets that may jump.
         let may = match config.how {
             Displacement::Jump { gap } => self.since_jump >= gap.get() - 1,
             Displacement::Behind { .. } | Displacement::Later { .. } => true,
         };
-        // `&&` is evaluated from the left: the word is drawn only for a packet with permission to leave its place.
+        // `&&` is evaluated from the left: the word is drawn only for a packet that may leave its place.
         let leaves = may && self.packets.as_mut().is_some_and(|packets| packets.happens(word()));
         // A held packet has not passed anything yet, so the function returns before counting it as passing.
         self.since_jump = if leaves { 0 } else { self.since_jump.saturating_add(1) };

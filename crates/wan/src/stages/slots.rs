@@ -1,4 +1,4 @@
-//! Slots: a line with sending only at some instants, and then of all gathered packets (Wi-Fi aggregation, a modem's grants; netem's `slot`).
+//! Slots: a line that sends only at some instants, and then all gathered packets (Wi-Fi aggregation, a modem's grants; netem's `slot`).
 
 use alloc::collections::VecDeque;
 use alloc::format;

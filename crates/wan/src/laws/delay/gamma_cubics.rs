@@ -58,7 +58,7 @@ impl GammaCubics {
         Some(Self { cells: cells.into_boxed_slice().try_into().ok()?, density: whole * DENSITY })
     }
 
-    /// Returns the delays of several numbers, or [`GammaCubics::UNKNOWN`] for the few delays with need for the whole series, and for NaN.
+    /// Returns the delays of several numbers, or [`GammaCubics::UNKNOWN`] for the few delays that need the whole series, and for NaN.
     #[inline(always)]
     pub(crate) fn nanos<const N: usize>(&self, z: &[f64; N]) -> [u64; N] {
         let (mut places, mut offsets) = ([0; N], [0.0; N]);

@@ -82,7 +82,7 @@ impl Standard {
         }
     }
 
-    /// Returns one draw. Forms computed from a normal number draw this number by the ziggurat, with rare need for words from `more`.
+    /// Returns one draw. Forms computed from a normal number draw this number by the ziggurat, which rarely needs words from `more`.
     #[inline]
     pub(super) fn draw(&self, word: u64, more: impl FnMut() -> u64) -> f64 {
         match self {

@@ -15,7 +15,7 @@ pub fn standard_normal(word: u64, more: impl FnMut() -> u64) -> f64 {
     in_the_core(word).unwrap_or_else(|| outside_the_core(word, more))
 }
 
-/// Returns a standard normal number for a uniform word, or `None` in the 1.2 % of cases with need for further words.
+/// Returns a standard normal number for a uniform word, or `None` in the 1.2 % of cases that need further words.
 #[inline(always)]
 pub(crate) fn in_the_core(word: u64) -> Option<f64> {
     let (layer, size) = point(word);

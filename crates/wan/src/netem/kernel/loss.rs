@@ -91,9 +91,9 @@ impl FourState {
 pub(super) struct GilbertElliott {
     pub(super) p: u32,
     pub(super) r: u32,
-    /// Probability of a packet's passage in the bad state.
+    /// Probability that a packet passes in the bad state.
     pub(super) h: u32,
-    /// Probability of a packet's loss in the good state, 1 − k.
+    /// Probability that a packet is lost in the good state, 1 − k.
     pub(super) k1: u32,
 }
 

@@ -292,7 +292,7 @@ impl DirectLinks {
         link.count(now, self.until, verdict)
     }
 
-    /// Takes back the count of a delivered packet with an arrival unseen by the driver.
+    /// Takes back the count of a delivered packet, for a driver that will not see the arrival.
     ///
     /// # Panics
     ///

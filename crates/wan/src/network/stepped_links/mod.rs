@@ -19,7 +19,7 @@ use crate::line::{Line, Sink};
 use crate::packet::{Marks, Outputs, PacketInfo};
 use queued::{QueuedKind, QueuedLink};
 
-/// Links of any kind, for a driver with a known instant of its next offer to each link.
+/// Links of any kind, for a driver that knows the instant of its next offer to each link.
 ///
 /// A queue's decision about a packet may depend on later packets, but never before these packets come. So a link with a known instant of its next packet
 /// decides at once about everything until then, and no queue of events is needed to wake the link. A driver with an earlier end calls
@@ -259,7 +259,7 @@ impl<T: Clone> SteppedLinks<T> {
         }
     }
 
-    /// Takes back the count of a delivered packet with an arrival unseen by the driver.
+    /// Takes back the count of a delivered packet, for a driver that will not see the arrival.
     ///
     /// # Panics
     ///

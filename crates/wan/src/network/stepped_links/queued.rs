@@ -1,4 +1,4 @@
-//! Links with waiting only for a transmitter of constant rate, for packets of one size.
+//! Links whose packets wait only for a transmitter of constant rate, for packets of one size.
 //!
 //! A link keeps the stages with immediate decisions, and its queue. The answers are the answers of [`BottleneckStage`](crate::stages::queue::BottleneckStage)
 //! between the stages of [`Staged`](crate::line::staged::Staged), with less memory per link: packets are not boxed, and equal packet sizes make the waiting

@@ -16,7 +16,7 @@ use core::fmt;
 
 use cohaptic_units::Probability;
 
-/// Parameters of the chain: `pij` is the probability of a packet's move of the chain from state i to state j.
+/// Parameters of the chain: `pij` is the probability that a packet moves the chain from state i to state j.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct FourState {
     p13: Probability,
@@ -128,8 +128,8 @@ impl FourState {
         )
     }
 
-    /// Returns the probability of a packet's move of the chain from a state (row) to a state (column). A packet with a move to the third or fourth state is
-    /// lost. The states are, in order: gap, received within a burst, lost within a burst, isolated loss (states 1 to 4).
+    /// Returns the probability that a packet moves the chain from a state (row) to a state (column). A packet that moves the chain to the third or fourth state
+    /// is lost. The states are, in order: gap, received within a burst, lost within a burst, isolated loss (states 1 to 4).
     #[must_use]
     pub fn transitions(&self) -> [[f64; 4]; 4] {
         let [p13, p31, p32, p23, p14] = [self.p13, self.p31, self.p32, self.p23, self.p14].map(Probability::get);

@@ -19,9 +19,9 @@ pub struct GilbertElliott {
     pub p: Probability,
     /// Probability of going from bad to good, per packet. The mean stay in the bad state is 1/r packets.
     pub r: Probability,
-    /// Probability of a packet's passage in the bad state. The usual value is 0: every packet is lost.
+    /// Probability that a packet gets through in the bad state. The usual value is 0: every packet is lost.
     pub h: Probability,
-    /// Probability of a packet's passage in the good state. The usual value is 1: no packet is lost.
+    /// Probability that a packet gets through in the good state. The usual value is 1: no packet is lost.
     pub k: Probability,
 }
 

@@ -14,9 +14,9 @@ use cohaptic_units::{Instant, Probability};
 pub struct GilbertElliottInTime {
     good: Duration,
     bad: Duration,
-    /// Probability of a packet's passage while the link is bad. The usual value is 0.
+    /// Probability that a packet gets through while the link is bad. The usual value is 0.
     pub h: Probability,
-    /// Probability of a packet's passage while the link is good. The usual value is 1.
+    /// Probability that a packet gets through while the link is good. The usual value is 1.
     pub k: Probability,
 }
 

@@ -1,4 +1,5 @@
-//! Queue of packets of one size with drops of the newest packet, without keeping packets: the departure of each packet, and the question of room for a packet.
+//! Queue of packets of one size with drops of the newest packet, without keeping packets: the departure of each packet, and whether there is room for the
+//! packet.
 //!
 //! A packet leaves at D(n) = max(a(n), D(n−1)) + S, with a the instant of its offer and S its transmission time (Lindley 1952). Packets of one size leave at
 //! distances of S as long as the transmitter is busy, so the latest departure tells the number of waiting packets.
@@ -67,7 +68,8 @@ impl Line {
         nanos(self.rate.transmission_time(self.bits))
     }
 
-    /// Returns the most work \[ns\] before a packet for a turn within `wait`. More work never makes a turn earlier, so bisection finds the bound.
+    /// Returns the most work \[ns\] that may lie before a packet with its turn within `wait`. More work never makes a turn earlier, so bisection finds the
+    /// bound.
     fn most_work(self, wait: Duration) -> u64 {
         let (mut holds, mut fails) = (0, self.service().max(1));
         // Doubles the bracket until `fails` is too much work; `holds` never is.
