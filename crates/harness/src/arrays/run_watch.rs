@@ -28,7 +28,7 @@ pub(super) trait RunWatch<const A: usize> {
     }
 }
 
-/// Observer only for the question about going on.
+/// Observer that is asked only whether the run goes on.
 pub(super) struct Unwatched<'k>(pub(super) &'k mut dyn FnMut(Instant) -> bool);
 
 impl<const A: usize> RunWatch<A> for Unwatched<'_> {

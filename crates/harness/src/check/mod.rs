@@ -114,7 +114,7 @@ impl Observer for ExpectationWatch<'_> {
     observe_by_field! { watched }
 }
 
-/// Observer only for the question about going on.
+/// Observer that is asked only whether the run goes on.
 struct Asking<'a, F>(&'a mut F);
 
 impl<F: FnMut() -> bool> Observer for Asking<'_, F> {

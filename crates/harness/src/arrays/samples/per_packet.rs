@@ -60,8 +60,8 @@ pub(in crate::arrays) struct PerPacket<const A: usize, const L: usize> {
 enum Links<const A: usize> {
     /// Links with the fate of a packet decided at its sending.
     Direct(DirectLinks),
-    /// Links with a need for the instant of the sender's next packet. Only in single runs: scenes side by side have direct links, and `const { L > 1 }`
-    /// keeps the compiler from generating this case.
+    /// Links that need the instant of the sender's next packet. Only in single runs: scenes side by side have direct links, and `const { L > 1 }` keeps the
+    /// compiler from generating this case.
     Stepped(SteppedLinks<State<A>>),
 }
 

@@ -77,7 +77,7 @@ pub struct SeatStats {
 pub(crate) struct Seat {
     /// `true` if the peer is in another process.
     pub(crate) is_process: bool,
-    /// Indices of the fades with the silence of the peer: all fades, or for a pointer only the fade of its own hand.
+    /// Indices of the fades that fall and rise with the silence of the peer: all fades, or for a pointer only the fade of its own hand.
     followed: Range<usize>,
     /// Time until silence and time of fading.
     silence: Silence,
@@ -120,7 +120,7 @@ impl Seat {
         })
     }
 
-    /// Returns the fades with the silence of the peer.
+    /// Returns the fades that fall and rise with the silence of the peer.
     pub(crate) fn followed_mut(&mut self) -> &mut [Fade] {
         &mut self.fades[self.followed.clone()]
     }
