@@ -71,6 +71,7 @@ class Delays:
         skew: bool,
         tick: SupportsFloat | SupportsIndex | None,
         cut: bool,
+        hold_out: SupportsFloat | SupportsIndex | None,
     ) -> str:
         """
         Estimates the link, and gives the document of `cohaptic fit --json`. `offset`, `least` and `tick` are in seconds.

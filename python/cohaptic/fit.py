@@ -24,6 +24,7 @@ def fit(
     split: float | None = None,
     tick: float | None = None,
     cut: bool = False,
+    hold_out: float | None = None,
 ) -> dict[str, Any]:
     """Estimates the link that made measurements, and gives the document of ``cohaptic fit --json``.
 
@@ -36,7 +37,8 @@ def fit(
     drift of one clock against the other, where it is significant.
 
     ``direction`` is the way of the packets in a file that has both ways, and ``split`` the share of a round trip that is the delay of one way, such as 0.5.
-    ``tick`` [s] is the tick of the clock that showed the delays, to which it rounds or, with ``cut``, cuts.
+    ``tick`` [s] is the tick of the clock that showed the delays, to which it rounds or, with ``cut``, cuts. ``hold_out`` is the
+    share of the time at the end whose packets are not fitted and judge the link, such as 0.5.
 
     >>> from cohaptic import Link
     >>> sent = np.arange(20_000) * 0.01
@@ -58,5 +60,5 @@ def fit(
         measured = _native.Delays.read(os.fspath(source), None if receiver is None else os.fspath(receiver), port, direction, split)
     if cut and tick is None:
         raise TypeError("cut is the way of a clock with a known tick: expected tick too")
-    document: dict[str, Any] = json.loads(measured.fit(offset, least, skew, tick, cut))
+    document: dict[str, Any] = json.loads(measured.fit(offset, least, skew, tick, cut, hold_out))
     return document

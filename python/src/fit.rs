@@ -88,8 +88,21 @@ impl Delays {
     }
 
     /// Estimates the link, and gives the document of `cohaptic fit --json`. `offset`, `least` and `tick` are in seconds.
-    #[pyo3(signature = (offset, least, skew, tick, cut))]
-    fn fit(&self, py: Python<'_>, offset: Option<f64>, least: Option<f64>, skew: bool, tick: Option<f64>, cut: bool) -> PyResult<String> {
+    #[pyo3(signature = (offset, least, skew, tick, cut, hold_out))]
+    #[expect(clippy::too_many_arguments, reason = "the options of `cohaptic fit`")]
+    fn fit(
+        &self,
+        py: Python<'_>,
+        offset: Option<f64>,
+        least: Option<f64>,
+        skew: bool,
+        tick: Option<f64>,
+        cut: bool,
+        hold_out: Option<f64>,
+    ) -> PyResult<String> {
+        if hold_out.is_some_and(|share| !(share > 0.0 && share < 1.0)) {
+            return Err(PyValueError::new_err("hold_out: expected a part above 0 and below 1"));
+        }
         let span = |name: &str, seconds: Option<f64>| {
             seconds.map(Duration::try_from_secs_f64).transpose().map_err(|error| of_value(&format!("{name}: {error}")))
         };
@@ -98,7 +111,7 @@ impl Delays {
         if offset.is_some_and(|offset| !offset.is_finite()) {
             return Err(PyValueError::new_err("offset: expected a finite number of seconds"));
         }
-        let corrections = Corrections { offset_s: offset, least, skew, tick };
+        let corrections = Corrections { offset_s: offset, least, skew, tick, hold_out };
         let answered = interruptible(py, |_: &Stop| self.source.fit(&corrections, Path::new(FILE)))?;
         match answered {
             Ok(answered) => Ok(json(&document(&answered))),

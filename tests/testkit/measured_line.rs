@@ -23,7 +23,7 @@ async fn longest_pause(bed: Bed) -> Duration {
 }
 
 #[test]
-fn the_evening_at_home_has_pauses_of_a_tenth_of_a_second() {
+fn no_pause_of_the_evening_at_home_lasts_300_milliseconds() {
     let pause = Testbed::from_file("testkit/home.toml").run(longest_pause);
-    assert!(pause < Duration::from_millis(100), "{pause:?}");
+    assert!(pause < Duration::from_millis(300), "{pause:?}");
 }

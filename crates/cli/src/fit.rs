@@ -18,7 +18,7 @@ pub(crate) fn fit(arguments: &FitArguments) -> Result<ExitCode, Failure> {
     let source = read(arguments)?;
     let out = arguments.out.as_deref().unwrap_or_else(|| Path::new("link.toml"));
     let tick = arguments.tick.map(|tick| if arguments.cut { Tick::Cut(tick) } else { Tick::Rounded(tick) });
-    let corrections = Corrections { offset_s: arguments.offset, least: arguments.least, skew: arguments.skew, tick };
+    let corrections = Corrections { offset_s: arguments.offset, least: arguments.least, skew: arguments.skew, tick, hold_out: arguments.hold_out };
     let answered = source.fit(&corrections, out).map_err(|error| failure(&arguments.file, error))?;
     let law_is_missing = arguments.require_law && !answered.has_law;
     let mut written: Vec<&Path> = Vec::new();

@@ -25,6 +25,8 @@ pub fn document(answered: &Answered) -> impl Serialize {
         #[serde(flatten)]
         measured_by: estimate.and_then(|estimate| estimate.probed.as_ref()).map(|probed| document! { measured_by: probed }),
         #[serde(flatten)]
+        hold_out: estimate.and_then(|estimate| estimate.held_out.as_ref()).map(|judged| document! { hold_out: judged }),
+        #[serde(flatten)]
         clocks: estimate.map(|estimate| document! { clocks: &estimate.clocks }),
     }
 }

@@ -3,6 +3,7 @@
 mod clocks;
 mod document;
 mod ends;
+mod hold_out;
 mod milliseconds;
 mod probed;
 mod recorded;
@@ -13,6 +14,7 @@ mod words;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use cohaptic_measure::fit::hold_out::HoldOut;
 pub use cohaptic_measure::fit::readers::Direction;
 use cohaptic_measure::fit::readers::Recording;
 use cohaptic_measure::fit::{self, FitError, Fitted, Measurements, MeasurementsError, Skew};
@@ -38,6 +40,8 @@ pub struct Corrections {
     pub skew: bool,
     /// Tick of the clock that showed the delays; `None` if the delays themselves tell the tick.
     pub tick: Option<Tick>,
+    /// Share of the time, above 0 and below 1, whose packets are held out from the fit and judge the link. `None` to fit all packets.
+    pub hold_out: Option<f64>,
 }
 
 /// Tick of a clock.
@@ -66,7 +70,7 @@ pub struct Answered {
     pub scene: String,
     /// The file that the link names; `None` if the link needs no file.
     pub beside: Option<Beside>,
-    /// `false` if no law fits the delays.
+    /// `false` if no law fits the delays, or if the held-out packets refuse the link.
     pub has_law: bool,
     kind: Kind,
 }
@@ -98,6 +102,7 @@ struct Estimate {
     skew: Option<Skew>,
     matched: Option<Ends>,
     probed: Option<Probed>,
+    held_out: Option<HoldOut>,
 }
 
 /// Why no link is estimated.
@@ -136,12 +141,19 @@ impl Source {
             Found::Recorded(recording) => return recorded::answer(recording, corrections, file),
         };
         let (measurements, clocks, skew) = clocks::settled(corrections, measured)?;
+        let parts = corrections.hold_out.map(|share| measurements.hold_out(share)).transpose();
+        let parts = parts.map_err(|error| FitFailure::Measurements(format!("hold-out: {error}")))?;
+        let (measurements, rest) = match parts {
+            Some((first, rest)) => (first, Some(rest)),
+            None => (measurements, None),
+        };
         let fitted = fit::fit(&measurements)?;
         let beside = fitted.delays_csv().map(|content| Beside::new(file, "delays.csv", content));
         let scene = fitted.link.to_scene_toml(&beside.as_ref().map_or_else(String::new, Beside::name));
-        read_again(&scene, Some(&fitted.link), file, beside.as_ref())?;
-        let has_law = beside.is_none();
-        let estimate = Estimate { fitted, measurements, clocks, skew, matched: measured.matched.clone(), probed: measured.probed.clone() };
+        let config = read_again(&scene, Some(&fitted.link), file, beside.as_ref())?;
+        let held_out = rest.zip(config).map(|(rest, config)| hold_out::judge(&fitted, config, &measurements, &rest));
+        let has_law = beside.is_none() && held_out.as_ref().is_none_or(|judged| judged.refused.is_empty());
+        let estimate = Estimate { fitted, measurements, clocks, skew, matched: measured.matched.clone(), probed: measured.probed.clone(), held_out };
         Ok(Answered { scene, beside, has_law, kind: Kind::Estimated(Box::new(estimate)) })
     }
 }

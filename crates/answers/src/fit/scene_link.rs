@@ -8,17 +8,17 @@ use cohaptic_linkfile::document::Sources;
 use cohaptic_linkfile::link::{read_link, read_modulators};
 use cohaptic_linkfile::reading::{FileReader, parse_with};
 use cohaptic_measure::fit::FittedLink;
-use cohaptic_wan::{Delay, LinkModel};
+use cohaptic_wan::{LinkConfig, LinkModel};
 
 use super::{Beside, FitFailure};
 
 /// Reads the link as a scene does before anything is written, and compares the moments of its delay with the fitted moments; `None` if nothing was fitted.
-/// `file`: path of the file with the link. `beside`: the file that the link names, if it names one.
+/// Returns the fitted link as a scene reads it. `file`: path of the file with the link. `beside`: the file that the link names, if it names one.
 ///
 /// # Errors
 ///
 /// [`FitFailure::Scene`] if a scene refuses the link, [`FitFailure::Unheld`] if a scene reads another mean or standard deviation.
-pub(super) fn read_again(scene: &str, link: Option<&FittedLink>, file: &Path, beside: Option<&Beside>) -> Result<(), FitFailure> {
+pub(super) fn read_again(scene: &str, link: Option<&FittedLink>, file: &Path, beside: Option<&Beside>) -> Result<Option<LinkConfig>, FitFailure> {
     // The file named by the link does not exist yet, so its content is given here.
     let named = |_: &Path| beside.map(|beside| beside.content.as_bytes().to_vec()).ok_or_else(|| io::Error::from(io::ErrorKind::NotFound));
     let read = parse_with(Sources { file, text: scene, overrides: &[] }, FileReader(&named), |document, context| {
@@ -27,11 +27,12 @@ pub(super) fn read_again(scene: &str, link: Option<&FittedLink>, file: &Path, be
         read_link(&table.get("link")?.node, context.with_modulators(Some(&modulators)))
     });
     let read = read.map_err(|error| FitFailure::Scene(Box::new(error)))?;
-    let Some(link) = link else { return Ok(()) };
-    let delay = match read.whole {
-        LinkModel::Fixed(config) => config.delay,
-        LinkModel::Modulated(_) | LinkModel::Replay(_) | LinkModel::Kernel(_) => Delay::default(),
+    let config = match read.whole {
+        LinkModel::Fixed(config) => config,
+        LinkModel::Modulated(_) | LinkModel::Replay(_) | LinkModel::Kernel(_) => LinkConfig::default(),
     };
+    let Some(link) = link else { return Ok(None) };
+    let delay = &config.delay;
     let read = [delay.mean(), delay.jitter().map_or(Duration::ZERO, |jitter| jitter.sd)].map(|span| span.as_secs_f64());
     for (what, found, read) in [("mean", link.delay_s, read[0]), ("standard deviation", link.jitter.sd_s, read[1])] {
         // The scene rounds to nanoseconds; the relative part allows for the rounding of `f64`.
@@ -41,7 +42,7 @@ pub(super) fn read_again(scene: &str, link: Option<&FittedLink>, file: &Path, be
             )));
         }
     }
-    Ok(())
+    Ok(Some(config))
 }
 
 /// Resolution of the times in a scene \[s\].

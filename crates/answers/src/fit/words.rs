@@ -8,7 +8,7 @@ use cohaptic_units::print::{Counted, Span};
 use super::ends::Ends;
 use super::milliseconds::milliseconds;
 use super::probed::Probed;
-use super::{Answered, Estimate, Kind, clocks, recorded};
+use super::{Answered, Estimate, Kind, clocks, hold_out, recorded};
 
 /// Returns the text about a link: the link, the read packets and the goodness of each law, or what a file records.
 #[must_use]
@@ -80,6 +80,9 @@ fn estimated(scene: &str, estimate: &Estimate) -> String {
     let best = goodness.losses.first().map_or(0.0, |loss| loss.bic);
     for loss in &goodness.losses {
         line(format!("  {:<60}{:>10.5} %{:>14.1}", model(loss), loss.mean_loss * 100.0, loss.bic - best));
+    }
+    if let Some(judged) = &estimate.held_out {
+        text.push_str(&hold_out::words(judged));
     }
     text
 }

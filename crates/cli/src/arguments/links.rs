@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::examples::{self, after, after_measurements};
-use super::numbers::{any_integer, integer, share, signed_duration};
+use super::numbers::{any_integer, integer, part, share, signed_duration};
 
 #[derive(Debug, Args)]
 #[command(after_help = after(examples::LINK))]
@@ -93,10 +93,13 @@ pub(crate) struct FitArguments {
     /// Remove the linear drift of one clock against the other first, where it is significant at 1 %
     #[arg(long)]
     pub(crate) skew: bool,
+    /// Fit the packets of the first part of the time, and judge the link by those of this share at the end, such as 50%
+    #[arg(long, value_name = "SHARE", value_parser = part)]
+    pub(crate) hold_out: Option<f64>,
     /// Print one JSON document and nothing else
     #[arg(long)]
     pub(crate) json: bool,
-    /// End with status 1, and write nothing, where no law fits the delays
+    /// End with status 1, and write nothing, where no law fits the delays, or where the held-out packets refuse the link
     #[arg(long)]
     pub(crate) require_law: bool,
     /// Write the link table of a scene into this file, and the delays into a file next to it if no law fits them

@@ -66,6 +66,12 @@ pub(crate) fn share(text: &str) -> Result<f64, String> {
     read.filter(|share| *share > 0.0).ok_or_else(|| "expected even, or a share above 0 such as 0.4 or 60%".to_owned())
 }
 
+/// A part of a whole: a number above 0 and below 1, or a percentage.
+pub(crate) fn part(text: &str) -> Result<f64, String> {
+    let read = probability(text).ok().map(Probability::get).filter(|part| *part > 0.0 && *part < 1.0);
+    read.ok_or_else(|| "expected a part above 0 and below 1, such as 0.5 or 50%".to_owned())
+}
+
 fn expected(least: u64, most: u64) -> String {
     if most == u64::MAX {
         format!("expected an integer of at least {least}, below 2^64")

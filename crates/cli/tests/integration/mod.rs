@@ -24,6 +24,7 @@ mod explain;
 mod falcon;
 mod fit;
 mod fit_captures;
+mod fit_hold_out;
 mod fit_programs;
 mod help;
 #[cfg(unix)]

@@ -22,6 +22,7 @@ mod cells;
 mod correlation;
 mod distribution;
 mod hidden_markov;
+pub mod hold_out;
 mod law;
 mod link;
 mod link_delay;

@@ -6,7 +6,7 @@
 use serde::Deserialize;
 
 use super::json::parse;
-use super::recording::{Key, Link, Rate, Recording};
+use super::recording::{Key, Link, Rate, Recording, whole};
 use super::{Program, ReaderError};
 use crate::series::count_u64;
 
@@ -101,9 +101,4 @@ pub(super) fn read(text: &str) -> Result<Recording, ReaderError> {
         notes.push("if packets were lost because more was sent than the line takes, a queue loses them: leave the key loss out then".to_owned());
     }
     Ok(Recording { program: Program::Iperf3, rate: Some(rate), notes, link: Link::Constant(keys) })
-}
-
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 1 to 10^15")]
-const fn whole(bps: f64) -> u64 {
-    bps.round() as u64
 }

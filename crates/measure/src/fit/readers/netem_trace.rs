@@ -12,7 +12,7 @@ use std::time::Duration;
 use serde_json::Value;
 
 use super::json::parse;
-use super::recording::{Key, Link, Recording, Turn};
+use super::recording::{Key, Link, Recording, Turn, whole};
 use super::{Program, ReaderError};
 
 /// Most turns of a pattern, all repetitions included. The states of a modulator have a weight for each other state.
@@ -227,9 +227,4 @@ fn path_or_beginning(path: &str) -> &str {
 
 fn found(path: &str, value: &Value, expected: &str) -> ReaderError {
     ReaderError::found(path_or_beginning(path), value, expected)
-}
-
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 10^15")]
-const fn whole(bps: f64) -> u64 {
-    bps.round() as u64
 }

@@ -76,6 +76,12 @@ pub(super) struct Turn {
     pub(super) lasts: Duration,
 }
 
+/// Rounds a rate from 0 to 10¹⁵ bit/s.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 10^15")]
+pub(super) fn whole(bps: f64) -> u64 {
+    bps.round() as u64
+}
+
 impl Key {
     fn toml(&self) -> String {
         match self {

@@ -506,7 +506,7 @@ pub(super) const DOCUMENTS: [Document; 25] = [
         lines: &[
             "python3 programs/captures.py && cohaptic fit sender.pcap receiver.pcap --skew --least 20ms --json",
             "python3 programs/measured.py && cohaptic fit line.json --direction up --json",
-            "python3 programs/measured.py && cohaptic fit line.txt --split even --json",
+            "python3 programs/measured.py && cohaptic fit line.txt --split even --hold-out 50% --json",
             "python3 programs/measured.py && cohaptic fit rate.json --json",
         ],
         rows: &[
@@ -538,6 +538,16 @@ pub(super) const DOCUMENTS: [Document; 25] = [
                 "recorded.program, recorded.rate.NAME, recorded.notes",
                 "of a file without delays of packets, in place of `link`, `goodness` and `clocks`: which program wrote it; of a measured rate `intervals`, `seconds`, \
                  `mean_bps`, `between_bps` (10 % and 90 % of the intervals), `loss`, and whether it `is_lower_bound`; what the link lacks",
+            ),
+            (
+                "hold_out.fitted, hold_out.held_out, hold_out.refused",
+                "with `--hold-out`: packets of both parts, and why the [held-out packets](commands-network.md#packets-that-the-fit-has-not-seen) refuse the link",
+            ),
+            (
+                "hold_out.measured.NAME, hold_out.best.NAME, hold_out.independent.NAME, hold_out.gilbert.NAME, hold_out.replay.NAME",
+                "figures of the held-out packets, of this link, of independent packets, of Gilbert–Elliott losses with independent delays, and of the first part: \
+                 `mean_s`, `quantiles_s` (95 %, 99 %), `wasserstein_s` (W₁ from the held-out delays), `autocorrelation` (1, 10 and 100 packets apart), `loss`, \
+                 `mean_run`, `longer_runs` (shares of the runs of two or more and of three or more losses)",
             ),
             ("clocks.added_s", "with `--offset` or `--least`, or where an offset is assumed: what was added to every delay"),
             ("clocks.is_assumed", "`true` where the offset is assumed: the least delays of both ways are then equal"),

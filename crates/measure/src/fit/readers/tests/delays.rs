@@ -1,34 +1,11 @@
-//! Small files written for these tests by the formats of the programs.
+//! Delays of IRTT, LENS and ping.
 
 use std::fmt::Write as _;
 
-use proptest::prelude::*;
 use serde_json::{Value, json};
 
 use super::*;
 use crate::fit::fit;
-
-fn delays(text: &str, direction: Option<Direction>) -> Delays {
-    match read(text, direction) {
-        Ok(Some(Content::Delays(delays))) => delays,
-        other => panic!("{other:?}"),
-    }
-}
-
-fn recording(text: &str) -> Recording {
-    match read(text, None) {
-        Ok(Some(Content::Link(recording))) => recording,
-        other => panic!("{other:?}"),
-    }
-}
-
-fn refused(text: &str) -> String {
-    read(text, None).unwrap_err().to_string()
-}
-
-fn refused_way(text: &str, direction: Direction) -> String {
-    read(text, Some(direction)).unwrap_err().to_string()
-}
 
 /// Returns instants of sending [ms] and delays [ms], rounded to picoseconds.
 fn packets(delays: &Delays) -> Vec<(f64, Option<f64>)> {
@@ -37,7 +14,7 @@ fn packets(delays: &Delays) -> Vec<(f64, Option<f64>)> {
 }
 
 /// Returns the JSON of irtt with a probe every 10 ms: `lost`, and the delays up and down [ns] on a server whose clock is ahead by 3 s.
-fn irtt(probes: &[(Value, i64, i64)]) -> Value {
+pub(super) fn irtt(probes: &[(Value, i64, i64)]) -> Value {
     const AHEAD: i64 = 3_000_000_000;
     let trips: Vec<Value> = (0..)
         .zip(probes)
@@ -237,179 +214,4 @@ fn printed_digits_are_intervals() {
     let best = &fitted.goodness.laws[0];
     assert!(best.fits && best.distribution == crate::fit::DelayLaw::Uniform, "{:#?}", fitted.goodness.laws);
     assert!((fitted.goodness.resolution_s - 5e-5).abs() < 1e-12 || (fitted.goodness.resolution_s - 5e-6).abs() < 1e-12);
-}
-
-fn iperf3(protocol: &str, sums: &[Value]) -> String {
-    let intervals: Vec<Value> = sums.iter().map(|sum| json!({ "streams": [], "sum": sum })).collect();
-    json!({ "start": { "test_start": { "protocol": protocol } }, "intervals": intervals, "end": {} }).to_string()
-}
-
-fn sum(start: f64, bps: f64) -> Value {
-    json!({ "start": start, "end": start + 1.0, "seconds": 1.0, "bytes": 5, "bits_per_second": bps, "omitted": false })
-}
-
-#[test]
-fn iperf3_gives_the_mean_rate() {
-    let mut omitted = sum(0.0, 9e9);
-    omitted["omitted"] = json!(true);
-    let sums: Vec<Value> = std::iter::once(omitted).chain((1..=10).map(|i| sum(f64::from(i), f64::from(i) * 1e6))).collect();
-    let found = recording(&iperf3("TCP", &sums));
-    let rate = Rate { intervals: 10, seconds: 10.0, mean_bps: 5.5e6, between_bps: [1e6, 9e6], is_lower_bound: true, loss: None };
-    assert_eq!(found.rate, Some(rate));
-    assert_eq!((found.to_scene_toml("x"), found.beside()), ("[link]\nrate = \"5500000bit\"\n".to_owned(), None));
-    assert!(found.notes.iter().any(|note| note.contains("lower bound")));
-    let counted = |start: f64, lost: i64| {
-        let mut sum = sum(start, 8e6);
-        sum["lost_packets"] = json!(lost);
-        sum["packets"] = json!(500);
-        sum
-    };
-    let udp = recording(&iperf3("UDP", &[counted(0.0, 6), counted(1.0, -1)]));
-    assert_eq!(udp.rate.unwrap().loss, Some(0.005));
-    assert_eq!(udp.to_scene_toml(""), "[link]\nrate = \"8000000bit\"\nloss = 0.005\n");
-}
-
-#[test]
-fn iperf3_is_refused_at_its_place() {
-    let sender = refused(&iperf3("UDP", &[sum(0.0, 1e6)]));
-    assert!(
-        sender.starts_with("intervals[0].sum.lost_packets: found nothing, expected the count of the receiver: run iperf3 with -u -R"),
-        "{sender}"
-    );
-    assert!(refused(&iperf3("SCTP", &[sum(0.0, 1e6)])).starts_with("start.test_start.protocol: found \"SCTP\""));
-    assert!(refused(&iperf3("TCP", &[sum(0.0, -1.0)])).starts_with("intervals[0].sum.bits_per_second: found -1"));
-    let mut backwards = sum(3.0, 1e6);
-    backwards["end"] = json!(2.0);
-    assert_eq!(refused(&iperf3("TCP", &[backwards])), "intervals[0].sum.end: found 2, expected a time after the start, 3");
-    assert!(refused(&iperf3("TCP", &[])).starts_with("intervals: found none"));
-    assert!(refused(&iperf3("TCP", &[json!({ "start": 0 })])).contains("missing field `end`"));
-    let failed = json!({ "start": {}, "intervals": [], "error": "unable to connect" }).to_string();
-    assert!(refused(&failed).starts_with("error: found \"unable to connect\""));
-}
-
-#[test]
-fn cellreplay_gives_the_base_delay_or_the_line() {
-    let light = recording("0 30 0 1 1 2\n500 42 0 0 3\n1000 36 0\n");
-    assert_eq!(light.to_scene_toml("l.delays.csv"), "[link]\ntrace = { file = \"l.delays.csv\", between = \"lines\", repeat = true }\n");
-    assert_eq!(light.beside(), Some(("delays.csv", "t_ms,delay_ms\n0,30\n500,42\n1000,36\n")));
-    assert!(light.notes.iter().any(|note| note.contains("no link depends on the load")));
-    let heavy = recording("0\n3\n3\n9\n");
-    assert_eq!(heavy.to_scene_toml("h.line"), "[link]\ntrace = { file = \"h.line\", bytes = \"1400B\" }\n");
-    assert_eq!(heavy.beside(), Some(("line", "0\n3\n3\n9\n")));
-}
-
-#[test]
-fn cellreplay_is_refused_at_its_place() {
-    assert_eq!(refused("0\n5\nx\n"), "line 3, time: found \"x\", expected whole milliseconds, at most 10^12");
-    assert_eq!(refused("0\n5 6\n"), "line 2: found \"6\", expected one instant a line, as on the first line");
-    assert_eq!(refused("5\n4\n"), "line 2, time: found 4, expected at least 5, the time of the line before");
-    assert_eq!(refused("0 30 0\n5\n9 30\n"), "line 2, base delay: found \"\", expected whole milliseconds, at most 10^12");
-    assert_eq!(refused("0 30 0\n5 30 x\n"), "line 2: found \"x\", expected whole milliseconds of the packets of a train");
-    assert_eq!(refused("0 30\n5 30\n"), "the trace: found 2 lines, expected at least 3 of a light trace");
-    assert_eq!(refused("0\n0\n"), "line 2, time: found 0, expected a trace that lasts longer than 0 ms");
-    assert!(refused("0\n\n5\n").starts_with("line 2, time: found \"\""));
-}
-
-fn rate_for(bps: u64, secs: u64) -> Value {
-    json!({ "StaticBwConfig": { "bw": { "gbps": bps / 1_000_000_000, "bps": bps % 1_000_000_000 }, "duration": { "secs": secs, "nanos": 0 } } })
-}
-
-#[test]
-fn netem_trace_is_a_constant_or_a_pattern() {
-    let constant = json!({ "RepeatedBwPatternConfig": { "pattern": [rate_for(1_200_000_000, 1)], "count": 0 } });
-    assert_eq!(recording(&constant.to_string()).to_scene_toml(""), "[link]\nrate = \"1200000000bit\"\n");
-    let twice = json!({ "RepeatedBwPatternConfig": { "pattern": [rate_for(12_000_000, 1), rate_for(24_000_000, 2)], "count": 0 } });
-    let pattern = "[link]\n\
-                   modulated = { by = \"pattern\", turn-1 = { rate = \"12000000bit\" }, turn-2 = { rate = \"24000000bit\" } }\n\n\
-                   [[modulators]]\n\
-                   name = \"pattern\"\n\
-                   states = [\n    \
-                   { name = \"turn-1\", sojourn = { fixed = \"1s\" }, next = \"turn-2\" },\n    \
-                   { name = \"turn-2\", sojourn = { fixed = \"2s\" }, next = \"turn-1\" },\n]\n";
-    assert_eq!(recording(&twice.to_string()).to_scene_toml(""), pattern);
-    // Texts, a count, and patterns within patterns: four turns, of which the last one stays.
-    let human = r#"{"RepeatedDelayPatternConfig":{"pattern":[{"StaticDelayConfig":{"delay":"10ms","duration":"1s"}},
-        {"StaticDelayConfig":{"delay":"20ms","duration":"1s 500ms"}}],"count":2}}"#;
-    let human = recording(human);
-    let text = human.to_scene_toml("");
-    assert!(
-        text.contains("turn-4 = { delay = \"20ms\" }") && text.contains("fixed = \"1.5s\"") && text.ends_with("{ name = \"turn-4\" },\n]\n"),
-        "{text}"
-    );
-    assert_eq!(human.notes, ["the pattern ends: its last turn holds for ever"]);
-    let trace = recording(r#"{"TraceBwConfig":[[29.0,[2.0,4.0]],[8.5,[0.5]]]}"#).to_scene_toml("");
-    assert!(trace.contains("turn-2 = { rate = \"4000000bit\" }") && trace.contains("fixed = \"29ms\"") && trace.contains("turn-3"), "{trace}");
-    assert_eq!(recording("[[29.0,[2.0]]]").to_scene_toml(""), "[link]\nrate = \"2000000bit\"\n");
-    let loss = |numbers: &str| recording(&format!("{{\"StaticLossConfig\":{{\"loss\":{numbers}}}}}")).to_scene_toml("");
-    assert_eq!(loss("[0.25]"), "[link]\nloss = 0.25\n");
-    assert_eq!(loss("[0.1,0.25]"), "[link]\nloss = { gilbert-elliott = { p = 0.1, r = 0.75 } }\n");
-    let rate = |text: &str| recording(&json!({ "StaticBwConfig": { "bw": text } }).to_string()).to_scene_toml("");
-    assert_eq!((rate("12Mbps"), rate("1Gbps 200Mbps")), ("[link]\nrate = \"12000000bit\"\n".into(), "[link]\nrate = \"1200000000bit\"\n".into()));
-}
-
-#[test]
-fn netem_trace_is_refused_at_its_place() {
-    let of = |value: Value| refused(&value.to_string());
-    assert!(of(json!({ "NormalizedBwConfig": {} })).starts_with("NormalizedBwConfig: another library draws these rates"));
-    let within = |entry: Value| of(json!({ "RepeatedBwPatternConfig": { "pattern": [rate_for(5, 1), entry], "count": 1 } }));
-    assert!(
-        within(json!({ "StaticBwConfig": { "bw": "fast" } })).starts_with("RepeatedBwPatternConfig.pattern[1].StaticBwConfig.bw: found \"fast\"")
-    );
-    assert!(within(json!({ "StaticDelayConfig": {} })).ends_with("found \"StaticDelayConfig\", expected configurations of one kind in a pattern"));
-    assert!(within(json!(5)).starts_with("RepeatedBwPatternConfig.pattern[1]: found 5, expected a table with the name"));
-    assert!(of(json!({ "TraceBwConfig": [[29.0, [2.0, -1.0]]] })).starts_with("TraceBwConfig[0][1][1]: found -1.0, expected a rate above 0"));
-    assert!(of(json!({ "TraceBwConfig": [[29.0]] })).starts_with("TraceBwConfig[0]: found [29.0], expected pairs of milliseconds"));
-    assert!(
-        of(json!({ "StaticLossConfig": { "loss": [0.1, 0.2, 0.3] } }))
-            .starts_with("StaticLossConfig.loss: found [0.1,0.2,0.3], expected a list of one or two")
-    );
-    assert!(of(json!({ "StaticBwConfig": { "duration": "soon" } })).starts_with("StaticBwConfig.duration: found \"soon\""));
-    let many = json!({ "RepeatedBwPatternConfig": { "pattern": [rate_for(5, 1), rate_for(6, 1)], "count": 1_000_000_000_u64 } });
-    assert!(of(many).ends_with("expected at most 1000"));
-    assert!(refused("[]").starts_with("the configuration: found nothing that lasts"));
-    let first_for_ever = json!({ "RepeatedBwPatternConfig": { "pattern": [rate_for(5, 1), { "RepeatedBwPatternConfig": { "pattern": [rate_for(6, 1)], "count": 0 } }], "count": 1 } });
-    assert!(of(first_for_ever).starts_with("RepeatedBwPatternConfig.pattern[1]: a pattern that repeats for ever after another one"));
-}
-
-/// One file of each program.
-fn samples() -> Vec<String> {
-    vec![
-        irtt(&[(json!("false"), 8_000_000, 7_000_001), (json!("true_up"), 0, 0), (json!(true), 0, 0)]).to_string(),
-        "timestamp,rtt,uplink,downlink\n1705744800000000000,0,0,-1\n1705744800010000000,30.5,20.25,10.25\n".to_owned(),
-        "timestamp,rtt\n1705744800.0918,91.8\n1705744800.102,100.0\n".to_owned(),
-        "PING h\n[100.06] 64 bytes from h: icmp_seq=2 time=60.6 ms\n[100.1] 64 bytes from h: icmp_seq=9 time=50 ms\n9 packets transmitted, time 70ms\n".to_owned(),
-        iperf3("UDP", &[sum(0.0, 1e6)]),
-        iperf3("TCP", &[sum(0.0, 1e6)]),
-        "0 30 0 1\n500 42 0\n1000 36 0\n".to_owned(),
-        "0\n3\n9\n".to_owned(),
-        json!({ "RepeatedBwPatternConfig": { "pattern": [rate_for(12_000_000, 1), rate_for(24_000_000, 2)], "count": 2 } }).to_string(),
-        r#"{"StaticLossConfig":{"loss":[0.1,0.2],"duration":"1s 5ms"}}"#.to_owned(),
-        "[[29.0,[2.0,4.0]]]".to_owned(),
-    ]
-}
-
-proptest! {
-    /// Any edit of any file is answered. What is read has finite delays in the order of sending, and texts of links are TOML.
-    #[test]
-    fn edited_files_never_panic(
-        which in any::<prop::sample::Index>(),
-        edits in prop::collection::vec((any::<prop::sample::Index>(), prop_oneof![any::<char>(), prop::sample::select("0159-.e,[]{}\":= \n".chars().collect::<Vec<_>>())]), 0..6),
-    ) {
-        let samples = samples();
-        let mut text: Vec<char> = which.get(&samples).chars().collect();
-        for (place, character) in edits {
-            let place = place.index(text.len());
-            text[place] = character;
-        }
-        let text: String = text.into_iter().collect();
-        for direction in [None, Some(Direction::Up), Some(Direction::Down), Some(Direction::Rtt)] {
-            match read(&text, direction) {
-                Ok(Some(Content::Delays(delays))) => {
-                    prop_assert!(Measurements::new(delays.measurements.packets().to_vec()).is_ok(), "{text}");
-                }
-                Ok(Some(Content::Link(link))) => prop_assert!(link.to_scene_toml("a.csv").parse::<toml::Table>().is_ok(), "{}", link.to_scene_toml("a.csv")),
-                Ok(None) | Err(_) => {}
-            }
-        }
-    }
 }
