@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cohaptic_testkit::{Bed, Testbed, time};
+use cohaptic_testkit::{Bed, Instant, Testbed, time};
 
 /// Sends a position every 10 ms, and returns the longest time for which the other end had no new one.
 async fn longest_pause(bed: Bed) -> Duration {
@@ -13,8 +13,8 @@ async fn longest_pause(bed: Bed) -> Duration {
             time::sleep(Duration::from_millis(10)).await;
         }
     });
-    let (mut longest, mut before, mut buffer) = (Duration::ZERO, None, [0; 4]);
-    while let Ok(Ok(_)) = time::timeout(Duration::from_secs(1), server.recv(&mut buffer)).await {
+    let (mut longest, mut before) = (Duration::ZERO, None::<Instant>);
+    while let Ok(Ok(_)) = time::timeout(Duration::from_secs(1), server.recv(&mut [0; 4])).await {
         let now = time::now();
         longest = longest.max(before.map_or(Duration::ZERO, |before| now - before));
         before = Some(now);

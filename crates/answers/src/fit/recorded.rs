@@ -14,7 +14,9 @@ use super::{Answered, Beside, Corrections, FitFailure, Kind};
 /// [`FitFailure::Measurements`] if the clocks are to be corrected, which such a file does not have, [`FitFailure::Scene`] if a scene refuses the link.
 pub(super) fn answer(recording: &Recording, corrections: &Corrections, file: &Path) -> Result<Answered, FitFailure> {
     if *corrections != Corrections::default() {
-        return Err(FitFailure::Measurements("the file has no delays of packets: expected neither offset nor least, skew or tick".to_owned()));
+        return Err(FitFailure::Measurements(
+            "the file has no delays of packets: expected none of offset, least, skew, tick and hold-out".to_owned(),
+        ));
     }
     let beside = recording.beside().map(|(extension, content)| Beside::new(file, extension, content.to_owned()));
     let scene = recording.to_scene_toml(&beside.as_ref().map_or_else(String::new, Beside::name));

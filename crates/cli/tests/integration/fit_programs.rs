@@ -136,7 +136,8 @@ fn rates_and_recorded_links_are_links_of_a_scene() {
     assert_eq!((&document["recorded"]["rate"]["is_lower_bound"], document.get("link")), (&json!(true), None));
     let text = desk.text("fit rate.json");
     assert!(text.contains("mean rate 5.500 Mbit/s, from 1.000 Mbit/s (10 %) to 9.000 Mbit/s (90 %)\n") && text.contains("lower bound"), "{text}");
-    desk.cohaptic("fit rate.json --skew").assert_refused(2, &["the file has no delays of packets: expected neither offset nor least, skew or tick"]);
+    desk.cohaptic("fit rate.json --skew")
+        .assert_refused(2, &["the file has no delays of packets: expected none of offset, least, skew, tick and hold-out"]);
     desk.cohaptic("fit rate.json --split even").assert_refused(2, &["split: the file has no round trips"]);
 
     desk.write("light.txt", "0 30 0 1\n500 42 0 0\n1000 36 0 3\n");
