@@ -11,6 +11,7 @@ mod sources;
 mod test;
 mod workspace;
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -33,7 +34,15 @@ pub(crate) fn tokio(arguments: &TokioArguments) -> Result<ExitCode, Failure> {
 
 /// Runs `cargo test` with the package in the place of tokio.
 pub(crate) fn test(arguments: &TestArguments) -> Result<ExitCode, Failure> {
-    test::run(&arguments.arguments)
+    test::run(&with_dashes(&arguments.arguments, std::env::args_os().collect()))
+}
+
+/// Returns the arguments of `cargo test` among `all` arguments of this program, of which `read` were read as such. The parser of arguments takes two dashes
+/// before the first of these as its own, which are meant for cargo: `cohaptic test -- --nocapture`.
+fn with_dashes(read: &[OsString], mut all: Vec<OsString>) -> Vec<OsString> {
+    let begin = all.len().saturating_sub(read.len());
+    let has_dashes = begin > 0 && all[begin - 1] == "--";
+    all.split_off(begin - usize::from(has_dashes))
 }
 
 /// Generates the package. Returns the version of tokio, and the folder of the package.

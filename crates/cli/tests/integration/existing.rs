@@ -173,6 +173,10 @@ fn cargo_gets_the_arguments_and_cargo_lock_is_put_back() {
     assert_eq!(said[3..], ["test", "-p", "program", "--test", "network", "--", "--nocapture", "--locked"]);
     assert!(!desk.path("target/cohaptic/Cargo.lock.saved").exists());
 
+    // Two dashes before all other arguments are cargo's as well.
+    run(&desk, "test -- --nocapture");
+    assert!(desk.read("said").ends_with("\ntest\n--\n--nocapture\n"), "{}", desk.read("said"));
+
     for option in ["--locked", "--frozen"] {
         run(&desk, &format!("test {option}")).assert_refused(2, &[&format!("{option} cannot be")]);
     }
