@@ -83,9 +83,10 @@ pub(crate) fn parse(words: &str) -> Result<LinkModel, String> {
 #[cfg(feature = "files")]
 fn named(text: &str) -> Option<Result<LinkModel, String>> {
     let name = text.parse::<cohaptic_linkfile::library::ProfileName>().ok()?;
-    let link = name.one_direction().map_err(|error| error.to_string()).and_then(|_| {
-        cohaptic_linkfile::link_from_keys(&[format!("profile={text}")]).map_err(|error| error.to_string())
-    });
+    let link = name
+        .one_direction()
+        .map_err(|error| error.to_string())
+        .and_then(|_| cohaptic_linkfile::link_from_keys(&[format!("profile={text}")]).map_err(|error| error.to_string()));
     Some(link.map_err(|error| format!("`{text}` is not a link: {error}")))
 }
 

@@ -74,7 +74,6 @@ impl<P: Clone> Link<P> {
     /// # Errors
     ///
     /// [`TimeWentBack`] if an earlier call had a later instant. The link is then unchanged.
-    #[inline]
     pub fn handle_packet(&mut self, now: Instant, info: impl Into<PacketInfo>, payload: P) -> Result<(), TimeWentBack> {
         check_time(&mut self.now, now)?;
         // Stages with queues must be up to date before the offer: at equal instants a packet leaves a queue first.
@@ -104,7 +103,6 @@ impl<P: Clone> Link<P> {
     /// # Errors
     ///
     /// [`TimeWentBack`] if an earlier call had a later instant. The link is then unchanged.
-    #[inline]
     pub fn handle_timeout(&mut self, now: Instant) -> Result<(), TimeWentBack> {
         check_time(&mut self.now, now)?;
         self.let_happen(now);
@@ -122,7 +120,6 @@ impl<P: Clone> Link<P> {
 
     /// Returns the next event: an arrival, a drop, or the making of a copy. Returns `None` when all events up to now have been polled.
     #[must_use]
-    #[inline]
     pub fn poll_event(&mut self) -> Option<PacketEvent<P>> {
         if let Some(event) = self.traffic.happened.pop_front() {
             return Some(event);
@@ -194,14 +191,12 @@ impl<P: Clone> Link<P> {
 }
 
 impl<P> Sink<InLink<P>> for Traffic<P> {
-    #[inline]
     fn arrives(&mut self, at: Instant, packet: InLink<P>, copy: u8, marks: Marks) {
         // Nearly all packets have no marks, so an allocation is rare.
         let marks = (marks != Marks::default()).then(|| Box::new(marks));
         self.pending.push(Pending { at, packet, copy, marks });
     }
 
-    #[inline]
     fn happened(&mut self, at: Instant, fate: Fate, packet: InLink<P>, copy: u8, marks: Marks) {
         self.happened.push_back(packet.event(at, fate, copy, marks));
     }
@@ -220,7 +215,6 @@ struct InLink<P> {
 
 impl<P> InLink<P> {
     /// Returns the event of a fate of this packet at the instant `at`.
-    #[inline]
     fn event(self, at: Instant, fate: Fate, copy: u8, marks: Marks) -> PacketEvent<P> {
         let Self { sequence, offered, size, payload } = self;
         let Marks { congestion: marked, damage, .. } = marks;

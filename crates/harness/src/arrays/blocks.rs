@@ -146,7 +146,6 @@ impl Blocks {
 
     /// Returns the least and the greatest position of the copies \[m\] for each axis, in a single run. Lanes beyond the last peer repeat the last peer and
     /// change neither position.
-    #[inline]
     pub(super) fn extremes(&self) -> impl Iterator<Item = (f64, f64)> {
         self.blocks.chunks(self.places.blocks()).map(|blocks| {
             let (mut low, mut high) = (Lanes::splat(f64::INFINITY), Lanes::splat(f64::NEG_INFINITY));

@@ -18,7 +18,6 @@ pub(super) fn on_widest<O: NullaryFnOnce>(processor: Arch, what: O) -> O::Output
 
 /// Calls a function compiled for any processor. Not inlined, because `on_widest` is inlined into many callers.
 #[cold]
-#[inline(never)]
 fn on_any<O: NullaryFnOnce>(processor: Arch, what: O) -> O::Output {
     processor.dispatch(what)
 }

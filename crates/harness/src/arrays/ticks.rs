@@ -46,7 +46,6 @@ impl<'a> Ticks<'a> {
     }
 
     /// Like [`Ticks::positions`], eight positions at a time. Numbers beyond the last peer are arbitrary.
-    #[inline]
     pub(crate) fn blocks_of_positions(&self, axis: usize) -> impl Iterator<Item = &[f64; WIDTH]> {
         let blocks = self.peers.div_ceil(WIDTH);
         self.blocks[axis * blocks..(axis + 1) * blocks].iter().map(Block::positions)

@@ -75,7 +75,6 @@ impl Positions {
     }
 
     /// Takes the positions and attitudes of an instant. `position` has the arguments peer and axis; both functions return `None` for peers without a row.
-    #[inline]
     fn see(&mut self, at: Instant, position: impl Fn(usize, usize) -> Option<f64>, attitude: impl Fn(usize) -> Option<Attitude>) {
         // Until the expected instant each position replaces the one before, so the last tick at or before that instant stays.
         for watched in self.positions.iter_mut().filter(|watched| at <= watched.at) {

@@ -39,7 +39,6 @@ struct Receiver {
 impl Receiver {
     /// Returns the index of a sender in `sampled`, or the index for its insertion. First tries the index that the sender has if all other peers send, and
     /// searches only if a different sender is found there.
-    #[inline]
     fn place_of(&self, from: usize, to: usize) -> Result<usize, usize> {
         // In a mesh the senders of a receiver are all peers but itself, so a sender after the receiver stands one place earlier.
         let likely = from - usize::from(from > to);
@@ -113,7 +112,6 @@ impl Accumulator for Ages {
         }
     }
 
-    #[inline]
     fn on_tick(&mut self, row: &TickRow<'_>) {
         // One sum for each receiver makes the tick of a peer independent of its number of senders.
         let Receiver { sampled, nanos, instants } = &self.receivers[row.peer];

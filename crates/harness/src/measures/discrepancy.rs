@@ -43,7 +43,6 @@ impl Accumulator for Discrepancy {
         Self { squares: 0.0, count: 0, sketch }
     }
 
-    #[inline]
     fn on_instant(&mut self, row: &InstantRow) {
         self.squares += row.discrepancy * row.discrepancy;
         self.count += 1;
@@ -79,7 +78,6 @@ impl Accumulator for Settling {
         Self { band: asked.settings.band, since: Some(Instant::ZERO) }
     }
 
-    #[inline]
     fn on_instant(&mut self, row: &InstantRow) {
         if row.discrepancy > self.band {
             // A later instant within the band begins anew.

@@ -36,7 +36,6 @@ impl Force {
         Self { peak: 0.0, squares: 0.0, count: 0, jump: 0.0, latest: vec![[f64::NAN; 3]; asked.scene.peers.len()] }
     }
 
-    #[inline]
     fn add(&mut self, peer: usize, force: &[f64]) {
         self.count += force.len() as u64;
         for (component, latest) in force.iter().zip(&mut self.latest[peer]) {
@@ -75,7 +74,6 @@ impl Accumulator for CoordinationForce {
         Self(Force::new(asked))
     }
 
-    #[inline]
     fn on_tick(&mut self, row: &TickRow<'_>) {
         self.0.add(row.peer, row.coordination_force);
     }
@@ -96,7 +94,6 @@ impl Accumulator for FeltForce {
         Self(Force::new(asked))
     }
 
-    #[inline]
     fn on_tick(&mut self, row: &TickRow<'_>) {
         self.0.add(row.peer, row.coupling_force);
     }

@@ -61,7 +61,6 @@ impl Accumulator for Impedance {
         Self(Probe::new(asked))
     }
 
-    #[inline]
     fn on_tick(&mut self, row: &TickRow<'_>) {
         // Earlier ticks and other peers say nothing about the steady response of the probe.
         let Some(probe) = self.0.as_mut().filter(|probe| probe.peer == row.peer && probe.from <= row.at) else { return };
@@ -96,7 +95,6 @@ struct Fit {
 const DEPENDENT: f64 = 1e-9;
 
 impl Fit {
-    #[inline]
     fn add(&mut self, regressors: [f64; 3], signals: [f64; 2]) {
         // Normal equations of least squares: Σ r·rᵀ on the left and Σ r·s on the right, summed tick by tick.
         for (row, one) in self.normal.iter_mut().zip(regressors) {

@@ -30,13 +30,11 @@ impl Default for QuantileSketch {
 
 impl QuantileSketch {
     /// Counts a value. Values below 2⁻⁴⁰ count as zero; values from 2²⁴ on, and NaN, count as infinite.
-    #[inline]
     pub(crate) fn insert(&mut self, value: f64) {
         self.insert_many(value, 1);
     }
 
     /// Counts a value `times` times.
-    #[inline]
     pub(crate) fn insert_many(&mut self, value: f64, times: u64) {
         self.count += times;
         if value < LEAST {

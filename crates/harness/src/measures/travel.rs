@@ -20,7 +20,6 @@ pub(crate) struct Travelled {
 
 impl Travelled {
     /// Takes a position at a tick \[m\]. An overflowed position does not count as distant.
-    #[inline]
     pub(crate) fn see(&mut self, at: Instant, position: f64, distance: f64) {
         // The first call is at the first tick of the copy.
         let start = *self.start.get_or_insert(position);
@@ -52,7 +51,6 @@ impl Accumulator for Travel {
         Self { travel: asked.settings.travel, travelled: Travelled::default() }
     }
 
-    #[inline]
     fn on_tick(&mut self, row: &TickRow<'_>) {
         // Other peers have no part in the figure: `[measure]` names the one peer.
         let MeasureTravel { peer, axis, distance } = self.travel;

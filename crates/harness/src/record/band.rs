@@ -84,7 +84,6 @@ impl Bands {
     }
 
     /// Returns the extremes of all curves in the span of an instant; `None` at the end of the scene and beyond.
-    #[inline]
     fn of_span(&mut self, at: Instant) -> Option<&mut [Extremes]> {
         // The values of a run come in the order of time, so the span of the latest value is usually the right span.
         if !self.latest.1.contains(&at.as_nanos()) {

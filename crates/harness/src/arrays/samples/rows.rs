@@ -70,7 +70,6 @@ impl Rows {
     }
 
     /// Returns the number of links to a receiver.
-    #[inline]
     pub(super) fn columns(&self, receiver: usize) -> usize {
         match self {
             Self::All { peers, .. } => *peers,
@@ -79,7 +78,6 @@ impl Rows {
     }
 
     /// Returns the sender of a link, by index in the scene. With [`Rows::All`] this may be the receiver itself.
-    #[inline]
     pub(super) fn sender(&self, receiver: usize, column: usize) -> usize {
         match self {
             Self::All { .. } => column,
@@ -96,7 +94,6 @@ impl Rows {
     }
 
     /// Returns the index of the link in a column.
-    #[inline]
     pub(super) fn link(&self, receiver: usize, column: usize) -> usize {
         match self {
             Self::All { peers, .. } => receiver * peers + column,
@@ -105,7 +102,6 @@ impl Rows {
     }
 
     /// Returns the place of the samples from the link in a column.
-    #[inline]
     pub(super) fn place(&self, receiver: usize, column: usize) -> usize {
         match self {
             // The receiver holds no sample of itself: the places of later senders are lower by one.
@@ -115,7 +111,6 @@ impl Rows {
     }
 
     /// Returns the column of the held samples in a place of a receiver. Inverse of [`Rows::place`].
-    #[inline]
     pub(super) fn column_of(&self, receiver: usize, place: usize) -> usize {
         match self {
             Self::All { peers, first } => {
@@ -158,7 +153,6 @@ impl Rows {
     }
 
     /// Returns the factor of samples over the link in a column; `None` if samples are not weighted.
-    #[inline]
     pub(super) fn weight(&self, receiver: usize, column: usize) -> Option<f64> {
         match self {
             Self::All { .. } => None,

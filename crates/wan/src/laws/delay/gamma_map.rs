@@ -78,7 +78,6 @@ impl GammaMap {
 
     /// Returns x(z) by the exact inverse.
     #[cold]
-    #[inline(never)]
     fn exactly(&self, z: f64) -> f64 {
         let z = z.clamp(-LARGEST_NORMAL, LARGEST_NORMAL);
         gamma_inverse::inverse(self.shape, Tail::of_normal(z), z)

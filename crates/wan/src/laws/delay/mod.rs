@@ -202,7 +202,6 @@ impl Law {
     /// Returns one independent draw for a uniform word. `more` gives further uniform words. The normal, lognormal and gamma laws need further words in 1.2 %
     /// of the draws, and the other laws need none.
     #[must_use]
-    #[inline]
     pub fn draw(&self, word: u64, more: impl FnMut() -> u64) -> f64 {
         self.delay(self.fit.standard.draw(word, more))
     }
@@ -268,7 +267,6 @@ impl Law {
     }
 
     /// Returns the delay of a number of the standard law.
-    #[inline]
     fn delay(&self, x: f64) -> f64 {
         (self.fit.origin + self.fit.scale * x).max(self.asked.floor).min(f64::MAX)
     }

@@ -41,7 +41,6 @@ const SQRT_3: f64 = 1.732_050_807_568_877_2;
 
 impl Standard {
     /// Returns F⁻¹(Φ(z)).
-    #[inline]
     pub(super) fn at_normal(&self, z: f64) -> f64 {
         match self {
             Self::Normal => z,
@@ -83,7 +82,6 @@ impl Standard {
     }
 
     /// Returns one draw. Forms computed from a normal number draw this number by the ziggurat, which rarely needs words from `more`.
-    #[inline]
     pub(super) fn draw(&self, word: u64, more: impl FnMut() -> u64) -> f64 {
         match self {
             Self::Normal => standard_normal(word, more),

@@ -25,7 +25,6 @@ impl Tail {
 
     /// Returns the place of a uniform word. The top bit is the side, and the other bits are (k + ½)·2⁻⁶⁴ from the end, so the ends of a law are resolved to
     /// 3·10⁻²⁰.
-    #[inline]
     pub(super) fn of_word(word: u64) -> Self {
         // The complement of an upper word counts from the upper end.
         if word >> 63 == 0 { Self::Below(from_the_end(word)) } else { Self::Above(from_the_end(!word)) }
@@ -57,7 +56,6 @@ impl Tail {
 }
 
 /// Returns (word + ½)·2⁻⁶⁴, a probability below ½. `word` is below 2^63.
-#[inline]
 #[expect(clippy::cast_precision_loss, reason = "a word below 2^63, rounded to 53 bits, is a probability to 16 digits")]
 fn from_the_end(word: u64) -> f64 {
     const TWO_POW_MINUS_64: f64 = 1.0 / (4_294_967_296.0 * 4_294_967_296.0);

@@ -10,7 +10,6 @@ use tables::{F, R, X};
 
 /// Returns a standard normal number for a uniform word. `more` gives further uniform words, rarely needed.
 #[must_use]
-#[inline]
 pub fn standard_normal(word: u64, more: impl FnMut() -> u64) -> f64 {
     in_the_core(word).unwrap_or_else(|| outside_the_core(word, more))
 }

@@ -18,7 +18,6 @@ impl Correlated {
         Self { rho, last: unseeded.next_u32() }
     }
 
-    #[inline]
     pub(super) fn next(&mut self, prng: &mut Prng) -> u32 {
         let drawn = prng.next_u32();
         if self.rho == 0 {
@@ -31,7 +30,6 @@ impl Correlated {
     }
 
     /// Returns whether an event of this probability (in 1/2³²) happens. No number is drawn for probability 0.
-    #[inline]
     pub(super) fn happens(&mut self, probability: u32, prng: &mut Prng) -> bool {
         probability != 0 && probability >= self.next(prng)
     }

@@ -139,7 +139,6 @@ impl Chains {
     /// Delivers the packets of the links in `slow`, with delays beyond `cubics`. A separate function, because a call within the loop over all links would force
     /// the loop's values out of registers.
     #[cold]
-    #[inline(never)]
     fn offer_slowly(
         &self,
         (links, normals): (&mut [LinkState], &mut [f64; DirectLinks::AT_ONCE]),

@@ -121,7 +121,6 @@ impl<T: Clone> SteppedLinks<T> {
     /// # Panics
     ///
     /// If the link is missing.
-    #[inline]
     pub fn offer(&mut self, (now, next): (Instant, Instant), link: LinkId, item: T, mut arrives: impl FnMut(Instant, bool, u64, T)) {
         // Events after the end of the run are not counted.
         let (until, next) = (self.until, next.min(self.until));
