@@ -94,8 +94,8 @@ registry! {
     PeerEnergy: Peer, "energy_j", "J", "Part of that energy which was injected into the copy of this peer";
     Viscosity: Run, "viscosity_n_s_m", "N·s/m", "Real part of the impedance that the hand of the probe meets at its frequency, over the second half of the scene";
     EffectiveMass: Run, "effective_mass_kg", "kg", "Imaginary part of that impedance by the angular frequency";
-    PacketRate: Run, "packets_per_s", "1/s", "Packets that all peers offer to the network a second";
-    BitRate: Run, "sent_bits_per_s", "bit/s", "Bits of the datagrams in these packets a second";
+    PacketRate: Run, "packets_per_s", "1/s", "Packets that all peers offer to the network per second";
+    BitRate: Run, "sent_bits_per_s", "bit/s", "Bits of the datagrams in these packets per second";
     AgeMean: Run, "age_mean_s", "s", "Mean age of held samples, tick less sampling, over ticks and pairs of peers from the first arrival on";
     AgeP99: Run, "age_p99_s", "s", "Quantile of 99 % of that age";
 }

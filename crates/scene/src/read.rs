@@ -23,19 +23,19 @@ use crate::sections::{
 
 /// Keys at the top level of a scene.
 pub(crate) static ROOT: Table = Table::of(&[&[
-    required("scene", Form::Table(&SCENE), "How long the scene lasts, its seed and its axes").expecting("a table [scene] with a duration"),
+    required("scene", Form::Table(&SCENE), "Length, seed and axes of the scene").expecting("a table [scene] with a duration"),
     required("object", Form::Table(&OBJECT), "The shared virtual object, of which every peer has a copy").expecting("a table [object] with a mass"),
-    required("coordination", Form::Table(&COORDINATION), "How the copies are kept together").expecting("a table [coordination] with a strategy"),
-    optional("simulation", Form::Table(&SIMULATION), "How motion between ticks is computed"),
-    optional("peer", Form::Table(&PEER), "Holds for every peer that does not say otherwise"),
-    optional("peers", Form::List(&Form::Table(&PEERS)), "One peer each: its own keys are laid over those of [peer]"),
-    optional("topology", Form::Table(&TOPOLOGY), "The peers to which each peer sends"),
+    required("coordination", Form::Table(&COORDINATION), "Coordination of the copies").expecting("a table [coordination] with a strategy"),
+    optional("simulation", Form::Table(&SIMULATION), "Integration of the motion between two ticks"),
+    optional("peer", Form::Table(&PEER), "Keys of every peer that does not have them in its own table"),
+    optional("peers", Form::List(&Form::Table(&PEERS)), "One peer per entry: its own keys are laid over those of [peer]"),
+    optional("topology", Form::Table(&TOPOLOGY), "Peers to which each peer sends"),
     optional("modulators", Form::List(&Form::Table(&MODULATOR)), "Chains of states that links follow"),
-    optional("link", Form::Table(&LINK_TABLE), "Holds for every link that does not say otherwise; without it links are ideal"),
-    optional("links", Form::List(&Form::Table(&LINK_ENTRY)), "One direction of one pair each: its own keys are laid over those of [link]"),
+    optional("link", Form::Table(&LINK_TABLE), "Keys of every link that does not have them in its own table; links are ideal by default"),
+    optional("links", Form::List(&Form::Table(&LINK_ENTRY)), "One direction between two peers per entry: its own keys are laid over those of [link]"),
     optional("timeline", Form::List(&Form::Table(&TIMELINE)), "Changes while the scene runs"),
-    optional("measure", Form::Table(&MEASURE), "Numbers that sum a run up, computed while it runs"),
-    optional("expect", Form::Table(&EXPECT), "The result that must come out: makes the scene a test for cohaptic check"),
+    optional("measure", Form::Table(&MEASURE), "Measures of a run, computed while it runs"),
+    optional("expect", Form::Table(&EXPECT), "Expected results, which cohaptic check compares with those of a run"),
 ]]);
 
 impl Scene {

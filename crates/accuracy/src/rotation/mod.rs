@@ -21,7 +21,7 @@ use closed_form::FreeTop;
 use methods::Method;
 
 const CASE: &str = "free top near its unstable axis";
-const COST: &str = "µs a second of motion";
+const COST: &str = "µs per second of motion";
 const ERRORS: [&str; 3] = ["angle [rad]", "energy [relative]", "momentum in world axes [relative]"];
 const REFERENCES: [&str; 3] = ["closed form by Jacobi's functions", "its first value", "its first value"];
 

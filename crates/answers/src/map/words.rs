@@ -30,7 +30,7 @@ pub fn words(filled: &Filled<'_>, speed: Speed, pictures: bool) -> String {
         }
         headlines(axes, map, |value| value).iter().for_each(|line| text.push_str(&format!("  {line}\n")));
     }
-    let _ = writeln!(text, "\n{} computed in {:.3} s: {:.0} a second", Counted(speed.cells, "cell"), speed.wall_s, speed.cells_per_s());
+    let _ = writeln!(text, "\n{} computed in {:.3} s: {:.0} per second", Counted(speed.cells, "cell"), speed.wall_s, speed.cells_per_s());
     for note in filled.notes() {
         let _ = writeln!(text, "note: {note}");
     }

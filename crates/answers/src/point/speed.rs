@@ -48,11 +48,11 @@ pub(super) fn words(analysis: &Analysis) -> String {
     let (radius, a_second) = (analysis.radius.value, per_second(analysis));
     let (low, high) = analysis.radius.bounds();
     let factors = match a_second.known() {
-        Some(a_second) => format!("by a factor of {radius:.6} a frame and {a_second:.4e} a second"),
+        Some(a_second) => format!("by a factor of {radius:.6} per frame and {a_second:.4e} per second"),
         // A second has many frames, and the factor per second can be beyond `f64`.
-        None if a_second.high.is_infinite() && low > 0.0 => format!("by a factor of {radius:.4e} a frame"),
-        None if low > 0.0 => format!("by a factor of {low:.6} to {high:.6} a frame and {:.4e} to {:.4e} a second", a_second.low, a_second.high),
-        None => format!("by a factor of at most {high:.1e} a frame and {:.4e} a second", a_second.high),
+        None if a_second.high.is_infinite() && low > 0.0 => format!("by a factor of {radius:.4e} per frame"),
+        None if low > 0.0 => format!("by a factor of {low:.6} to {high:.6} per frame and {:.4e} to {:.4e} per second", a_second.low, a_second.high),
+        None => format!("by a factor of at most {high:.1e} per frame and {:.4e} per second", a_second.high),
     };
     match (analysis.verdict(), time_constant(analysis)) {
         (Verdict::Stable, Some(constant)) => {
@@ -104,7 +104,7 @@ mod tests {
         assert_eq!((constant.known(), constant.low), (None, 0.0));
         assert!((constant.high - 1600.0 / (1.0 / 5.5e-7_f64).ln()).abs() < 1e-6, "{constant:?}");
         let words = words(&clocks);
-        assert!(words.contains("time constant at most 111.0") && words.contains("at most 5.5e-7 a frame"), "{words}");
+        assert!(words.contains("time constant at most 111.0") && words.contains("at most 5.5e-7 per frame"), "{words}");
     }
 
     /// Frames of one second with a radius of 0.5 ± 0.1: 1/ln(1/0.4) = 1.091 s to 1/ln(1/0.6) = 1.958 s.

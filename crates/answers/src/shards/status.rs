@@ -103,7 +103,7 @@ pub fn status_words(status: &Status<'_>) -> String {
     let Status { folder, names: Names { piece, unit }, workers, .. } = status;
     let ([all, done], end, unassigned) = (status.counts(), status.end(), status.unassigned());
     let mut text = format!("{folder}: {} of {} {piece}s are done, {} of {} {unit}s\n", done.0, all.0, done.1, all.1);
-    let mut rows = vec![["shard", "state", "process", "host", "done", "left", "a second", "ends in"].map(str::to_owned)];
+    let mut rows = vec![["shard", "state", "process", "host", "done", "left", "per second", "ends in"].map(str::to_owned)];
     rows.extend(workers.iter().take(MOST_WORKERS).map(|worker| {
         let speed = worker.units_per_s().map_or_else(|| "-".to_owned(), |speed| figure(speed, 1));
         let end = status.worker_ends_in(worker).map_or_else(|| "-".to_owned(), span);

@@ -169,7 +169,7 @@ pub(super) fn traffic(traffic: &Traffic) -> [String; 2] {
     let Traffic { seconds, exchanges, reports_per_s, timeouts, garbage_bytes, faults, implausible, late_turns, worst_late_us, .. } = traffic;
     [
         format!(
-            "{exchanges} exchanges in {seconds:.2} s, {reports_per_s:.0} reports a second; {late_turns} turns of the loop were late, the worst by {worst_late_us:.0} µs"
+            "{exchanges} exchanges in {seconds:.2} s, {reports_per_s:.0} reports per second; {late_turns} turns of the loop were late, the worst by {worst_late_us:.0} µs"
         ),
         format!("{timeouts} time-outs, {garbage_bytes} bytes of garbage, {faults} failed transfers, {implausible} impossible reports"),
     ]

@@ -58,7 +58,7 @@ fn keys_are_explained_with_their_units() {
     for (key, words) in [
         ("stiffness = 2100.0", "Gain on the difference of positions, K_T [N/m]"),
         ("mass = 0.45", "Mass of the whole object [kg]"),
-        ("update = \"8ms\"", "How often each peer sends a sample"),
+        ("update = \"8ms\"", "Time between two samples of a peer"),
         ("# seed = 0", "Seed of all random numbers"),
         ("# loss = 0", "Probability that a packet is lost"),
     ] {

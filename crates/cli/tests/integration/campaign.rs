@@ -104,7 +104,7 @@ fn people_are_told_what_came_out() {
     let text = desk.text(&format!("{SIX} --vary link.loss=0%..40%/11 --out out"));
     for part in [
         "Three users, far apart\n  66 runs of 22 combinations, 3 of each\n",
-        " a second\n",
+        " per second\n",
         "  0 diverged; the largest discrepancy is ",
         "  coordination.stiffness  link.loss  diverged  mean discrepancy",
         "\n                     500         0%         0",

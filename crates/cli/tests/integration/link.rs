@@ -146,7 +146,7 @@ fn the_text_sets_asked_beside_achieved() {
         assert!(text.contains(part), "no {part:?} in:\n{text}");
     }
     // The speed of the emulator says nothing of the link. Only the document has it.
-    assert!(!text.contains("a second"), "{text}");
+    assert!(!text.contains("per second"), "{text}");
 }
 
 #[test]

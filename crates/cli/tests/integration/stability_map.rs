@@ -137,7 +137,7 @@ fn people_get_a_small_picture() {
         "        31 |",
         "         1 |",
         " of 900 cells are stable; the least",
-        " a second\n",
+        " per second\n",
     ] {
         assert!(text.contains(part), "no {part:?} in {text}");
     }

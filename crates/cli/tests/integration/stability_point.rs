@@ -82,8 +82,8 @@ fn people_get_the_same_in_words() {
     for part in [
         "Two users\n",
         "over a frame of 8ms",
-        " a frame and ",
-        " a second: ",
+        " per frame and ",
+        " per second: ",
         "parts that do not mix",
         "all, equal peers as their average",
         &radius,

@@ -21,8 +21,7 @@ pub static LINK_TABLE: Table = Table::of(&LINK);
 pub static LINK_CHANGE: Table = Table::over(&LINK);
 
 /// Keys of the two ends of a link.
-pub const ENDS: [Key; 2] =
-    [required("from", Form::Text, "The name of the one that sends"), required("to", Form::Text, "The name of the one that receives")];
+pub const ENDS: [Key; 2] = [required("from", Form::Text, "Name of the sender"), required("to", Form::Text, "Name of the receiver")];
 /// Table of an entry `[\[links\]]`: both ends, and keys laid over those of `[link]`.
 pub static LINK_ENTRY: Table = Table::over(&joined::<17>(&[&[&ENDS], &LINK]));
 
@@ -35,8 +34,8 @@ pub const LINKS_BETWEEN: Form = Form::AnyOf(&[Form::Words(ALL_LINKS), Form::Tabl
 
 /// Table with both ends of a link, or with the peer of an access line.
 pub static LINK_OR_LINE: Table = Table::of(&[&[
-    optional("from", Form::Text, "The name of the peer that sends"),
-    optional("to", Form::Text, "The name of the peer that receives"),
-    optional("uplink", Form::Text, "In place of both: the uplink of this peer"),
-    optional("downlink", Form::Text, "In place of both: the downlink of this peer"),
+    optional("from", Form::Text, "Name of the sender"),
+    optional("to", Form::Text, "Name of the receiver"),
+    optional("uplink", Form::Text, "Name of the peer whose uplink is meant, in place of from and to"),
+    optional("downlink", Form::Text, "Name of the peer whose downlink is meant, in place of from and to"),
 ]]);

@@ -98,28 +98,29 @@ impl Default for RelayLimits {
 /// Table at the top of a relay file.
 pub static ROOT: Table = Table::of(&[&[
     optional("relay", Form::Table(&RELAY), "Seed and limits"),
-    required("programs", Form::List(&Form::Table(&programs::PROGRAM)), "The programs, at least two")
+    required("programs", Form::List(&Form::Table(&programs::PROGRAM)), "Programs, at least two")
         .expecting("at least two entries [[programs]], each with a name and a port"),
     optional("modulators", Form::List(&Form::Table(&MODULATOR)), "Chains of states that links follow"),
-    optional("link", Form::Table(&LINK_TABLE), "Holds for every link that does not say otherwise; without it links are ideal"),
-    optional("links", Form::List(&Form::Table(&LINK_ENTRY)), "One direction of one pair each: its own keys are laid over those of [link]"),
+    optional("link", Form::Table(&LINK_TABLE), "Keys of every link that does not have them in its own table; links are ideal by default"),
+    optional("links", Form::List(&Form::Table(&LINK_ENTRY)), "One direction between two peers per entry: its own keys are laid over those of [link]"),
     optional("timeline", Form::List(&Form::Table(&TIMELINE)), "Changes while the relay runs"),
 ]]);
 static RELAY: Table = Table::of(&[&[
-    optional("title", Form::Text, "A line for people; without it the name of the file"),
+    optional("title", Form::Text, "Title for people; the name of the file by default"),
     usual("seed", Form::Integer(0, i64::MAX.unsigned_abs()), "0", "Seed of all random numbers"),
     usual("allow-remote", Form::Boolean, "false", "Whether ports and addresses may be on other machines"),
     // Each datagram in flight takes at least a hundred bytes of memory, so the largest value stands for 1.7 GB.
-    usual("most-packets", Form::Integer(1, 1 << 24), "262144", "The most datagrams in flight at once").expecting("a number of datagrams, {}"),
-    usual("most-bytes", Form::Size, "\"64MB\"", "The most bytes of datagrams in flight at once"),
-    usual("forget-after", Form::PositiveDuration, "\"30s\"", "A learnt address that is silent for so long may be replaced"),
-    usual("tolerance", Form::PositiveDuration, "\"1ms\"", "Later than this is late"),
+    usual("most-packets", Form::Integer(1, 1 << 24), "262144", "Largest number of datagrams in flight at once")
+        .expecting("a number of datagrams, {}"),
+    usual("most-bytes", Form::Size, "\"64MB\"", "Largest number of bytes in flight at once"),
+    usual("forget-after", Form::PositiveDuration, "\"30s\"", "Time of silence after which a learnt address may be replaced"),
+    usual("tolerance", Form::PositiveDuration, "\"1ms\"", "Lateness up to which a datagram is on time"),
 ]]);
 static TIMELINE: Table = Table::of(&[&[
-    required("at", Form::Duration, "When, from the beginning").expecting("a time such as \"3s\""),
-    required("link", LINKS_BETWEEN, "Which links change: all, or one by its ends")
+    required("at", Form::Duration, "Time since the beginning").expecting("a time such as \"3s\""),
+    required("link", LINKS_BETWEEN, "Links that change: all, or one by its ends")
         .expecting("\"all\" or a table such as { from = \"left\", to = \"right\" }"),
-    required("set", Form::Table(&LINK_CHANGE), "The keys that change"),
+    required("set", Form::Table(&LINK_CHANGE), "Keys that change"),
 ]]);
 
 impl RelayFile {

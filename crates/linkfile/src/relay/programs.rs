@@ -14,11 +14,15 @@ const MOST_PROGRAMS: usize = 256;
 
 /// Table of an entry `[\[programs\]]`.
 pub(super) static PROGRAM: Table = Table::of(&[&[
-    required("name", Form::Text, "Its name, which names its links: unique, not all, without space and without . > / , and quotes")
+    required("name", Form::Text, "Name of the program, which names its links: unique, not all, without space and without . > / , and quotes")
         .expecting("the name of the program"),
-    required("port", Form::Like(&["127.0.0.1:7001"]), "The address that stands for it: a program that sends there speaks to it")
+    required("port", Form::Like(&["127.0.0.1:7001"]), "Address that stands for the program: other programs send there to reach it")
         .expecting("the address that stands for it, such as \"127.0.0.1:7001\""),
-    optional("address", Form::Like(&["127.0.0.1:9001"]), "Where it sends from and listens; without it learnt from the first datagram that it sends"),
+    optional(
+        "address",
+        Form::Like(&["127.0.0.1:9001"]),
+        "Address from which the program sends and at which it listens; learnt from its first datagram by default",
+    ),
 ]]);
 
 /// Entry of a program, with the nodes for faults.

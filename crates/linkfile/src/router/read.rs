@@ -16,31 +16,31 @@ use crate::reading::{Context, TableReader, defaults, parse, values, with_text};
 
 /// Table at the top of a router file.
 pub static ROOT: Table = Table::of(&[&[
-    required("router", Form::Table(&ROUTER), "Seed, memory, and where packets go to which no rule applies")
+    required("router", Form::Table(&ROUTER), "Seed, memory, and the way of packets to which no rule applies")
         .expecting("a table such as [router] with a default"),
     required("left", Form::Table(&SIDE), "One side: a tun or an interface").expecting(A_SIDE),
     required("right", Form::Table(&SIDE), "The other side: of the same kind as the first").expecting(A_SIDE),
-    optional("links", Form::Table(&LINKS), "The links, each under its name"),
-    optional("rules", Form::List(&Form::Table(&RULE)), "Which packets go where: the first rule that applies decides"),
+    optional("links", Form::Table(&LINKS), "Links, each under its name"),
+    optional("rules", Form::List(&Form::Table(&RULE)), "Ways of packets: the first rule that applies decides"),
     optional("modulators", Form::List(&Form::Table(&MODULATOR)), "Chains of states that links follow"),
 ]]);
 const A_SIDE: &str = "a table such as { tun = \"wan0\", addresses = [\"10.1.0.1/24\"] } or { interface = \"eth1\" }";
 static ROUTER: Table = Table::of(&[&[
     usual("seed", Form::Integer(0, i64::MAX.unsigned_abs()), "0", "Seed of all random numbers"),
-    optional("memory", Form::Table(&MEMORY), "How much may be inside all links together; what comes beyond is dropped"),
+    optional("memory", Form::Table(&MEMORY), "Limits of all links together; packets beyond them are dropped"),
     required(
         "default",
         Form::AnyOf(const { &[TARGET_FORM, Form::Table(&DEFAULT)] }),
-        "Where packets go to which no rule applies: the name of a link, pass or drop",
+        "Way of packets to which no rule applies: the name of a link, pass or drop",
     ),
 ]]);
 static DEFAULT: Table = Table::of(&[&[
-    required("left-to-right", TARGET_FORM, "The name of a link, pass or drop").expecting(TARGET),
-    required("right-to-left", TARGET_FORM, "The name of a link, pass or drop").expecting(TARGET),
+    required("left-to-right", TARGET_FORM, "Way of packets in this direction: the name of a link, pass or drop").expecting(TARGET),
+    required("right-to-left", TARGET_FORM, "Way of packets in this direction: the name of a link, pass or drop").expecting(TARGET),
 ]]);
 static MEMORY: Table = Table::of(&[&[
-    usual("packets", Form::Integer(1, 1 << 32), "262144", "The most packets").expecting("a number of packets, {}"),
-    usual("bytes", Form::Size, "\"256MB\"", "The most bytes"),
+    usual("packets", Form::Integer(1, 1 << 32), "262144", "Largest number of packets").expecting("a number of packets, {}"),
+    usual("bytes", Form::Size, "\"256MB\"", "Largest number of bytes"),
 ]]);
 static LINKS: Table = Table::with_others(&[], &Form::Table(&LINK_TABLE));
 

@@ -14,18 +14,18 @@ pub(super) const TARGET: &str = "the name of a link, \"pass\" or \"drop\"";
 pub(super) const TARGET_FORM: Form = Form::Like(&["pass", "drop", "wan"]);
 /// Table of an entry `[\[rules\]]`.
 pub(super) static RULE: Table = Table::of(&[&[
-    optional("from", Form::Words(const { &words(&SIDES) }), "On which side the packet comes in"),
-    optional("source", Form::Like(&["10.1.0.0/16"]), "An address or a network that it comes from"),
-    optional("destination", Form::Like(&["10.2.0.0/16"]), "An address or a network that it goes to"),
+    optional("from", Form::Words(const { &words(&SIDES) }), "Side on which the packet comes in"),
+    optional("source", Form::Like(&["10.1.0.0/16"]), "Source of the packet: an address or a network"),
+    optional("destination", Form::Like(&["10.2.0.0/16"]), "Destination of the packet: an address or a network"),
     optional(
         "protocol",
         Form::AnyOf(const { &[Form::Like(&["tcp", "udp", "icmp", "icmpv6"]), Form::Integer(0, 255)] }),
-        "Its protocol, by name or number",
+        "Protocol of the packet, by name or number",
     ),
-    optional("source-port", PORTS_FORM, "A port or a range of ports that it comes from"),
-    optional("destination-port", PORTS_FORM, "A port or a range of ports that it goes to"),
-    optional("port", PORTS_FORM, "A port or a range of ports, on either end"),
-    required("link", TARGET_FORM, "Where it goes: the name of a link, pass or drop").expecting(TARGET),
+    optional("source-port", PORTS_FORM, "Source port of the packet, or a range of ports"),
+    optional("destination-port", PORTS_FORM, "Destination port of the packet, or a range of ports"),
+    optional("port", PORTS_FORM, "Source or destination port of the packet, or a range of ports"),
+    required("link", TARGET_FORM, "Way of the packet: the name of a link, pass or drop").expecting(TARGET),
 ]]);
 const SIDES: Choices<Side, 2> = [("left", Side::Left, "what comes in on the left"), ("right", Side::Right, "what comes in on the right")];
 const PORTS_FORM: Form = Form::AnyOf(&[Form::Integer(0, 65_535), Form::Like(&["5000-5999"])]);

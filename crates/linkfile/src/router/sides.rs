@@ -8,19 +8,19 @@ use crate::reading::{Context, TableReader, values};
 
 /// Table of a side.
 pub(super) static SIDE: Table = Table::of(&[&[
-    optional("tun", Form::Text, "Name of a TUN device, which is made and is gone with the router")
+    optional("tun", Form::Text, "Name of a TUN device, which the router makes and removes at its end")
         .expecting("tun = \"NAME\" for a device of the router, or interface = \"NAME\" for one that is there"),
-    optional("interface", Form::Text, "In place of tun: name of an Ethernet interface that is there"),
+    optional("interface", Form::Text, "Name of an Ethernet interface that exists, in place of tun"),
     optional(
         "namespace",
         Form::Like(&["lab", "/proc/4711/ns/net"]),
         "Network namespace of the device: a name or a path; without it that of the program",
     ),
-    usual("existing", Form::Boolean, "false", "The TUN device is there and is left as it is"),
+    usual("existing", Form::Boolean, "false", "Whether the TUN device exists already and is left as it is"),
     usual("addresses", Form::List(&Form::Like(&["10.1.0.1/24", "fd00::1/64"])), "[]", "Addresses of the TUN device with their prefixes"),
-    optional("mtu", Form::Integer(68, 65_535), "The largest packet that the TUN device takes, in bytes; without it the system's")
+    optional("mtu", Form::Integer(68, 65_535), "Largest packet that the TUN device takes, in bytes; the system's own by default")
         .expecting("a number of bytes, {}"),
-    usual("offloads", Form::Boolean, "true", "Packets cross the TUN device in large segments, which the router cuts and joins"),
+    usual("offloads", Form::Boolean, "true", "Whether packets cross the TUN device in large segments, which the router cuts and joins"),
 ]]);
 
 /// Reads a side: a TUN device, or an interface with a namespace.

@@ -42,14 +42,14 @@ impl<const A: usize> ControllerKind<A> for ClientServer<A> {
             key: "server",
             form: LawForm::Peer,
             default: "",
-            about: "The peer that has the object; the first if there is no such key",
+            about: "Name of the peer that has the object; the first peer by default",
             can_change: false,
         },
         LawParameter {
             key: "returns",
             form: LawForm::Words(RETURNS),
             default: "\"force\"",
-            about: "What the server sends to its clients",
+            about: "Content of the samples that the server sends to its clients",
             can_change: false,
         },
     ];

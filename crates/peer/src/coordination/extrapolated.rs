@@ -21,7 +21,7 @@ impl LawKind for Extrapolated {
         key: "horizon",
         form: LawForm::Duration,
         default: "\"100ms\"",
-        about: "Up to which age samples are extrapolated; 0 for average-position itself",
+        about: "Largest age up to which samples are extrapolated; 0 for average-position itself",
         can_change: true,
     }];
 

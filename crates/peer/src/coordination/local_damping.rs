@@ -31,7 +31,7 @@ impl LawKind for LocalDamping {
             key: "age",
             form: LawForm::AutomaticDuration,
             default: "\"auto\"",
-            about: "The age of the oldest sample in use, for a damping of auto; auto where all links have constant delays, with patterns of lost packets or none",
+            about: "Age of the oldest sample in use, for a damping of auto; auto needs constant delays on all links, and no loss but patterns of lost packets",
             can_change: false,
         },
     ];

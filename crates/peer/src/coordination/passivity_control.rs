@@ -44,7 +44,7 @@ impl<const A: usize> ControllerKind<A> for PassivityControl<A> {
         key: "reserve",
         form: LawForm::Energy,
         default: "0",
-        about: "Energy that each peer may give on each axis beyond what the springs between the copies hold at the beginning",
+        about: "Energy that each peer may give on each axis beyond the energy of the springs between the copies at the beginning",
         can_change: true,
     }];
 

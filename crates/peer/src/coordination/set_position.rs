@@ -68,7 +68,7 @@ impl<const A: usize> ControllerKind<A> for SetPosition<A> {
             key: "ceiling",
             form: LawForm::Energy,
             default: "0.01",
-            about: "The most energy that a tank holds; the rest goes to the others",
+            about: "Largest energy that a tank holds; energy beyond goes to the other peers",
             can_change: true,
         },
     ];

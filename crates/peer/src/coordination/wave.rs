@@ -95,7 +95,7 @@ impl<const A: usize> ControllerKind<A> for Wave<A> {
             key: "on-loss",
             form: LawForm::Words(ON_LOSS),
             default: "\"zero\"",
-            about: "What acts when the next wave is due and has not come",
+            about: "Wave that acts if the next wave is due and has not come",
             can_change: false,
         },
     ];

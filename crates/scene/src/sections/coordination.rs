@@ -17,30 +17,30 @@ use crate::model::{CoordinationSpec, Scaling};
 use crate::quantities::{DAMPING, DISTANCE, ENERGY, IMPEDANCE, ROTATIONAL_DAMPING, ROTATIONAL_STIFFNESS, STIFFNESS};
 
 pub(crate) static COORDINATION: Table = Table::of(&[&[
-    required("strategy", Form::Words(const { &words(&STRATEGIES) }), "Where each copy is drawn to").expecting("one of {}"),
+    required("strategy", Form::Words(const { &words(&STRATEGIES) }), "Law of the force on each copy").expecting("one of {}"),
     required("stiffness", number(STIFFNESS), "Gain on the difference of positions, K_T"),
     usual("damping", number(DAMPING), "0", "Gain on the difference of velocities, B_T"),
-    required("update", Form::PositiveDuration, "How often each peer sends a sample; a whole multiple of every peer's tick"),
-    optional("send-when", Form::Table(&SEND_WHEN), "Which of these samples are sent; without it all"),
-    usual("scaling", SCALING, "\"none\"", "How both gains follow the number of peers"),
-    usual("pull", Form::Words(const { &words(&PULLS) }), "\"mean\"", "Whether both gains count once, or once for each other peer"),
+    required("update", Form::PositiveDuration, "Time between two samples of a peer; a whole multiple of every peer's tick"),
+    optional("send-when", Form::Table(&SEND_WHEN), "Conditions on which a sample is sent; all samples are sent by default"),
+    usual("scaling", SCALING, "\"none\"", "Scaling of both gains with the number of peers"),
+    usual("pull", Form::Words(const { &words(&PULLS) }), "\"mean\"", "Number of times that both gains count"),
     optional(
         "rotational-stiffness",
         vector(ROTATIONAL_STIFFNESS),
-        "Gain on turns between copies, K_R; none above the sum of the others; without it K_T times inertia over mass",
+        "Gain on angles between copies, K_R, about each axis at most the sum of the other two; K_T times inertia over mass by default",
     ),
     optional(
         "rotational-damping",
         vector(ROTATIONAL_DAMPING),
-        "Gain on the difference of angular velocities, B_R; without it B_T times inertia over mass",
+        "Gain on the difference of angular velocities, B_R; B_T times inertia over mass by default",
     ),
 ]])
 .and(|| &LAWS);
 static LAWS: LazyLock<Vec<Key>> = LazyLock::new(|| law_keys(false));
 static SEND_WHEN: Table = Table::of(&[&[
-    optional("velocity", Form::Probability, "The velocity differs from the one sent last by this part of its size, below 100%"),
-    optional("position", number(DISTANCE), "The copy is that far from where receivers hold it"),
-    optional("heartbeat", Form::PositiveDuration, "That much time has passed since the last sample"),
+    optional("velocity", Form::Probability, "Least relative change of the velocity since the last sample that was sent, below 100%"),
+    optional("position", number(DISTANCE), "Least distance of the copy from the position at which receivers hold it"),
+    optional("heartbeat", Form::PositiveDuration, "Longest time between two samples that are sent"),
 ]]);
 const STRATEGIES: Choices<Coordination, { Coordination::ALL.len() }> = {
     let mut choices = [("", Coordination::ALL[0], ""); Coordination::ALL.len()];
@@ -61,11 +61,11 @@ pub(super) const SCALINGS: Choices<Scaling, 2> =
 
 /// Keys of `coordination` in an entry of the timeline.
 pub(super) static CHANGES: Table = Table::of(&[&[
-    optional("stiffness", number(STIFFNESS), "Gain on the difference of positions; without it as it was"),
-    optional("damping", number(DAMPING), "Gain on the difference of velocities; without it as it was"),
-    optional("rotational-stiffness", vector(ROTATIONAL_STIFFNESS), "Gain on turns; without it as it was"),
-    optional("rotational-damping", vector(ROTATIONAL_DAMPING), "Gain on angular velocities; without it as it was"),
-    optional("send-when", Form::Table(&SEND_WHEN), "Which samples are sent; without it as it was"),
+    optional("stiffness", number(STIFFNESS), "Gain on the difference of positions; unchanged by default"),
+    optional("damping", number(DAMPING), "Gain on the difference of velocities; unchanged by default"),
+    optional("rotational-stiffness", vector(ROTATIONAL_STIFFNESS), "Gain on angles; unchanged by default"),
+    optional("rotational-damping", vector(ROTATIONAL_DAMPING), "Gain on the difference of angular velocities; unchanged by default"),
+    optional("send-when", Form::Table(&SEND_WHEN), "Conditions on which a sample is sent; unchanged by default"),
 ]])
 .and(|| &CHANGING_LAWS);
 static CHANGING_LAWS: LazyLock<Vec<Key>> = LazyLock::new(|| law_keys(true));
@@ -83,7 +83,7 @@ fn law_keys(changing: bool) -> Vec<Key> {
         let keys: Vec<Key> = law.parameters().iter().filter(|parameter| !changing || parameter.can_change).map(key_of).collect();
         // Declarations are `'static`. The two callers are `LazyLock`s, so that each `LazyLock` leaks its declarations once.
         let groups: &'static [&'static [Key]] = vec![&*keys.leak()].leak();
-        (!groups[0].is_empty()).then(|| optional(law.name(), Form::Table(Box::leak(Box::new(Table::of(groups)))), "Own parameters"))
+        (!groups[0].is_empty()).then(|| optional(law.name(), Form::Table(Box::leak(Box::new(Table::of(groups)))), "Parameters of this law"))
     };
     Coordination::ALL.iter().filter_map(table_of).collect()
 }

@@ -18,22 +18,18 @@ pub(super) static DEVICE: Table = Table::of(&[&[
     somewhere("mass", number(MASS), "Mass of the device"),
     usual("damping", number(DAMPING), "0", "Viscous damping of the device"),
     optional("inertia", vector(INERTIA), "Moments of inertia of a device with six degrees of freedom"),
-    usual("rotational-damping", vector(ROTATIONAL_DAMPING), "0", "Viscous damping of its turn"),
+    usual("rotational-damping", vector(ROTATIONAL_DAMPING), "0", "Viscous rotational damping of the device"),
 ]]);
 pub(super) static COUPLING: Table = Table::of(&[&[
     somewhere("stiffness", number(STIFFNESS), "Stiffness between device and copy, K_C"),
     usual("damping", number(DAMPING), "0", "Damping between device and copy, B_C"),
-    usual("scaling", SCALING, "\"none\"", "How all follow the number of peers"),
-    optional(
-        "rotational-stiffness",
-        number(ROTATIONAL_STIFFNESS),
-        "Stiffness between the turns of device and copy, K_CR; needed with device.inertia",
-    ),
-    usual("rotational-damping", number(ROTATIONAL_DAMPING), "0", "Damping between their turns, B_CR"),
+    usual("scaling", SCALING, "\"none\"", "Scaling of stiffness and damping with the number of peers"),
+    optional("rotational-stiffness", number(ROTATIONAL_STIFFNESS), "Rotational stiffness between device and copy, K_CR; needed with device.inertia"),
+    usual("rotational-damping", number(ROTATIONAL_DAMPING), "0", "Rotational damping between device and copy, B_CR"),
 ]]);
 pub(super) const CONTACT: Form = Form::AnyOf(&[Form::Words(&[("grasp", "held both ways"), ("none", "not touched")]), Form::Table(&PUSH)]);
 static PUSH: Table =
-    Table::of(&[&[required("push", DIRECTION, "A finger that can push in that direction and cannot pull").expecting("a direction such as \"+x\"")]]);
+    Table::of(&[&[required("push", DIRECTION, "Direction in which a finger pushes, which cannot pull").expecting("a direction such as \"+x\"")]]);
 const DIRECTION: Form = Form::Words(const { &words(&DIRECTIONS) });
 const DIRECTIONS: Choices<Direction, 6> = [
     ("+x", Direction { axis: 0, positive: true }, "to larger x"),
@@ -44,8 +40,8 @@ const DIRECTIONS: Choices<Direction, 6> = [
     ("-z", Direction { axis: 2, positive: false }, "to smaller z"),
 ];
 pub(super) static CLOCK: Table = Table::of(&[&[
-    usual("offset", Form::Duration, "\"0s\"", "By how much its first tick is late"),
-    usual("drift", DRIFT, "0", "How fast it runs: parts per million as text, or seconds gained in a second, at most 0.1 either way"),
+    usual("offset", Form::Duration, "\"0s\"", "Lateness of the peer's first tick"),
+    usual("drift", DRIFT, "0", "Gain of the peer's clock: parts per million as text, or seconds per second from -0.1 to 0.1"),
 ]]);
 const DRIFT: Form = Form::AnyOf(&[Form::Like(&["20ppm", "-20ppm"]), Form::Number(values::Quantity::any(""))]);
 
@@ -104,7 +100,7 @@ pub(super) fn read_clock(node: &Node, context: Context<'_>) -> Option<(Duration,
 
 /// Reads a drift: a number in seconds gained per second, or a text in parts per million.
 fn read_drift(node: &Node, context: Context<'_>) -> Option<Drift> {
-    const EXPECTED: &str = "a drift such as \"20ppm\" or \"-20ppm\", or a number, seconds gained in a second";
+    const EXPECTED: &str = "a drift such as \"20ppm\" or \"-20ppm\", or a number, seconds gained per second";
     let fraction = match &node.value {
         Value::Text(text) => {
             let fraction = parts_per_million(text);

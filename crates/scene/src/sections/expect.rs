@@ -22,42 +22,46 @@ use crate::sections::read_measure_name;
 
 pub(crate) static EXPECT: Table = Table::of(&[&[
     optional("stable", Form::Boolean, "Whether a small disturbance dies out"),
-    optional("discrepancy", Form::Table(&METRES), "The largest distance along an axis between two copies"),
-    optional("position", Form::List(&Form::Table(&POSITIONS)), "Where copies are at some time"),
-    optional("travel", Form::List(&Form::Table(&TRAVEL)), "When copies have first moved so far"),
-    optional("loss", Form::List(&Form::Table(&LOSS)), "Which fraction of what was offered was dropped"),
-    optional("delay", Form::List(&Form::Table(&DELAY)), "The mean delay of what was delivered"),
-    optional("measures", Form::List(&Form::Table(&MEASURE)), "The values of measures"),
-    optional("rotation-discrepancy", Form::Table(&RADIANS), "The largest angle between two copies"),
-    optional("orientation", Form::List(&Form::Table(&ORIENTATION)), "How copies are turned at some time"),
+    optional("discrepancy", Form::Table(&METRES), "Largest distance along an axis between two copies"),
+    optional("position", Form::List(&Form::Table(&POSITIONS)), "Positions of copies at given times"),
+    optional("travel", Form::List(&Form::Table(&TRAVEL)), "Times at which copies have first moved by a distance"),
+    optional("loss", Form::List(&Form::Table(&LOSS)), "Fraction of the offered packets that is dropped"),
+    optional("delay", Form::List(&Form::Table(&DELAY)), "Mean delay of the delivered packets"),
+    optional("measures", Form::List(&Form::Table(&MEASURE)), "Values of measures"),
+    optional("rotation-discrepancy", Form::Table(&RADIANS), "Largest angle between two copies"),
+    optional("orientation", Form::List(&Form::Table(&ORIENTATION)), "Orientations of copies at given times"),
 ]]);
 static RADIANS: Table = Table::of(&[&[optional("min", number(ANGLE_BOUND), "At least"), optional("max", number(ANGLE_BOUND), "At most")]]);
 static ORIENTATION: Table = Table::of(&[&[
     PEER,
     AT,
-    required("of", QUATERNION, "A quaternion w, x, y, z of any length").expecting("a quaternion, a list of four numbers w, x, y, z"),
-    required("max", number(ANGLE_BOUND), "The largest angle between the two"),
+    required("of", QUATERNION, "Expected orientation, as a quaternion w, x, y, z of any length")
+        .expecting("a quaternion, a list of four numbers w, x, y, z"),
+    required("max", number(ANGLE_BOUND), "Largest angle between both orientations"),
 ]]);
 static METRES: Table = Table::of(&[&METRE_BOUNDS]);
 const METRE_BOUNDS: [Key; 2] = [optional("min", number(POSITION), "At least"), optional("max", number(POSITION), "At most")];
 const TIME_BOUNDS: [Key; 2] = [optional("min", Form::Duration, "At least"), optional("max", Form::Duration, "At most")];
 const FRACTION_BOUNDS: [Key; 2] = [optional("min", Form::Probability, "At least"), optional("max", Form::Probability, "At most")];
-const PEER: Key = required("peer", Form::Text, "The name of a peer").expecting("the name of a peer");
-const AT: Key = required("at", Form::Duration, "When, from the beginning of the scene").expecting("a time such as \"1s\"");
-const ALONG: Key = usual("axis", AXIS, "\"x\"", "Along which axis");
+const PEER: Key = required("peer", Form::Text, "Name of the peer").expecting("the name of a peer");
+const AT: Key = required("at", Form::Duration, "Time since the beginning of the scene").expecting("a time such as \"1s\"");
+const ALONG: Key = usual("axis", AXIS, "\"x\"", "Axis of the motion");
 static POSITIONS: Table = Table::of(&[&[PEER, ALONG, AT], &METRE_BOUNDS]);
-static TRAVEL: Table = Table::of(&[&[PEER, ALONG, required("distance", number(DISTANCE), "How far from where it began")], &TIME_BOUNDS]);
+static TRAVEL: Table =
+    Table::of(&[&[PEER, ALONG, required("distance", number(DISTANCE), "Distance from the position at the beginning")], &TIME_BOUNDS]);
 const LINK: Key = usual(
     "link",
     Form::AnyOf(const { &[Form::Words(ALL_LINKS), Form::Table(&LINK_OR_LINE)] }),
     "\"all\"",
-    "Which link: all, one by its ends, or an access line",
+    "Link: all links, one by its ends, or an access line",
 );
-static LOSS: Table =
-    Table::of(&[&[LINK, optional("cause", Form::Words(const { &words(&CAUSES) }), "Dropped for this cause; without it for any")], &FRACTION_BOUNDS]);
+static LOSS: Table = Table::of(&[
+    &[LINK, optional("cause", Form::Words(const { &words(&CAUSES) }), "Cause of the drops that count; all causes by default")],
+    &FRACTION_BOUNDS,
+]);
 static DELAY: Table = Table::of(&[&[LINK], &TIME_BOUNDS]);
 static MEASURE: Table = Table::of(&[&[
-    required("name", MEASURE_NAME_FORM, "The name of the measure, which ends in its unit").expecting("the name of a measure such as \"energy_j\""),
+    required("name", MEASURE_NAME_FORM, "Name of the measure, which ends in its unit").expecting("the name of a measure such as \"energy_j\""),
     optional("min", Form::Number(Quantity::any("")), "At least"),
     optional("max", Form::Number(Quantity::any("")), "At most"),
 ]]);

@@ -15,17 +15,17 @@ use crate::quantities::{ADDED_MASS, ANGLE, DAMPING, FORCE, FREQUENCY, POSITION, 
 
 pub(super) const HAND: Form = Form::AnyOf(&[Form::Words(&[("none", "nothing; takes away what [peer] says")]), Form::Table(&HAND_TABLE)]);
 static HAND_TABLE: Table = Table::of(&[&[
-    optional("force", vector(FORCE), "A constant force"),
-    optional("sine", Form::Table(&FORCE_SINE), "A force that sways"),
-    optional("file", Form::File, "A recorded force: a CSV with the header t,fx (and fy, fz, then tx,ty,tz), in s, N and N·m"),
-    optional("arm", Form::Table(&ARM), "An arm that adds its mass to the device and holds it with a damper and a spring"),
-    optional("follows", Form::Table(&FOLLOWS), "Beside arm: the motion that it wants; without it to rest at 0"),
-    optional("torque", vector(TORQUE), "A constant torque on a device that turns, in world axes"),
+    optional("force", vector(FORCE), "Constant force of the hand"),
+    optional("sine", Form::Table(&FORCE_SINE), "Force of the hand that follows a sine"),
+    optional("file", Form::File, "CSV file of a recorded force with the header t,fx (and fy, fz, then tx,ty,tz), in s, N and N·m"),
+    optional("arm", Form::Table(&ARM), "Arm that adds its mass to the device and holds the device with a damper and a spring"),
+    optional("follows", Form::Table(&FOLLOWS), "Motion that the arm wants, with hand.arm; rest at 0 by default"),
+    optional("torque", vector(TORQUE), "Constant torque on a device that turns, in world axes"),
 ]]);
 static FORCE_SINE: Table = Table::of(&[
     &[required("amplitude", vector(FORCE), "Amplitude")],
     &SINE,
-    &[optional("torque", vector(TORQUE), "Amplitude of a torque that sways with it")],
+    &[optional("torque", vector(TORQUE), "Amplitude of a torque that follows the same sine")],
 ]);
 static MOTION_SINE: Table = Table::of(&[&[required("amplitude", vector(POSITION), "Amplitude")], &SINE]);
 const SINE: [Key; 2] = [
@@ -38,9 +38,9 @@ static ARM: Table = Table::of(&[&[
     required("stiffness", number(STIFFNESS), "Stiffness of the arm"),
 ]]);
 static FOLLOWS: Table = Table::of(&[&[
-    optional("position", vector(POSITION), "A constant position"),
-    optional("sine", Form::Table(&MOTION_SINE), "A position that sways"),
-    optional("file", Form::File, "A recorded motion: a CSV with the header t,x (and y, z, then tx,ty,tz), in s, m and N·m"),
+    optional("position", vector(POSITION), "Constant position that the arm wants"),
+    optional("sine", Form::Table(&MOTION_SINE), "Wanted position that follows a sine"),
+    optional("file", Form::File, "CSV file of a recorded motion with the header t,x (and y, z, then tx,ty,tz), in s, m and N·m"),
 ]]);
 
 const EXPECTED: &str = "\"none\", { force = … }, { sine = … }, { file = … } or { arm = …, follows = … }";

@@ -11,24 +11,20 @@ use super::MOST;
 use crate::model::Axes;
 
 pub(crate) static SCENE: Table = Table::of(&[&[
-    optional("title", Form::Text, "A line for people; without it the name of the file"),
-    required("duration", Form::PositiveDuration, "How long the scene lasts, above zero").expecting("a duration above zero such as \"7s\""),
+    optional("title", Form::Text, "Title for people; the name of the file by default"),
+    required("duration", Form::PositiveDuration, "Length of the scene, above zero").expecting("a duration above zero such as \"7s\""),
     usual("seed", Form::Integer(0, MOST), "0", "Seed of all random numbers"),
-    usual("axes", Form::Integer(1, 3), "1", "How many translational axes: x, then y, then z").expecting("a number of axes: 1, 2 or 3"),
+    usual("axes", Form::Integer(1, 3), "1", "Number of translational axes: x, then y, then z").expecting("a number of axes: 1, 2 or 3"),
     // Bounds the memory of a mistyped count: each peer takes about two kilobytes.
-    optional(
-        "count",
-        Form::Integer(2, 1_000_000),
-        "The number of equal peers, named peer1, peer2 and so on; entries [[peers]] may change some of them",
-    )
-    .expecting("a number of peers, {}"),
+    optional("count", Form::Integer(2, 1_000_000), "Number of equal peers, named peer1, peer2 and so on; entries [[peers]] may change some of them")
+        .expecting("a number of peers, {}"),
 ]]);
 
 pub(crate) static SIMULATION: Table = Table::of(&[&[
-    usual("integrator", Form::Words(const { &words(&INTEGRATORS) }), "\"exact\"", "How motion between ticks is computed"),
-    usual("substeps", Form::Integer(1, u32::MAX as u64), "1", "Steps a tick; not with exact").expecting(STEPS),
+    usual("integrator", Form::Words(const { &words(&INTEGRATORS) }), "\"exact\"", "Integration of the motion between two ticks"),
+    usual("substeps", Form::Integer(1, u32::MAX as u64), "1", "Steps of the integrator per tick; not with exact").expecting(STEPS),
     // Bounds the computing time of a tick.
-    usual("rotation-steps", Form::Integer(1, 10_000), "1", "Steps of a turn in a tick, times substeps").expecting(STEPS),
+    usual("rotation-steps", Form::Integer(1, 10_000), "1", "Steps of the rotation per substep").expecting(STEPS),
 ]]);
 const INTEGRATORS: Choices<Method, 3> = [
     ("exact", Method::Exact, "the exact solution"),

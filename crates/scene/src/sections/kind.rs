@@ -32,24 +32,29 @@ const KINDS: Choices<Word, 4> = [
 ];
 pub(super) const KIND: Form = Form::Words(const { &words(&KINDS) });
 pub(super) static SILENCE: Table = Table::of(&[&[
-    usual("after", Form::PositiveDuration, "\"100ms\"", "After how long a silence the pull fades"),
-    usual("fade", Form::PositiveDuration, "\"250ms\"", "How long that takes"),
+    usual("after", Form::PositiveDuration, "\"100ms\"", "Length of the silence after which the pull fades"),
+    usual("fade", Form::PositiveDuration, "\"250ms\"", "Time in which the pull fades"),
 ]]);
 /// Keys of a pointer. With the defaults the device of a Falcon follows nearly without overshoot, and the largest force is no greater than the force of an
 /// adult's wrist.
 pub(super) static POINTER: Table = Table::of(&[&[
     usual("stiffness", number(STIFFNESS), "400", "Stiffness of the arm between pointer and device"),
-    usual("damping", number(DAMPING), "20", "Its damping"),
-    usual("force-limit", number(POSITIVE_FORCE), "20", "The arm pulls with no greater force"),
+    usual("damping", number(DAMPING), "20", "Damping of the arm between pointer and device"),
+    usual("force-limit", number(POSITIVE_FORCE), "20", "Largest force with which the arm pulls"),
     usual("held", Form::Boolean, "false", "Whether the pointer holds the device from the beginning"),
 ]]);
 /// Keys of a Falcon. With 10,000 counts per newton metre, full scale is about the force in the maker's description. The limit of 4 N is half of the reported
 /// force of the device. The origin is the middle of the workspace.
 pub(super) static FALCON: Table = Table::of(&[&[
-    usual("device", Form::Like(&["first", "simulated"]), "\"first\"", "The first that no other peer has, one that is simulated, or a serial number"),
-    usual("counts-per-newton-metre", number(POSITIVE_COUNTS), "10000", "Motor counts for a torque at the joint of an arm"),
-    usual("force-limit", number(POSITIVE_FORCE), "4", "No greater force is sent to the motors"),
-    usual("origin", Form::Triple(POSITION), "[0, 0, 0.125]", "The place in the device's coordinates that is the origin of the scene"),
+    usual(
+        "device",
+        Form::Like(&["first", "simulated"]),
+        "\"first\"",
+        "Device: the first that no other peer has, a simulated one, or the one with a serial number",
+    ),
+    usual("counts-per-newton-metre", number(POSITIVE_COUNTS), "10000", "Motor counts per torque at the joint of an arm"),
+    usual("force-limit", number(POSITIVE_FORCE), "4", "Largest force that is sent to the motors"),
+    usual("origin", Form::Triple(POSITION), "[0, 0, 0.125]", "Origin of the scene in the coordinates of the device"),
 ]]);
 
 impl Default for Silence {

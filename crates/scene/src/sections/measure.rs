@@ -12,18 +12,18 @@ use crate::model::{Axes, Change, ChangeKind, MeasureSettings, MeasureSpec, Measu
 use crate::quantities::DISTANCE;
 
 pub(crate) static MEASURE: Table = Table::of(&[&[
-    usual("names", Form::AnyOf(const { &[Form::Words(&[("all", "every measure")]), Form::List(&MEASURE_NAME)] }), "\"all\"", "Which measures"),
-    optional("travel", Form::Table(&TRAVEL), "What travel_s is about"),
-    usual("band", number(DISTANCE), "0.001", "Above this discrepancy the copies are not settled, for settling_s"),
-    optional("probe", Form::Table(&PROBE), "Whose hand meets the impedance of viscosity_n_s_m and effective_mass_kg, which have no value without it"),
+    usual("names", Form::AnyOf(const { &[Form::Words(&[("all", "every measure")]), Form::List(&MEASURE_NAME)] }), "\"all\"", "Names of the measures"),
+    optional("travel", Form::Table(&TRAVEL), "Travel of which travel_s is the time"),
+    usual("band", number(DISTANCE), "0.001", "Largest discrepancy of settled copies, for settling_s"),
+    optional("probe", Form::Table(&PROBE), "Peer whose hand feels viscosity_n_s_m and effective_mass_kg, which have no value without this key"),
 ]]);
 static TRAVEL: Table = Table::of(&[&[
-    optional("peer", Form::Text, "The name of the peer whose copy is meant; without it the first"),
-    usual("distance", number(DISTANCE), "0.02", "How far from where it began"),
-    usual("axis", AXIS, "\"x\"", "Along which axis"),
+    optional("peer", Form::Text, "Name of the peer whose copy travels; the first peer by default"),
+    usual("distance", number(DISTANCE), "0.02", "Distance from the position at the beginning"),
+    usual("axis", AXIS, "\"x\"", "Axis of the motion"),
 ]]);
 static PROBE: Table = Table::of(&[&[
-    required("peer", Form::Text, "The name of a peer whose hand is a sine from the beginning to the end").expecting("the name of a peer")
+    required("peer", Form::Text, "Name of a peer whose hand is a sine from the beginning to the end").expecting("the name of a peer")
 ]]);
 /// Words for the measures of the run as a whole, and an example for the measures of a peer.
 pub(super) const MEASURE_NAME_FORM: Form = Form::AnyOf(&[Form::Words(&MEASURES), Form::Like(&["peers.left.energy_j"])]);

@@ -14,26 +14,22 @@ use crate::quantities::{DAMPING, INERTIA, MASS, POSITION, RATE, ROTATIONAL_DAMPI
 pub(crate) static OBJECT: Table = Table::of(&[&[
     required("mass", number(MASS), "Mass of the whole object"),
     usual("damping", number(DAMPING), "0", "Viscous damping of each copy"),
-    usual("split-mass", Form::Boolean, "true", "Whether each of N copies has the mass divided by N, or all of it"),
-    usual("position", vector(POSITION), "0", "Where copies and devices begin"),
-    usual("velocity", vector(VELOCITY), "0", "With which velocity copies and devices begin"),
+    usual("split-mass", Form::Boolean, "true", "Whether each of the N copies has the mass divided by N; if false, each copy has the whole mass"),
+    usual("position", vector(POSITION), "0", "Position of copies and devices at the beginning"),
+    usual("velocity", vector(VELOCITY), "0", "Velocity of copies and devices at the beginning"),
     optional("enclosure", Form::Table(&ENCLOSURE), "Walls that limit the travel of every copy"),
     optional(
         "inertia",
         vector(INERTIA),
-        "Principal moments of inertia of the whole object, which turns then; none above the sum of the others; needs three axes",
+        "Principal moments of inertia of the whole object, each at most the sum of the other two. An object with this key turns, which needs three axes",
     ),
-    optional(
-        "rotational-damping",
-        vector(ROTATIONAL_DAMPING),
-        "Viscous damping of the turn of each copy; without it damping times inertia over mass",
-    ),
-    usual("orientation", QUATERNION, "[1, 0, 0, 0]", "Quaternion w, x, y, z of any length with which copies and devices begin"),
-    usual("angular-velocity", vector(RATE), "0", "Angular velocity in their own axes with which they begin"),
+    optional("rotational-damping", vector(ROTATIONAL_DAMPING), "Viscous rotational damping of each copy; damping times inertia over mass by default"),
+    usual("orientation", QUATERNION, "[1, 0, 0, 0]", "Orientation of copies and devices at the beginning, as a quaternion w, x, y, z of any length"),
+    usual("angular-velocity", vector(RATE), "0", "Angular velocity of copies and devices at the beginning, in their own axes"),
 ]]);
 static ENCLOSURE: Table = Table::of(&[&[
-    required("min", vector(POSITION), "The lower end on each axis").expecting(ENDS),
-    required("max", vector(POSITION), "The upper end on each axis").expecting(ENDS),
+    required("min", vector(POSITION), "Position of the lower wall on each axis").expecting(ENDS),
+    required("max", vector(POSITION), "Position of the upper wall on each axis").expecting(ENDS),
     required("stiffness", number(WALL_STIFFNESS), "Stiffness of the walls"),
     required("damping", number(DAMPING), "Damping of the walls"),
 ]]);

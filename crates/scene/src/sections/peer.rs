@@ -22,28 +22,29 @@ use crate::quantities::{POSITION, RATE, Spread, VELOCITY, maybe_vector_of};
 pub(crate) static PEER: Table = Table::of(&[&KEYS, &ACCESS]);
 /// Keys of an entry `[[peers]]`.
 pub(crate) static PEERS: Table =
-    Table::over(&[&[required("name", Form::Text, "Its name: unique, not all, without space and without . > / , and quotes")], &KEYS, &ACCESS]);
+    Table::over(&[&[required("name", Form::Text, "Name of the peer: unique, not all, without space and without . > / , and quotes")], &KEYS, &ACCESS]);
 const KEYS: [Key; 19] = [
-    somewhere("device", Form::Table(&DEVICE), "The haptic device"),
+    somewhere("device", Form::Table(&DEVICE), "Haptic device of the peer"),
     somewhere("coupling", Form::Table(&COUPLING), "Spring and damper between device and copy; not needed where contact is none"),
-    usual("contact", CONTACT, "\"grasp\"", "How the device touches the object"),
-    usual("hand", HAND, "\"none\"", "What the user does: a constant force, a sine, a recorded file, or an arm that follows a motion"),
+    usual("contact", CONTACT, "\"grasp\"", "Contact between the device and the object"),
+    usual("hand", HAND, "\"none\"", "Action of the user: a constant force, a sine, a recorded file, or an arm that follows a motion"),
     usual("tick", Form::PositiveDuration, "\"1ms\"", "Period of the control loop"),
-    usual("compute-delay", Form::Integer(0, 1), "0", "Ticks from computing a force to applying it").expecting("a number of ticks, 0 or 1"),
-    usual("phase", Form::Integer(0, MOST), "0", "At which tick the first sample is sent, below coordination.update / tick")
+    usual("compute-delay", Form::Integer(0, 1), "0", "Ticks between the computation of a force and its application")
+        .expecting("a number of ticks, 0 or 1"),
+    usual("phase", Form::Integer(0, MOST), "0", "Number of the tick at which the first sample is sent, below coordination.update / tick")
         .expecting("a number of ticks, an integer from 0 to below coordination.update / tick"),
-    optional("clock", Form::Table(&CLOCK), "How the peer's clock differs"),
-    optional("position", vector(POSITION), "Where its copy and device begin; without it where the object does"),
-    optional("velocity", vector(VELOCITY), "With which velocity they begin; without it that of the object"),
-    optional("device-position", vector(POSITION), "Where its device begins, if not with its copy"),
-    optional("device-velocity", vector(VELOCITY), "With which velocity its device begins, if not with that of its copy"),
-    usual("grasp", vector(POSITION), "0", "Where the device grasps an object that turns, from its centre in its own axes"),
-    optional("orientation", QUATERNION, "As of the object"),
-    optional("angular-velocity", vector(RATE), "As of the object"),
-    usual("kind", KIND, "\"simulated\"", "Where the peer lives in a live session"),
-    optional("silence", Form::Table(&SILENCE), "When the pull of a peer that lives elsewhere fades"),
-    optional("falcon", Form::Table(&FALCON), "Which device a peer of kind falcon has, and how its numbers are meant"),
-    optional("pointer", Form::Table(&POINTER), "The arm through which a pointer pulls the device of a peer of kind pointer"),
+    optional("clock", Form::Table(&CLOCK), "Difference between the peer's clock and the time of the scene"),
+    optional("position", vector(POSITION), "Position of the peer's copy and device at the beginning; that of the object by default"),
+    optional("velocity", vector(VELOCITY), "Velocity of the peer's copy and device at the beginning; that of the object by default"),
+    optional("device-position", vector(POSITION), "Position of the peer's device at the beginning; that of its copy by default"),
+    optional("device-velocity", vector(VELOCITY), "Velocity of the peer's device at the beginning; that of its copy by default"),
+    usual("grasp", vector(POSITION), "0", "Point at which the device grasps an object that turns, from the centre of the object in its own axes"),
+    optional("orientation", QUATERNION, "As the key of [object], for this peer"),
+    optional("angular-velocity", vector(RATE), "As the key of [object], for this peer"),
+    usual("kind", KIND, "\"simulated\"", "Place of the peer in a live session"),
+    optional("silence", Form::Table(&SILENCE), "Fading of the pull of a silent peer in another program"),
+    optional("falcon", Form::Table(&FALCON), "Device of a peer of kind falcon, and the meaning of its numbers"),
+    optional("pointer", Form::Table(&POINTER), "Arm through which a pointer pulls the device of a peer of kind pointer"),
 ];
 
 /// Returns the keys with tables. These tables are laid over each other key by key. Every other key replaces the key below as a whole.

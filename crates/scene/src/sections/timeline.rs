@@ -19,17 +19,17 @@ use crate::context::SceneContext;
 use crate::model::{Change, ChangeKind, CoordinationSpec, PeerSpec};
 
 pub(crate) static TIMELINE: Table = Table::of(&[&[
-    required("at", Form::Duration, "When, from the beginning of the scene").expecting("a time such as \"3s\""),
-    optional("link", LINKS_BETWEEN, "Which links change: all, or one by its ends"),
-    optional("peer", Form::Text, "The name of the peer that changes"),
-    optional("set", Form::Table(&SET), "The keys that change: of the link, or contact and hand of the peer"),
-    optional("coordination", Form::Table(&CHANGES), "In place of link or peer, and without set: what changes at every peer"),
+    required("at", Form::Duration, "Time since the beginning of the scene").expecting("a time such as \"3s\""),
+    optional("link", LINKS_BETWEEN, "Links that change: all, or one by its ends"),
+    optional("peer", Form::Text, "Name of the peer that changes"),
+    optional("set", Form::Table(&SET), "Keys that change: those of the link, or contact and hand of the peer"),
+    optional("coordination", Form::Table(&CHANGES), "Keys that change at every peer, in place of link or peer, and without set"),
 ]]);
 /// Keys under `set`, of a link or of a peer. The key `link` or `peer` beside `set` tells which of the two.
 static SET: Table = Table::over(&joined::<17>(&[LINK.as_slice(), &[&OF_PEER]]));
 static SET_OF_PEER: Table = Table::over(&[&OF_PEER]);
 const OF_PEER: [Key; 2] =
-    [optional("contact", CONTACT, "Of a peer: how the device touches the object"), optional("hand", HAND, "Of a peer: what the user does")];
+    [optional("contact", CONTACT, "Contact between the device of the peer and the object"), optional("hand", HAND, "Action of the user of the peer")];
 
 /// An entry read alone, before the entries are sorted by time. The effect of an entry depends on the entries before.
 #[derive(Debug)]

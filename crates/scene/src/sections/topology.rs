@@ -19,12 +19,12 @@ enum Kind {
 }
 
 pub(crate) static TOPOLOGY: Table = Table::of(&[&[
-    usual("kind", Form::Words(const { &words(&KINDS) }), "\"full\"", "The neighbours of a peer"),
-    optional("neighbours", Form::Integer(2, u16::MAX as u64), "Of a ring: how many, an even number; without it 2")
+    usual("kind", Form::Words(const { &words(&KINDS) }), "\"full\"", "Neighbours of a peer"),
+    optional("neighbours", Form::Integer(2, u16::MAX as u64), "Number of neighbours in a ring, even; 2 by default")
         .expecting("how many peers each hears, an even number from 2 to 65534"),
-    optional("hub", Form::Text, "Of a star: the name of a peer; without it the first"),
-    optional("role", Form::Words(const { &words(&ROLES) }), "Of the hub; without it peer"),
-    optional("file", Form::File, "Of a graph: mutual weights, a row a peer"),
+    optional("hub", Form::Text, "Name of the hub of a star; the first peer by default"),
+    optional("role", Form::Words(const { &words(&ROLES) }), "Role of the hub; peer by default"),
+    optional("file", Form::File, "File of the mutual weights of a graph, one row per peer"),
 ]]);
 const KINDS: Choices<Kind, 4> = [
     ("full", Kind::Full, "all others"),

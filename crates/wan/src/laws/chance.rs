@@ -127,8 +127,8 @@ pub(crate) const CHANCE: Form = Form::AnyOf(&[Form::Probability, Form::Table(&CH
 static CHANCE_TABLE: Table = Table::of(&[&CHANCES]);
 /// Keys of a chance, for tables with further keys.
 pub(crate) const CHANCES: [Key; 2] = [
-    optional("probability", Form::Probability, "The fraction of packets that it happens to"),
-    usual("correlation", number(CORRELATION), "0", "Correlation of what happens to a packet with what happened to the one before"),
+    optional("probability", Form::Probability, "Fraction of the packets that this happens to"),
+    usual("correlation", number(CORRELATION), "0", "Correlation of this event between successive packets"),
 ];
 
 impl Chance {

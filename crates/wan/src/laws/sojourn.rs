@@ -65,14 +65,14 @@ impl Sojourn {
 /// Form of a sojourn time.
 pub(crate) const SOJOURN: Form = Form::AnyOf(&[Form::Duration, Form::Table(&SOJOURN_TABLE)]);
 static SOJOURN_TABLE: Table = Table::of(&[&[
-    optional("exponential", Form::Duration, "By chance without memory, with this mean; a plain duration means the same"),
-    optional("fixed", Form::Duration, "Always so long"),
-    optional("uniform", Form::Pair(&Form::Duration), "The shortest and the longest span, and all between as likely"),
-    optional("erlang", Form::Table(&ERLANG), "The sum of several exponential stages"),
+    optional("exponential", Form::Duration, "Mean of an exponential law; a plain duration means the same"),
+    optional("fixed", Form::Duration, "Constant time"),
+    optional("uniform", Form::Pair(&Form::Duration), "Shortest and longest time of a uniform law"),
+    optional("erlang", Form::Table(&ERLANG), "Erlang law: the sum of several exponential stages"),
 ]]);
 static ERLANG: Table = Table::of(&[&[
-    required("mean", Form::Duration, "The mean of all stages together").expecting("the mean of all stages together, a duration"),
-    required("stages", Form::Integer(1, 1000), "How many stages").expecting("a number of stages from 1 to 1000"),
+    required("mean", Form::Duration, "Mean of all stages together").expecting("the mean of all stages together, a duration"),
+    required("stages", Form::Integer(1, 1000), "Number of stages").expecting("a number of stages from 1 to 1000"),
 ]]);
 
 impl Sojourn {

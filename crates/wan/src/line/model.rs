@@ -176,23 +176,18 @@ impl LinkModel {
 
 /// Parameters that choose the kind of a link. A modulator cannot change these parameters between its states.
 pub const LINK_KIND_PARAMETERS: [Key; 4] = [
-    usual(
-        "modulated",
-        Form::AnyOf(const { &[Form::Table(&MODULATED), NONE] }),
-        "\"none\"",
-        "Keys that hold while a modulator is in one of its states",
-    ),
+    usual("modulated", Form::AnyOf(const { &[Form::Table(&MODULATED), NONE] }), "\"none\"", "Keys for the states of a modulator"),
     usual(
         "replay",
         Form::File,
         "\"none\"",
-        "A log of fates: the n-th packet meets the fate of the n-th of the log. Takes away all other keys; \"none\" takes it away",
+        "Log of fates: the n-th packet meets the fate of the n-th packet of the log. Takes away all other keys; \"none\" takes it away",
     ),
-    usual("netem", NETEM, "\"none\"", "The link in the words of tc-netem. Takes away all other keys; \"none\" takes it away"),
-    usual("netem-profile", Form::Words(&PROFILES), "\"exact\"", "The meaning of the words of netem"),
+    usual("netem", NETEM, "\"none\"", "Link in the words of tc-netem. Takes away all other keys; \"none\" takes it away"),
+    usual("netem-profile", Form::Words(&PROFILES), "\"exact\"", "Meaning of the words of netem"),
 ];
 static MODULATED: Table = Table::with_others(
-    &[&[required("by", Form::Text, "The name of a modulator; beside it keys of the link under the names of its states")]],
+    &[&[required("by", Form::Text, "Name of a modulator; further keys of this table are its states, each with keys of the link")]],
     &Form::Table(&STATE),
 );
 /// Keys of a link in one state of a modulator.

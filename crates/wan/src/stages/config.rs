@@ -160,10 +160,14 @@ impl LinkConfig {
 }
 
 /// Parameter of the largest packet.
-const MTU: [Key; 1] = [usual("mtu", Form::AnyOf(&[Form::Size, UNLIMITED]), "\"unlimited\"", "Larger packets are dropped")];
+const MTU: [Key; 1] = [usual("mtu", Form::AnyOf(&[Form::Size, UNLIMITED]), "\"unlimited\"", "Size above which packets are dropped")];
 /// Parameter of the number of packets inside the link.
-const LIMIT: [Key; 1] =
-    [usual("limit", Form::Like(&["1000 packets", "unlimited"]), "\"unlimited\"", "How many packets may be inside, waiting and propagating together")];
+const LIMIT: [Key; 1] = [usual(
+    "limit",
+    Form::Like(&["1000 packets", "unlimited"]),
+    "\"unlimited\"",
+    "Largest number of packets in the link, waiting and propagating together",
+)];
 
 /// Parameters of a link, grouped by stage, in the order of `explain`.
 pub const LINK_PARAMETERS: [&[Key]; 14] = [

@@ -158,11 +158,15 @@ const CORRUPT: Form = Form::AnyOf(&[Form::Probability, Form::Table(&CORRUPT_TABL
 static CORRUPT_TABLE: Table = Table::of(&[
     &CHANCES,
     &[
-        usual("bits", Form::Integer(1, MOST_OF_32_BITS), "1", "How many different bits of such a packet are flipped")
+        usual("bits", Form::Integer(1, MOST_OF_32_BITS), "1", "Number of different bits that are flipped in such a packet")
             .expecting("a number of bits of at least 1"),
-        optional("bit-error-rate", Form::Probability, "In place of probability and bits: each bit by itself"),
-        optional("bytes", Form::Like(&["8-15"]), "The first and the last byte that may be hit, counted from 0"),
-        usual("checksum", Form::Words(&CHECKSUMS), "\"discards\"", "What the receiver does with a damaged packet"),
+        optional(
+            "bit-error-rate",
+            Form::Probability,
+            "Probability that a bit is flipped, for each bit independently, in place of probability and bits",
+        ),
+        optional("bytes", Form::Like(&["8-15"]), "First and last byte that may be hit, counted from 0"),
+        usual("checksum", Form::Words(&CHECKSUMS), "\"discards\"", "Treatment of a damaged packet by the receiver"),
     ],
 ]);
 const CHECKSUMS: [(&str, &str); 2] = words(&Checksum::CHOICES);

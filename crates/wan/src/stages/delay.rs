@@ -441,11 +441,11 @@ pub(crate) const KEYS: [Key; 2] = [
 ];
 pub(crate) const JITTER: Form = Form::AnyOf(&[Form::Duration, Form::Table(&JITTER_TABLE)]);
 static JITTER_TABLE: Table = Table::of(&[&[
-    optional("sd", Form::Duration, "Standard deviation. Must be given, but for measured delays: theirs then"),
-    usual("distribution", Form::AnyOf(const { &[Form::Words(&LAWS), Form::Table(&LAW_FILE)] }), "\"normal\"", "The law of the delay"),
-    usual("floor", Form::Duration, "\"0s\"", "No packet is faster"),
-    usual("correlation", number(CORRELATION), "0", "Correlation of a packet's delay with that of the one before"),
-    optional("correlation-time", Form::PositiveDuration, "In place of correlation: the time over which delays forget, whatever is sent"),
+    optional("sd", Form::Duration, "Standard deviation of the delay. Required, except for measured delays, whose own deviation is the default"),
+    usual("distribution", Form::AnyOf(const { &[Form::Words(&LAWS), Form::Table(&LAW_FILE)] }), "\"normal\"", "Law of the delay"),
+    usual("floor", Form::Duration, "\"0s\"", "Smallest delay of a packet"),
+    usual("correlation", number(CORRELATION), "0", "Correlation between the delays of successive packets"),
+    optional("correlation-time", Form::PositiveDuration, "Time constant of the memory of delays, in place of correlation"),
 ]]);
 const LAWS: [(&str, &str); 8] = words(&Distribution::CHOICES);
 
@@ -463,8 +463,8 @@ impl Distribution {
     ];
 }
 static LAW_FILE: Table = Table::of(&[&[
-    optional("table", Form::File, "A .dist table as tc reads it"),
-    optional("empirical", Form::File, "A CSV file of measured delays with the header delay, in seconds"),
+    optional("table", Form::File, "Table of a law, a .dist file as tc reads it"),
+    optional("empirical", Form::File, "CSV file of measured delays with the header delay, in seconds"),
 ]]);
 
 impl Delay {

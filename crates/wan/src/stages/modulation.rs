@@ -305,17 +305,17 @@ impl ModulationStage {
 
 /// Parameters of a modulator.
 pub static MODULATOR: Table = Table::of(&[&[
-    required("name", Form::Text, "What links call it, without space or dot").expecting("a name that links refer to"),
-    required("states", Form::List(&Form::Table(&MODULATOR_STATE)), "Its states; the first is the one in the beginning")
+    required("name", Form::Text, "Name of the modulator, without space or dot").expecting("a name that links refer to"),
+    required("states", Form::List(&Form::Table(&MODULATOR_STATE)), "States; the modulator begins in the first")
         .expecting("a list such as [{ name = \"good\", sojourn = \"2s\" }, { name = \"bad\", sojourn = \"1s\" }]"),
 ]]);
 static MODULATOR_STATE: Table = Table::of(&[&[
-    required("name", Form::Text, "The name of the state, without space or dot, and not by").expecting("the name of the state"),
-    optional("sojourn", SOJOURN, "How long it lasts; without it for ever"),
+    required("name", Form::Text, "Name of the state, without space or dot, and not by").expecting("the name of the state"),
+    optional("sojourn", SOJOURN, "Length of a stay in the state; endless by default"),
     optional(
         "next",
         Form::AnyOf(const { &[Form::Text, Form::Table(&WEIGHTS)] }),
-        "Which state follows: a name, or names with weights; without it each other one alike",
+        "Next state: a name, or names with weights; each other state is equally likely by default",
     ),
 ]]);
 static WEIGHTS: Table = Table::with_others(&[], &number(WEIGHT));

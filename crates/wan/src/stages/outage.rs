@@ -242,23 +242,24 @@ fn drawn(law: Sojourn, draws: Stream, span: u64) -> Duration {
 }
 
 /// Parameter of outages.
-pub(crate) const KEYS: [Key; 1] = [usual("outage", OUTAGE, "[]", "When the link is down: a list of spans, or a table")];
+pub(crate) const KEYS: [Key; 1] = [usual("outage", OUTAGE, "[]", "Times at which the link is down: a list of spans, or a table")];
 /// Parameters of a span of time.
 pub(crate) static SPAN: Table = Table::of(&[&[
-    required("from", Form::Duration, "When it begins, from the beginning of the scene").expecting("a time such as \"1s\""),
-    required("to", Form::Duration, "When it ends, from the beginning of the scene").expecting("a time such as \"2s\""),
+    required("from", Form::Duration, "Beginning of the span, since the beginning of the scene").expecting("a time such as \"1s\""),
+    required("to", Form::Duration, "End of the span, since the beginning of the scene").expecting("a time such as \"2s\""),
 ]]);
 const OUTAGE: Form = Form::AnyOf(&[Form::List(&Form::Table(&SPAN)), Form::Table(&OUTAGE_TABLE)]);
 static OUTAGE_TABLE: Table = Table::of(&[&[
     usual("scheduled", Form::List(&Form::Table(&SPAN)), "[]", "Spans in order, none within another"),
-    optional("random", Form::Table(&RANDOM_OUTAGE), "By chance, beginning up"),
-    optional("idle", Form::Table(&IDLE_OUTAGE), "When nothing was sent for some time"),
+    optional("random", Form::Table(&RANDOM_OUTAGE), "Random outages; the link is up at first"),
+    optional("idle", Form::Table(&IDLE_OUTAGE), "Outages after a time in which no packet was sent"),
 ]]);
 static RANDOM_OUTAGE: Table =
-    Table::of(&[&[required("up", SOJOURN, "How long the link is up"), required("down", SOJOURN, "How long the link is down")]]);
+    Table::of(&[&[required("up", SOJOURN, "Time for which the link is up"), required("down", SOJOURN, "Time for which the link is down")]]);
 static IDLE_OUTAGE: Table = Table::of(&[&[
-    required("after", Form::PositiveDuration, "For how long nothing was sent").expecting("how long nothing must be sent, a duration such as \"10s\""),
-    required("down", Form::PositiveDuration, "For how long the link is down then")
+    required("after", Form::PositiveDuration, "Time without a packet after which the link goes down")
+        .expecting("how long nothing must be sent, a duration such as \"10s\""),
+    required("down", Form::PositiveDuration, "Time for which the link is then down")
         .expecting("how long the link is down then, a duration such as \"2s\""),
 ]]);
 

@@ -183,7 +183,7 @@ pub(crate) const KEYS: [Key; 1] = [usual(
     "trace",
     Form::AnyOf(const { &[Form::File, Form::Table(&TRACE)] }),
     "\"none\"",
-    "A recorded line or path, from a file; \"none\" takes it away",
+    "File of a recorded line or path; \"none\" takes it away",
 )];
 static TRACE: Table = Table::of(&[&[
     required(
@@ -191,10 +191,10 @@ static TRACE: Table = Table::of(&[&[
         Form::File,
         "Instants of delivery in milliseconds, one a line (mahimahi), or a CSV with t,delay or t,delay,loss in seconds, or what fit reads",
     ),
-    usual("bytes", Form::Size, "\"1504B\"", "What leaves at each instant of delivery"),
-    usual("between", Form::Words(&BETWEEN), "\"steps\"", "What holds between two rows of a recorded path"),
+    usual("bytes", Form::Size, "\"1504B\"", "Bytes that leave at each instant of delivery"),
+    usual("between", Form::Words(&BETWEEN), "\"steps\"", "Delay between two rows of a recorded path"),
     usual("repeat", Form::Boolean, "false", "Whether a recorded path begins anew after its end"),
-    usual("start", Form::Words(&START), "\"zero\"", "What times of a recorded path count from"),
+    usual("start", Form::Words(&START), "\"zero\"", "Origin of the times of a recorded path"),
 ]]);
 const START: [(&str, &str); 2] = [("zero", "the start of the run"), ("first", "the first row, as for times since 1970")];
 const BETWEEN: [(&str, &str); 2] = words(&Between::CHOICES);

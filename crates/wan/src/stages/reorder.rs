@@ -174,12 +174,12 @@ const REORDER: Form = Form::AnyOf(&[Form::Probability, Form::Table(&REORDER_TABL
 static REORDER_TABLE: Table = Table::of(&[
     &CHANCES,
     &[
-        usual("gap", Form::Integer(1, MOST_OF_32_BITS), "1", "Such a packet jumps ahead, at most one in this number of packets")
+        usual("gap", Form::Integer(1, MOST_OF_32_BITS), "1", "Number of packets of which at most one jumps ahead")
             .expecting("a number of packets of at least 1"),
-        optional("behind", Form::Integer(1, MOST_OF_32_BITS), "Such a packet is held until this number of others has passed it; needs at-most")
+        optional("behind", Form::Integer(1, MOST_OF_32_BITS), "Number of packets that pass such a packet before it goes on; needs at-most")
             .expecting("a number of packets of at least 1"),
-        optional("at-most", Form::Duration, "How long a packet is held behind others at most"),
-        optional("later", Form::Duration, "Such a packet takes this much longer"),
+        optional("at-most", Form::Duration, "Longest time for which a packet is held behind others"),
+        optional("later", Form::Duration, "Additional delay of such a packet"),
     ],
 ]);
 

@@ -191,20 +191,15 @@ impl<T> SlotStage<T> {
 }
 
 /// Parameter of slots.
-pub(crate) const KEYS: [Key; 1] = [usual(
-    "slots",
-    Form::AnyOf(const { &[Form::Table(&SLOTS), NONE] }),
-    "\"none\"",
-    "The line sends only now and then, all that has gathered or a part of it",
-)];
+pub(crate) const KEYS: [Key; 1] =
+    [usual("slots", Form::AnyOf(const { &[Form::Table(&SLOTS), NONE] }), "\"none\"", "Slots in which the line sends; between them packets gather")];
 static SLOTS: Table = Table::of(&[&[
-    optional("min", Form::Duration, "The shortest time from slot to slot")
-        .expecting("the shortest time from slot to slot, a duration such as \"10ms\""),
-    optional("max", Form::Duration, "The longest time from slot to slot; without it min"),
-    optional("delay", Form::Duration, "In place of min and max: the mean time from slot to slot"),
-    optional("jitter", JITTER, "Beside delay: how the time from slot to slot varies"),
-    optional("packets", Form::Integer(1, MOST), "How many packets leave in a slot at most").expecting("a number of packets of at least 1"),
-    optional("bytes", Form::Size, "How many bytes leave in a slot at most"),
+    optional("min", Form::Duration, "Shortest time from slot to slot").expecting("the shortest time from slot to slot, a duration such as \"10ms\""),
+    optional("max", Form::Duration, "Longest time from slot to slot; min by default"),
+    optional("delay", Form::Duration, "Mean time from slot to slot, in place of min and max"),
+    optional("jitter", JITTER, "Variation of the time from slot to slot, with delay"),
+    optional("packets", Form::Integer(1, MOST), "Largest number of packets that leave in a slot").expecting("a number of packets of at least 1"),
+    optional("bytes", Form::Size, "Largest number of bytes that leave in a slot"),
 ]]);
 
 impl Slots {

@@ -35,9 +35,9 @@ pub(crate) struct Spike {
 const MOST: f64 = 1e6;
 
 static PARAMETERS: Table = Table::of(&[&[
-    required("rate", number(Quantity::not_negative("1/s")), "How many spikes begin in a second on average, at most 1000000"),
-    required("height", Form::Duration, "By how much packets are later when a spike begins"),
-    required("decay", Form::Duration, "The time in which a spike falls to 1/e of its height"),
+    required("rate", number(Quantity::not_negative("1/s")), "Mean number of spikes per second, at most 1000000"),
+    required("height", Form::Duration, "Additional delay at the beginning of a spike"),
+    required("decay", Form::Duration, "Time in which a spike falls to 1/e of its height"),
 ]]);
 
 impl Impairment for Spike {
@@ -47,7 +47,7 @@ impl Impairment for Spike {
         "spike",
         Form::AnyOf(const { &[Form::Table(&PARAMETERS), NONE] }),
         "\"none\"",
-        "Now and then packets are late by a delay that decays, as at a handover",
+        "Additional delays that begin at random and decay, as at a handover",
     );
 
     fn of(values: &Values) -> Result<Self, Refusal> {
@@ -55,7 +55,7 @@ impl Impairment for Spike {
         let refuse = |key, message: String| Err(Refusal { key, message });
         // A range contains no NaN, so NaN is refused as well.
         if !(0.0..=MOST).contains(&rate) {
-            return refuse("rate", format!("{rate} is out of range: expected at most {MOST} spikes a second"));
+            return refuse("rate", format!("{rate} is out of range: expected at most {MOST} spikes per second"));
         }
         if decay.is_zero() {
             return refuse("decay", "zero is out of range: expected a duration above zero such as \"300ms\"".to_string());
@@ -64,7 +64,7 @@ impl Impairment for Spike {
     }
 
     fn words(&self) -> String {
-        format!("spikes of {} with a decay of {}, {} a second", Span(self.height), Span(self.decay), self.rate)
+        format!("spikes of {} with a decay of {}, {} per second", Span(self.height), Span(self.decay), self.rate)
     }
 
     fn extra_delay(&self) -> ExtraDelay {

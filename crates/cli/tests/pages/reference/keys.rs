@@ -296,7 +296,10 @@ fn meanings(words: Words) -> Vec<String> {
 fn a_table_with_the_keys_of_another_one_names_it() {
     let pages = pages();
     let [links, scenes, networks] = pages.each_ref().map(|(_, text)| text.as_str());
-    assert!(scenes.contains("\n## Scene `[[peers]]`\n\nOne peer each") && scenes.contains("- …: All of [Scene [peer]](#scene-peer)\n"), "{scenes}");
+    assert!(
+        scenes.contains("\n## Scene `[[peers]]`\n\nOne peer per entry") && scenes.contains("- …: All of [Scene [peer]](#scene-peer)\n"),
+        "{scenes}"
+    );
     assert!(networks.contains("All of [Keys of a link](reference-link-keys.md#keys-of-a-link)"), "{networks}");
     assert!(scenes.contains("- `stiffness` (number ≥ 0 [N/m]; *required*): Gain on the difference of positions, K_T\n"), "{scenes}");
     assert!(links.contains("\n### `jitter`\n") && links.contains("[table](#jitter)"), "{links}");

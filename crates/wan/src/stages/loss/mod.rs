@@ -172,45 +172,50 @@ impl Remembering {
 /// Parameters of losses.
 pub(crate) const KEYS: [Key; 2] = [
     usual("loss", LOSS, "0", "Probability that a packet is lost, or a model of bursts, or chosen packets"),
-    usual("mark-instead-of-loss", Form::Boolean, "false", "What would be lost is marked instead (ECN)"),
+    usual("mark-instead-of-loss", Form::Boolean, "false", "Whether packets that would be lost are marked instead (ECN)"),
 ];
 const LOSS: Form = Form::AnyOf(&[Form::Probability, Form::Table(&LOSS_TABLE)]);
 static LOSS_TABLE: Table = Table::of(&[&[
     optional("gilbert-elliott", Form::Table(&GILBERT_ELLIOTT), "Bursts: a good and a bad state, for each packet or in time"),
     optional("states", Form::Table(&FOUR_STATES), "Bursts: the four states of tc-netem"),
-    optional("bursts", Form::Table(&BURSTS), "Bursts by their fraction and length"),
-    optional("correlated", CHANCE, "Each packet with a correlation to the one before"),
-    optional("packets", Form::List(&Form::AnyOf(const { &[Form::Integer(0, MOST), Form::Like(&["10-19"])] })), "Those packets, counted from 0"),
-    optional("times", Form::List(&Form::Table(&SPAN)), "Whatever is sent then"),
+    optional("bursts", Form::Table(&BURSTS), "Bursts, given by the lost fraction and their length"),
+    optional("correlated", CHANCE, "Losses that are correlated between successive packets"),
+    optional(
+        "packets",
+        Form::List(&Form::AnyOf(const { &[Form::Integer(0, MOST), Form::Like(&["10-19"])] })),
+        "Numbers of the lost packets, counted from 0",
+    ),
+    optional("times", Form::List(&Form::Table(&SPAN)), "Spans in which every packet is lost"),
     optional(
         "every",
         Form::AnyOf(&[Form::Integer(1, MOST), Form::Duration]),
-        "Beside packets or times: the pattern repeats after this number of packets, or after this time",
+        "Number of packets or time after which the pattern of packets or times repeats",
     ),
 ]]);
 static GILBERT_ELLIOTT: Table = Table::of(&[&[
     optional("p", Form::Probability, "Probability of going from good to bad at each packet").expecting("a probability, of going from good to bad"),
-    optional("r", Form::Probability, "Probability of going back; without it 1 - p"),
-    optional("mean-good", Form::PositiveDuration, "In place of p: the mean time in the good state")
+    optional("r", Form::Probability, "Probability of going from bad to good at each packet; 1 - p by default"),
+    optional("mean-good", Form::PositiveDuration, "Mean time in the good state, in place of p")
         .expecting("the mean time in the good state, a duration such as \"160ms\""),
-    optional("mean-bad", Form::PositiveDuration, "In place of r: the mean time in the bad state")
+    optional("mean-bad", Form::PositiveDuration, "Mean time in the bad state, in place of r")
         .expecting("the mean time in the bad state, a duration such as \"40ms\""),
-    usual("h", Form::Probability, "0", "Probability of getting through in the bad state"),
-    usual("k", Form::Probability, "1", "Probability of getting through in the good state"),
+    usual("h", Form::Probability, "0", "Probability that a packet gets through in the bad state"),
+    usual("k", Form::Probability, "1", "Probability that a packet gets through in the good state"),
 ]]);
 static FOUR_STATES: Table = Table::of(&[&[
-    required("p13", Form::Probability, "From receiving to a burst of loss").expecting("a probability, of going from the gap to a burst"),
-    optional("p31", Form::Probability, "From a burst of loss to receiving; without it 1 - p13"),
-    usual("p32", Form::Probability, "0", "From a burst of loss to receiving within a burst"),
-    usual("p23", Form::Probability, "1", "From receiving within a burst to loss"),
-    usual("p14", Form::Probability, "0", "From receiving to a single loss"),
+    required("p13", Form::Probability, "Probability of going from receiving to a burst of loss")
+        .expecting("a probability, of going from the gap to a burst"),
+    optional("p31", Form::Probability, "Probability of going from a burst of loss to receiving; 1 - p13 by default"),
+    usual("p32", Form::Probability, "0", "Probability of going from a burst of loss to receiving within a burst"),
+    usual("p23", Form::Probability, "1", "Probability of going from receiving within a burst to loss"),
+    usual("p14", Form::Probability, "0", "Probability of going from receiving to a single loss"),
 ]]);
 static BURSTS: Table = Table::of(&[&[
-    required("loss", Form::Probability, "The mean fraction lost").expecting("a probability, the mean fraction lost"),
-    required("length", number(PACKETS), "The mean length of a burst").expecting("the mean length of a burst, a number of packets of at least 1"),
-    usual("density", Form::Probability, "1", "The fraction lost within bursts"),
-    usual("isolated", Form::Probability, "0", "The fraction lost outside of bursts"),
-    usual("good-run", number(PACKETS), "1", "The mean number received in a row within a burst"),
+    required("loss", Form::Probability, "Mean fraction of lost packets").expecting("a probability, the mean fraction lost"),
+    required("length", number(PACKETS), "Mean length of a burst").expecting("the mean length of a burst, a number of packets of at least 1"),
+    usual("density", Form::Probability, "1", "Fraction of lost packets within bursts"),
+    usual("isolated", Form::Probability, "0", "Fraction of lost packets outside of bursts"),
+    usual("good-run", number(PACKETS), "1", "Mean number of packets received in a row within a burst"),
 ]]);
 
 impl Loss {

@@ -287,14 +287,28 @@ fn drop<T>(outputs: &mut Outputs<T>, now: Instant, cause: DropCause, (_, packet)
 
 /// Parameters of the transmitter and of the queue before the transmitter.
 pub(crate) const KEYS: [Key; 4] = [
-    usual("rate", Form::AnyOf(&[Form::Rate, UNLIMITED]), "\"unlimited\"", "How fast packets are sent, in bits per second"),
-    optional("queue", Form::Table(&QUEUE), "How much may wait for the line, and which packets are dropped. Needs rate or a recorded line"),
-    usual("overhead", SIGNED_SIZE, "\"0B\"", "What each packet costs beyond its own size. Needs rate or a recorded line"),
-    usual("cells", Form::AnyOf(const { &[Form::Table(&CELLS), NONE] }), "\"none\"", "Packets travel in whole cells. Needs rate or a recorded line"),
+    usual("rate", Form::AnyOf(&[Form::Rate, UNLIMITED]), "\"unlimited\"", "Rate at which packets are sent, in bits per second"),
+    optional(
+        "queue",
+        Form::Table(&QUEUE),
+        "Packets that may wait for the line, and the choice of those that are dropped. Needs rate or a recorded line",
+    ),
+    usual("overhead", SIGNED_SIZE, "\"0B\"", "Bytes that each packet takes beyond its own size. Needs rate or a recorded line"),
+    usual(
+        "cells",
+        Form::AnyOf(const { &[Form::Table(&CELLS), NONE] }),
+        "\"none\"",
+        "Cells in which packets travel, always whole ones. Needs rate or a recorded line",
+    ),
 ];
 static QUEUE: Table = Table::of(&[&[
-    required("limit", LIMIT, "How much may wait"),
-    usual("discipline", Form::AnyOf(const { &[Form::Words(&DISCIPLINES), Form::Table(&DISCIPLINE)] }), "\"tail-drop\"", "Which packets are dropped"),
+    required("limit", LIMIT, "Largest number of packets or bytes, or longest wait, in the queue"),
+    usual(
+        "discipline",
+        Form::AnyOf(const { &[Form::Words(&DISCIPLINES), Form::Table(&DISCIPLINE)] }),
+        "\"tail-drop\"",
+        "Choice of the packets that are dropped",
+    ),
 ]]);
 const DISCIPLINES: [(&str, &str); 4] = [
     ("tail-drop", "the newest when the queue is full"),
@@ -303,8 +317,8 @@ const DISCIPLINES: [(&str, &str); 4] = [
     ("red", "some of the newest, the more the longer the queue is on average; needs a limit in bytes"),
 ];
 static DISCIPLINE: Table = Table::of(&[&[
-    optional("codel", Form::Table(&CODEL), "The oldest when they wait more than the target for an interval"),
-    optional("red", Form::Table(&RED), "Some of the newest when the average queue is above min, all above max"),
+    optional("codel", Form::Table(&CODEL), "Drops of the oldest packets when they wait longer than the target for an interval"),
+    optional("red", Form::Table(&RED), "Drops of some of the newest packets while the average queue is above min, and of all above max"),
 ]]);
 
 impl Bottleneck {

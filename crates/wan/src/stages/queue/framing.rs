@@ -41,8 +41,8 @@ impl Framing {
 
 /// Parameters of cells.
 pub(crate) static CELLS: Table = Table::of(&[&[
-    required("payload", Form::Size, "What a cell carries").expecting("what a cell carries, a size such as \"48B\""),
-    usual("overhead", Form::Size, "\"0B\"", "What a cell costs beyond that"),
+    required("payload", Form::Size, "Bytes of packets that a cell carries").expecting("what a cell carries, a size such as \"48B\""),
+    usual("overhead", Form::Size, "\"0B\"", "Bytes of a cell beyond its payload"),
 ]]);
 /// Form of a size that may be negative.
 pub(crate) const SIGNED_SIZE: Form = Form::Like(&["28B", "-14B"]);

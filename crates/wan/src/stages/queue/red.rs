@@ -136,14 +136,14 @@ impl RedState {
 
 /// Parameters of the discipline.
 pub(crate) static RED: Table = Table::of(&[&[
-    required("min", Form::Size, "The average queue at which dropping begins")
+    required("min", Form::Size, "Average queue at which dropping begins")
         .expecting("the average queue at which dropping begins, a size such as \"5kB\""),
-    required("max", Form::Size, "The average queue at which everything is dropped")
+    required("max", Form::Size, "Average queue at which every packet is dropped")
         .expecting("the average queue at which everything is dropped, a size such as \"15kB\""),
     usual("max-probability", Form::Probability, "\"10%\"", "Probability of a drop just below max"),
     usual("weight", number(FRACTION), "0.002", "Weight of the newest length in the average"),
     usual("mean-packet", Form::Size, "\"500B\"", "Size of a packet, for the time when the line is idle"),
-    usual("ecn", Form::Boolean, "false", "Packets are marked where they would be dropped"),
+    usual("ecn", Form::Boolean, "false", "Whether packets are marked instead of dropped"),
 ]]);
 
 #[cfg(test)]

@@ -232,18 +232,23 @@ impl<T> TokenBucketStage<T> {
 }
 
 /// Parameter of the bucket.
-pub(crate) const KEYS: [Key; 1] =
-    [usual("token-bucket", Form::AnyOf(const { &[Form::Table(&TOKEN_BUCKET), NONE] }), "\"none\"", "How much may leave in bursts")];
+pub(crate) const KEYS: [Key; 1] = [usual(
+    "token-bucket",
+    Form::AnyOf(const { &[Form::Table(&TOKEN_BUCKET), NONE] }),
+    "\"none\"",
+    "Limit on the average rate, and on bursts above it",
+)];
 static TOKEN_BUCKET: Table = Table::of(&[&[
-    required("rate", Form::Rate, "How fast the bucket fills").expecting("how fast the bucket fills, a rate such as \"1Mbit\""),
-    required("burst", Form::Size, "What the bucket holds").expecting("what the bucket holds, a size such as \"10kB\""),
-    optional("peak", Form::Table(&PEAK), "A second, smaller bucket, which limits how fast a burst leaves"),
-    usual("limit", LIMIT, "\"unlimited\"", "How much may wait for tokens"),
-    usual("overhead", SIGNED_SIZE, "\"0B\"", "What each packet costs beyond its own size"),
+    required("rate", Form::Rate, "Rate at which the bucket fills").expecting("how fast the bucket fills, a rate such as \"1Mbit\""),
+    required("burst", Form::Size, "Bytes that the bucket holds").expecting("what the bucket holds, a size such as \"10kB\""),
+    optional("peak", Form::Table(&PEAK), "Second, smaller bucket, which limits the rate of a burst"),
+    usual("limit", LIMIT, "\"unlimited\"", "Largest number of packets or bytes, or longest wait, for tokens"),
+    usual("overhead", SIGNED_SIZE, "\"0B\"", "Bytes that each packet takes beyond its own size"),
 ]]);
 static PEAK: Table = Table::of(&[&[
-    required("rate", Form::Rate, "How fast a burst leaves").expecting("how fast a burst leaves, a rate such as \"2Mbit\""),
-    required("burst", Form::Size, "At least the largest packet").expecting("at least the largest packet, a size such as \"1500B\""),
+    required("rate", Form::Rate, "Rate at which a burst leaves").expecting("how fast a burst leaves, a rate such as \"2Mbit\""),
+    required("burst", Form::Size, "Bytes that the second bucket holds, at least those of the largest packet")
+        .expecting("at least the largest packet, a size such as \"1500B\""),
 ]]);
 
 impl TokenBucket {
