@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::sync::OnceLock;
 
 use cohaptic_paper::{Claim, FAILS, Options, Reproduction, Unwatched, Verdict, Watch, page, reproduce};
-use cohaptic_picture::Size;
+use cohaptic_picture::{Size, escape};
 
 fn again() -> Reproduction {
     reproduce(Options { quick: true, ..Options::default() }, &Unwatched).unwrap()
@@ -92,6 +92,11 @@ fn the_page_begins_with_the_answer() {
     );
     let (at, sections) = (page.find(&answer).unwrap_or_else(|| panic!("no {answer:?}")), page.find("<section ").unwrap());
     assert!(at < page.find("<table>").unwrap() && at < sections);
+    // The object is less viscous with AP, and PD is stable where AP is not.
+    let advice = "<p>So for the same gains AP gives the less viscous object, but it need not be stable where PD is.";
+    assert!(page[at..sections].contains(advice), "{page}");
+    let (_, symbols) = page[..sections].split_once("<h2>How to read this page</h2>").unwrap();
+    assert!(["AP", "PD", "KT", "ρ"].iter().all(|symbol| symbols.contains(symbol)) && symbols.matches("<dt>").count() > 5, "{symbols}");
     for claim in &quick().claims {
         let begin = page.find(&format!("<section id=\"{}\">", claim.id)).unwrap();
         assert_eq!(page[..sections].contains(claim.short), !claim.is_own, "{}", claim.id);
@@ -100,7 +105,28 @@ fn the_page_begins_with_the_answer() {
         assert!(claim.tables.iter().all(|table| section.contains(&table.title)), "{}", claim.id);
         let is_shown = |figure: &&str| section.contains(&format!("<figure id=\"{figure}\">")) || section.contains(&format!("href=\"#{figure}\""));
         assert!(claim.figures.iter().all(is_shown), "{}", claim.id);
+        assert_words(claim, section);
     }
+}
+
+/// Checks that a claim's section has the words of the paper, the answer, the scene and its commands, and of a claim that fails anywhere where and why.
+fn assert_words(claim: &Claim, section: &str) {
+    // A long command is broken before its options, as a shell takes it.
+    let commands = section.replace(" \\\n    --", " --");
+    assert!(commands.contains(&format!("<pre>{}</pre>", escape(&claim.commands))), "{}: {section}", claim.id);
+    assert!(section.lines().all(|line| !line.starts_with("<pre>cohaptic") || line.chars().count() < 120), "{}: {section}", claim.id);
+    for text in [claim.says, &claim.ours, &claim.how, &claim.scene] {
+        assert!(section.contains(&escape(text)), "{}: no {text:?} in {section}", claim.id);
+    }
+    for (words, are_said) in [
+        ("It holds where", matches!(claim.verdict, Verdict::HoldsWhere(_))),
+        ("It fails at", matches!(claim.verdict, Verdict::FailsAt(_))),
+        ("Why they differ:", claim.verdict != Verdict::Holds),
+    ] {
+        assert_eq!(section.contains(words), are_said, "{}: {words}", claim.id);
+    }
+    let failing = claim.tables.iter().flat_map(|table| table.rows.iter().flatten()).filter(|cell| cell.ends_with(FAILS)).count();
+    assert_eq!(section.matches(&format!("{FAILS}</b></t")).count(), failing, "{}: {section}", claim.id);
 }
 
 #[test]
