@@ -54,9 +54,11 @@ pub fn any_link() -> impl Strategy<Value = String> + Clone {
             format!("delay = \"{us}us\"{jitter}")
         })
     });
-    (delay, loss, copies, damage, disorder, line, slots, outage).prop_map(|(delay, loss, copies, damage, disorder, line, slots, outage)| {
-        [delay, loss, copies, damage, disorder, line, slots, outage].into_iter().flatten().collect::<Vec<_>>().join(", ")
-    })
+    (delay, loss, copies, damage, disorder, line, slots, outage)
+        .prop_map(|(delay, loss, copies, damage, disorder, line, slots, outage)| {
+            [delay, loss, copies, damage, disorder, line, slots, outage].into_iter().flatten().collect::<Vec<_>>().join(", ")
+        })
+        .boxed()
 }
 
 /// A link of its own for each direction of each pair of the peers of [`Draft::calm`].

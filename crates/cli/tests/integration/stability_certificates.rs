@@ -57,17 +57,17 @@ fn certificates_hold_for_a_checker_that_shares_no_code() {
     // Peers that are told apart by their links alone.
     let alike = FAR.replace(", contact = \"none\"", "");
     for (scene, options) in [
-        (alike.as_str(), "--x coordination.stiffness=50..400 --y peer.coupling.stiffness=500..2500 --prove 3"),
-        (EQUAL, "--x coordination.stiffness=100..1500 --y peer.coupling.stiffness=500..3500 --prove 3"),
-        (EQUAL, "--x coordination.stiffness=100..6000 --y coordination.damping=0..60 --prove 3 --set coordination.strategy=average-position"),
-        (EQUAL, "--x coordination.stiffness=50..300 --y peer.coupling.damping=0..20 --prove 3 --set coordination.damping=0 --set object.damping=15"),
-        (UNEQUAL, "--x coordination.stiffness=20..400 --y peer.coupling.stiffness=500..2500 --prove 3"),
-        (FAR, "--x coordination.stiffness=50..400 --y peer.coupling.stiffness=500..2500 --prove 3"),
-        (UNEQUAL, "--x coordination.stiffness=20..3000 --y peer.coupling.stiffness=500..2500 --prove 3"),
-        (EQUAL, "--x object.mass=0.3..2 --y coordination.stiffness=100..1000 --prove 3 --set coordination.strategy=average-position"),
-        (EQUAL, "--x object.mass=0.1..2 --y object.damping=0..5 --prove 3"),
-        (EQUAL, "--x peer.device.mass=0.05..0.5 --y peer.device.damping=0..20 --prove 3"),
-        (EQUAL, "--x coordination.stiffness=10..2000 --y coordination.damping=0..20 --prove 3 --set coordination.strategy=extrapolated"),
+        (alike.as_str(), "--x coordination.stiffness=50..225 --y peer.coupling.stiffness=500..1500 --prove 2"),
+        (EQUAL, "--x coordination.stiffness=100..800 --y peer.coupling.stiffness=500..2000 --prove 2"),
+        (EQUAL, "--x coordination.stiffness=100..3050 --y coordination.damping=30..60 --prove 2 --set coordination.strategy=average-position"),
+        (EQUAL, "--x coordination.stiffness=50..175 --y peer.coupling.damping=0..10 --prove 2 --set coordination.damping=0 --set object.damping=15"),
+        (UNEQUAL, "--x coordination.stiffness=210..400 --y peer.coupling.stiffness=500..1500 --prove 2"),
+        (FAR, "--x coordination.stiffness=50..225 --y peer.coupling.stiffness=500..1500 --prove 2"),
+        (UNEQUAL, "--x coordination.stiffness=20..3000 --y peer.coupling.stiffness=500..2500 --prove 2"),
+        (EQUAL, "--x object.mass=0.3..1.15 --y coordination.stiffness=550..1000 --prove 2 --set coordination.strategy=average-position"),
+        (EQUAL, "--x object.mass=0.1..1.05 --y object.damping=0..2.5 --prove 2"),
+        (EQUAL, "--x peer.device.mass=0.275..0.5 --y peer.device.damping=0..10 --prove 2"),
+        (EQUAL, "--x coordination.stiffness=1005..2000 --y coordination.damping=10..20 --prove 2 --set coordination.strategy=extrapolated"),
     ] {
         let desk = Desk::with("scene.toml", scene);
         let document = desk.json(&format!("stability map scene.toml {options} --certificate --out out --json"));
