@@ -28,8 +28,9 @@ pub(super) static COUPLING: Table = Table::of(&[&[
     usual("rotational-damping", number(ROTATIONAL_DAMPING), "0", "Rotational damping between device and copy, B_CR"),
 ]]);
 pub(super) const CONTACT: Form = Form::AnyOf(&[Form::Words(&[("grasp", "held both ways"), ("none", "not touched")]), Form::Table(&PUSH)]);
-static PUSH: Table =
-    Table::of(&[&[required("push", DIRECTION, "Direction in which a finger pushes, which cannot pull").expecting("a direction such as \"+x\"")]]);
+static PUSH: Table = Table::of(&[&[
+    required("push", DIRECTION, "Direction in which a finger pushes; the finger cannot pull").expecting("a direction such as \"+x\"")
+]]);
 const DIRECTION: Form = Form::Words(const { &words(&DIRECTIONS) });
 const DIRECTIONS: Choices<Direction, 6> = [
     ("+x", Direction { axis: 0, positive: true }, "to larger x"),

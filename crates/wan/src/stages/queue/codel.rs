@@ -144,7 +144,7 @@ fn control_law(t: Instant, interval: Duration, count: u64) -> Instant {
 
 /// Parameters of the discipline.
 pub(crate) static CODEL: Table = Table::of(&[&[
-    usual("target", Form::PositiveDuration, "\"5ms\"", "Wait that packets may have for any time"),
+    usual("target", Form::PositiveDuration, "\"5ms\"", "Wait that packets should not exceed"),
     usual("interval", Form::PositiveDuration, "\"100ms\"", "Time for which packets may wait longer than the target"),
     usual("mtu", Form::Size, "\"1500B\"", "Size of the queue up to which no packet is dropped"),
     usual("ecn", Form::Boolean, "false", "Whether packets are marked instead of dropped"),
