@@ -4,15 +4,20 @@ use cohaptic_testkit::{Bed, Testbed};
 
 mod axum;
 mod beds;
+mod descriptors;
 mod foreign;
 mod h2;
+mod http_client;
+mod linux;
 mod loopback;
 mod mini_redis;
 mod ping_pong;
+mod redis;
 mod refused;
 mod signals;
 mod sockets;
 mod tasks;
+mod tonic;
 mod websocket;
 
 /// Seeds with which each program runs.

@@ -1,9 +1,7 @@
 //! What a test bed refuses, with a sentence that says what to do.
 
-use std::os::fd::AsRawFd;
-
 use cohaptic_testkit::{Bed, Testbed};
-use tokio::net::{TcpListener, UdpSocket};
+use tokio::net::{TcpListener, TcpSocket, TcpStream, UdpSocket};
 
 fn on_one_host<F: Future<Output = ()> + 'static>(program: impl FnOnce() -> F + 'static) {
     Testbed::new(["host"]).on_tokio().run(|bed: Bed| async move {
@@ -56,21 +54,20 @@ fn a_socket_on_no_host() {
 }
 
 #[test]
-fn descriptors_and_real_sockets() {
+fn real_sockets_that_are_bound() {
     on_one_host(async || {
-        let listener = TcpListener::bind("0.0.0.0:0").await.unwrap();
-        assert!(listener.into_std().unwrap_err().to_string().contains("have no descriptors. Make the socket with the functions of `tokio::net`"));
         let real = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
         real.set_nonblocking(true).unwrap();
-        assert!(UdpSocket::from_std(real).unwrap_err().to_string().contains("`UdpSocket::from_std` in a test bed"));
-    });
-}
-
-#[test]
-#[should_panic(expected = "`UdpSocket::as_raw_fd` in a test bed")]
-fn a_number_of_a_descriptor() {
-    on_one_host(async || {
-        UdpSocket::bind("0.0.0.0:0").await.unwrap().as_raw_fd();
+        let error = UdpSocket::from_std(real).unwrap_err().to_string();
+        assert!(error.contains("`UdpSocket::from_std` in a test bed") && error.contains("the functions of `tokio::net`"), "{error}");
+        let real = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+        let client = std::net::TcpStream::connect(real.local_addr().unwrap()).unwrap();
+        client.set_nonblocking(true).unwrap();
+        let error = TcpStream::from_std(client.try_clone().unwrap()).unwrap_err().to_string();
+        assert!(error.contains("`TcpStream::from_std` in a test bed"), "{error}");
+        let error = TcpSocket::from_std_stream(client).connect("127.0.0.1:9".parse().unwrap()).await.unwrap_err().to_string();
+        assert!(error.contains("`TcpSocket::from_std_stream` in a test bed") && error.contains("bind it afterwards"), "{error}");
+        assert!(TcpListener::from_std(real).is_err());
     });
 }
 

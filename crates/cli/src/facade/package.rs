@@ -24,14 +24,16 @@ macro_rules! files {
 }
 
 /// Sources of the package that stands in for tokio.
-const SOURCES: [(&str, &str); 29] = files![
+const SOURCES: [(&str, &str); 31] = files![
     "hosted.rs",
     "lib.rs",
     "net/addr.rs",
+    "net/bed_socket.rs",
     "net/descriptors.rs",
     "net/listener.rs",
     "net/lookup.rs",
     "net/mod.rs",
+    "net/placeholder.rs",
     "net/ready.rs",
     "net/socket.rs",
     "net/stream.rs",
@@ -207,8 +209,11 @@ fn standing_in(version: &str, real: &Table, sockets: &str) -> String {
     for (name, list) in &features {
         let mut own = vec![format!("real/{name}")];
         own.extend(parts(list).into_iter().filter(is_feature));
-        if name == "io-util" && !implicit.contains("bytes") {
-            own.push("dep:bytes".to_owned());
+        // Packages that the package itself uses, where no feature of their name brings them.
+        for (feature, package) in [("io-util", "bytes"), ("net", "socket2")] {
+            if name == feature && !implicit.contains(package) {
+                own.push(format!("dep:{package}"));
+            }
         }
         if name == "rt" {
             own.push("dep:loopback".to_owned());
@@ -216,14 +221,15 @@ fn standing_in(version: &str, real: &Table, sockets: &str) -> String {
         let _ = writeln!(text, "{} = {own:?}", Value::String(name.clone()));
     }
     for name in &implicit {
-        let bytes = if name == "bytes" { ", \"dep:bytes\"" } else { "" };
-        let _ = writeln!(text, "{name} = [\"real/{name}\"{bytes}]");
+        let own = if ["bytes", "socket2"].contains(&&**name) { format!(", \"dep:{name}\"") } else { String::new() };
+        let _ = writeln!(text, "{name} = [\"real/{name}\"{own}]");
     }
     let _ = write!(
         text,
         "\n[dependencies]\nbytes = {{ version = \"1\", optional = true }}\ncohaptic-sockets = {{ {sockets} }}\n\
          loopback = {{ package = \"{}\", path = \"../loopback\", default-features = false, features = [\"loopback\", \"pcapng\"], optional = true }}\n\
-         real = {{ package = \"{REAL}\", path = \"../real-tokio\", default-features = false }}\n\n[workspace]\n\n[lints.rust]\nwarnings = \"allow\"\n",
+         real = {{ package = \"{REAL}\", path = \"../real-tokio\", default-features = false }}\nsocket2 = {{ version = \"0.6\", features = [\"all\"], optional = true \
+         }}\n\n[workspace]\n\n[lints.rust]\nwarnings = \"allow\"\n",
         loopback::NAME
     );
     text

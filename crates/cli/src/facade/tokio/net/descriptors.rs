@@ -1,13 +1,19 @@
-//! Descriptors. A socket of a test bed has none.
+//! Descriptors. Those of a socket of a test bed are of its placeholder: see `placeholder`.
 
 use std::io;
+
+#[cfg(unix)]
+use super::bed_socket::BedSocket;
+#[cfg(unix)]
+use super::placeholder::{self, Pointer};
 
 /// Returns the error of a real socket that is to become one of a test bed, or the other way round.
 pub(super) fn refused(what: &str) -> io::Error {
     io::Error::new(
         io::ErrorKind::Unsupported,
         format!(
-            "`{what}` in a test bed: its sockets are no sockets of the system and have no descriptors. Make the socket with the functions of `tokio::net`"
+            "`{what}` in a test bed: this socket belongs to the system, since it is bound or connected, or was made by the standard library. Make the socket \
+             with the functions of `tokio::net`, or give `TcpSocket::from_std_stream` a new socket and bind it afterwards"
         ),
     )
 }
@@ -17,24 +23,53 @@ pub(super) fn refuse_real(what: &str) -> io::Result<()> {
     if super::bed()?.is_some() { Err(refused(what)) } else { Ok(()) }
 }
 
-/// Fails the test: there is no descriptor to return.
-#[cold]
+/// Returns the socket of a test bed for which the socket `real` stands.
+#[cfg(unix)]
 #[track_caller]
-pub(super) fn none(what: &str) -> ! {
-    panic!("{}", refused(what))
+pub(super) fn from_placeholder<T>(real: &impl std::os::fd::AsFd, what: &str) -> io::Result<std::sync::Arc<T>>
+where
+    T: cohaptic_sockets::Configured + ?Sized + 'static,
+{
+    placeholder::find(real.as_fd())?.ok_or_else(|| refused(what))
 }
 
-/// Implements the traits of descriptors for a type with one field of the type `Either`.
+#[cfg(not(unix))]
+pub(super) fn from_placeholder<T: ?Sized>(_: &impl Sized, what: &str) -> io::Result<std::sync::Arc<T>> {
+    Err(refused(what))
+}
+
+/// Returns the placeholder of a socket of a test bed, which keeps the socket until the placeholder comes back.
+#[cfg(unix)]
+pub(super) fn into_placeholder<P, S>(socket: BedSocket<P>, kind: socket2::Type, _: &str) -> io::Result<S>
+where
+    P: Pointer,
+    P::Target: cohaptic_sockets::Configured,
+    S: From<std::os::fd::OwnedFd>,
+{
+    socket.into_descriptor(kind).map(S::from)
+}
+
+#[cfg(not(unix))]
+pub(super) fn into_placeholder<B, S>(_: B, _: socket2::Type, what: &str) -> io::Result<S> {
+    Err(refused(what))
+}
+
+/// Fails the test: the system gives no descriptor.
+#[cold]
+#[track_caller]
+pub(super) fn none(what: &str, error: &io::Error) -> ! {
+    panic!("`{what}` in a test bed: no placeholder can be made for the descriptor: {error}")
+}
+
+/// Implements the traits of descriptors for a type with one field of the type `Either`. `$type` is the type of a placeholder.
 macro_rules! descriptors {
-    ($kind:ident) => {
+    ($kind:ident, $type:ident) => {
         #[cfg(unix)]
         impl std::os::fd::AsRawFd for $kind {
             #[track_caller]
             fn as_raw_fd(&self) -> std::os::fd::RawFd {
-                match &self.0 {
-                    $crate::net::Either::Real(socket) => socket.as_raw_fd(),
-                    $crate::net::Either::Bed(_) => $crate::net::descriptors::none(concat!(stringify!($kind), "::as_raw_fd")),
-                }
+                use std::os::fd::AsFd;
+                self.as_fd().as_raw_fd()
             }
         }
 
@@ -44,7 +79,10 @@ macro_rules! descriptors {
             fn as_fd(&self) -> std::os::fd::BorrowedFd<'_> {
                 match &self.0 {
                     $crate::net::Either::Real(socket) => socket.as_fd(),
-                    $crate::net::Either::Bed(_) => $crate::net::descriptors::none(concat!(stringify!($kind), "::as_fd")),
+                    $crate::net::Either::Bed(socket) => match socket.descriptor(socket2::Type::$type) {
+                        Ok(descriptor) => descriptor,
+                        Err(error) => $crate::net::descriptors::none(concat!(stringify!($kind), "::as_fd"), &error),
+                    },
                 }
             }
         }
@@ -55,7 +93,10 @@ macro_rules! descriptors {
             fn as_raw_socket(&self) -> std::os::windows::io::RawSocket {
                 match &self.0 {
                     $crate::net::Either::Real(socket) => socket.as_raw_socket(),
-                    $crate::net::Either::Bed(_) => $crate::net::descriptors::none(concat!(stringify!($kind), "::as_raw_socket")),
+                    $crate::net::Either::Bed(_) => {
+                        let what = concat!(stringify!($kind), "::as_raw_socket");
+                        $crate::net::descriptors::none(what, &$crate::net::descriptors::refused(what))
+                    }
                 }
             }
         }
@@ -66,7 +107,10 @@ macro_rules! descriptors {
             fn as_socket(&self) -> std::os::windows::io::BorrowedSocket<'_> {
                 match &self.0 {
                     $crate::net::Either::Real(socket) => socket.as_socket(),
-                    $crate::net::Either::Bed(_) => $crate::net::descriptors::none(concat!(stringify!($kind), "::as_socket")),
+                    $crate::net::Either::Bed(_) => {
+                        let what = concat!(stringify!($kind), "::as_socket");
+                        $crate::net::descriptors::none(what, &$crate::net::descriptors::refused(what))
+                    }
                 }
             }
         }

@@ -4,16 +4,18 @@ use std::fmt;
 use std::future::{Future, poll_fn};
 use std::io;
 use std::net::SocketAddr;
+use std::sync::Arc;
 use std::task::{Context, Poll};
 
 use cohaptic_sockets::{Call, Listener};
 
 use super::addr::{no_address, with_real};
-use super::descriptors::{descriptors, refuse_real, refused};
+use super::bed_socket::BedSocket;
+use super::descriptors::{descriptors, from_placeholder, into_placeholder};
 use super::{Either, TcpStream, ToSocketAddrs, either};
 
 /// See `tokio::net::TcpListener`.
-pub struct TcpListener(pub(super) Either<real::net::TcpListener, Box<dyn Listener>>);
+pub struct TcpListener(pub(super) Either<real::net::TcpListener, BedSocket<Arc<dyn Listener>>>);
 
 impl TcpListener {
     /// See `tokio::net::TcpListener::bind`.
@@ -29,7 +31,7 @@ impl TcpListener {
             let mut failed = no_address("could not resolve to any address");
             for address in target.addresses(&*bed)? {
                 match bed.listen(call, address) {
-                    Ok(listener) => return Ok(Self(Either::Bed(listener))),
+                    Ok(listener) => return Ok(Self(Either::Bed(listener.into()))),
                     Err(error) => failed = error,
                 }
             }
@@ -50,14 +52,16 @@ impl TcpListener {
         either!(
             &self.0,
             |listener| listener.poll_accept(cx).map_ok(|(stream, peer)| (TcpStream(Either::Real(stream)), peer)),
-            listener.poll_accept(cx).map_ok(|(stream, peer)| (TcpStream(Either::Bed(stream)), peer))
+            listener.poll_accept(cx).map_ok(|(stream, peer)| (TcpStream(Either::Bed(stream.into())), peer))
         )
     }
 
     /// See `tokio::net::TcpListener::from_std`.
     #[track_caller]
     pub fn from_std(listener: std::net::TcpListener) -> io::Result<Self> {
-        refuse_real("TcpListener::from_std")?;
+        if super::bed()?.is_some() {
+            return from_placeholder::<dyn Listener>(&listener, "TcpListener::from_std").map(|found| Self(Either::Bed(found.into())));
+        }
         real::net::TcpListener::from_std(listener).map(|real| Self(Either::Real(real)))
     }
 
@@ -65,7 +69,7 @@ impl TcpListener {
     pub fn into_std(self) -> io::Result<std::net::TcpListener> {
         match self.0 {
             Either::Real(listener) => listener.into_std(),
-            Either::Bed(_) => Err(refused("TcpListener::into_std")),
+            Either::Bed(listener) => into_placeholder(listener, socket2::Type::STREAM, "TcpListener::into_std"),
         }
     }
 
@@ -99,4 +103,4 @@ impl fmt::Debug for TcpListener {
     }
 }
 
-descriptors!(TcpListener);
+descriptors!(TcpListener, STREAM);

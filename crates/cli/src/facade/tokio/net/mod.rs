@@ -7,11 +7,15 @@ mod addr;
 pub use addr::ToSocketAddrs;
 
 #[cfg(feature = "net")]
+mod bed_socket;
+#[cfg(feature = "net")]
 mod descriptors;
 #[cfg(feature = "net")]
 mod listener;
 #[cfg(feature = "net")]
 mod lookup;
+#[cfg(all(feature = "net", unix))]
+mod placeholder;
 #[cfg(feature = "net")]
 mod ready;
 #[cfg(feature = "net")]

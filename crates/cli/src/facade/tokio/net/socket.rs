@@ -7,11 +7,14 @@ use std::time::Duration;
 
 use cohaptic_sockets::{Call, Flag, Number, Socket, Version};
 
-use super::descriptors::{descriptors, refuse_real, refused};
+use super::bed_socket::BedSocket;
+use super::descriptors::{descriptors, into_placeholder, refuse_real};
+#[cfg(unix)]
+use super::placeholder;
 use super::{Either, TcpListener, TcpStream, either};
 
 /// See `tokio::net::TcpSocket`.
-pub struct TcpSocket(Either<real::net::TcpSocket, Box<dyn Socket>>);
+pub struct TcpSocket(Either<real::net::TcpSocket, BedSocket<Box<dyn Socket>>>);
 
 /// Getters and setters of options.
 macro_rules! options {
@@ -37,7 +40,7 @@ impl TcpSocket {
     #[track_caller]
     pub fn new_v4() -> io::Result<Self> {
         match super::bed()? {
-            Some(bed) => bed.socket(Call::here("TcpSocket::new_v4"), Version::Four).map(|socket| Self(Either::Bed(socket))),
+            Some(bed) => bed.socket(Call::here("TcpSocket::new_v4"), Version::Four).map(|socket| Self(Either::Bed(socket.into()))),
             None => real::net::TcpSocket::new_v4().map(|real| Self(Either::Real(real))),
         }
     }
@@ -46,7 +49,7 @@ impl TcpSocket {
     #[track_caller]
     pub fn new_v6() -> io::Result<Self> {
         match super::bed()? {
-            Some(bed) => bed.socket(Call::here("TcpSocket::new_v6"), Version::Six).map(|socket| Self(Either::Bed(socket))),
+            Some(bed) => bed.socket(Call::here("TcpSocket::new_v6"), Version::Six).map(|socket| Self(Either::Bed(socket.into()))),
             None => real::net::TcpSocket::new_v6().map(|real| Self(Either::Real(real))),
         }
     }
@@ -140,7 +143,7 @@ impl TcpSocket {
                 refuse_real("TcpSocket::from_std_stream")?;
                 socket.connect(address).await.map(|stream| TcpStream(Either::Real(stream)))
             }
-            Either::Bed(socket) => socket.connect(address).await.map(|stream| TcpStream(Either::Bed(stream))),
+            Either::Bed(socket) => socket.into_inner().connect(address).await.map(|stream| TcpStream(Either::Bed(stream.into()))),
         }
     }
 
@@ -152,13 +155,33 @@ impl TcpSocket {
                 refuse_real("TcpSocket::from_std_stream")?;
                 socket.listen(backlog).map(|listener| TcpListener(Either::Real(listener)))
             }
-            Either::Bed(socket) => socket.listen(backlog).map(|listener| TcpListener(Either::Bed(listener))),
+            Either::Bed(socket) => socket.into_inner().listen(backlog).map(|listener| TcpListener(Either::Bed(listener.into()))),
         }
     }
 
-    /// See `tokio::net::TcpSocket::from_std_stream`. In a test bed the socket neither connects nor listens.
+    /// See `tokio::net::TcpSocket::from_std_stream`. In a test bed a new socket becomes one of the test bed, with the options that it has. A socket that is
+    /// bound or connected stays real, and neither connects nor listens.
+    #[track_caller]
     pub fn from_std_stream(stream: std::net::TcpStream) -> Self {
+        #[cfg(unix)]
+        if let Some(socket) = Self::of_bed(&stream) {
+            return Self(Either::Bed(socket.into()));
+        }
         Self(Either::Real(real::net::TcpSocket::from_std_stream(stream)))
+    }
+
+    /// Returns the socket of the test bed for which a real socket stands.
+    #[cfg(unix)]
+    #[track_caller]
+    fn of_bed(stream: &std::net::TcpStream) -> Option<Box<dyn Socket>> {
+        use std::os::fd::AsFd;
+        let (bed, fd) = (super::bed().ok()??, stream.as_fd());
+        if let Some(socket) = placeholder::take::<dyn Socket>(fd).ok()? {
+            return Some(socket);
+        }
+        let socket = bed.socket(Call::here("TcpSocket::from_std_stream"), placeholder::unbound(fd)?).ok()?;
+        placeholder::set_all(&*socket, fd).ok()?;
+        Some(socket)
     }
 }
 
@@ -168,14 +191,15 @@ impl fmt::Debug for TcpSocket {
     }
 }
 
-descriptors!(TcpSocket);
+descriptors!(TcpSocket, STREAM);
 
 #[cfg(unix)]
 impl std::os::fd::FromRawFd for TcpSocket {
     /// See `tokio::net::TcpSocket::from_raw_fd`.
     unsafe fn from_raw_fd(fd: std::os::fd::RawFd) -> Self {
-        // SAFETY: the caller keeps the promises that the real function asks for.
-        Self(Either::Real(unsafe { real::net::TcpSocket::from_raw_fd(fd) }))
+        // SAFETY: the caller keeps the promises that this function asks for as well.
+        let stream = unsafe { std::net::TcpStream::from_raw_fd(fd) };
+        Self::from_std_stream(stream)
     }
 }
 
@@ -185,7 +209,13 @@ impl std::os::fd::IntoRawFd for TcpSocket {
     fn into_raw_fd(self) -> std::os::fd::RawFd {
         match self.0 {
             Either::Real(socket) => socket.into_raw_fd(),
-            Either::Bed(_) => panic!("{}", refused("TcpSocket::into_raw_fd")),
+            Either::Bed(socket) => {
+                let what = "TcpSocket::into_raw_fd";
+                match into_placeholder::<_, std::net::TcpStream>(socket, socket2::Type::STREAM, what) {
+                    Ok(stream) => stream.into_raw_fd(),
+                    Err(error) => super::descriptors::none(what, &error),
+                }
+            }
         }
     }
 }
@@ -205,7 +235,7 @@ impl std::os::windows::io::IntoRawSocket for TcpSocket {
     fn into_raw_socket(self) -> std::os::windows::io::RawSocket {
         match self.0 {
             Either::Real(socket) => socket.into_raw_socket(),
-            Either::Bed(_) => panic!("{}", refused("TcpSocket::into_raw_socket")),
+            Either::Bed(_) => panic!("{}", super::descriptors::refused("TcpSocket::into_raw_socket")),
         }
     }
 }

@@ -5,6 +5,7 @@ use std::future::{Future, poll_fn};
 use std::io::{self, IoSlice, IoSliceMut};
 use std::net::SocketAddr;
 use std::pin::Pin;
+use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
@@ -12,12 +13,13 @@ use cohaptic_sockets::{Call, Stream};
 use real::io::{AsyncRead, AsyncWrite, Interest, ReadBuf, Ready};
 
 use super::addr::{no_address, with_real};
-use super::descriptors::{descriptors, refuse_real, refused};
+use super::bed_socket::BedSocket;
+use super::descriptors::{descriptors, from_placeholder, into_placeholder};
 use super::tcp::{OwnedReadHalf, OwnedWriteHalf, ReadHalf, WriteHalf};
 use super::{Either, ToSocketAddrs, either};
 
 /// See `tokio::net::TcpStream`.
-pub struct TcpStream(pub(super) Either<real::net::TcpStream, Box<dyn Stream>>);
+pub struct TcpStream(pub(super) Either<real::net::TcpStream, BedSocket<Arc<dyn Stream>>>);
 
 impl TcpStream {
     /// See `tokio::net::TcpStream::connect`.
@@ -33,7 +35,7 @@ impl TcpStream {
             let mut failed = no_address("could not resolve to any address");
             for address in target.addresses(&*bed)? {
                 match bed.connect(call, address).await {
-                    Ok(stream) => return Ok(Self(Either::Bed(stream))),
+                    Ok(stream) => return Ok(Self(Either::Bed(stream.into()))),
                     Err(error) => failed = error,
                 }
             }
@@ -44,7 +46,9 @@ impl TcpStream {
     /// See `tokio::net::TcpStream::from_std`.
     #[track_caller]
     pub fn from_std(stream: std::net::TcpStream) -> io::Result<Self> {
-        refuse_real("TcpStream::from_std")?;
+        if super::bed()?.is_some() {
+            return from_placeholder::<dyn Stream>(&stream, "TcpStream::from_std").map(|found| Self(Either::Bed(found.into())));
+        }
         real::net::TcpStream::from_std(stream).map(|real| Self(Either::Real(real)))
     }
 
@@ -52,7 +56,7 @@ impl TcpStream {
     pub fn into_std(self) -> io::Result<std::net::TcpStream> {
         match self.0 {
             Either::Real(stream) => stream.into_std(),
-            Either::Bed(_) => Err(refused("TcpStream::into_std")),
+            Either::Bed(stream) => into_placeholder(stream, socket2::Type::STREAM, "TcpStream::into_std"),
         }
     }
 
@@ -343,4 +347,4 @@ impl fmt::Debug for TcpStream {
     }
 }
 
-descriptors!(TcpStream);
+descriptors!(TcpStream, STREAM);

@@ -4,13 +4,15 @@ use std::fmt;
 use std::future::{Future, poll_fn};
 use std::io;
 use std::net::SocketAddr;
+use std::sync::Arc;
 use std::task::{Context, Poll};
 
 use cohaptic_sockets::{Call, Datagrams};
 use real::io::{Interest, ReadBuf, Ready};
 
 use super::addr::{no_address, with_real};
-use super::descriptors::{descriptors, refuse_real, refused};
+use super::bed_socket::BedSocket;
+use super::descriptors::{descriptors, from_placeholder, into_placeholder};
 use super::{Either, ToSocketAddrs, either};
 
 #[path = "udp_options.rs"]
@@ -19,7 +21,7 @@ mod options;
 mod receiving;
 
 /// See `tokio::net::UdpSocket`.
-pub struct UdpSocket(Either<real::net::UdpSocket, Box<dyn Datagrams>>);
+pub struct UdpSocket(Either<real::net::UdpSocket, BedSocket<Arc<dyn Datagrams>>>);
 
 impl UdpSocket {
     /// See `tokio::net::UdpSocket::bind`.
@@ -35,7 +37,7 @@ impl UdpSocket {
             let mut failed = no_address("could not resolve to any address");
             for address in target.addresses(&*bed)? {
                 match bed.bind(call, address) {
-                    Ok(socket) => return Ok(Self(Either::Bed(socket))),
+                    Ok(socket) => return Ok(Self(Either::Bed(socket.into()))),
                     Err(error) => failed = error,
                 }
             }
@@ -46,7 +48,9 @@ impl UdpSocket {
     /// See `tokio::net::UdpSocket::from_std`.
     #[track_caller]
     pub fn from_std(socket: std::net::UdpSocket) -> io::Result<Self> {
-        refuse_real("UdpSocket::from_std")?;
+        if super::bed()?.is_some() {
+            return from_placeholder::<dyn Datagrams>(&socket, "UdpSocket::from_std").map(|found| Self(Either::Bed(found.into())));
+        }
         real::net::UdpSocket::from_std(socket).map(|real| Self(Either::Real(real)))
     }
 
@@ -54,7 +58,7 @@ impl UdpSocket {
     pub fn into_std(self) -> io::Result<std::net::UdpSocket> {
         match self.0 {
             Either::Real(socket) => socket.into_std(),
-            Either::Bed(_) => Err(refused("UdpSocket::into_std")),
+            Either::Bed(socket) => into_placeholder(socket, socket2::Type::DGRAM, "UdpSocket::into_std"),
         }
     }
 
@@ -227,4 +231,4 @@ impl fmt::Debug for UdpSocket {
     }
 }
 
-descriptors!(UdpSocket);
+descriptors!(UdpSocket, DGRAM);
