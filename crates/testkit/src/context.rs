@@ -64,6 +64,11 @@ pub(crate) fn shared() -> Option<Arc<Shared>> {
     RUNNING.with_borrow(|running| running.as_ref().map(|running| Arc::clone(&running.shared)))
 }
 
+/// Like [`shared`], for a hook of panics: the thread may end, or the state of the thread may be borrowed.
+pub(crate) fn try_shared() -> Option<Arc<Shared>> {
+    RUNNING.try_with(|running| Some(Arc::clone(&running.try_borrow().ok()?.as_ref()?.shared))).ok()?
+}
+
 /// Returns the test bed that runs on this thread. `what` completes the message of the panic.
 ///
 /// # Panics

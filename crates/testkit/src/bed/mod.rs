@@ -313,6 +313,7 @@ impl Testbed {
         let again = self.again(seed, origin);
         let mut setup = self.setup;
         let artefacts = Artefacts::new(setup.artefacts.take(), seed);
+        failure::install();
         if artefacts.is_wanted() {
             setup.record();
         }
@@ -353,7 +354,7 @@ impl Testbed {
                     let test = if differs { again.test(&drawn, true) } else { String::new() };
                     artefacts.report(panicked, test, record)
                 }));
-                resume_unwind(panic)
+                resume_unwind(failure::told(panic))
             }
         }
     }

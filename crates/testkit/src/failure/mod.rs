@@ -1,8 +1,10 @@
 //! Report of a failure. For a property the report is printed once, for the smallest input, and not for each input on the way there.
 
+mod hook;
 #[cfg(feature = "strategies")]
 mod searching;
 
+pub(crate) use hook::{install, told};
 #[cfg(feature = "strategies")]
 pub(crate) use searching::Searching;
 

@@ -5,8 +5,7 @@ use std::backtrace::{Backtrace, BacktraceStatus};
 use std::cell::{Cell, RefCell};
 use std::fmt::Write as _;
 use std::marker::PhantomData;
-use std::panic::{self, PanicHookInfo};
-use std::sync::Once;
+use std::panic::PanicHookInfo;
 use std::thread;
 
 use super::{Lines, print};
@@ -46,7 +45,9 @@ impl Panic {
     fn of(info: &PanicHookInfo<'_>) -> Self {
         let place = info.location().map_or_else(|| "an unknown place".to_owned(), ToString::to_string);
         let payload = info.payload();
-        let text = payload.downcast_ref::<String>().map(String::as_str).or_else(|| payload.downcast_ref::<&str>().copied());
+        let text = super::hook::better(payload)
+            .or_else(|| payload.downcast_ref::<String>().map(String::as_str))
+            .or_else(|| payload.downcast_ref::<&str>().copied());
         Self { place, message: text.unwrap_or("Box<dyn Any>").to_owned(), backtrace: Backtrace::capture() }
     }
 
@@ -71,7 +72,7 @@ pub(crate) struct Searching(PhantomData<*const ()>);
 
 impl Searching {
     pub(crate) fn begin() -> Self {
-        hold_panics_back();
+        super::install();
         SEARCHES.set(SEARCHES.get() + 1);
         Self(PhantomData)
     }
@@ -133,25 +134,8 @@ pub(super) fn keep_last(lines: impl FnOnce() -> Lines) {
     }
 }
 
-/// Installs, once per process, a hook that keeps panics of a thread while a value of the thread may shrink. Other panics go to the previous hook.
-fn hold_panics_back() {
-    static ONCE: Once = Once::new();
-    // A hook cannot be set while a panic unwinds. The next search sets the hook.
-    if thread::panicking() {
-        return;
-    }
-    ONCE.call_once(|| {
-        let before = panic::take_hook();
-        panic::set_hook(Box::new(move |info| {
-            if !keep(info) {
-                before(info);
-            }
-        }));
-    });
-}
-
-/// Keeps a panic. Returns whether the panic is kept.
-fn keep(info: &PanicHookInfo<'_>) -> bool {
+/// Keeps a panic of a thread while a value of the thread may shrink. Returns whether the panic is kept.
+pub(super) fn keep(info: &PanicHookInfo<'_>) -> bool {
     // A panic may occur while the thread ends, when the thread-local state is gone, or while the state is borrowed.
     let keep = |kept: &RefCell<Kept>| kept.try_borrow_mut().map(|mut kept| kept.panic = Some(Panic::of(info))).is_ok();
     SEARCHES.try_with(Cell::get).is_ok_and(|searches| searches > 0) && KEPT.try_with(keep).unwrap_or(false)

@@ -224,3 +224,33 @@ fn a_panic_of_any_task_is_the_tests() {
         says(|| bed.run(program), &["from a task"]);
     }
 }
+
+#[test]
+fn tokio_without_its_runtime_is_told_the_way_out() {
+    let way_out = ["this test bed runs on the executor of the test kit", "call `Testbed::on_tokio` before `run`"];
+    says(|| bed().run(|_| async { tokio::time::sleep(Duration::from_millis(1)).await }), &way_out);
+    says(|| bed().run(|_| async { drop(tokio::time::interval(Duration::from_millis(1))) }), &way_out);
+    says(|| bed().run(|_| async { drop(tokio::net::UdpSocket::bind("127.0.0.1:0").await) }), &way_out);
+    let of_task = |bed: Bed| async move { bed.host("a").spawn(tokio::time::sleep(Duration::from_millis(1))).await.unwrap() };
+    says(|| bed().run(of_task), &way_out);
+}
+
+#[test]
+fn a_socket_of_the_real_tokio_is_told_the_way_out() {
+    let way_out = ["of the real tokio is made in a test bed", "`cohaptic_testkit::net`", "`cohaptic tokio`"];
+    let bind = async || drop(tokio::net::UdpSocket::bind("127.0.0.1:0").await);
+    let connect = async || drop(tokio::net::TcpStream::connect("127.0.0.1:9").await);
+    says(|| bed().on_tokio().run(move |_| bind()), &way_out);
+    says(|| bed().on_tokio().run(move |bed| async move { bed.host("a").spawn(connect()).await.unwrap() }), &way_out);
+    // Tokio catches the panic of its own task, and the run fails all the same.
+    let caught = |_| async move {
+        let _ = tokio::task::spawn_local(bind()).await;
+        time::sleep(Duration::from_secs(1)).await;
+    };
+    says(|| bed().on_tokio().run(caught), &way_out);
+}
+
+#[test]
+fn outside_of_a_test_bed_tokio_says_what_it_says() {
+    says(|| drop(tokio::time::sleep(Duration::ZERO)), &["there is no reactor running"]);
+}
