@@ -4,6 +4,7 @@ use std::io;
 
 /// Error of a call, as the system names it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(not(feature = "tcp"), allow(dead_code, reason = "some are of TCP alone"))]
 pub(crate) enum Errno {
     /// `EPIPE`.
     BrokenPipe,

@@ -111,7 +111,9 @@ fn key(name: &str) -> impl Iterator<Item = u8> {
 
 /// Returns why a text is not a valid name of a host, or `None` if it is valid.
 pub(crate) fn name_fault(name: &str) -> Option<String> {
-    let is_word =
-        !name.is_empty() && !name.contains([':', '[', ']']) && !name.contains(char::is_whitespace) && name.parse::<std::net::IpAddr>().is_err();
+    let is_word = !matches!(name, "" | ".")
+        && !name.contains([':', '[', ']'])
+        && !name.contains(char::is_whitespace)
+        && name.parse::<std::net::IpAddr>().is_err();
     (!is_word).then(|| format!("`{name}` is not a name of a host; expected a word without `:`, `[` and `]` that is not an address"))
 }

@@ -38,17 +38,24 @@ impl Testbed {
     pub(super) fn address_calls(&self) -> impl Iterator<Item = String> {
         let settings = &self.setup.settings;
         let chosen = settings.addresses.iter().map(|((host, is_six), short)| {
-            let address = Addresses::long(*short, *is_six);
-            format!(".address({:?}, std::net::IpAddr::from({}))", self.setup.names[host.index()], octets(address))
+            let octets = match Addresses::long(*short, *is_six) {
+                IpAddr::V4(v4) => format!("{:?}", v4.octets()),
+                IpAddr::V6(v6) => format!("{:?}", v6.segments()),
+            };
+            format!(".address({:?}, {octets})", self.setup.names[host.index()])
         });
         chosen.chain(settings.six_first.then(|| ".ipv6_first()".to_owned()))
     }
 }
 
-/// Returns the octets of an address as an array of Rust.
-fn octets(address: IpAddr) -> String {
-    match address {
-        IpAddr::V4(v4) => format!("{:?}", v4.octets()),
-        IpAddr::V6(v6) => format!("{:?}", v6.segments().map(|part| format!("{part:#x}"))).replace('"', "").replacen("0xfd00", "0xfd00_u16", 1),
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_printed_test_has_the_addresses() {
+        let bed = Testbed::new(["a", "b"]).address("b", [192, 168, 1, 10]).address("a", [0xfd00, 0, 0, 0, 0, 0, 7, 1]).ipv6_first();
+        let calls: Vec<String> = bed.address_calls().collect();
+        assert_eq!(calls, [".address(\"a\", [64768, 0, 0, 0, 0, 0, 7, 1])", ".address(\"b\", [192, 168, 1, 10])", ".ipv6_first()"]);
     }
 }

@@ -12,6 +12,7 @@ mod holds;
 mod passing;
 mod shared;
 mod socket_name;
+mod socket_state;
 mod sockets;
 #[cfg(feature = "tcp")]
 mod tcp;

@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 
 use cohaptic_wan::{NodeId, Path};
 
-use super::sockets::SocketState;
+use super::socket_state::SocketState;
 use super::{Core, Ends, Kind, Parcel, SocketId};
 use crate::address::Addresses;
 use crate::errno::Errno;

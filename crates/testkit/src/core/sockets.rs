@@ -1,7 +1,7 @@
 //! UDP sockets: the ports to which they are bound, the datagrams in their buffers, and the tasks that wait for datagrams.
 
 use std::io;
-use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
+use std::net::{IpAddr, Ipv6Addr, SocketAddr};
 use std::task::{Poll, Waker};
 
 use cohaptic_units::Instant;
@@ -9,167 +9,12 @@ use cohaptic_units::print::Seconds;
 use cohaptic_wan::{NodeId, Ring};
 
 use super::bound::{Port, SocketId};
-use super::waking::{Waiters, Woken};
-use super::{Core, Parcel, SocketName, mapped, unmapped};
+use super::socket_state::{SocketState, memory_of};
+use super::waking::Waiters;
+use super::{Core, Parcel};
 use crate::address::Addresses;
 use crate::errno::Errno;
-use crate::trace::Lost;
 use crate::wire::{Held, Where};
-
-/// Access of the readers to a received datagram.
-impl Parcel {
-    #[inline]
-    pub(crate) fn from(&self) -> SocketAddr {
-        self.addresses.from()
-    }
-
-    /// Returns the address to which the datagram was sent.
-    #[cfg(feature = "quinn")]
-    pub(crate) fn to(&self) -> IpAddr {
-        self.addresses.to().ip()
-    }
-
-    /// Copies the datagram into `buffer`, cut to the length of the buffer. Returns the number of bytes copied.
-    #[inline]
-    pub(crate) fn copy_to(&self, buffer: &mut [u8]) -> usize {
-        let len = self.bytes.len().min(buffer.len());
-        buffer[..len].copy_from_slice(&self.bytes[..len]);
-        len
-    }
-}
-
-#[derive(Debug)]
-pub(crate) struct SocketState {
-    pub(super) host: NodeId,
-    /// Address to which the socket is bound, as [`Addresses::short`]; `None` if the socket is bound to all addresses of its host.
-    pub(super) at: Option<u32>,
-    pub(super) port: Port,
-    /// Peer to which the socket is connected, as packets have its address: of IPv4 also if the socket is of IPv6.
-    pub(super) peer: Option<SocketAddr>,
-    /// Size of the receive buffer \[byte\].
-    pub(super) room: usize,
-    pub(super) inbox: Ring<Box<Parcel>>,
-    /// Bytes of all datagrams in `inbox`, without overhead.
-    pub(super) held: usize,
-    /// Memory that Linux would count for all datagrams in `inbox` \[bytes\].
-    pub(super) memory: usize,
-    readers: Waiters,
-    /// `true` if IP has refused a datagram that was sent, and the program has not been told.
-    pub(super) refused: bool,
-    pub(super) may_broadcast: bool,
-    /// Instant at which the host crashed or its program was killed; `None` while the socket lives.
-    pub(super) died: Option<Instant>,
-}
-
-impl SocketState {
-    /// Puts a datagram into the buffer. `all` counts the bytes of the whole run. A datagram whose memory does not fit is lost, unless the buffer is empty.
-    #[inline(always)]
-    pub(super) fn keep(&mut self, mut parcel: Box<Parcel>, all: &mut Held, woken: &mut Woken) -> Result<(), Lost> {
-        let (len, is_six) = (parcel.bytes.len(), parcel.addresses.is_six);
-        parcel.addresses.is_mapped = self.port.is_six() && !is_six;
-        let memory = self.memory + memory_of(len, is_six);
-        if memory > self.room && self.memory > 0 {
-            return Err(Lost::BufferFull);
-        }
-        self.memory = memory;
-        self.held += len;
-        all.add(Where::Buffers, Held::cost(len));
-        self.inbox.push(|| parcel);
-        self.readers.wake(woken);
-        Ok(())
-    }
-
-    /// Drops all datagrams in the buffer.
-    fn clear(&mut self, all: &mut Held) {
-        all.remove(Where::Buffers, self.held as u64 + self.inbox.len() as u64 * Held::cost(0));
-        self.inbox.clear();
-        (self.held, self.memory) = (0, 0);
-    }
-
-    pub(super) fn name(&self) -> SocketName {
-        SocketName { kind: "UDP", host: self.host, local: self.local(), peer: None }
-    }
-
-    /// Returns whether the next call returns an error.
-    #[inline]
-    pub(super) const fn has_error(&self) -> bool {
-        // `|` evaluates both operands: one branch is cheaper than two.
-        self.died.is_some() | self.refused
-    }
-
-    /// Returns the local address of the socket.
-    pub(super) fn local(&self) -> SocketAddr {
-        let (is_six, number) = (self.port.is_six(), self.port.number());
-        let ip = match self.at {
-            Some(at) => Addresses::long(at, is_six),
-            None if is_six => Ipv6Addr::UNSPECIFIED.into(),
-            None => Ipv4Addr::UNSPECIFIED.into(),
-        };
-        SocketAddr::new(ip, number)
-    }
-
-    /// Returns whether the socket is bound to all addresses of both versions of IP.
-    #[inline]
-    fn is_dual(&self) -> bool {
-        self.at.is_none() && self.port.is_six()
-    }
-
-    /// Returns the port in each version of IP over which the socket receives.
-    fn versions(&self) -> impl Iterator<Item = Port> + use<> {
-        std::iter::once(self.port).chain(self.is_dual().then(|| Port::new(false, self.port.number())))
-    }
-
-    /// Returns an address of a packet as the program sees it.
-    fn shown(&self, address: SocketAddr) -> SocketAddr {
-        if self.port.is_six() { mapped(address) } else { address }
-    }
-
-    /// Returns the address of the other end of a packet of this socket: of IPv4 for `::ffff:10.0.0.1`, which a socket of IPv6 reaches over IPv4.
-    ///
-    /// # Errors
-    ///
-    /// If the socket cannot send packets of that version of IP.
-    #[inline]
-    pub(super) fn wire_form(&self, to: SocketAddr) -> io::Result<SocketAddr> {
-        if to.is_ipv6() == self.port.is_six() && !to.is_ipv6() {
-            return Ok(to);
-        }
-        self.other_form(to)
-    }
-
-    #[inline(never)]
-    fn other_form(&self, to: SocketAddr) -> io::Result<SocketAddr> {
-        let form = if self.port.is_six() { unmapped(to) } else { to };
-        if form.is_ipv6() == self.port.is_six() || self.is_dual() {
-            return Ok(form);
-        }
-        // A socket that is bound to an address of IPv6 has no address of IPv4 to send from.
-        if self.port.is_six() { Errno::NetworkUnreachable.fail() } else { Errno::OtherVersion.fail() }
-    }
-
-    /// Handles the message of IP that no socket is bound to the port `by`. A socket that is not connected to `by` ignores the message.
-    #[inline(never)]
-    pub(super) fn refuse(&mut self, by: SocketAddr, woken: &mut Woken) {
-        if self.peer == Some(by) {
-            self.refused = true;
-            self.readers.wake(woken);
-        }
-    }
-
-    pub(super) fn die(&mut self, at: Instant, all: &mut Held, woken: &mut Woken) {
-        self.died = Some(at);
-        self.clear(all);
-        self.readers.wake(woken);
-    }
-}
-
-/// Returns the memory that Linux counts for a received datagram of `len` bytes (`SKB_TRUESIZE`): a descriptor of 256 bytes, and a piece of memory for headers
-/// and data whose size is a power of two, apart from the smallest.
-#[inline]
-const fn memory_of(len: usize, is_six: bool) -> usize {
-    let used = len + if is_six { 72 } else { 59 };
-    if used <= 256 { 832 } else { 256 + (used + 320).next_power_of_two() }
-}
 
 /// All sockets that have not been closed.
 #[derive(Debug, Default)]

@@ -106,8 +106,8 @@ impl UdpSocket {
         self.option(|options| &options.send_buffer)
     }
 
-    /// Sets the size of the send buffer \[byte\]: as with Linux, to twice `size`, where a size above 212,992 counts as that, and to 4608 at least (`SO_SNDBUF`).
-    /// The size is stored and has no effect: see [`UdpSocket::send_buffer_size`].
+    /// Sets the size of the send buffer \[byte\] (`SO_SNDBUF`): as with Linux, to twice `size`, where a size above 212,992 counts as that, and to 4608 at
+    /// least. The size is stored and has no effect: see [`UdpSocket::send_buffer_size`].
     ///
     /// # Errors
     ///

@@ -149,8 +149,8 @@ impl TcpListener {
         self.open(|core| core.listener_config(self.id).ttl.into())
     }
 
-    /// Sets the time to live of packets of accepted connections, from 1 to 255. The time to live is in the packets and in captures, and has no other effect: see
-    /// [`TcpListener::ttl`].
+    /// Sets the time to live of packets of accepted connections, from 1 to 255. The time to live is in the packets and in captures, and has no other effect:
+    /// see [`TcpListener::ttl`].
     ///
     /// # Errors
     ///

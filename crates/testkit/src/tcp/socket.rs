@@ -109,8 +109,8 @@ impl TcpSocket {
     /// # Errors
     ///
     /// [`io::ErrorKind::AddrInUse`] if another socket has the port and not both sockets are [shared](TcpSocket::set_reuseaddr), or if another socket listens
-    /// there; [`io::ErrorKind::AddrNotAvailable`] if the host does not have the address; [`io::ErrorKind::InvalidInput`] if the socket is bound already. That of
-    /// the system if the address is of the other version of IP (`EAFNOSUPPORT`).
+    /// there; [`io::ErrorKind::AddrNotAvailable`] if the host does not have the address; [`io::ErrorKind::InvalidInput`] if the socket is bound already. That
+    /// of the system if the address is of the other version of IP (`EAFNOSUPPORT`).
     pub fn bind(&self, address: SocketAddr) -> io::Result<()> {
         let mut settings = self.settings();
         if settings.bound.is_some() || address.is_ipv6() != self.is_six {

@@ -31,7 +31,8 @@ use crate::resolve::{ToSocketAddrs, none};
 ///   up again.
 /// - A host with new addresses loses its connections: both ends are silent, and time out when they write.
 /// - [`TcpStream::set_linger`] has an effect with zero only, because dropping a stream takes no time.
-/// - `from_std`, `into_std` and `AsFd` are missing, because there is no socket of the operating system.
+/// - `from_std`, `into_std` and `AsFd` are missing, because there is no socket of the operating system. The package that `cohaptic tokio` writes has them, with
+///   placeholders.
 /// - After its host has crashed, every method returns [`io::ErrorKind::ConnectionAborted`], with the way out. The same error comes from every method after the
 ///   run of the test bed has ended, also within the run of another test bed.
 /// - The stream belongs to the thread that runs the test bed. On another thread every method returns [`io::ErrorKind::Unsupported`], and the run fails.
