@@ -77,8 +77,10 @@ impl Core {
             Receivers::One(receiver) if receiver == host => self.hand_over(host, parcel),
             Receivers::One(receiver) => self.offer(Path { from: host, to: receiver }, parcel),
             Receivers::All => {
-                for other in (0..self.hosts.len()).map(NodeId::new).filter(|other| *other != host) {
-                    self.offer(Path { from: host, to: other }, parcel.clone());
+                // The receiver of the link of a loopback is the sender.
+                let paths = (0..self.hosts.len()).map(|other| Path { from: host, to: NodeId::new(other) });
+                for path in paths.filter(|path| self.receiver(*path) != host).collect::<Vec<_>>() {
+                    self.offer(path, parcel.clone());
                 }
                 // Sockets of the sender hear a broadcast as well, over loopback.
                 self.hand_over(host, parcel);

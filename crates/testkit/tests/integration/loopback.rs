@@ -72,6 +72,20 @@ fn datagrams_cross_it_as_well() {
     });
 }
 
+/// A broadcast comes back to the sockets of the host, once.
+#[test]
+fn a_broadcast_crosses_it_once() {
+    run("delay 1ms", async {
+        let socket = UdpSocket::bind("0.0.0.0:7").await.unwrap();
+        socket.set_broadcast(true).unwrap();
+        let begin = Instant::now();
+        socket.send_to(b"all", "255.255.255.255:7").await.unwrap();
+        socket.recv(&mut [0; 3]).await.unwrap();
+        assert_eq!(begin.elapsed(), Duration::from_millis(1));
+        assert!(tokio::time::timeout(Duration::from_secs(1), socket.recv(&mut [0; 3])).await.is_err());
+    });
+}
+
 /// The loopback is one link, as with `tc qdisc add dev lo`: both directions share its rate.
 #[test]
 fn both_directions_share_the_rate() {
