@@ -85,7 +85,8 @@ mod tests {
     /// Every limit of the fields' descriptions, once.
     #[test]
     fn impossible_constants_are_refused() {
-        let cases: [(&str, fn(&mut TcpConfig)); 16] = [
+        type Change = fn(&mut TcpConfig);
+        let cases: [(&str, Change); 16] = [
             ("the MTU 127 is below 128 bytes", |config| config.mtu = 127),
             ("ttl is zero", |config| config.ttl = 0),
             ("initial_window is zero", |config| config.initial_window = 0),

@@ -174,7 +174,8 @@ impl Connection {
         self.config.nodelay
     }
 
-    /// Lets acknowledgements leave at once (`true`) or wait (`TCP_QUICKACK`). As in Linux, the setting is not permanent: later traffic changes it.
+    /// Lets acknowledgements wait for data to travel with (`false`), or not (`true`), and then sends an acknowledgement that waits (`TCP_QUICKACK`). As in
+    /// Linux, the setting is not permanent, because later traffic changes it, and promises nothing about later acknowledgements.
     pub fn set_quickack(&mut self, quickack: bool) {
         self.receive.is_interactive = !quickack;
         if quickack && self.receive.ack_at.is_some() {

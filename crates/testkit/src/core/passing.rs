@@ -220,13 +220,12 @@ impl Core {
 
     /// Delivers an arrived packet to its socket, or returns why the packet is lost.
     #[inline(always)]
-    #[cfg_attr(not(feature = "tcp"), expect(unused_mut, reason = "only a segment is taken out of its parcel"))]
-    fn arrive(&mut self, path: Path, mut parcel: Box<Parcel>) -> Result<(), Lost> {
+    fn arrive(&mut self, path: Path, parcel: Box<Parcel>) -> Result<(), Lost> {
         #[cfg(feature = "tcp")]
         if parcel.addresses.kind == Kind::Segment {
-            let (bytes, marked) = (std::mem::take(&mut parcel.bytes), parcel.arrival.marked);
+            let end = self.arrive_segment(path.to, &parcel.bytes, parcel.arrival.marked);
             self.spare.put(parcel);
-            return self.arrive_segment(path.to, bytes, marked);
+            return end;
         }
         let Some(id) = self.socket_for(path.to, &parcel.addresses) else { return Err(self.lose(path, &parcel)) };
         let socket = self.sockets.get_mut(id);

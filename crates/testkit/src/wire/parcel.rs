@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use bytes::Bytes;
 #[cfg(feature = "tcp")]
-use cohaptic_tcp::Segment;
+use cohaptic_tcp::{Payload, Segment};
 use cohaptic_units::Instant;
 use cohaptic_wan::{NodeId, Path};
 
@@ -146,7 +146,9 @@ impl Octets {
                 octets.clear();
                 octets.extend_from_slice(bytes);
             }
-            _ => *self = Self::Own(bytes.to_vec()),
+            Self::Shared(_) => *self = Self::Own(bytes.to_vec()),
+            #[cfg(feature = "tcp")]
+            Self::Segment(..) => *self = Self::Own(bytes.to_vec()),
         }
     }
 }
@@ -181,7 +183,14 @@ impl<A: Default> Spare<A> {
     #[cfg(feature = "tcp")]
     pub(crate) fn wrapped(&mut self, addresses: A, segment: Segment<'static>, ecn_capable: bool) -> Box<Parcel<A>> {
         let mut parcel = self.0.pop().unwrap_or_else(empty);
-        *parcel = Parcel::new(addresses, segment.into(), ecn_capable);
+        (parcel.addresses, parcel.ecn_capable) = (addresses, ecn_capable);
+        match &mut parcel.bytes {
+            Octets::Segment(whole, length) => {
+                *length = segment.packet_length();
+                **whole = Whole { segment, packet: OnceLock::new() };
+            }
+            Octets::Own(_) | Octets::Shared(_) => parcel.bytes = segment.into(),
+        }
         parcel
     }
 
@@ -191,8 +200,12 @@ impl<A: Default> Spare<A> {
         if self.0.len() >= Self::MOST {
             return;
         }
-        if !matches!(&parcel.bytes, Octets::Own(octets) if octets.capacity() <= Self::LONGEST) {
-            parcel.bytes = Octets::default();
+        match &mut parcel.bytes {
+            Octets::Own(octets) if octets.capacity() <= Self::LONGEST => {}
+            // The memory of the writer is not kept, only the box.
+            #[cfg(feature = "tcp")]
+            Octets::Segment(whole, _) => (whole.segment.payload, whole.packet) = (Payload::default(), OnceLock::new()),
+            Octets::Own(_) | Octets::Shared(_) => parcel.bytes = Octets::default(),
         }
         self.0.push(parcel);
     }
@@ -238,5 +251,37 @@ mod tests {
             spare.put(parcel_of(Octets::Own(Vec::with_capacity(1))));
         }
         assert_eq!(spare.0.len(), Spare::<u8>::MOST);
+    }
+
+    #[cfg(feature = "tcp")]
+    #[test]
+    fn the_packet_of_a_segment_is_written_when_somebody_looks() {
+        use cohaptic_tcp::{Ecn, Flags, Options};
+
+        let segment = |octets: &[u8]| Segment {
+            source: "10.0.0.1:1".parse().unwrap(),
+            destination: "10.0.0.2:2".parse().unwrap(),
+            sequence: 1,
+            acknowledgement: 2,
+            flags: Flags::ACK,
+            window: 3,
+            options: Options { timestamps: Some((4, 5)), ..Options::default() },
+            ecn: Ecn::Capable0,
+            ttl: 64,
+            payload: octets.to_vec().into(),
+        };
+        let is_written = |parcel: &Parcel<u8>| matches!(&parcel.bytes, Octets::Segment(whole, _) if whole.packet.get().is_some());
+        let mut spare = Spare::default();
+        for octets in [&b"first"[..], b"", b"longer than the first"] {
+            let parcel = spare.wrapped(1, segment(octets), true);
+            // 20 octets of each header, and 12 of timestamps.
+            assert_eq!((parcel.bytes.len(), is_written(&parcel)), (52 + octets.len(), false));
+            assert_eq!((Segment::parse(&parcel.bytes), parcel.bytes[..].len()), (Ok(segment(octets)), 52 + octets.len()));
+            assert!(is_written(&parcel));
+            spare.put(parcel);
+            let Octets::Segment(kept, _) = &spare.0[0].bytes else { panic!("the box is kept") };
+            assert!(kept.segment.payload.is_empty() && kept.packet.get().is_none());
+        }
+        assert_eq!(&*spare.copied(1, b"a datagram", false).bytes, b"a datagram");
     }
 }

@@ -10,26 +10,32 @@ use crate::wire::Octets;
 
 impl Core {
     /// Handles a packet that has arrived at `host`. `marked` tells whether a queue marked the packet.
-    pub(in crate::core) fn arrive_segment(&mut self, host: NodeId, packet: Octets, marked: bool) -> Result<(), Lost> {
+    pub(in crate::core) fn arrive_segment(&mut self, host: NodeId, packet: &Octets, marked: bool) -> Result<(), Lost> {
         if !self.is_up(host) {
             return Err(Lost::HostDown);
         }
         match packet {
-            Octets::Segment(whole, _) => self.take_segment(host, whole.segment, marked),
-            damaged => self.take_segment(host, Segment::parse(&damaged).map_err(|_| Lost::Checksum)?, marked),
+            Octets::Segment(whole, _) => self.take_segment(host, &whole.segment, marked),
+            damaged @ (Octets::Own(_) | Octets::Shared(_)) => self.take_segment(host, &Segment::parse(damaged).map_err(|_| Lost::Checksum)?, marked),
         }
     }
 
-    fn take_segment(&mut self, host: NodeId, mut segment: Segment<'_>, marked: bool) -> Result<(), Lost> {
+    /// Handles a segment that has arrived whole. A segment that carries no mark of congestion is not copied.
+    fn take_segment(&mut self, host: NodeId, segment: &Segment<'_>, marked: bool) -> Result<(), Lost> {
         if !self.is_own(host, segment.destination.ip()) {
             return Err(Lost::NoSuchAddress);
         }
         if marked && segment.ecn != Ecn::NotCapable {
-            segment.ecn = Ecn::Congestion;
+            return self.route_segment(host, &Segment { ecn: Ecn::Congestion, ..segment.clone() });
         }
+        self.route_segment(host, segment)
+    }
+
+    /// Hands a segment to its connection or listener, or refuses the segment.
+    fn route_segment(&mut self, host: NodeId, segment: &Segment<'_>) -> Result<(), Lost> {
         self.forget_old();
         // Only an opening segment may find a listener.
-        let listener = if is_first(&segment) { self.listener_at(host, segment.destination) } else { None };
+        let listener = if is_first(segment) { self.listener_at(host, segment.destination) } else { None };
         let route = super::route(host, segment.destination, segment.source);
         if let Some(id) = self.tcp.routes.get(&route).copied() {
             let (now, end) = (self.now(), self.tcp.end(id));
@@ -37,8 +43,8 @@ impl Core {
                 self.check_backlog(waited_at)?;
             }
             let machine = &mut self.tcp.end_mut(id).machine;
-            if listener.is_none() || !machine.gives_way_to(&segment) {
-                machine.handle_segment(now, &segment);
+            if listener.is_none() || !machine.gives_way_to(segment) {
+                machine.handle_segment(now, segment);
                 self.settle(id);
                 return Ok(());
             }
@@ -47,7 +53,7 @@ impl Core {
             self.settle(id);
         }
         if let Some(listener) = listener {
-            return self.take_syn(listener, &segment);
+            return self.take_syn(listener, segment);
         }
         if let Some(reset) = segment.refusal(self.tcp_config(host).ttl) {
             self.emit(host, None, reset);
@@ -109,7 +115,7 @@ impl Core {
     pub(in crate::core) fn take_from_loopback(&mut self) -> bool {
         let Some((host, segment)) = self.tcp.loopback.pop_front() else { return false };
         // Fates of packets are recorded for links only. Loopback is not part of the network.
-        let _ = self.take_segment(host, segment, false);
+        let _ = self.take_segment(host, &segment, false);
         true
     }
 
