@@ -53,7 +53,7 @@ pub(super) fn settled(asked: &Corrections, measured: &Measured) -> Result<(Measu
     // What a reader assumed gives way to what the user knows.
     let assumed_s = probed.as_ref().and_then(|probed| probed.added_s);
     let is_assumed = assumed_s.is_some() && asked.offset_s.is_none() && asked.least.is_none();
-    let mut added_s = asked.offset_s.or(assumed_s.filter(|_| is_assumed));
+    let mut added_s = asked.offset_s.or_else(|| assumed_s.filter(|_| is_assumed));
     let shifted = asked.offset_s.map(|by| measurements.shifted(by - assumed_s.unwrap_or(0.0))).transpose().map_err(|error| refused(&error))?;
     let measurements = shifted.as_ref().unwrap_or(measurements);
     // With one clock a change of the least delay is a change of the path, and belongs to the link.

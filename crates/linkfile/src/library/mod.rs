@@ -257,6 +257,6 @@ pub fn of_owner(link: Arc<LinkModel>, owner: &str) -> Arc<LinkModel> {
             let name = format!("{} of {owner}", modulated.modulator().name());
             Arc::new(LinkModel::Modulated(modulated.with_modulator_name(&name)))
         }
-        _ => link,
+        LinkModel::Fixed(_) | LinkModel::Modulated(_) | LinkModel::Replay(_) | LinkModel::Kernel(_) => link,
     }
 }

@@ -54,6 +54,7 @@ const fn of_directions(form: Form) -> [Key; 3] {
 /// # Panics
 ///
 /// If the text is no profile: the texts are part of this program, and a test reads each.
+#[expect(clippy::panic, reason = "the texts are part of this program, and a test reads each")]
 pub(super) fn profile(file: &str, text: &str) -> Profile {
     let file = format!("{file}.toml");
     let read = parse(Sources { file: Path::new(&file), text, overrides: &[] }, read_profile);
@@ -89,7 +90,7 @@ fn read_profile(node: &Node, context: Context<'_>) -> Option<Profile> {
         version,
         chains: chains.map_or_else(Vec::new, |node| match &node.value {
             Value::List(list) => list.iter().map(|chain| value_text(chain)).collect(),
-            _ => Vec::new(),
+            Value::Text(_) | Value::Integer(_) | Value::Float(_) | Value::Boolean(_) | Value::Date | Value::Table(_) => Vec::new(),
         }),
         modulators,
     };

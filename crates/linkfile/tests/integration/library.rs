@@ -17,17 +17,13 @@ fn refused(keys: &[&str]) -> String {
 }
 
 fn modulated(name: &str) -> Modulated {
-    match link(&[&format!("profile={name}")]) {
-        LinkModel::Modulated(modulated) => modulated,
-        other => panic!("{other:?}"),
-    }
+    let LinkModel::Modulated(modulated) = link(&[&format!("profile={name}")]) else { panic!("{name} has no modulator") };
+    modulated
 }
 
 fn fixed(name: &str) -> LinkConfig {
-    match link(&[&format!("profile={name}")]) {
-        LinkModel::Fixed(config) => config,
-        other => panic!("{other:?}"),
-    }
+    let LinkModel::Fixed(config) = link(&[&format!("profile={name}")]) else { panic!("{name} has a modulator") };
+    config
 }
 
 fn close(found: f64, expected: f64, tolerance: f64) {
@@ -108,13 +104,13 @@ fn walks_of_the_rate_have_their_autocorrelation() {
         #[expect(clippy::cast_precision_loss, reason = "a rate")]
         let rates: Vec<f64> = walk.configs().iter().map(|config| bits_of(config) as f64).collect();
         let middle = rates.iter().sum::<f64>() / 5.0;
-        let stay = |state: usize| walk.modulator().states()[state].sojourn.unwrap().mean().as_secs_f64();
-        assert!(stay(0) == 2.0 * stay(2) && stay(4) == stay(0) && stay(1) == stay(2) && stay(3) == stay(2), "{name}");
+        let stay = |state: usize| walk.modulator().states()[state].sojourn.unwrap().mean();
+        assert!(stay(0) == 2 * stay(2) && stay(4) == stay(0) && stay(1) == stay(2) && stay(3) == stay(2), "{name}");
         let found = |after: f64| {
             let mode = |k: f64| {
                 let turn = std::f64::consts::PI * k / 5.0;
                 let weight: f64 = (1..=5).zip(&rates).map(|(i, rate)| (rate - middle) * (turn * (f64::from(i) - 0.5)).cos()).sum();
-                (weight * weight, (-(1.0 - turn.cos()) / stay(2) * after).exp())
+                (weight * weight, (-(1.0 - turn.cos()) / stay(2).as_secs_f64() * after).exp())
             };
             let modes: Vec<(f64, f64)> = (1..5).map(|k| mode(f64::from(k))).collect();
             modes.iter().map(|(weight, decay)| weight * decay).sum::<f64>() / modes.iter().map(|(weight, _)| weight).sum::<f64>()
@@ -126,10 +122,8 @@ fn walks_of_the_rate_have_their_autocorrelation() {
 }
 
 fn bits_of(config: &LinkConfig) -> u64 {
-    match &config.bottleneck.as_ref().unwrap().service {
-        cohaptic_wan::Service::Rate(rate) => rate.as_bits_per_sec(),
-        other => panic!("{other:?}"),
-    }
+    let cohaptic_wan::Service::Rate(rate) = &config.bottleneck.as_ref().unwrap().service else { panic!("a recorded line") };
+    rate.as_bits_per_sec()
 }
 
 /// Half of the round trips over a busy Wi-Fi are above 20 ms and a tenth above 100 ms. The DSL line has round trips of least 19.9, mean 21.3 and deviation 6.3 ms.
@@ -212,9 +206,9 @@ fn keys_are_laid_over_a_profile() {
 /// The access lines of one peer follow one modulator, and those of two peers follow two.
 #[test]
 fn a_modulator_belongs_to_the_owner_of_a_line() {
-    let name = |line: &str, owner: &str| match &*of_owner(Arc::new(link(&[&format!("profile={line}")])), owner) {
-        LinkModel::Modulated(modulated) => modulated.modulator().name().to_owned(),
-        other => panic!("{other:?}"),
+    let name = |line: &str, owner: &str| {
+        let LinkModel::Modulated(own) = &*of_owner(Arc::new(link(&[&format!("profile={line}")])), owner) else { panic!("{line} has no modulator") };
+        own.modulator().name().to_owned()
     };
     assert_eq!(name("starlink/up", "anna"), name("starlink/down", "anna"));
     assert_ne!(name("starlink/up", "anna"), name("starlink/up", "bob"));

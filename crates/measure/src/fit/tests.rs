@@ -74,7 +74,9 @@ fn two_heaps_have_no_law() {
     let counts = [(20, 4000), (21, 900), (22, 100), (40, 100), (41, 900), (42, 4000)];
     let mut delays: Vec<f64> = counts.iter().flat_map(|&(delay, count)| std::iter::repeat_n(f64::from(delay) * 1e-3, count)).collect();
     for last in (1..delays.len()).rev() {
-        delays.swap(last, (rng.unit() * (last + 1) as f64) as usize);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to below the number of delays")]
+        let other = (rng.unit() * (last + 1) as f64) as usize;
+        delays.swap(last, other);
     }
     let fitted = fit(&one_clock(&delays)).unwrap();
     assert_eq!(fitted.link.jitter.distribution, FittedLaw::Empirical);

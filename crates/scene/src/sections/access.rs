@@ -13,7 +13,11 @@ use cohaptic_wan::LinkModel;
 
 /// Keys of the access lines of a peer.
 pub(super) const ACCESS: [Key; 3] = [
-    optional("access", Form::Like(&["starlink", "none"]), "Access lines of the peer from the library of links; the keys of uplink and downlink are laid over those lines"),
+    optional(
+        "access",
+        Form::Like(&["starlink", "none"]),
+        "Access lines of the peer from the library of links; the keys of uplink and downlink are laid over those lines",
+    ),
     optional("uplink", Form::Table(&LINK_TABLE), "Access line that every packet of the peer passes before the links"),
     optional("downlink", Form::Table(&LINK_TABLE), "Access line that every packet to the peer passes after the links"),
 ];

@@ -21,8 +21,11 @@ use crate::quantities::{POSITION, RATE, Spread, VELOCITY, maybe_vector_of};
 /// Keys of `[peer]`: the defaults of all peers.
 pub(crate) static PEER: Table = Table::of(&[&KEYS, &ACCESS]);
 /// Keys of an entry `[[peers]]`.
-pub(crate) static PEERS: Table =
-    Table::over(&[&[required("name", Form::Text, "Name of the peer: unique, not all, without space and without . > / , and quotes")], &KEYS, &ACCESS]);
+pub(crate) static PEERS: Table = Table::over(&[
+    &[required("name", Form::Text, "Name of the peer: unique, not all, without space and without . > / , and quotes")],
+    &KEYS,
+    &ACCESS,
+]);
 const KEYS: [Key; 19] = [
     somewhere("device", Form::Table(&DEVICE), "Haptic device of the peer"),
     somewhere("coupling", Form::Table(&COUPLING), "Spring and damper between device and copy; not needed where contact is none"),

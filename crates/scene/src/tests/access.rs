@@ -6,10 +6,8 @@ use super::{SCENE, check_replaced, parse};
 
 /// Returns the name of the modulator of a line.
 fn modulator(line: Option<&LinkModel>) -> &str {
-    match line {
-        Some(LinkModel::Modulated(modulated)) => modulated.modulator().name(),
-        other => panic!("{other:?}"),
-    }
+    let Some(LinkModel::Modulated(modulated)) = line else { panic!("a line without a modulator: {line:?}") };
+    modulated.modulator().name()
 }
 
 /// The uplink and the downlink of a peer change state together, those of two peers apart, also where both have the keys of `[peer]`.

@@ -175,7 +175,8 @@ impl Modulator {
         // of zero, or one that is no number, tells that the remaining states cannot be reached.
         for last in (1..size).rev() {
             let leaves: f64 = weights[last][..last].iter().sum();
-            if !(leaves > 0.0) {
+            // The weights of a state that lasts for ever are zero, and their shares no numbers.
+            if leaves.is_nan() || leaves <= 0.0 {
                 return None;
             }
             for from in 0..last {
