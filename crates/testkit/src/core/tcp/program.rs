@@ -61,6 +61,7 @@ impl Core {
 
     /// Returns what would not block now, as the `poll` of Linux tells: reading, writing, the end of reading, and the end of writing. Writing has ended when both
     /// directions have: after a shutdown of the own direction alone the system does not tell so.
+    #[cfg(feature = "facade")]
     pub(crate) fn readiness(&self, id: ConnId) -> [bool; 4] {
         let [readable, writable] = self.is_ready(id);
         let connection = self.connection(id);
