@@ -117,6 +117,7 @@ pages! {
     reference_documents: "docs/reference-documents.md",
     reference_keys: "docs/reference-keys.md",
     reference_link_keys: "docs/reference-link-keys.md",
+    reference_links: "docs/reference-links.md",
     reference_network_keys: "docs/reference-network-keys.md",
     relay: "docs/relay.md",
     #[ignore = ".ci/nightly runs it: it takes long"]
