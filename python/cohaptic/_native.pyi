@@ -5,7 +5,7 @@ from _typeshed import SupportsGetItem
 from os import PathLike
 from typing import Any, SupportsFloat, SupportsIndex, final
 
-__all__ = ["Campaign", "CampaignAnswer", "Delays", "Drawing", "Held", "Link", "Run", "Scene", "State", "Table", "admittance", "boundary", "causes", "eigenvalues", "map", "monodromy", "stability"]
+__all__ = ["Campaign", "CampaignAnswer", "Delays", "Drawing", "Held", "Link", "Run", "Scene", "State", "Table", "admittance", "boundary", "causes", "eigenvalues", "is_profile", "map", "monodromy", "profile", "stability"]
 
 @final
 class Campaign:
@@ -63,16 +63,7 @@ class Delays:
     """
     A source of measurements.
     """
-    def fit(
-        self,
-        /,
-        offset: SupportsFloat | SupportsIndex | None,
-        least: SupportsFloat | SupportsIndex | None,
-        skew: bool,
-        tick: SupportsFloat | SupportsIndex | None,
-        cut: bool,
-        hold_out: SupportsFloat | SupportsIndex | None,
-    ) -> str:
+    def fit(self, /, offset: SupportsFloat | SupportsIndex | None, least: SupportsFloat | SupportsIndex | None, skew: bool, tick: SupportsFloat | SupportsIndex | None, cut: bool, hold_out: SupportsFloat | SupportsIndex | None) -> str:
         """
         Estimates the link, and gives the document of `cohaptic fit --json`. `offset`, `least` and `tick` are in seconds.
         """
@@ -82,13 +73,7 @@ class Delays:
         Delays \\[s\\] of packets sent at those instants \\[s\\]; NaN of packets that were lost.
         """
     @staticmethod
-    def read(
-        file: str | PathLike[str],
-        receiver: str | PathLike[str] | None = None,
-        port: SupportsIndex | None = None,
-        direction: str | None = None,
-        split: SupportsFloat | SupportsIndex | None = None,
-    ) -> Delays:
+    def read(file: str | PathLike[str], receiver: str | PathLike[str] | None = None, port: SupportsIndex | None = None, direction: str | None = None, split: SupportsFloat | SupportsIndex | None = None) -> Delays:
         """
         Reads a table of delays, a log of fates or a file of another program, or the captures of both ends. `direction` is `up`, `down` or `rtt`; `split` is the
         share of the round trip that is the delay.

@@ -30,8 +30,9 @@ def fit(
 
     Its ``scene`` has the link as keys of a scene, its ``goodness`` says how good the estimate is.
 
-    ``source`` is a file with one-way measurements, a file of fates, a file of IRTT, ping, iperf3, LENS, CellReplay or netem-trace, or the capture of the sender, with that of the receiver as ``receiver``, of which only
-    datagrams to the UDP ``port`` count. Or it is a pair of arrays: when each packet was sent, and its delay [s], which is NaN where the packet was lost.
+    ``source`` is a file with one-way measurements, a file of fates, a file of IRTT, ping, iperf3, LENS, CellReplay or netem-trace, or the capture of the
+    sender, with that of the receiver as ``receiver``, of which only datagrams to the UDP ``port`` count. Or it is a pair of arrays: when each packet was
+    sent, and its delay [s], which is NaN where the packet was lost.
 
     ``offset`` [s] is added to the clock of the receiver, and so to every delay. ``least`` [s] says what the least delay is. ``skew`` removes the linear
     drift of one clock against the other, where it is significant.
@@ -57,7 +58,9 @@ def fit(
     else:
         if receiver is not None and (direction is not None or split is not None):
             raise TypeError("direction and split are for files of other programs: expected one file")
-        measured = _native.Delays.read(os.fspath(source), None if receiver is None else os.fspath(receiver), port, direction, split)
+        measured = _native.Delays.read(
+            os.fspath(source), None if receiver is None else os.fspath(receiver), port, direction, split
+        )
     if cut and tick is None:
         raise TypeError("cut is the way of a clock with a known tick: expected tick too")
     document: dict[str, Any] = json.loads(measured.fit(offset, least, skew, tick, cut, hold_out))

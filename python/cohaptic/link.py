@@ -77,9 +77,9 @@ class Event(NamedTuple):
 class Link:
     """A directed link: delays, losses, queues, order.
 
-    ``spec`` is said in words of ``tc-netem``, or in keys of a scene: ``"delay 20ms 5ms loss 1%"`` or ``"delay=20ms jitter=5ms loss=1%"``; a list has
-    keys whose values have spaces. Or it is a link of the library, which keys may follow: ``"starlink/down rate=50Mbit"``. Seed, sender and receiver are the address of its random numbers: equal addresses give equal links, those of
-    ``cohaptic link`` with the same seed.
+    ``spec`` is said in words of ``tc-netem``, or in keys of a scene: ``"delay 20ms 5ms loss 1%"`` or ``"delay=20ms jitter=5ms loss=1%"``; a list has keys
+    whose values have spaces. Or it is a link of the library, which keys may follow: ``"starlink/down rate=50Mbit"``. Seed, sender and receiver are the
+    address of its random numbers: equal addresses give equal links, those of ``cohaptic link`` with the same seed.
 
     >>> sent = Link("delay 20ms loss 10%", seed=1).send(np.arange(5) * 0.01, 64)
     >>> sent.arrived

@@ -25,7 +25,6 @@
 mod address;
 pub mod document;
 mod fingerprint;
-pub mod library;
 pub mod link;
 pub mod mesh;
 mod quantity_text;
@@ -37,6 +36,7 @@ pub mod schema;
 pub use address::{AddressError, address};
 pub use document::{Diagnostic, FileError};
 pub use fingerprint::{Fingerprint, FingerprintError};
+pub use link::library;
 pub use mesh::{KeysOfLinks, LinkChange, LinkKeys, LinkSelector, LinkTable, link_from_keys};
 pub use quantity_text::{number_and_unit, text_of_quantity};
 pub use relay::{RelayChange, RelayFile, RelayLimits, RelayProgram, relay_link_keys, relay_link_keys_of_text};

@@ -7,7 +7,7 @@ use cohaptic_wan::{LINK_KIND_PARAMETERS, LINK_PARAMETERS};
 /// Keys of a link of any kind, in the order of the reference.
 pub const LINK: [&[Key]; 16] = joined(&[&LINK_PARAMETERS, &[&LINK_KIND_PARAMETERS, &PROFILE]]);
 
-/// Key that takes a link of the [library](crate::library).
+/// Key that takes a link of the [library](crate::link::library).
 const PROFILE: [Key; 1] = [usual(
     "profile",
     Form::Like(&["starlink/up", "transatlantic", "none"]),

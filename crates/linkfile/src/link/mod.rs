@@ -5,6 +5,7 @@ mod corrupt;
 mod delay;
 mod distribution;
 pub(crate) mod keys;
+pub mod library;
 mod listed;
 mod loss;
 mod loss_pattern;

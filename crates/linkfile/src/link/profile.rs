@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
+use super::library::ProfileName;
 use super::{is_none, says_everything, written_together};
 use crate::document::{Entry, Node, Place, Table, Value, join};
-use crate::library::ProfileName;
 use crate::reading::{Context, Modulators, values};
 
 /// Keys of a link whose profile was put in, with the modulators of the profile.

@@ -11,7 +11,7 @@ use crate::document::{Node, Sources, Value, value_text};
 use crate::link::{read_link, read_modulators};
 use crate::reading::{Context, Modulators, TableReader, parse, values};
 
-use crate::schema::link::{LINK_TABLE, MODULATOR};
+use crate::link::keys::{LINK_TABLE, MODULATOR};
 
 static ROOT: Table = Table::of(&[&[
     required("name", Form::Text, "The name, without version and direction"),
@@ -139,7 +139,7 @@ fn texts(node: &Node, context: Context<'_>) -> Option<Vec<String>> {
 mod tests {
     use std::collections::BTreeSet;
 
-    use crate::library::{Direction, Grade, profiles};
+    use crate::link::library::{Direction, Grade, profiles};
 
     /// Every number can be followed to its source: each key of each direction, the keys of the states of a modulator among them, has a reason; each source that a
     /// reason names exists and is used; and only an assumption has no source.
