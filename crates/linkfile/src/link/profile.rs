@@ -31,6 +31,7 @@ pub(super) fn resolve(node: &Node, context: Context<'_>) -> Option<Option<Resolv
         }
     };
     if let Some((whole_place, whole)) = table.0.iter().enumerate().rfind(|(_, entry)| says_everything(entry)) {
+        // Within one table no order is meant, so that neither of two whole descriptions is laid over the other.
         if written_together(whole, entry) {
             let message = format!("profile and {} exclude each other: expected only one of them, or {} = \"none\"", whole.name, whole.name);
             context.fault(entry.key, &entry.node.path, message);
@@ -44,6 +45,7 @@ pub(super) fn resolve(node: &Node, context: Context<'_>) -> Option<Option<Resolv
     // Entries stand in the order of laying over. What stands before the profile in another table lies below the profile, which says everything about its link.
     let is_over = |(index, other): (usize, &&Entry)| index != place && (index > place || written_together(other, entry));
     let over: Vec<Entry> = table.0.iter().enumerate().filter(|(index, other)| is_over((*index, other))).map(|(_, other)| other.clone()).collect();
+    // A key of the user holds at any time. In a state of the profile the same key would win, because keys of states are laid over those of the link.
     let own: Vec<&str> = over.iter().map(|entry| entry.name.as_str()).collect();
     let below = without_in_states(&at(&profile.line(direction).keys, entry.node.place, &node.path), &own);
     let over = Node { value: Value::Table(Table(over.clone())), place: node.place, path: node.path.clone() };

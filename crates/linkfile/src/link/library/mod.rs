@@ -197,9 +197,11 @@ impl Profile {
     /// Returns the worst grade of delay, rate and loss in both directions.
     #[must_use]
     pub fn grade(&self) -> Grade {
+        // The other keys, such as the order of packets, are assumptions in nearly all profiles and would make every grade the same.
         let of = |line: &Line| {
             line.reasons.iter().filter(|(key, _)| ["delay", "rate", "loss"].contains(&key.as_str())).map(|(_, reason)| reason.grade).max()
         };
+        // Grades are ordered from the best to the worst. A profile without any of the three keys has nothing that a source could support.
         of(&self.down).max(of(&self.up)).unwrap_or(Grade::C)
     }
 }
@@ -236,6 +238,7 @@ pub fn nearest(given: &str) -> Option<&'static str> {
     let bare = Direction::BOTH
         .iter()
         .fold(given, |name, direction| name.strip_suffix(direction.word()).and_then(|name| name.strip_suffix('/')).unwrap_or(name));
+    // The version stands before the direction, so that the cut comes after the direction is gone.
     let bare = bare.split('@').next().unwrap_or(bare);
     crate::reading::nearest(&names().collect::<Vec<_>>(), bare)
 }
@@ -253,6 +256,7 @@ pub(crate) fn modulator_name(profile: &str, version: u32, modulator: &str) -> St
 #[must_use]
 pub fn of_owner(link: Arc<LinkModel>, owner: &str) -> Arc<LinkModel> {
     match &*link {
+        // A modulator of the user's file keeps its name: several peers that name it are meant to change state together.
         LinkModel::Modulated(modulated) if modulated.modulator().name().starts_with(OWN) => {
             let name = format!("{} of {owner}", modulated.modulator().name());
             Arc::new(LinkModel::Modulated(modulated.with_modulator_name(&name)))

@@ -32,6 +32,7 @@ impl FromStr for ProfileName {
     type Err = NameError;
 
     fn from_str(text: &str) -> Result<Self, NameError> {
+        // Only the last part can be a direction: the names of tools' tables have a slash too.
         let (text, direction) = match text.rsplit_once('/') {
             Some((rest, "down")) => (rest, Some(Direction::Down)),
             Some((rest, "up")) => (rest, Some(Direction::Up)),
@@ -60,6 +61,7 @@ impl ProfileName {
         let name = &self.profile.name;
         match self.direction {
             Some(direction) => Ok(direction),
+            // Either direction is right for a symmetric profile, and the answer must not depend on which one a caller prefers.
             None if self.profile.is_symmetric() => Ok(Direction::Down),
             None => Err(NameError(format!("{name} differs by direction: expected {name}/down, towards the user, or {name}/up"))),
         }

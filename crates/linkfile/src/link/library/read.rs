@@ -57,6 +57,7 @@ const fn of_directions(form: Form) -> [Key; 3] {
 #[expect(clippy::panic, reason = "the texts are part of this program, and a test reads each")]
 pub(super) fn profile(file: &str, text: &str) -> Profile {
     let file = format!("{file}.toml");
+    // A profile names no further file, so that the folder of the name does not matter.
     let read = parse(Sources { file: Path::new(&file), text, overrides: &[] }, read_profile);
     read.unwrap_or_else(|error| panic!("{error}")).whole
 }
@@ -65,6 +66,7 @@ fn read_profile(node: &Node, context: Context<'_>) -> Option<Profile> {
     let mut table = TableReader::new(node, context, &ROOT, "a profile")?;
     let name: String = table.read("name", text)?;
     let version = u32::try_from(table.value::<u64>("version")?).ok()?;
+    // Modulators come before both directions, because the keys of a direction name them.
     let chains = table.get("modulators");
     let modulators = owned(&name, version, &*read_modulators(chains, context)?);
     let [because, between] = ["because", "between"].map(|key| table.get(key));
@@ -88,6 +90,7 @@ fn read_profile(node: &Node, context: Context<'_>) -> Option<Profile> {
         up: table.read("up", |keys, _| line(keys, Direction::Up))?,
         name,
         version,
+        // The list was read above, so that any other value has been refused.
         chains: chains.map_or_else(Vec::new, |node| match &node.value {
             Value::List(list) => list.iter().map(|chain| value_text(chain)).collect(),
             Value::Text(_) | Value::Integer(_) | Value::Float(_) | Value::Boolean(_) | Value::Date | Value::Table(_) => Vec::new(),
@@ -109,6 +112,7 @@ fn owned(profile: &str, version: u32, modulators: &Modulators) -> Arc<Modulators
 /// Returns the entries for one direction: those of both directions, and those of the direction in place of them.
 fn entries_of<T>(table: Option<&Node>, direction: Direction, read: impl Fn(&Node) -> Option<T>) -> Option<BTreeMap<String, T>> {
     let of = |key: &str| table.and_then(Node::as_table)?.get(key)?.node.as_table();
+    // The later entry of a key replaces the earlier one in the map.
     let entries = [of("both"), of(direction.word())].into_iter().flatten().flat_map(|table| &table.0);
     entries.map(|entry| Some((entry.name.clone(), read(&entry.node)?))).collect()
 }
