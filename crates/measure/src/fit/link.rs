@@ -107,6 +107,7 @@ fn duration(seconds: f64) -> Span {
 pub(super) fn text_of(text: &str) -> String {
     let escaped = |character: char| match character {
         '"' | '\\' => format!("\\{character}"),
+        // All control characters are below U+00A0, so four digits are enough.
         control if control.is_control() => format!("\\u{:04X}", u32::from(control)),
         other => other.to_string(),
     };

@@ -68,6 +68,7 @@ impl Measurements {
     pub fn new(packets: Vec<Measurement>) -> Result<Self, MeasurementsError> {
         let mut before_s = f64::NEG_INFINITY;
         for (packet, &Measurement { sent_s, delay_s }) in (1..).zip(&packets) {
+            // Finite numbers are checked before the order, because no comparison with NaN holds and NaN would pass as in order.
             if let Some(value) = [Some(sent_s), delay_s].into_iter().flatten().find(|value| !value.is_finite()) {
                 return Err(MeasurementsError::NotFinite { packet, value });
             }
@@ -85,6 +86,7 @@ impl Measurements {
         let mut packets: Vec<Measurement> = Vec::with_capacity(log.packets());
         let mut before = None;
         for record in log.records() {
+            // A log is sorted by packet and copy, so a new number begins a new packet.
             if before != Some(record.sequence) {
                 before = Some(record.sequence);
                 packets.push(Measurement { sent_s: record.offered.as_secs_f64(), delay_s: None });

@@ -198,6 +198,7 @@ pub fn fit(measurements: &Measurements) -> Result<Fitted, FitError> {
     let packets = measurements.packets();
     let arrivals: Vec<(f64, f64)> = measurements.arrivals().collect();
     let received = arrivals.len();
+    // Each delay keeps its own tick through the sort, because programs print long delays with fewer digits.
     let mut shown: Vec<(f64, Option<f64>)> =
         packets.iter().enumerate().filter_map(|(number, packet)| Some((packet.delay_s?, measurements.ticks.of(number)))).collect();
     shown.sort_by(|one, other| one.0.total_cmp(&other.0));
@@ -231,6 +232,7 @@ pub fn fit(measurements: &Measurements) -> Result<Fitted, FitError> {
     let laws = distribution::fit_all(&cells, &moments, effective);
     let correlation = correlation::fit(&arrivals, spacing_s);
     let losses = loss::fit_all(&packets.iter().map(|packet| (packet.sent_s, packet.delay_s.is_none())).collect::<Vec<_>>(), evenly_spaced);
+    // Batch means need the order of sending, so `sorted` does not serve here.
     let delays: Vec<f64> = arrivals.iter().map(|arrival| arrival.1).collect();
     let delay = match laws.first().filter(|best| best.fit.fits) {
         Some(best) => LinkDelay::of_law(best),
@@ -271,6 +273,7 @@ pub fn fit(measurements: &Measurements) -> Result<Fitted, FitError> {
 fn error_of_drift(measurements: &Measurements, arrivals: &[(f64, f64)]) -> f64 {
     let Some((skew, first)) = measurements.removed().zip(measurements.packets().first()) else { return 0.0 };
     let since = series::mean(&arrivals.iter().map(|arrival| arrival.0 - first.sent_s).collect::<Vec<_>>()).unwrap_or(0.0);
+    // The drift has other degrees of freedom than 30 batch means. The ratio of quantiles makes one factor, 2.045, right for both errors.
     since * skew.standard_error * student(0.975, skew.blocks - 2) / student(0.975, batches::MOST - 1)
 }
 
@@ -291,6 +294,7 @@ fn spacing(packets: &[Measurement]) -> (f64, bool) {
 fn effective(packets: &[Measurement]) -> f64 {
     let delays: Vec<Option<f64>> = packets.iter().map(|packet| packet.delay_s).collect();
     let received = count(delays.iter().flatten().count());
+    // A negative correlation would count more delays than were measured, and a correlation of 1 none.
     let lag_one = series::autocorrelation(&delays, 1).first().copied().unwrap_or(0.0).clamp(0.0, 0.999_999);
     (received * (1.0 - lag_one) / (1.0 + lag_one)).max(2.0)
 }

@@ -77,6 +77,7 @@ impl Measurements {
     ///
     /// [`MeasurementsError::Share`] if the share is not above 0 and at most 1.
     pub fn share_of_round_trip(&self, share: f64) -> Result<Self, MeasurementsError> {
+        // The condition is negated so that NaN is refused, too.
         if !(share > 0.0 && share <= 1.0) {
             return Err(MeasurementsError::Share { share });
         }

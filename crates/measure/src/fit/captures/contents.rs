@@ -143,6 +143,7 @@ impl Capture {
 /// Returns whether two datagrams have the same length, and equal payloads as far as both were captured.
 pub(super) fn agree(one: &Capture, number: usize, other: &Capture, other_number: usize) -> bool {
     let (first, second) = (&one.datagrams[number], &other.datagrams[other_number]);
+    // Frames may be cut at either end, so only octets in both files are compared. The lengths as sent must still be equal.
     let octets = first.captured().min(second.captured());
     first.length == second.length && one.payload(first)[..octets] == other.payload(second)[..octets]
 }

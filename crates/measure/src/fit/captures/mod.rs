@@ -180,6 +180,7 @@ pub fn between(sender: impl Read, receiver: impl Read, port: Option<u16>) -> Res
         sent.contents.seen_again += doubled;
         pairs = Pairs::of(&sent, &arrived);
     }
+    // Cut datagrams come last, because only datagrams without any other explanation may be parts of a cut datagram.
     hidden::pair(&mut sent, &mut arrived, &mut pairs);
     matched(sent, arrived, &pairs)
 }
@@ -192,7 +193,9 @@ fn matched(mut sent: Capture, arrived: Capture, pairs: &Pairs) -> Result<Matched
     // Times of 64-bit nanoseconds are far inside the range of 128-bit attoseconds.
     let since = |later: &Datagram, earlier: &Datagram| instant(later).zip(instant(earlier)).and_then(|(later, earlier)| later.seconds_since(earlier));
     let own = |range: std::ops::Range<usize>| range.filter(|number| !pairs.is_again[*number] && !pairs.is_hidden[*number]);
+    // The judged range holds a matched datagram, so the range is not empty and its start is a valid index.
     let first = &sent.datagrams[own(judged.clone()).next().unwrap_or(judged.start)];
+    // A time out of range becomes NaN, and `Measurements::new` refuses NaN with the number of the packet.
     let packet = |number: usize| {
         let datagram = &sent.datagrams[number];
         let delay_s = pairs.arrival_of[number].map(|arrival| since(&arrived.datagrams[arrival], datagram).unwrap_or(f64::NAN));

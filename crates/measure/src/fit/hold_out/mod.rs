@@ -99,12 +99,14 @@ impl HoldOut {
         // Quantiles and W₁ are those of the delays of the first part, whatever their order.
         let without_memory = Figures { autocorrelation: [Some(0.0); 3], ..replay };
         let lost = replay.loss > 0.0;
+        // Without memory, a run of losses goes on with the probability `again` after each loss, so its length is geometric.
         let runs = |again: f64| (lost.then(|| 1.0 / (1.0 - again)), lost.then_some([again, again * again]));
         let with_runs = |again: f64| {
             let (mean_run, longer_runs) = runs(again);
             Figures { mean_run, longer_runs, ..without_memory }
         };
         let independent = with_runs(replay.loss);
+        // A geometric run with the mean m goes on with the probability 1 − 1/m.
         let gilbert = with_runs(1.0 - replay.mean_run.unwrap_or(1.0).recip());
         let refused = refused(first, rest, tick_s, [&measured, &best, &replay]);
         Self { fitted: first.packets().len(), held_out: rest.packets().len(), measured, best, independent, gilbert, replay, refused }
@@ -153,8 +155,10 @@ fn wasserstein(one: &[f64], other: &[f64]) -> f64 {
     let (mut sum, mut before) = (0.0, f64::NAN);
     let (mut below_one, mut below_other) = (0, 0);
     while below_one < one.len() || below_other < other.len() {
+        // `next` is the least delay not yet passed in either sample. Each pass goes beyond at least one delay, so the loop ends.
         let next = one.get(below_one).copied().unwrap_or(f64::INFINITY).min(other.get(below_other).copied().unwrap_or(f64::INFINITY));
         if !before.is_nan() {
+            // Between two neighbouring delays of the joined samples, both distribution functions are constant.
             sum += (count(below_one) / count(one.len()) - count(below_other) / count(other.len())).abs() * (next - before);
         }
         below_one += one[below_one..].iter().take_while(|delay| **delay <= next).count();
@@ -177,6 +181,7 @@ fn errors(packets: &[Measurement]) -> (f64, Option<f64>) {
 fn refused(first: &Measurements, rest: &Measurements, tick_s: f64, [measured, best, replay]: [&Figures; 3]) -> Vec<String> {
     let mut refused = Vec::new();
     let [found, own] = [best, replay].map(|figures| figures.wasserstein_s.unwrap_or(0.0));
+    // Measured delays are rounded to ticks and delays of the link are not, so a distance within one tick refuses nothing.
     let limit = tick_s.max(2.0 * own);
     if found > limit {
         refused.push(format!("its delays are {:.4} ms from the held-out ones (W1), and at most {:.4} ms may be", found * 1e3, limit * 1e3));
@@ -194,6 +199,7 @@ fn refused(first: &Measurements, rest: &Measurements, tick_s: f64, [measured, be
     if (found - wanted).abs() > ERRORS * error {
         refused.push(format!("its loss is {found:.4} %, and {wanted:.4} % of the held-out packets; {error:.4} % is a standard error"));
     }
+    // A link without a loss has no runs. The share lost, compared before, judges such a link.
     if let (Some(found), Some(wanted), Some(error)) = (best.mean_run, measured.mean_run, runs_first.zip(runs_rest)) {
         let error = error.0.hypot(error.1);
         if (found - wanted).abs() > ERRORS * error {

@@ -48,6 +48,7 @@ struct Sum {
 /// Reads the JSON.
 pub(super) fn read(text: &str) -> Result<Recording, ReaderError> {
     let report: Report = parse(text)?;
+    // A failed test can have intervals too, and would pass for a shorter test.
     if let Some(error) = report.error {
         return Err(ReaderError::found("error", format!("\"{error}\""), "a test that ended without an error"));
     }
@@ -59,6 +60,7 @@ pub(super) fn read(text: &str) -> Result<Recording, ReaderError> {
         None => report.intervals.iter().any(|interval| interval.sum.packets.is_some()),
     };
     let (mut seconds, mut bits, mut rates, mut lost, mut packets) = (0.0, 0.0, Vec::new(), 0_u64, 0_u64);
+    // Omitted intervals (`-O`) are the slow start of TCP. Intervals are numbered before the filter, because errors name the index in the file.
     for (number, Interval { sum }) in report.intervals.iter().enumerate().filter(|(_, interval)| !interval.sum.omitted) {
         let place = |key: &str| format!("intervals[{number}].sum.{key}");
         if !(sum.end - sum.start > 0.0 && sum.end - sum.start < 1e9) {
@@ -75,6 +77,7 @@ pub(super) fn read(text: &str) -> Result<Recording, ReaderError> {
             packets = packets.saturating_add(sum.packets.ok_or_else(|| ReaderError::found(place("packets"), "nothing", expected))?);
         }
         seconds += sum.end - sum.start;
+        // Rates are weighted by time, because the last interval can be shorter than the others.
         bits += sum.bits_per_second * (sum.end - sum.start);
         rates.push(sum.bits_per_second);
     }
@@ -86,6 +89,7 @@ pub(super) fn read(text: &str) -> Result<Recording, ReaderError> {
     }
     rates.sort_by(f64::total_cmp);
     let intervals = rates.len();
+    // Number ⌈share·n/10⌉ of n, counted from 1. At least one rate is left here, so the index is valid.
     let rank = |share: usize| rates[(share * intervals).div_ceil(10).max(1) - 1];
     let loss = (packets > 0).then(|| count_u64(lost) / count_u64(packets));
     let rate = Rate { intervals, seconds, mean_bps: bits / seconds, between_bps: [rank(1), rank(9)], is_lower_bound: !is_udp, loss };

@@ -115,6 +115,7 @@ pub(super) fn read(text: &str, direction: Option<Direction>) -> Result<Delays, R
     let mut probes = Vec::with_capacity(report.round_trips.len());
     for (number, trip) in report.round_trips.iter().enumerate() {
         let clocks = &trip.timestamps.client.send;
+        // Instants are only compared with each other, so the monotonic clock serves where `--clock` left the wall clock out.
         let sent = needed(clocks.wall.or(clocks.monotonic), Paths.sent(number), "nanoseconds since 1970, or monotonic ones beside")?;
         let outcome = match trip.lost {
             Lost::Up => Outcome::LostUp,

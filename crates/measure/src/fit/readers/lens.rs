@@ -106,6 +106,7 @@ fn both_ways<'a>(
         let cells = cells(text);
         let sent = time(line, &cells, columns.timestamp, -9)?;
         let read = |place, name| milliseconds(line, &cells, place, name);
+        // A lost row has −1 in one column and 0 in the others, so the column without a delay decides before the zeros are read.
         let outcome = match (read(columns.rtt, "rtt")?, read(up, "uplink")?, read(down, "downlink")?) {
             (None, ..) => Outcome::Lost,
             (Some(_), None, _) => Outcome::LostUp,
@@ -126,11 +127,14 @@ fn round_trips<'a>(lines: impl Iterator<Item = (usize, &'a str)>, columns: &Colu
         let cells = cells(text);
         let at = time(line, &cells, columns.timestamp, 0)?;
         let delay_s = milliseconds(line, &cells, columns.rtt, "rtt")?.map(Attoseconds::seconds);
+        // Instants count from the first row, because `f64` resolves seconds since 1970 only to a quarter of a microsecond.
         let at_s = at.seconds_since(*first.get_or_insert(at));
         let at_s =
             at_s.ok_or_else(|| ReaderError::found(format!("line {line}, column timestamp"), "a time out of range", "within 10^20 s of the first"))?;
+        // A lost packet has no round trip to subtract, and keeps the instant of its row.
         packets.push(Measurement { sent_s: at_s - delay_s.unwrap_or(0.0), delay_s });
     }
+    // Answers can overtake each other, so rows in the order of answers need not be in the order of sending.
     packets.sort_by(|one, other| one.sent_s.total_cmp(&other.sent_s));
     let ticks = packets.iter().map(|packet| ping::tick_of(packet.delay_s.unwrap_or(0.0))).collect();
     Ok(Delays {

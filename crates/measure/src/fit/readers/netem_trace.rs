@@ -124,6 +124,7 @@ fn pattern(fields: &Value, path: &str, about: About) -> Result<Turns, ReaderErro
     if is_constant {
         return Ok(Turns { turns: once, forever: count == 0 });
     }
+    // Patterns inside patterns multiply. The product saturates, because a wrapped product could pass the limit.
     limited(once.len().saturating_mul(repeats), &places)?;
     let length = once.len();
     let turns = once.into_iter().cycle().take(length * repeats).collect();
@@ -148,6 +149,7 @@ fn trace(value: &Value, path: &str) -> Result<Turns, ReaderError> {
             let bps = bps
                 .filter(|bps| *bps > 0)
                 .ok_or_else(|| found(&format!("{place}[1][{place_in_list}]"), value, "a rate above 0, at most 10^9 Mbit/s"))?;
+            // A turn without length is passed over only here, after the checks, so that a wrong rate is refused in any case.
             if !lasts.is_zero() {
                 turns.push(Turn { key: Key::Rate(bps), lasts });
                 limited(turns.len(), path)?;
@@ -169,6 +171,7 @@ fn rate(value: &Value, path: &str) -> Result<u64, ReaderError> {
     const EXPECTED: &str = "a rate above 0 such as {\"gbps\": 0, \"bps\": 12000000} or \"12Mbps\"";
     let of_table = || {
         let part = |name: &str| value.get(name).map_or(Some(0), Value::as_u64);
+        // Without this line a text would count as a table without parts, of the rate 0, and `of_text` would not be tried.
         value.as_object()?;
         part("gbps")?.checked_mul(1_000_000_000)?.checked_add(part("bps")?)
     };
@@ -192,6 +195,7 @@ fn time(value: &Value, path: &str) -> Result<Duration, ReaderError> {
     const EXPECTED: &str = "a time such as {\"secs\": 1, \"nanos\": 0} or \"1s\", below 292 years";
     let of_table = || {
         value.as_object()?;
+        // From 10^9 nanoseconds on, `Duration::new` carries into the seconds, and panics if the seconds overflow.
         let nanos =
             value.get("nanos").map_or(Some(0), Value::as_u64).and_then(|nanos| u32::try_from(nanos).ok()).filter(|nanos| *nanos < 1_000_000_000)?;
         Some(Duration::new(value.get("secs").map_or(Some(0), Value::as_u64)?, nanos))

@@ -54,6 +54,7 @@ pub(super) fn take(program: Program, probes: &[Probe], direction: Option<Directi
     let first = probes.first().map_or(Attoseconds::new(0), |probe| probe.sent);
     let mut before = first;
     for (number, probe) in probes.iter().enumerate() {
+        // `Measurements::in_order` below relies on this check.
         if probe.sent < before {
             let expected = "probes in the order of sending";
             return Err(ReaderError::found(places.sent(number), "an instant before that of the probe before", expected));
@@ -63,10 +64,12 @@ pub(super) fn take(program: Program, probes: &[Probe], direction: Option<Directi
             (Outcome::Lost, Direction::Rtt)
             | (Outcome::LostUp, Direction::Up | Direction::Rtt)
             | (Outcome::LostDown, Direction::Down | Direction::Rtt) => None,
+            // The loss may have been on the other way: the packet counts neither as lost nor as delivered.
             (Outcome::Lost, Direction::Up | Direction::Down) => {
                 left_out.either_way += 1;
                 continue;
             }
+            // A lost request has no answer to measure, and a lost answer took the delay of its request with it.
             (Outcome::LostUp, Direction::Down) | (Outcome::LostDown, Direction::Up) => {
                 left_out.other_way += 1;
                 continue;
@@ -74,6 +77,7 @@ pub(super) fn take(program: Program, probes: &[Probe], direction: Option<Directi
             (Outcome::Answered { up, down, rtt }, _) => {
                 let (shown, offset) = match direction {
                     Direction::Up => (up, offset),
+                    // The server's clock is ahead by the offset, so a delay down is shown too short by the offset.
                     Direction::Down => (down, offset.map(|offset| Attoseconds::new(-offset.get()))),
                     Direction::Rtt => (rtt, None),
                 };

@@ -87,7 +87,9 @@ impl Key {
         match self {
             Self::Rate(bps) => format!("rate = \"{bps}bit\""),
             Self::Delay(delay) => format!("delay = \"{}\"", Span(*delay)),
+            // `{:?}` writes 1.0 where `{}` writes 1, so that TOML reads a float.
             Self::Loss(loss) => format!("loss = {loss:?}"),
+            // By default the bad state loses every packet and the good state none, so the state is the fate of the packet before.
             Self::LossInRuns([p, again]) => format!("loss = {{ gilbert-elliott = {{ p = {p:?}, r = {:?} }} }}", 1.0 - again),
         }
     }
@@ -115,6 +117,7 @@ impl Recording {
                 let _ = writeln!(text, "[[modulators]]\nname = \"pattern\"\nstates = [");
                 for (turn, Turn { lasts, .. }) in (1..).zip(turns) {
                     let next = if turn == turns.len() { 1 } else { turn + 1 };
+                    // A modulator never leaves a state without a sojourn, so the last turn of a pattern with an end holds for ever.
                     let ends = if turn == turns.len() && !forever {
                         String::new()
                     } else {
