@@ -65,6 +65,7 @@ pub fn list() -> String {
 /// Returns the value of a key for the list, without quotes; a word for a value that changes with the state of a modulator, and for a value that is missing.
 fn figure(line: &Line, key: &str) -> String {
     let value = line.keys().into_iter().find(|(name, _)| *name == key).map(|(_, value)| value.trim_matches('"').to_owned());
+    // The states of a modulator replace the key of the line, so the value of the line alone would mislead.
     let is_varied = line.keys().iter().any(|(name, value)| *name == "modulated" && value.contains(&format!("{key} = ")));
     match value {
         _ if is_varied => "varies".to_owned(),
@@ -77,6 +78,7 @@ fn figure(line: &Line, key: &str) -> String {
 #[must_use]
 pub fn words(profile: &Profile) -> String {
     let mut text = format!("{}: {}\n", profile.title(), profile.what);
+    // Tables of tools have neither place nor time, because nobody measured a link.
     let measured =
         [profile.place.as_str(), profile.when.as_str()].map(str::trim).into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(", ");
     if !measured.is_empty() {

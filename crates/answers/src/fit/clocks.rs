@@ -54,6 +54,7 @@ pub(super) fn settled(asked: &Corrections, measured: &Measured) -> Result<(Measu
     let assumed_s = probed.as_ref().and_then(|probed| probed.added_s);
     let is_assumed = assumed_s.is_some() && asked.offset_s.is_none() && asked.least.is_none();
     let mut added_s = asked.offset_s.or_else(|| assumed_s.filter(|_| is_assumed));
+    // The user's offset replaces the assumed offset, which the reader has already added to the delays.
     let shifted = asked.offset_s.map(|by| measurements.shifted(by - assumed_s.unwrap_or(0.0))).transpose().map_err(|error| refused(&error))?;
     let measurements = shifted.as_ref().unwrap_or(measurements);
     // With one clock a change of the least delay is a change of the path, and belongs to the link.
@@ -72,8 +73,10 @@ pub(super) fn settled(asked: &Corrections, measured: &Measured) -> Result<(Measu
     if let (Some(least), Some(found)) = (asked.least, settled.least_s()) {
         let by = least.as_secs_f64() - found;
         settled = settled.shifted(by).map_err(|error| refused(&error))?;
+        // The answer gives the time added to the delays of the file, including the time added by the reader.
         added_s = Some(by + assumed_s.unwrap_or(0.0));
     }
+    // A known offset, or a single clock for both ends, makes long delays credible.
     if let Some(mean_s) = settled.mean_s().filter(|mean| *mean > QUESTIONED_S && added_s.is_none() && !has_one_clock) {
         return Err(FitFailure::LongDelays { mean_s });
     }

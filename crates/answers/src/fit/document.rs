@@ -12,6 +12,7 @@ pub fn document(answered: &Answered) -> impl Serialize {
         Kind::Recorded(recording) => (None, Some(recording)),
     };
     document! {
+        // A flattened `None` writes no key, so estimated and recorded links each have only their own keys.
         #[serde(flatten)]
         fitted: estimate.map(|estimate| &estimate.fitted),
         #[serde(flatten)]

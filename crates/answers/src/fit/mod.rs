@@ -140,6 +140,7 @@ impl Source {
             Found::Measured(measured) => measured,
             Found::Recorded(recording) => return recorded::answer(recording, corrections, file),
         };
+        // Clocks are corrected before the packets are divided, so that both parts have the same correction.
         let (measurements, clocks, skew) = clocks::settled(corrections, measured)?;
         let parts = corrections.hold_out.map(|share| measurements.hold_out(share)).transpose();
         let parts = parts.map_err(|error| FitFailure::Measurements(format!("hold-out: {error}")))?;
@@ -151,6 +152,7 @@ impl Source {
         let beside = fitted.delays_csv().map(|content| Beside::new(file, "delays.csv", content));
         let scene = fitted.link.to_scene_toml(&beside.as_ref().map_or_else(String::new, Beside::name));
         let config = read_again(&scene, Some(&fitted.link), file, beside.as_ref())?;
+        // The link is judged as a scene reads it, with rounded numbers, because users run that link.
         let held_out = rest.zip(config).map(|(rest, config)| hold_out::judge(&fitted, config, &measurements, &rest));
         let has_law = beside.is_none() && held_out.as_ref().is_none_or(|judged| judged.refused.is_empty());
         let estimate = Estimate { fitted, measurements, clocks, skew, matched: measured.matched.clone(), probed: measured.probed.clone(), held_out };

@@ -29,6 +29,7 @@ pub(super) fn read_again(scene: &str, link: Option<&FittedLink>, file: &Path, be
     let read = read.map_err(|error| FitFailure::Scene(Box::new(error)))?;
     let config = match read.whole {
         LinkModel::Fixed(config) => config,
+        // Only recorded links are read as these models, and nothing was fitted of them, so this default is never returned.
         LinkModel::Modulated(_) | LinkModel::Replay(_) | LinkModel::Kernel(_) => LinkConfig::default(),
     };
     let Some(link) = link else { return Ok(None) };

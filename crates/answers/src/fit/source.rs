@@ -86,7 +86,9 @@ impl Source {
         }
         // Some editors begin a text with a byte order mark.
         if bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&bytes).starts_with(FateRow::HEADER.as_bytes()) {
+            // Wrong options are refused before a long log is read.
             read_as.is_not_needed()?;
+            // The bytes of the head are already taken from the reader, so they are put before the rest.
             let log = fates::read(bytes.chain(from)).map_err(|error| match error {
                 ReadError::Io(error) => SourceError::Io(error),
                 ReadError::NotText { line } => SourceError::NotText { line },
@@ -113,6 +115,7 @@ impl Source {
             }
             None => {
                 read_as.is_not_needed()?;
+                // A table does not say which clock showed its delays, so both ends are taken to have their own clocks.
                 let measurements = Measurements::from_csv(&text).map_err(|error| refused(&error))?;
                 Ok(Self::measured(measurements, None, false))
             }

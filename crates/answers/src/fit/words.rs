@@ -60,6 +60,7 @@ fn estimated(scene: &str, estimate: &Estimate) -> String {
     if goodness.laws.iter().any(|law| !law.fits) {
         line(format!("  * does not fit: its distance from the delays (Kolmogorov) is above {:.5}", goodness.kolmogorov_limit));
     }
+    // Fitting laws come first, so the first law tells whether any law fits.
     if goodness.laws.first().is_none_or(|law| !law.fits) {
         line("no law fits: the link draws from the measured delays, a file that --out writes next to the link".to_owned());
     }

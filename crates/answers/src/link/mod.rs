@@ -44,6 +44,7 @@ pub struct Measured {
 /// Returns the reason, in words, why a stream is too long; `None` if the stream can be sent. Half of the range of instants is reserved for delays.
 #[must_use]
 pub fn too_long(stream: &SteadyStream) -> Option<&'static str> {
+    // `sent` saturates at the last instant, so a stream beyond the range is too long as well.
     let is_too_long = stream.sent(stream.packets).as_nanos() > u64::MAX / 2;
     is_too_long.then_some("the stream lasts longer than 292 years: expected fewer packets, or less time between them")
 }

@@ -26,10 +26,12 @@ impl LinkPicture {
     pub fn record(&mut self, record: &PacketRecord) {
         let place = usize::try_from(record.sequence).unwrap_or(usize::MAX);
         if place >= MOST {
+            // A packet has several records. The end of copy 0 comes once per packet, so each packet is counted once.
             self.left_out += u64::from(record.copy == 0 && record.fate.is_end());
             return;
         }
         if place >= self.packets.len() {
+            // Packets may end out of order, so the places of earlier packets are made as well, and filled by later records.
             self.packets.resize(place + 1, (f64::NAN, f64::NAN));
         }
         let sent = record.offered.as_secs_f64();
@@ -37,6 +39,7 @@ impl LinkPicture {
             self.packets[place].0 = sent;
         }
         if let Fate::Delivered(at) = record.fate {
+            // Copies count in the rate of arrival, but the delay of a packet is the delay of copy 0.
             if record.copy == 0 {
                 self.packets[place].1 = at.saturating_duration_since(record.offered).as_secs_f64() * 1e3;
             }
@@ -50,6 +53,7 @@ impl LinkPicture {
     pub fn svg(&self, title: &str) -> String {
         let lost: Vec<f64> = self.packets.iter().filter(|(_, delay)| delay.is_nan()).map(|(sent, _)| *sent).collect();
         let mut delays = Panel::new(Axis::new("sent at").unit("s"), Axis::new("delay").unit("ms").include(0.0))
+            // The line is broken at each lost packet, because the delay of a lost packet is NaN.
             .with(Line::new(self.packets.iter().copied(), Look::of(0)).named("delay"));
         if !lost.is_empty() {
             delays = delays.with(Rug::new(lost, Look::of(1)).named("lost"));
@@ -89,6 +93,7 @@ impl LinkPicture {
     /// Returns the rate \[kbit/s\] of what arrived, averaged over intervals of equal length, each at its beginning \[s\].
     fn rates(&self) -> Vec<(f64, f64)> {
         let end = self.arrived.iter().map(|(at, _)| *at).fold(0.0, f64::max);
+        // Without an arrival after the beginning, the intervals have no length to divide by.
         if end == 0.0 {
             return Vec::new();
         }

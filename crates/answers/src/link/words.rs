@@ -94,6 +94,7 @@ fn shown(name: &str, value: Option<f64>) -> String {
     match name {
         "autocorrelation_1" | "loss_autocorrelation_1" => format!("{value:.5}"),
         "loss_run_mean" => format!("{value:.5}"),
+        // The name of the rate also ends in `_s`, so this arm comes before the arm for times.
         "rate_bit_s" => format!("{:.3} kbit/s", value / 1e3),
         name if name.ends_with("_s") => format!("{:.5} ms", value * 1e3),
         _ => format!("{:.5} %", value * 100.0),
