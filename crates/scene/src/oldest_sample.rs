@@ -64,7 +64,7 @@ impl Scene {
     fn lasting_clock(&self) -> Option<Clock> {
         let clock = self.peers[0].clock;
         let is_link_change = |what: &ChangeKind| matches!(what, ChangeKind::Link(_) | ChangeKind::AllLinks(_));
-        // Where a sample is left out, the sample before stays in use and gets older.
+        // In place of an omitted sample, the sample before stays in use and gets older.
         let thinned = self.leaves_out_samples();
         let differs = self.peers.iter().any(|peer| peer.clock != clock);
         (!thinned && !differs && !self.timeline.iter().any(|change| is_link_change(&change.what))).then_some(clock)

@@ -50,7 +50,7 @@ pub(super) fn settled(asked: &Corrections, measured: &Measured) -> Result<(Measu
     let share = probed.as_ref().and_then(|probed| probed.share).unwrap_or(1.0);
     let ticked = asked.tick.map(|tick| tick.of(measurements.clone(), share)).transpose().map_err(|error| refused(&error))?;
     let measurements = ticked.as_ref().unwrap_or(measurements);
-    // What a reader assumed gives way to what the user knows.
+    // A value that the user knows replaces the value that a reader assumed.
     let assumed_s = probed.as_ref().and_then(|probed| probed.added_s);
     let is_assumed = assumed_s.is_some() && asked.offset_s.is_none() && asked.least.is_none();
     let mut added_s = asked.offset_s.or_else(|| assumed_s.filter(|_| is_assumed));

@@ -1,4 +1,4 @@
-//! What the file of another program says about its measurements, and what was assumed.
+//! Statements of the file of another program about its measurements, and the assumptions of the reader.
 
 use cohaptic_measure::fit::readers::{Delays, Direction, LeftOut, Program};
 use cohaptic_measure::fit::{Measurements, MeasurementsError};

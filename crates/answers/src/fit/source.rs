@@ -17,7 +17,7 @@ pub struct Source {
     pub(super) found: Found,
 }
 
-/// What a source holds.
+/// Content of a source.
 #[derive(Clone, PartialEq, Debug)]
 pub(super) enum Found {
     Measured(Box<Measured>),
@@ -31,13 +31,13 @@ pub(super) struct Measured {
     pub(super) measurements: Measurements,
     /// Counts of a pair of captures; `None` for other sources.
     pub(super) matched: Option<Ends>,
-    /// What the file of another program says; `None` for other sources.
+    /// Statements of the file of another program; `None` for other sources.
     pub(super) probed: Option<Probed>,
     /// `true` if both ends share one clock, as in a log of fates and in a round trip.
     pub(super) has_one_clock: bool,
 }
 
-/// How the file of another program is read.
+/// Choices for reading the file of another program.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct ReadAs {
     /// Way of the packets, of a file that has both ways.

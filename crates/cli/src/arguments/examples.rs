@@ -16,7 +16,7 @@ pub(super) fn after(examples: &[&str]) -> String {
     text
 }
 
-/// How other programs make a file that `fit` reads, after the examples.
+/// Commands of other programs that make files for `fit`, after the examples.
 const MEASUREMENTS: &str = "\
 Programs whose files are read, and the command that makes a good measurement:
   irtt client -i 10ms -d 10m --stats=both -o line.json HOST    each way by itself: --direction up, down

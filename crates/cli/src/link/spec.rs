@@ -92,7 +92,7 @@ pub(crate) fn link_and_keys(spec: &[String]) -> Result<(LinkModel, LinkKeys), Fa
     let spec = spec.as_ref();
     if is_keys(spec)? {
         let model = link_from_keys(spec).map_err(Failure::LinkKeys)?;
-        // Each text has an equals sign here: `is_keys` has looked.
+        // Each text has an equals sign here, because `is_keys` has checked the texts.
         let keys = spec.iter().filter_map(|text| text.split_once('='));
         return Ok((model, keys.fold(nothing, |keys, (key, value)| keys.with(key.trim(), value))));
     }

@@ -111,7 +111,7 @@ pub(super) fn describe(scene: &Scene, report: &Report) -> String {
         if !refused.is_empty() {
             line(format!("refused: {}", refused.join(", ")));
         }
-        // Where the system does not tell the drops of the kernel, the sum is a lower bound.
+        // The sum is a lower bound on systems that do not tell the drops of the kernel.
         let lost = socket.counts.failures.in_all() + socket.counts.oversized + socket.kernel_drops.unwrap_or(0);
         if lost > 0 {
             line(format!("lost at the socket: {}", Counted(lost, "datagram")));

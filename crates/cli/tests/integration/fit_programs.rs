@@ -60,7 +60,7 @@ fn irtt_is_fitted_way_by_way() {
     ] {
         assert!(text.contains(part), "no {part:?} in:\n{text}");
     }
-    // What the user knows takes the place of what is assumed.
+    // A value that the user knows takes the place of an assumed value.
     for option in ["--offset=-7s", "--least 20ms"] {
         let known = desk.json(&format!("fit line.json --direction up {option} --json"));
         assert!((number(&known["goodness"]["mean_s"]) - 0.0225).abs() < 2e-5 && known["clocks"].get("is_assumed").is_none(), "{known:#}");
@@ -153,7 +153,7 @@ fn rates_and_recorded_links_are_links_of_a_scene() {
     desk.write("pattern.json", pattern.to_string());
     desk.text("fit pattern.json --out pattern.toml");
     assert!(desk.read("pattern.toml").contains("[[modulators]]\nname = \"pattern\"\n"));
-    // What is written is a link of a scene.
+    // The written file is a link of a scene.
     for (link, word) in [
         ("rate", "5500kbit"),
         ("light", "a recorded delay of at least 30ms"),

@@ -113,7 +113,7 @@ fn a_mean_square_ends() {
     assert_interrupted(&stopped(&desk, "stability point two.toml --set peers=[] --set scene.count=3 --set link.jitter=2ms", "-INT"));
 }
 
-/// What was proven by then is written, and the page warns that it is not all.
+/// An ended proof is written as far as it has come, and the page warns that cells are missing.
 #[test]
 fn the_page_of_a_proof_that_was_ended_says_so() {
     let desk = Desk::with("two.toml", TWO);

@@ -87,24 +87,26 @@ fn the_engine_loses_what_starlink_loses_and_only_at_boundaries() {
     assert!(error < 0.3 && (mean - 0.004 * 1875.0).abs() < 4.0 * error, "{mean} ± {error}");
 }
 
-/// The walks hold each state for a fifth of the time, and have the autocorrelations after 1 and 10 s of the page that describes them, where λₖ = (1 − cos(πk/5))/s
+/// The walks have the rates \[kbit/s\] and sojourns \[ms\] of their sources, hold each state for a fifth of the time, and have the autocorrelations after 1 and 10 s of the page that describes them, where λₖ = (1 − cos(πk/5))/s
 /// and cₖ = Σᵢ (rᵢ − r̄)·cos(πk(i − ½)/5).
 #[test]
 fn walks_of_the_rate_have_their_autocorrelation() {
-    for (name, [after_1, after_10]) in [
-        ("lte-driving/down", [0.930, 0.495]),
-        ("lte-driving/up", [0.858, 0.309]),
-        ("3g/down", [0.867, 0.292]),
-        ("3g/up", [0.897, 0.366]),
-        ("5g-walking/down", [0.920, 0.489]),
+    for (name, kbits, sojourn_ms, [after_1, after_10]) in [
+        ("lte-driving/down", [1212, 3185, 5412, 7072, 9034], 2758, [0.930, 0.495]),
+        ("lte-driving/up", [101, 743, 1044, 1112, 1177], 2011, [0.858, 0.309]),
+        ("3g/down", [192, 959, 1880, 2635, 4449], 1629, [0.867, 0.292]),
+        ("3g/up", [256, 696, 1053, 1301, 1420], 1996, [0.897, 0.366]),
+        ("5g-walking/down", [30_800, 78_610, 103_000, 125_700, 172_300], 2880, [0.920, 0.489]),
     ] {
         let walk = modulated(name);
         let shares = walk.modulator().shares().unwrap();
         shares.iter().for_each(|share| close(*share, 0.2, 1e-12));
         #[expect(clippy::cast_precision_loss, reason = "a rate")]
         let rates: Vec<f64> = walk.configs().iter().map(|config| bits_of(config) as f64).collect();
+        assert_eq!(walk.configs().iter().map(|config| bits_of(config) / 1000).collect::<Vec<_>>(), kbits, "{name}");
         let middle = rates.iter().sum::<f64>() / 5.0;
         let stay = |state: usize| walk.modulator().states()[state].sojourn.unwrap().mean();
+        assert_eq!(stay(2), Duration::from_millis(sojourn_ms), "{name}");
         assert!(stay(0) == 2 * stay(2) && stay(4) == stay(0) && stay(1) == stay(2) && stay(3) == stay(2), "{name}");
         let found = |after: f64| {
             let mode = |k: f64| {

@@ -39,3 +39,22 @@ fn a_wrong_name_is_refused_where_it_stands() {
         ("[peer]", "[peer]\naccess = 3", "10:10: peer.access: found the integer 3: expected the name of a link of the library"),
     ]);
 }
+
+/// Keys of one table are laid over the profile in any order, and a whole description cannot stand beside a profile but over one.
+#[test]
+fn a_profile_of_links_lies_below_the_keys_of_its_table() {
+    let links = |text: &str| SCENE.replace("delay = \"24ms\"", text);
+    let between = |text: &str| parse(&links(text), &[]).unwrap_or_else(|error| panic!("{error}")).links.between(0, 1).clone();
+    let slow = between("delay = \"7ms\"\nprofile = \"cable/up\"");
+    assert_eq!(slow, between("profile = \"cable/up\"\ndelay = \"7ms\""));
+    assert_eq!(slow, between("delay = \"7ms\"\norder = \"in-order\""));
+    let over = "profile = \"cable/up\"\n[[links]]\nfrom = \"left\"\nto = \"right\"\nnetem = \"delay 5ms\"";
+    assert_eq!(between(over), between("netem = \"delay 5ms\""));
+    let below = "netem = \"delay 5ms\"\n[[links]]\nfrom = \"left\"\nto = \"right\"\nprofile = \"cable/up\"";
+    assert_eq!(between(below), between("profile = \"cable/up\""));
+    check_replaced(&[(
+        "delay = \"24ms\"",
+        "netem = \"delay 5ms\"\nprofile = \"cable/up\"",
+        "18:1: link.profile: profile and netem exclude each other: expected only one of them, or netem = \"none\"",
+    )]);
+}

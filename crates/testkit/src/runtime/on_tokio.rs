@@ -180,11 +180,11 @@ fn step(now: Instant, next: Option<Instant>) -> Option<Instant> {
     }
 }
 
-/// What tokio calls before it parks its thread. Does something while a run goes on.
+/// Hook that tokio calls before parking its thread. The hook acts while a run goes on.
 #[derive(Default)]
 pub(crate) struct Hook(Mutex<Option<Arc<Parking>>>);
 
-/// What a run does before tokio parks its thread.
+/// State of a run that the hook needs before tokio parks its thread.
 struct Parking {
     idle: Arc<Idle>,
     shared: Arc<Shared>,

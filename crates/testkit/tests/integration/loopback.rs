@@ -64,7 +64,7 @@ fn datagrams_cross_it_as_well() {
         other.send_to(b"back", from).await.unwrap();
         one.recv(&mut [0; 4]).await.unwrap();
         assert_eq!(begin.elapsed(), Duration::from_millis(5));
-        // That nobody hears is known after a round trip.
+        // The news that nobody hears takes a round trip.
         one.connect("127.0.0.1:9").await.unwrap();
         one.send(b"nobody").await.unwrap();
         assert_eq!(one.recv(&mut [0; 4]).await.unwrap_err().kind(), std::io::ErrorKind::ConnectionRefused);

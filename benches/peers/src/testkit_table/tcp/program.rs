@@ -39,7 +39,7 @@ pub trait Net: Clone + 'static {
 ///
 /// # Errors
 ///
-/// What the listener gives.
+/// The errors of the listener.
 pub async fn answer<N: Net>(net: N) -> io::Result<()> {
     let listener = net.listen().await?;
     loop {
@@ -64,7 +64,7 @@ pub async fn serve(mut stream: impl AsyncRead + AsyncWrite + Unpin) -> io::Resul
 ///
 /// # Errors
 ///
-/// What the connection gives.
+/// The errors of the connection.
 pub async fn ask<N: Net>(server: SocketAddr, questions: u32) -> io::Result<()> {
     asking(N::connect(server).await?, questions).await
 }
@@ -73,7 +73,7 @@ pub async fn ask<N: Net>(server: SocketAddr, questions: u32) -> io::Result<()> {
 ///
 /// # Errors
 ///
-/// What the connection gives.
+/// The errors of the connection.
 pub async fn asking(mut stream: impl AsyncRead + AsyncWrite + Unpin, questions: u32) -> io::Result<()> {
     for number in 0..questions {
         let (question, mut answer) = ([number.to_le_bytes()[0]; SIZE], [0; SIZE]);
@@ -97,13 +97,8 @@ pub async fn crowd<N: Net>(net: N, server: SocketAddr, connections: u32, questio
     future::try_join_all((0..connections).map(|number| net.spawn(client(number)))).await.map(drop)
 }
 
-/// Writes a number of octets on the first connection, and waits until the other end is shut.
-///
-/// # Errors
-///
-/// What the connection gives.
-pub async fn give<N: Net>(net: N, octets: usize) -> io::Result<()> {
-    let mut stream = N::accept(&net.listen().await?).await?;
+/// Writes a number of octets, shuts the connection for writing, and waits until the other end is shut.
+async fn write_and_shut(mut stream: impl AsyncRead + AsyncWrite + Unpin, octets: usize) -> io::Result<()> {
     let chunk = vec![7; CHUNK];
     let mut left = octets;
     while left > 0 {
@@ -111,6 +106,15 @@ pub async fn give<N: Net>(net: N, octets: usize) -> io::Result<()> {
     }
     stream.shutdown().await?;
     stream.read(&mut [0]).await.map(drop)
+}
+
+/// Writes a number of octets on the first connection, and waits until the other end is shut.
+///
+/// # Errors
+///
+/// The errors of the connection.
+pub async fn give<N: Net>(net: N, octets: usize) -> io::Result<()> {
+    write_and_shut(N::accept(&net.listen().await?).await?, octets).await
 }
 
 /// Reads a number of octets.
@@ -135,7 +139,7 @@ pub async fn take(stream: &mut (impl AsyncRead + Unpin), octets: usize) -> io::R
 ///
 /// # Errors
 ///
-/// What the listener gives.
+/// The errors of the listener.
 pub async fn swallow<N: Net>(net: N) -> io::Result<()> {
     let listener = net.listen().await?;
     loop {
@@ -154,14 +158,7 @@ async fn take_all(mut stream: impl AsyncRead + AsyncWrite + Unpin) -> io::Result
 ///
 /// # Errors
 ///
-/// What the connection gives.
+/// The errors of the connection.
 pub async fn feed<N: Net>(server: SocketAddr, octets: usize) -> io::Result<()> {
-    let mut stream = N::connect(server).await?;
-    let chunk = vec![7; CHUNK];
-    let mut left = octets;
-    while left > 0 {
-        left -= stream.write(&chunk[..left.min(CHUNK)]).await?;
-    }
-    stream.shutdown().await?;
-    stream.read(&mut [0]).await.map(drop)
+    write_and_shut(N::connect(server).await?, octets).await
 }

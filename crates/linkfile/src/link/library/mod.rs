@@ -114,13 +114,13 @@ pub struct Profile {
     pub name: String,
     /// Version, from 1.
     pub version: u32,
-    /// What the profile is a model of.
+    /// Link that the profile models, in words.
     pub what: String,
-    /// Where the link was measured. Empty if no source says it.
+    /// Place of the measurement. Empty if no source names a place.
     pub place: String,
-    /// When the link was measured. Empty if no source says it.
+    /// Time of the measurement. Empty if no source names a time.
     pub when: String,
-    /// How the numbers were made from the sources.
+    /// Way from the sources to the numbers.
     pub method: String,
     /// Properties of the real link without a key.
     pub not_modelled: Vec<String>,
@@ -142,7 +142,7 @@ pub struct Profile {
 pub struct Source {
     /// Authors, title, and where and when it appeared.
     pub cite: String,
-    /// How the source was read: `source` for the source itself, `transcription` for somebody's copy of its figures, `computed` for arithmetic.
+    /// Kind of reading: `source` for the source itself, `transcription` for somebody's copy of its figures, `computed` for arithmetic.
     pub read: String,
     /// Licence of the data of the source, and what of the data is used here.
     pub licence: String,
@@ -164,11 +164,11 @@ pub struct Line {
 #[derive(Clone, PartialEq, Debug)]
 #[non_exhaustive]
 pub struct Reason {
-    /// How far the number is known.
+    /// Grade of the knowledge about the number.
     pub grade: Grade,
     /// Names of sources in [`Profile::sources`]. Empty for an assumption.
     pub sources: Vec<String>,
-    /// How the number follows from the sources.
+    /// Way from the sources to the number.
     pub how: String,
 }
 

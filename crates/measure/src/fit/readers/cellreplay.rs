@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 use super::recording::{Link, Recording};
 use super::{Program, ReaderError};
 
-/// What leaves at an instant of a heavy trace \[bytes\].
+/// Octets that leave at an instant of a heavy trace \[bytes\].
 const PACKET_BYTES: u64 = 1_400;
 /// Fewest rows of a light trace that CellReplay takes.
 const FEWEST_ROWS: usize = 3;

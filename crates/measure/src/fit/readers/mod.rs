@@ -98,7 +98,7 @@ pub struct Delays {
     /// Offset of the server's clock that is assumed \[s\]: with this offset the least delays of both ways are equal. `None` for a round trip, which one clock
     /// measures.
     pub offset_s: Option<f64>,
-    /// What the reader assumed, in sentences without a full stop.
+    /// Assumptions of the reader, in sentences without a full stop.
     pub notes: Vec<String>,
 }
 

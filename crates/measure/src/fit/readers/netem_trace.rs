@@ -18,7 +18,7 @@ use super::{Program, ReaderError};
 /// Most turns of a pattern, all repetitions included. The states of a modulator have a weight for each other state.
 const MOST_TURNS: usize = 1_000;
 
-/// What a configuration is about.
+/// Subject of a configuration.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum About {
     Rate,

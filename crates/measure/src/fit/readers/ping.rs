@@ -1,4 +1,4 @@
-//! What `ping` and `ping -D` print.
+//! Output of `ping` and `ping -D`.
 //!
 //! A line with `icmp_seq=` (or `seq=`) and `time=` is an answer. The number of a packet has 16 bits, so it begins anew after 65535. A number without an answer
 //! is a lost packet. A line with `DUP!`, or a second answer to a number, is a copy. With `-D` a line begins with the instant of the answer, `[1700182800.41]`.

@@ -13,7 +13,7 @@ pub(super) struct Probe {
     pub(super) outcome: Outcome,
 }
 
-/// What became of a probe.
+/// Fate of a probe.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Outcome {
     /// The packet was lost on the way up.

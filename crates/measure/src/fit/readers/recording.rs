@@ -16,7 +16,7 @@ pub struct Recording {
     /// Measured rate; `None` for a file that describes a link.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate: Option<Rate>,
-    /// What the file has and the link has not, and what is assumed: sentences without a full stop.
+    /// Properties of the file that the link lacks, and assumptions: sentences without a full stop.
     pub notes: Vec<String>,
     #[serde(skip)]
     pub(super) link: Link,

@@ -54,7 +54,7 @@ fn one_frame(fates: &[Fate], channels: &[Channel], delay: Option<Duration>, name
 /// Rotates the frames so that the words begin after the last loss of a run, with arrivals before losses.
 fn rotated(fates: &[Vec<Fate>], mut said: Vec<String>) -> Vec<String> {
     let losses = |frame: usize| fates[frame % fates.len()].iter().filter(|fate| **fate == Fate::Lost).count();
-    // Where the words of an endless repetition begin has no meaning. This choice fixes the place for patterns with losses and arrivals.
+    // The beginning of the words of an endless repetition has no meaning. This choice fixes the place for patterns with losses and arrivals.
     let start = (0..fates.len()).find(|frame| losses(*frame) == 0 && losses(frame + fates.len() - 1) > 0);
     said.rotate_left(start.unwrap_or(0));
     said
