@@ -233,7 +233,7 @@ mod interrupted {
         let line = format!("stability map paper.toml {LONG} --out out");
         let outcome = interrupted(&desk, &line, |_| rows(&desk) > 3);
         assert_eq!((outcome.status, outcome.stdout.as_str()), (Some(130), ""));
-        for part in ["interrupted: ", " of 1000 rows are finished", "kept in out/map.rows.partial", "same command goes on"] {
+        for part in ["interrupted: ", " of 1000 rows are finished", "kept in out/map.rows.partial", "repeat the command to go on"] {
             assert!(outcome.stderr.contains(part), "no {part:?} in {}", outcome.stderr);
         }
         assert_eq!(desk.files("out"), ["map.rows.partial"]);
