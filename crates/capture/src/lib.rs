@@ -8,6 +8,7 @@
 //! packet 17 delivered after 24.1ms, copy 1, marked
 //! packet 18 dropped: queue-full
 //! packet 19 duplicated
+//! packet 20 dropped on the uplink: loss
 //! ```
 //!
 //! In an analyser, the filter `frame.comment contains "dropped"` then shows the lost packets. The frames are raw IPv4 (`LINKTYPE_RAW`) with UDP, with both
@@ -39,7 +40,7 @@ use std::fmt;
 use std::io::{self, Write};
 
 use cohaptic_units::print::Span;
-use cohaptic_wan::{Fate, PacketRecord};
+use cohaptic_wan::{Fate, PacketRecord, PathPart};
 
 /// Writes records as frames, in the order of the calls.
 ///
@@ -64,30 +65,32 @@ impl<W: Write> CaptureWriter<W> {
         Ok(Self { to, block: Vec::new() })
     }
 
-    /// Writes a frame for a packet with known bytes: IPv4 or IPv6 from the first octet on, unchanged.
+    /// Writes a frame for a packet with known bytes: IPv4 or IPv6 from the first octet on, unchanged. The path of the record is the part of the path in which
+    /// the fate occurred, or nothing for the link.
     ///
     /// # Errors
     ///
     /// The errors of the writer.
-    pub fn write_packet(&mut self, record: &PacketRecord, packet: &[u8]) -> io::Result<()> {
+    pub fn write_packet(&mut self, record: &PacketRecord<impl Copy + Into<PathPart>>, packet: &[u8]) -> io::Result<()> {
         self.write_frame(record, &block::Frame { captured: packet.into(), length: packet.len() })
     }
 
     /// Writes a frame for a packet without known headers. `payload` has the known bytes of the packet. If `payload` is shorter than [`PacketRecord::size`],
     /// the frame is marked as cut off and has no UDP checksum. A UDP payload has at most 65 507 bytes; the rest of a larger packet is not written.
+    /// The path of the record is as for [`CaptureWriter::write_packet`].
     ///
     /// # Errors
     ///
     /// The errors of the writer.
-    pub fn write(&mut self, record: &PacketRecord, payload: &[u8]) -> io::Result<()> {
+    pub fn write(&mut self, record: &PacketRecord<impl Copy + Into<PathPart>>, payload: &[u8]) -> io::Result<()> {
         let size = usize::try_from(record.size.get()).unwrap_or(usize::MAX);
         let datagram = block::build(record.sequence, record.marked, payload, size);
         self.write_frame(record, &datagram)
     }
 
-    fn write_frame(&mut self, record: &PacketRecord, frame: &block::Frame<'_>) -> io::Result<()> {
+    fn write_frame(&mut self, record: &PacketRecord<impl Copy + Into<PathPart>>, frame: &block::Frame<'_>) -> io::Result<()> {
         self.block.clear();
-        block::enhanced_packet(&mut self.block, record.at.as_nanos(), frame, &Comment(record).to_string());
+        block::enhanced_packet(&mut self.block, record.at.as_nanos(), frame, &Comment(record.with_path(record.path.into())).to_string());
         self.to.write_all(&self.block)
     }
 
@@ -103,15 +106,22 @@ impl<W: Write> CaptureWriter<W> {
 }
 
 /// Comment of a frame: the fate of the packet in words.
-struct Comment<'a>(&'a PacketRecord);
+struct Comment(PacketRecord<PathPart>);
 
-impl fmt::Display for Comment<'_> {
+impl fmt::Display for Comment {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let record = self.0;
+        let record = &self.0;
         write!(f, "packet {} ", record.sequence)?;
         match record.fate {
             Fate::Delivered(at) => write!(f, "delivered after {}", Span(at.saturating_duration_since(record.offered)))?,
-            Fate::Dropped(cause) => write!(f, "dropped: {}", cause.name())?,
+            Fate::Dropped(cause) => {
+                f.write_str(match record.path {
+                    PathPart::Uplink => "dropped on the uplink",
+                    PathPart::Link => "dropped",
+                    PathPart::Downlink => "dropped on the downlink",
+                })?;
+                write!(f, ": {}", cause.name())?;
+            }
             Fate::Duplicated => f.write_str("duplicated")?,
         }
         if record.copy > 0 {

@@ -113,6 +113,20 @@ fn the_fate_stands_in_the_comment() {
     assert_eq!(frames[3].data[4..6], 4_464_u16.to_be_bytes(), "70 000 modulo 65 536");
 }
 
+/// The part of a path on which a packet was dropped stands in the comment, unless it is the link.
+#[test]
+fn the_part_of_a_path_stands_in_the_comment() {
+    let mut writer = CaptureWriter::new(Vec::new(), "a -> b").unwrap();
+    for part in [PathPart::Uplink, PathPart::Link, PathPart::Downlink] {
+        writer.write(&record(0, 5, 3, Fate::Dropped(DropCause::Loss)).with_path(part), b"abc").unwrap();
+        writer.write(&delivered(1, 5, 3).with_path(part), b"abc").unwrap();
+    }
+    let comments: Vec<String> = frames_by_hand(&writer.finish().unwrap()).into_iter().map(|frame| frame.comment).collect();
+    let dropped = ["packet 0 dropped on the uplink: loss", "packet 0 dropped: loss", "packet 0 dropped on the downlink: loss"];
+    assert_eq!([&*comments[0], &*comments[2], &*comments[4]], dropped);
+    assert!(comments[1] == comments[3] && comments[3] == comments[5]);
+}
+
 #[test]
 fn a_payload_that_is_not_known_is_cut_off_and_has_no_checksum() {
     let frames = frames_by_hand(&capture(&[(delivered(0, 1, 64), b""), (delivered(1, 2, u64::MAX), b"ab")]));
@@ -154,6 +168,6 @@ fn a_packet_that_is_known_is_written_as_it_is() {
     let mut writer = CaptureWriter::new(Vec::new(), "left->right").unwrap();
     writer.write_packet(&record, &packet).unwrap();
     let frames = frames_by_library(&writer.finish().unwrap());
-    let comment = Comment(&record).to_string();
+    let comment = Comment(record.with_path(PathPart::Link)).to_string();
     assert_eq!(frames, [Frame { nanos: 9, original: 44, data: packet, comment }]);
 }

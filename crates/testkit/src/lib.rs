@@ -45,6 +45,8 @@
 #![cfg_attr(not(feature = "tcp"), doc = "| streams, as Linux does TCP | feature `tcp` |")]
 //! | timers to the nanosecond | [`time`], [`Instant`] |
 //! | what a link is: words of `tc-netem`, or a model of the emulator | [`ToLink`], [`wan`] |
+#![cfg_attr(feature = "files", doc = "| links with a name, such as `starlink`, and hosts behind one | [`LibraryLink`], [`Testbed::access`] |")]
+#![cfg_attr(not(feature = "files"), doc = "| links with a name, such as `starlink`, and hosts behind one | feature `files` |")]
 //! | single packets that are dropped, delayed, copied, damaged or held back | [`hit`], [`Testbed::on_packet`], [`Testbed::hit`](Testbed::hit()) |
 //! | programs without sockets: state machines | [`node`] |
 #![cfg_attr(feature = "strategies", doc = "| links and networks at random, which shrink to the least impaired | [`strategies`] |")]
@@ -72,7 +74,7 @@
 //! | `facade` | | programs that use tokio's own sockets, on a test bed unchanged, through the package that `cohaptic tokio` generates; brings `tcp` and `tokio` |
 //! | `loopback` | | runtimes whose loopback is a link, for the package that `cohaptic tokio` generates; not for use by hand; brings `facade` |
 //! | `tokio-net` | | the methods `ready`, `try_io` and `async_io` of sockets, whose types tokio has only with its own feature `net`; brings `tokio` |
-//! | `files` | | relay files (TOML) as hosts and links; files of plain words need no feature |
+//! | `files` | | links of the library by name, and relay files (TOML) as hosts and links; files of plain words need no feature |
 //! | `scenes` | | scene files as hosts and links and as tests, and strategies for scenes of coordination; brings `files` and `strategies` |
 //! | `hyper` | | connectors and executors for hyper and hyper-util; brings `tcp` and `tokio` |
 //! | `axum` | | `TcpListener` as a listener of `axum::serve`; brings `tcp` and `tokio` |
@@ -109,6 +111,8 @@ pub mod hit;
 mod host;
 #[cfg(feature = "hyper")]
 pub mod hyper;
+#[cfg(feature = "files")]
+mod library;
 mod link;
 #[cfg(feature = "loopback")]
 #[doc(hidden)]
@@ -152,6 +156,8 @@ pub use cohaptic_wan as wan;
 pub use fault::WordsError;
 pub use file::{LinkFile, LinkFileError};
 pub use host::Host;
+#[cfg(feature = "files")]
+pub use library::LibraryLink;
 pub use link::ToLink;
 #[cfg(feature = "strategies")]
 pub use proptest;
@@ -166,6 +172,7 @@ pub use task::{JoinHandle, TaskStopped};
 pub use tcp::{TcpConfig, TcpListener, TcpSocket, TcpStream};
 pub use trace::{Difference, Happening, Lost, PacketName, Trace, TraceEvent};
 pub use watch::STALL_VARIABLE;
+pub use wire::AccessStats;
 
 /// Runs the code of the README as a doc test.
 #[cfg(doctest)]

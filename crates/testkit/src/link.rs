@@ -4,6 +4,9 @@ use cohaptic_units::Instant;
 use cohaptic_wan::netem::Netem;
 use cohaptic_wan::{KernelNetem, LinkConfig, LinkModel, Modulated};
 
+#[cfg(feature = "files")]
+use crate::library::LibraryLink;
+
 /// Description of a link: a model, a configuration, or the words of `tc-netem`.
 pub trait ToLink {
     /// Returns the model of the link.
@@ -62,6 +65,11 @@ impl ToLink for str {
     }
 
     fn words(&self) -> Option<String> {
+        // The name of a link of the library is given its version, so that a test printed today means the same link for ever.
+        #[cfg(feature = "files")]
+        if let Some(Ok(link)) = LibraryLink::parse(self) {
+            return Some(link.to_string());
+        }
         Some(self.trim().to_owned())
     }
 }
@@ -71,7 +79,6 @@ pub(crate) fn parse(words: &str) -> Result<LinkModel, String> {
     if words.trim().is_empty() {
         return Ok(LinkModel::default());
     }
-    #[cfg(feature = "files")]
     if let Some(link) = named(words.trim()) {
         return link;
     }
@@ -81,13 +88,15 @@ pub(crate) fn parse(words: &str) -> Result<LinkModel, String> {
 
 /// Returns the link of the library with a name; `None` if the text is no name of the library.
 #[cfg(feature = "files")]
-fn named(text: &str) -> Option<Result<LinkModel, String>> {
-    let name = text.parse::<cohaptic_linkfile::library::ProfileName>().ok()?;
-    let link = name
-        .one_direction()
-        .map_err(|error| error.to_string())
-        .and_then(|_| cohaptic_linkfile::link_from_keys(&[format!("profile={text}")]).map_err(|error| error.to_string()));
+pub(crate) fn named(text: &str) -> Option<Result<LinkModel, String>> {
+    let link = LibraryLink::parse(text)?.and_then(|link| link.one_way());
     Some(link.map_err(|error| format!("`{text}` is not a link: {error}")))
+}
+
+/// Without the feature `files` there is no library.
+#[cfg(not(feature = "files"))]
+pub(crate) fn named(_text: &str) -> Option<Result<LinkModel, String>> {
+    None
 }
 
 impl ToLink for String {
@@ -117,7 +126,7 @@ mod tests {
     #[test]
     fn a_name_of_the_library_is_a_link_and_its_own_words() {
         assert_eq!("transatlantic".to_link().mean_delay(), std::time::Duration::from_millis(38));
-        assert_eq!(ToLink::words("starlink@1/up").as_deref(), Some("starlink@1/up"));
+        assert_eq!(ToLink::words(" starlink/up ").as_deref(), Some("starlink@1/up"));
         assert!(matches!("starlink/up".to_link(), LinkModel::Modulated(_)));
     }
 

@@ -46,7 +46,8 @@ impl Record {
     }
 
     /// Returns the fates of the packets from one host to another on their link, in the form that [`LinkModel::Replay`](cohaptic_wan::LinkModel::Replay)
-    /// replays. A packet that its link delivered to a host that was down, or over a path that was cut, counts as delivered here; the trace tells its end.
+    /// replays. With access lines (`Testbed::access`) the fate is that of the whole path, from uplink to downlink. A packet that its link delivered to a host
+    /// that was down, or over a path that was cut, counts as delivered here; the trace tells its end.
     ///
     /// # Panics
     ///
@@ -60,6 +61,11 @@ impl Record {
     pub(crate) fn paths(&self) -> Vec<Path> {
         let paths: BTreeSet<Path> = self.recorded.packets.iter().map(|seen| seen.path).collect();
         paths.into_iter().collect()
+    }
+
+    /// Returns a line of words for each link of the test, and for the access lines of each host.
+    pub(crate) fn network(&self) -> Vec<String> {
+        self.recorded.said.lines(self.recorded.trace.hosts())
     }
 
     pub(crate) fn packets_of(&self, path: Path) -> impl Iterator<Item = &Seen> {

@@ -63,6 +63,7 @@ impl Setup {
                 limits: Limits::default(),
                 said: Arc::default(),
                 laws: Laws::default(),
+                access: BTreeMap::new(),
                 loopback: None,
             },
             artefacts: None,
@@ -98,16 +99,36 @@ impl Setup {
         Arc::make_mut(&mut self.settings.said).set(path, &link);
     }
 
-    /// Sets all links, their changes, the hits and the seed as a file says. The setup must have the hosts of the file.
+    /// Sets the access lines of a host.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such host, or `link` is no name of the library with both directions.
+    #[cfg(feature = "files")]
+    #[expect(clippy::panic, reason = "a test that says nonsense is to fail, with the place")]
+    pub(crate) fn set_access(&mut self, host: &str, link: &str) {
+        let node = self.names.node(host);
+        let named = crate::library::LibraryLink::expect(link);
+        // A host has one name, whatever the letters of the test: the name decides about the random numbers of its lines.
+        let lines = named.and_then(|named| Ok((named.both_ways(&self.names[node.index()])?, named.to_string())));
+        let (lines, words) = lines.unwrap_or_else(|error| panic!("`{link}` is no access of host `{host}`: {error}"));
+        self.settings.access.insert(node, lines);
+        Arc::make_mut(&mut self.settings.said).set_access(node, Some(words));
+    }
+
+    /// Sets all links, their changes, the access lines, the hits and the seed as a file says. The setup must have the hosts of the file.
     pub(crate) fn read(&mut self, file: LinkFile) {
-        let LinkFile { hosts, every, links, changes, hits, seed } = file;
+        let LinkFile { hosts, every, links, changes, access, hits, seed } = file;
         let nodes: Vec<NodeId> = hosts.iter().map(|host| self.names.node(host)).collect();
         self.add_hits(&hits);
         self.every = every;
         self.links = links.into_iter().map(|((from, to), link)| (Path { from: nodes[from], to: nodes[to] }, link)).collect();
         self.changes =
             changes.into_iter().map(|change| LinkChange { from: nodes[change.from].index(), to: nodes[change.to].index(), ..change }).collect();
-        Arc::make_mut(&mut self.settings.said).set_models(self.every == LinkModel::default(), self.links.keys().copied());
+        self.settings.access = access.into_iter().map(|(host, lines)| (nodes[host], lines)).collect();
+        let said = Arc::make_mut(&mut self.settings.said);
+        said.set_models(self.every == LinkModel::default(), self.links.keys().copied());
+        self.settings.access.keys().for_each(|host| said.set_access(*host, None));
         self.seed = seed.or(self.seed);
     }
 

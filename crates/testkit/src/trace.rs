@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use cohaptic_units::Instant;
 use cohaptic_units::print::{Seconds, Span};
-use cohaptic_wan::{DropCause, NodeId, Path};
+use cohaptic_wan::{DropCause, NodeId, Path, PathPart};
 
 use crate::hit::Verdict;
 use crate::names::Names;
@@ -109,6 +109,10 @@ pub struct PacketName {
 pub enum Lost {
     /// The link dropped the packet.
     Link(DropCause),
+    /// The uplink of the sender dropped the packet: see `Testbed::access` (feature `files`).
+    Uplink(DropCause),
+    /// The downlink of the receiver dropped the packet.
+    Downlink(DropCause),
     /// The path was cut when the packet was sent, or when it would have arrived.
     Cut,
     /// The host was down when the packet arrived.
@@ -125,10 +129,23 @@ pub enum Lost {
     BacklogFull,
 }
 
+impl Lost {
+    /// Returns the loss of a packet that was dropped on a part of its path.
+    pub(crate) const fn on(part: PathPart, cause: DropCause) -> Self {
+        match part {
+            PathPart::Uplink => Self::Uplink(cause),
+            PathPart::Link => Self::Link(cause),
+            PathPart::Downlink => Self::Downlink(cause),
+        }
+    }
+}
+
 impl fmt::Display for Lost {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Link(cause) => cause.name(),
+            Self::Uplink(cause) => return write!(f, "{} (uplink)", cause.name()),
+            Self::Downlink(cause) => return write!(f, "{} (downlink)", cause.name()),
             Self::Cut => "the way is cut",
             Self::HostDown => "the host is down",
             Self::NoSuchAddress => "the host has another address",

@@ -246,6 +246,9 @@ fn link(line: &str, words: &[Range<usize>], file: &mut impl FnMut(&str) -> Resul
         let log = file(&line[path.clone()]).and_then(|text| FateLog::parse(&text).map_err(|error| error.to_string()));
         return log.map(|log| LinkModel::Replay(Arc::new(log))).map_err(|message| (path, message));
     }
+    if let Some(link) = crate::link::named(&line[whole.clone()]) {
+        return link.map_err(|message| (whole, message));
+    }
     let netem = Netem::parse(&line[whole.clone()]).map_err(|error| {
         let span = whole.start + error.span.start..whole.start + error.span.end;
         (span, error.to_string())

@@ -66,7 +66,7 @@ pub use event_queue::{Event, EventQueue};
 pub use fates::damage::Damage;
 pub use fates::fate::{DropCause, Fate};
 pub use fates::log::{FateLog, FateLogError, FateLogReader, FateRow};
-pub use fates::record::{PacketEvent, PacketRecord};
+pub use fates::record::{PacketEvent, PacketRecord, PathPart};
 pub use fates::stats::LinkStats;
 pub use laws::chance::{Chance, ChanceError};
 pub use laws::delay as law;

@@ -9,7 +9,7 @@ use cohaptic_units::{Bytes, Instant};
 
 use crate::event_queue::{Event, EventQueue};
 use crate::fates::fate::{DropCause, Fate};
-use crate::fates::record::{PacketEvent, PacketRecord};
+use crate::fates::record::{PacketEvent, PacketRecord, PathPart};
 use crate::fates::stats::LinkStats;
 use crate::line::filter::{Filter, Offered};
 use crate::line::model::LinkModel;
@@ -219,7 +219,7 @@ impl<P> InLink<P> {
         let Self { sequence, offered, size, payload } = self;
         let Marks { congestion: marked, damage, .. } = marks;
         let record = PacketRecord { path: (), sequence, copy, offered, at, size, fate, marked, damaged: damage.is_some() };
-        PacketEvent { record, payload, damage }
+        PacketEvent { record, payload, damage, part: PathPart::Link }
     }
 }
 

@@ -237,7 +237,7 @@ impl Engine {
                         self.pool.put(event.payload);
                         continue;
                     };
-                    let PacketEvent { record: PacketRecord { marked, .. }, mut payload, damage } = event;
+                    let PacketEvent { record: PacketRecord { marked, .. }, mut payload, damage, part: _ } = event;
                     if let Some(damage) = damage {
                         // A copy still in flight may share these bytes, undamaged; `make_mut` then clones the bytes.
                         damage.apply(&mut Arc::make_mut(&mut payload).bytes);

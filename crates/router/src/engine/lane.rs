@@ -57,7 +57,7 @@ impl Lane {
         let Fate::Delivered(at) = event.fate else { return None };
         self.delivered_bytes += event.size.get();
         self.recent.record(at.saturating_duration_since(event.offered));
-        let PacketEvent { record: PacketRecord { marked, .. }, payload: mut packet, damage } = event;
+        let PacketEvent { record: PacketRecord { marked, .. }, payload: mut packet, damage, part: _ } = event;
         if marked || damage.is_some() {
             // A copy may share the packet. `make_mut` then clones the packet, so that the copy keeps its own marks and bits.
             let packet = Arc::make_mut(&mut packet);

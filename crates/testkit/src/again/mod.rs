@@ -85,7 +85,8 @@ impl Again {
     }
 
     fn words(&self) -> impl Iterator<Item = &Words> {
-        std::iter::once(self.said.every()).chain(self.said.links().map(|(_, words)| words))
+        let links = self.said.links().map(|(_, words)| words);
+        std::iter::once(self.said.every()).chain(links).chain(self.said.access().map(|(_, words)| words))
     }
 
     /// Returns whether anything other than losses depends on the seed.
@@ -136,6 +137,13 @@ impl Again {
                 words if words == every => {}
                 Some(words) => lines.push(format!(".link({from:?}, {to:?}, {words:?})")),
             }
+        }
+        for (host, words) in self.said.access() {
+            let host = name(host);
+            lines.push(match words {
+                Words::Known(words) => format!(".access({host:?}, {words:?})"),
+                Words::Model => format!("// the access lines of {host}: models without words, as the test says it."),
+            });
         }
         // Losses precede the other laws, because the first verdict counts, and another law could delay a lost packet.
         for (path, numbers) in lost.into_iter().flatten() {

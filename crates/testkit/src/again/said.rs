@@ -12,6 +12,8 @@ use crate::link::ToLink;
 pub(crate) struct Said {
     every: Words,
     links: BTreeMap<Path, Words>,
+    /// Names of the links of the library that are the access lines of hosts.
+    access: BTreeMap<NodeId, Words>,
 }
 
 /// Link in the words of `tc-netem`, where an empty text is the ideal link; or a link without words.
@@ -87,10 +89,16 @@ impl Said {
         self.links.insert(path, Words::of(link));
     }
 
-    /// Sets all links to models, as a link file does.
+    /// Sets the name of a host's access lines; `None` if the access lines are models.
+    pub(crate) fn set_access(&mut self, host: NodeId, name: Option<String>) {
+        self.access.insert(host, name.map_or(Words::Model, Words::Known));
+    }
+
+    /// Sets all links to models, as a link file does. No host has access lines then.
     pub(crate) fn set_models(&mut self, every_is_ideal: bool, links: impl Iterator<Item = Path>) {
         self.every = if every_is_ideal { Words::default() } else { Words::Model };
         self.links = links.map(|path| (path, Words::Model)).collect();
+        self.access.clear();
     }
 
     pub(super) const fn every(&self) -> &Words {
@@ -102,7 +110,12 @@ impl Said {
         self.links.iter().map(|(path, words)| (*path, words)).filter(|(_, words)| **words != self.every)
     }
 
-    /// Returns a line for each link that is not ideal, and a line for all links that are not named.
+    /// Returns the access lines, sorted by host.
+    pub(super) fn access(&self) -> impl Iterator<Item = (NodeId, &Words)> {
+        self.access.iter().map(|(host, words)| (*host, words))
+    }
+
+    /// Returns a line for each link that is not ideal, a line for all links that are not named, and a line for the access lines of each host.
     pub(crate) fn lines(&self, hosts: &[String]) -> Vec<String> {
         let name = |host: NodeId| hosts.get(host.index()).map_or("?", |name| name);
         let links = self.links().map(|(path, words)| {
@@ -110,7 +123,8 @@ impl Said {
             format!("{} -> {}: {shown}", name(path.from), name(path.to))
         });
         let every = (self.every != Words::default()).then(|| format!("all: {}", self.every.shown()));
-        every.into_iter().chain(links).collect()
+        let access = self.access().map(|(host, words)| format!("access of {}: {}", name(host), words.shown()));
+        every.into_iter().chain(links).chain(access).collect()
     }
 }
 
@@ -144,6 +158,7 @@ mod tests {
         assert_eq!(said.lines(&hosts), ["all: delay 1ms", "a -> b: ideal", "b -> a: loss 1%"]);
         said.set(path(0, 1), &"delay 1ms");
         said.set(path(1, 0), &cohaptic_wan::LinkModel::default());
-        assert_eq!(said.lines(&hosts), ["all: delay 1ms", "b -> a: a model without words"]);
+        said.set_access(NodeId(1), Some("starlink@1".to_owned()));
+        assert_eq!(said.lines(&hosts), ["all: delay 1ms", "b -> a: a model without words", "access of b: starlink@1"]);
     }
 }

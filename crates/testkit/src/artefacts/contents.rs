@@ -1,12 +1,14 @@
 //! Contents of the files of a record.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use cohaptic_units::print::Seconds;
-use cohaptic_wan::{DropCause, Fate};
+use cohaptic_wan::{Fate, FateLog, Path};
 
 use super::folder::{MARK, MARKED};
 use crate::record::Record;
+use crate::trace::Lost;
 
 /// Returns the names and contents of the files of a record.
 pub(super) fn files(record: &Record) -> Vec<(String, Vec<u8>)> {
@@ -22,7 +24,7 @@ pub(super) fn files(record: &Record) -> Vec<(String, Vec<u8>)> {
         let (one, other) = (&hosts[path.from.index()], &hosts[path.to.index()]);
         // Writing to a `String` cannot fail.
         let _ = writeln!(links, "{one} -> {other}: replay {fates}");
-        let _ = writeln!(table, "  {one} -> {other}: {}", counts(&log));
+        let _ = writeln!(table, "  {one} -> {other}: {}", counts(record, path, &log));
         files.push((fates, log.to_text().into_bytes()));
         #[cfg(feature = "pcapng")]
         files.push((format!("packets-{from}-to-{to}.pcapng"), capture(record, path, one, other)));
@@ -48,38 +50,44 @@ pub(super) fn files(record: &Record) -> Vec<(String, Vec<u8>)> {
         crate::SEED_VARIABLE,
         seed.value,
     );
-    let links = format!("# What the links did, packet by packet.\nseed: {}\nhosts: {}\n{links}", seed.value, hosts.join(" "));
+    let asked: String = record.network().iter().map(|line| format!("# {line}\n")).collect();
+    let asked = if asked.is_empty() { asked } else { format!("# The links as the test has them:\n{asked}") };
+    let links = format!("# What the links did, packet by packet.\n{asked}seed: {}\nhosts: {}\n{links}", seed.value, hosts.join(" "));
     files.push((MARKED.to_owned(), summary.into_bytes()));
     files.push(("trace.txt".to_owned(), trace.into_bytes()));
     files.push(("links.txt".to_owned(), links.into_bytes()));
     files
 }
 
-/// Returns the counts of a link in words: `12 packets, 10 arrived, 1 copied, 2 lost (loss), 1 lost (queue-full)`.
-fn counts(log: &cohaptic_wan::FateLog) -> String {
+/// Returns the counts of a path in words: `12 packets, 10 arrived, 1 copied, 2 lost (loss), 1 lost (queue-full (uplink))`.
+fn counts(record: &Record, path: Path, log: &FateLog) -> String {
     let count = |is: &dyn Fn(Fate) -> bool| log.records().iter().filter(|record| is(record.fate)).count();
     let mut text = format!("{} packets, {} arrived", log.packets(), count(&|fate| matches!(fate, Fate::Delivered(_))));
     let copied = count(&|fate| fate == Fate::Duplicated);
     if copied > 0 {
         let _ = write!(text, ", {copied} copied");
     }
-    for cause in DropCause::ALL {
-        let lost = count(&|fate| fate == Fate::Dropped(cause));
-        if lost > 0 {
-            let _ = write!(text, ", {lost} lost ({})", cause.name());
+    let mut lost: BTreeMap<Lost, usize> = BTreeMap::new();
+    // The log may be shorter than the packets, and counts those that it has.
+    for seen in record.packets_of(path).filter(|seen| seen.sequence < log.packets() as u64) {
+        if let Fate::Dropped(cause) = seen.fate {
+            *lost.entry(Lost::on(seen.part, cause)).or_default() += 1;
         }
+    }
+    for (why, count) in lost {
+        let _ = write!(text, ", {count} lost ({why})");
     }
     text
 }
 
 #[cfg(feature = "pcapng")]
-fn capture(record: &Record, path: cohaptic_wan::Path, from: &str, to: &str) -> Vec<u8> {
+fn capture(record: &Record, path: Path, from: &str, to: &str) -> Vec<u8> {
     #[cfg(feature = "tcp")]
     let segments = segments(record, path);
     let write = || -> std::io::Result<Vec<u8>> {
         let mut capture = cohaptic_capture::CaptureWriter::new(Vec::new(), &format!("{from} -> {to}"))?;
         for seen in record.packets_of(path) {
-            let packet = seen.without_path();
+            let packet = seen.record.with_path(seen.part);
             #[cfg(feature = "tcp")]
             if segments.contains(&packet.sequence) {
                 capture.write_packet(&packet, &seen.payload)?;
@@ -95,7 +103,7 @@ fn capture(record: &Record, path: cohaptic_wan::Path, from: &str, to: &str) -> V
 
 /// Returns the numbers of the packets of a path that are whole IP packets, which are those of TCP.
 #[cfg(all(feature = "pcapng", feature = "tcp"))]
-fn segments(record: &Record, path: cohaptic_wan::Path) -> std::collections::BTreeSet<u64> {
+fn segments(record: &Record, path: Path) -> std::collections::BTreeSet<u64> {
     let number = |event: &crate::TraceEvent| {
         let crate::Happening::Segment { packet, .. } = event.what else { return None };
         (packet.path == path).then_some(packet.sequence)

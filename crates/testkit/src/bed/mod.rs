@@ -138,6 +138,38 @@ impl Testbed {
         self.link(one, other, &link).link(other, one, &link)
     }
 
+    /// Gives a host the access lines of a link of the library, such as `starlink` or `lte-driving delay*1.4` (feature `files`): see
+    /// [`LibraryLink`](crate::LibraryLink). Every packet of the host first passes the *uplink*, the link of the library away from the user; every packet to the
+    /// host last passes the *downlink*, towards the user. In between is the link from host to host, ideal unless the test says otherwise. Packets to all other
+    /// hosts share the uplink and wait for each other there.
+    ///
+    /// What changes a link of the library by itself, such as its rate, changes uplink and downlink of one host together, and those of two hosts apart.
+    /// [`Bed::access_stats`] returns what the lines did, and the trace tells on which part of its path a packet was lost. A packet that a
+    /// [hit](crate::hit) drops has passed the uplink, and goes no further.
+    ///
+    /// ```
+    /// use cohaptic_testkit::{Instant, Testbed, time};
+    ///
+    /// let arrived = Testbed::new(["phone", "server"]).access("phone", "devtools/slow-4g").links("transatlantic").run(|bed| async move {
+    ///     let server = bed.host("server").bind("0.0.0.0:7").unwrap();
+    ///     bed.host("phone").bind("0.0.0.0:0").unwrap().send_to(&[0; 75], "server:7").await.unwrap();
+    ///     server.recv(&mut [0; 75]).await.unwrap();
+    ///     assert_eq!(bed.access_stats("phone").unwrap().uplink.delivered(), 1);
+    ///     time::now()
+    /// });
+    /// // 600 bits at 750 kbit/s, 75 ms over the uplink, and 38 ms over the Atlantic.
+    /// assert_eq!(arrived, Instant::from_nanos(113_800_000));
+    /// ```
+    ///
+    /// # Panics
+    ///
+    /// If there is no such host, or the library has no such link. A name with a direction is refused, because a host has both.
+    #[cfg(feature = "files")]
+    pub fn access(mut self, host: &str, link: impl AsRef<str>) -> Self {
+        self.setup.set_access(host, link.as_ref());
+        self
+    }
+
     /// Sets the seed of all chance in the links. The environment variable [`SEED_VARIABLE`](crate::SEED_VARIABLE) takes precedence. Without either, the seed is
     /// derived from the file in which the bed is run and the function that contains the program. So the seed does not depend on threads, and is the same with
     /// `--test-threads=1` and with nextest. Editing other functions or moving this function within its file does not change the seed; renaming the function

@@ -17,6 +17,7 @@ use crate::link::ToLink;
 use crate::names::Names;
 use crate::task::JoinHandle;
 use crate::trace::{Happening, Trace};
+use crate::wire::AccessStats;
 
 /// Handle of the test bed for a running program: access to hosts, links, faults and the record.
 #[derive(Clone)]
@@ -131,7 +132,7 @@ impl Bed {
         self.shared.with(|core| core.set_link(path, link));
     }
 
-    /// Returns the statistics of the link from one host to another so far.
+    /// Returns the statistics of the link from one host to another so far. Packets that an uplink before the link has lost do not count.
     ///
     /// # Panics
     ///
@@ -140,6 +141,17 @@ impl Bed {
     pub fn link_stats(&self, from: &str, to: &str) -> LinkStats {
         let path = self.names().path(from, to);
         self.shared.with(|core| core.wire.link_stats(path)).unwrap_or_else(|| unreachable_link(from))
+    }
+
+    /// Returns the statistics of the access lines (`Testbed::access`) of a host so far, or `None` if the host has none.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such host.
+    #[must_use]
+    pub fn access_stats(&self, host: &str) -> Option<AccessStats> {
+        let host = self.names().node(host);
+        self.shared.with(|core| core.wire.access_stats(host))
     }
 
     /// Returns how many packets from one host to another were [hit](crate::hit) so far.

@@ -16,12 +16,13 @@ use cohaptic_wan::LinkModel;
 use crate::fault::WordsError;
 use crate::hit::PathHit;
 use crate::link::LinkChange;
+use crate::settings::AccessLines;
 use crate::words;
 
 /// Hosts and the links between them, read from a file.
 ///
 /// A file whose name ends in `.toml` is a relay file, whose programs become the hosts (feature `files`), or a scene file, whose peers become the hosts (feature
-/// `scenes`). The file gives the links, their changes during the run, and the seed of the run. Devices, objects and expectations are ignored.
+/// `scenes`). The file gives the links, their changes during the run, the access lines, and the seed of the run. Devices, objects and expectations are ignored.
 ///
 /// Any other file consists of plain words, an entry per line:
 ///
@@ -37,8 +38,9 @@ use crate::words;
 /// ```
 ///
 /// After the colon follow words of `tc-netem`, which are emulated exactly, or nothing, which is the ideal link, or `replay` and the file of a fate log,
-/// relative to the link file. `all` stands for every link that no other line names; without `all` such links are ideal. Without `hosts` the hosts are those
-/// named by lines, in the order of the lines. `hit` and a path tell which packets of the path are [hit](crate::hit).
+/// relative to the link file, or, with the feature `files`, the name of a link of the library such as `starlink/up`. `all` stands for every link that no
+/// other line names; without `all` such links are ideal. Without `hosts` the hosts are those named by lines, in the order of the lines. `hit` and a path tell
+/// which packets of the path are [hit](crate::hit).
 ///
 /// Relative paths begin in the folder in which the test runs; under `cargo test` this is the folder of the package.
 #[derive(Clone, PartialEq, Debug)]
@@ -50,6 +52,8 @@ pub struct LinkFile {
     pub(crate) links: BTreeMap<(usize, usize), LinkModel>,
     /// Changes of links, sorted by time.
     pub(crate) changes: Vec<LinkChange>,
+    /// Access lines by index of the host.
+    pub(crate) access: BTreeMap<usize, AccessLines>,
     /// Hits on packets.
     pub(crate) hits: Vec<PathHit>,
     pub(crate) seed: Option<u64>,
@@ -167,7 +171,7 @@ impl LinkFile {
 
     fn parse_with(text: &str, file: impl FnMut(&str) -> Result<String, String>) -> Result<Self, WordsError> {
         let words::Words { hosts, every, links, hits, seed } = words::parse(text, file)?;
-        Ok(Self { hosts, every, links, changes: Vec::new(), hits, seed })
+        Ok(Self { hosts, every, links, changes: Vec::new(), access: BTreeMap::new(), hits, seed })
     }
 
     #[cfg(not(feature = "files"))]

@@ -5,20 +5,37 @@ use std::sync::Arc;
 
 use cohaptic_linkfile::mesh::pairs;
 use cohaptic_scene::{ChangeKind, Scene};
+use cohaptic_wan::{LinkConfig, LinkModel};
 
 use super::{LinkFile, LinkFileError};
 use crate::link::LinkChange;
+use crate::settings::AccessLines;
 
 /// Returns whether a text is a relay file. A text that is no TOML counts as a scene file, whose parser then reports the place of the error.
 pub(super) fn is_relay(text: &str) -> bool {
     text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("programs") || table.contains_key("relay"))
 }
 
+/// Returns whether a line may copy packets.
+fn may_copy(line: &LinkModel) -> bool {
+    let copies = |config: &LinkConfig| !config.duplication.is_never();
+    match line {
+        LinkModel::Fixed(config) => copies(config),
+        LinkModel::Modulated(modulated) => modulated.configs().iter().any(copies),
+        LinkModel::Replay(_) | LinkModel::Kernel(_) => true,
+    }
+}
+
 impl LinkFile {
     pub(super) fn of_scene(scene: Scene, path: &Path) -> Result<Self, LinkFileError> {
         let refused = |what: String| Err(LinkFileError::NotLinks { path: path.to_path_buf(), what });
-        if let Some(peer) = scene.peers.iter().find(|peer| peer.uplink.is_some() || peer.downlink.is_some()) {
-            return refused(format!("peer `{}` has an access line, which a test bed's hosts have not; expected links alone", peer.name));
+        // Copies are numbered as by a path with one line that copies, the link.
+        let copied = |line: &Option<Arc<LinkModel>>| line.as_deref().is_some_and(may_copy);
+        if let Some(peer) = scene.peers.iter().find(|peer| copied(&peer.uplink) || copied(&peer.downlink)) {
+            return refused(format!(
+                "an access line of peer `{}` copies packets; expected an access line without duplicate, netem and replay",
+                peer.name
+            ));
         }
         if scene.topology.is_some() {
             return refused("a [topology], and a test bed has links from each host to each other; expected kind = \"full\"".to_owned());
@@ -42,7 +59,10 @@ impl LinkFile {
                 | ChangeKind::SendWhen(_) => {}
             }
         }
+        let model = |line: &Option<Arc<LinkModel>>| line.as_deref().cloned();
+        let lines = scene.peers.iter().map(|peer| AccessLines { uplink: model(&peer.uplink), downlink: model(&peer.downlink) });
+        let access = lines.enumerate().filter(|(_, lines)| *lines != AccessLines::default()).collect();
         let hosts = scene.peers.into_iter().map(|peer| peer.name).collect();
-        Ok(Self::of_table(hosts, &scene.links, changes, scene.seed))
+        Ok(Self { access, ..Self::of_table(hosts, &scene.links, changes, scene.seed) })
     }
 }

@@ -27,7 +27,9 @@
 //!
 //! # What happens to a packet that is hit
 //!
-//! The law decides when the packet is offered. A packet to be dropped goes no further: its fate is [`DropCause::Filter`](cohaptic_wan::DropCause::Filter).
+//! The law decides when the packet is sent. A packet to be dropped goes no further than to its link: its fate is
+//! [`DropCause::Filter`](cohaptic_wan::DropCause::Filter). It passes the uplink of its host before, if the host has one (`Testbed::access`), because other
+//! packets wait behind it there.
 //! Every other packet passes the link first, which may lose the packet, and is delayed, copied, damaged or held at the far end. So the link draws the same
 //! random numbers for every other packet, whatever is hit. A further hit changes nothing else, and therefore sets of hits can shrink (`strategies::any_hits`,
 //! feature `strategies`). Copies that a link makes of a packet are not hit. If a path has several laws, all laws are asked, and the first verdict other than

@@ -71,6 +71,18 @@ impl Nodes {
         self.link(one, other, &link).link(other, one, &link)
     }
 
+    /// Gives a node the access lines of a link of the library (feature `files`): see [`Testbed::access`](crate::Testbed::access). The node must have been
+    /// added.
+    ///
+    /// # Panics
+    ///
+    /// As [`Testbed::access`](crate::Testbed::access).
+    #[cfg(feature = "files")]
+    pub fn access(mut self, node: &str, link: impl AsRef<str>) -> Self {
+        self.setup.set_access(node, link.as_ref());
+        self
+    }
+
     /// Sets all links, their changes, and the seed as a file says: see [`LinkFile`]. The hosts of the file are nodes that have been added.
     ///
     /// # Panics

@@ -21,7 +21,7 @@ use crate::record::Record;
 use crate::seed::Seed;
 use crate::setup::Setup;
 use crate::watch::{Kind, Watched};
-use crate::wire::Wire;
+use crate::wire::{AccessStats, Wire};
 
 /// Running nodes.
 ///
@@ -170,6 +170,16 @@ impl NodeRun {
     #[expect(clippy::panic, reason = "a misuse, and the way out")]
     pub fn link_stats(&self, from: &str, to: &str) -> LinkStats {
         self.wire.link_stats(self.names.path(from, to)).unwrap_or_else(|| panic!("node `{from}` has no link to itself"))
+    }
+
+    /// Returns the statistics of the access lines (`Nodes::access`) of a node so far, or `None` if the node has none.
+    ///
+    /// # Panics
+    ///
+    /// If there is no node of that name.
+    #[must_use]
+    pub fn access_stats(&self, name: &str) -> Option<AccessStats> {
+        self.wire.access_stats(self.id(name))
     }
 
     /// Returns the instant of the next event, or `None` if nothing will happen.

@@ -2,8 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use cohaptic_units::Instant;
 use cohaptic_units::print::Counted;
@@ -21,8 +19,6 @@ use crate::trace::PacketName;
 pub(super) struct Hitting<A> {
     paths: BTreeMap<Path, OnPath>,
     pub(super) exits: Exits<A>,
-    /// Whether to drop the packet being offered. Read by the filters of the links.
-    drops: Arc<AtomicBool>,
 }
 
 /// The laws of a path, and their counts.
@@ -70,14 +66,13 @@ impl HitCount {
 impl<A: Clone + Send + Sync + 'static> Hitting<A> {
     /// Returns the laws in their initial state, and the network with the filters of the laws. `None` if there are no laws.
     pub(super) fn new(laws: &Laws, names: &[String], seed: u64, network: Network<Box<Parcel<A>>>) -> (Option<Box<Self>>, Network<Box<Parcel<A>>>) {
-        let mut hitting = Self { paths: BTreeMap::new(), exits: Exits::default(), drops: Arc::default() };
+        let mut hitting = Self { paths: BTreeMap::new(), exits: Exits::default() };
         let mut network = network;
         for given in laws.iter() {
             let Path { from, to } = given.path;
-            // A path needs only one filter for all its laws: the verdict is passed through `drops`.
+            // A path needs only one filter for all its laws: the packet carries the verdict, over an uplink too, to its link.
             if !hitting.paths.contains_key(&given.path) {
-                let drops = Arc::clone(&hitting.drops);
-                network = network.with_filter(from, to, move |_| drops.load(Ordering::Relaxed)).expect("the hosts of laws are checked");
+                network = network.with_filter(from, to, |packet| packet.payload.is_hit).expect("the hosts of laws are checked");
             }
             let on_path = hitting.paths.entry(given.path).or_insert_with(|| {
                 let [from, to] = [from, to].map(|host| names[host.index()].clone());
@@ -93,7 +88,7 @@ impl<A: Clone + Send + Sync + 'static> Hitting<A> {
 }
 
 impl<A: Clone> Hitting<A> {
-    /// Asks the laws about a packet before the packet is offered to its link. The first verdict other than `Pass` counts.
+    /// Asks the laws about a packet before the packet is offered to its path. The first verdict other than `Pass` counts.
     pub(super) fn judge(&mut self, packet: PacketName, at: Instant, bytes: &[u8]) -> Verdict {
         let Some(on_path) = self.paths.get_mut(&packet.path) else { return Verdict::Pass };
         #[cfg(feature = "tcp")]
@@ -127,7 +122,6 @@ impl<A: Clone> Hitting<A> {
             }
         }
         on_path.hit += u64::from(verdict != Verdict::Pass);
-        self.drops.store(verdict == Verdict::Drop, Ordering::Relaxed);
         if !matches!(verdict, Verdict::Pass | Verdict::Drop) {
             self.exits.expect(packet.path, packet.sequence, verdict);
         }

@@ -13,7 +13,7 @@ use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use cohaptic_units::Instant;
-use cohaptic_wan::{DropCause, Fate, LinkModel, LinkStats, Network, NetworkConfig, NodeId, PacketInfo, Path};
+use cohaptic_wan::{AccessLine, DropCause, Fate, LinkModel, LinkStats, Network, NetworkConfig, NodeId, PacketInfo, Path};
 
 use exits::{Out, counted};
 pub(crate) use held::{BYTE_LIMIT, Held, Where};
@@ -22,7 +22,7 @@ use hitting::Hitting;
 pub(crate) use parcel::{Arrival, Octets, Parcel, Spare};
 pub(crate) use recording::{Recorded, Recording, Seen};
 
-use crate::again::{Drawn, MOST_LOST};
+use crate::again::{Drawn, MOST_LOST, Said};
 use crate::hit::Verdict;
 use crate::link::LinkChange;
 use crate::names::Names;
@@ -37,6 +37,16 @@ pub(crate) fn earlier(one: Option<Instant>, other: Option<Instant>) -> Option<In
         (Some(one), Some(other)) => Some(one.min(other)),
         (one, other) => one.or(other),
     }
+}
+
+/// Statistics of the access lines of a host: see `Testbed::access` (feature `files`). A line that the host does not have has counted nothing.
+#[derive(Clone, PartialEq, Debug, Default)]
+#[non_exhaustive]
+pub struct AccessStats {
+    /// Statistics of the line that every packet of the host passes before its link.
+    pub uplink: LinkStats,
+    /// Statistics of the line that every packet to the host passes after its link.
+    pub downlink: LinkStats,
 }
 
 pub(crate) struct Wire<A> {
@@ -55,6 +65,8 @@ pub(crate) struct Wire<A> {
     recording: Recording,
     /// Effects of chance so far.
     drawn: Drawn,
+    /// Description of the network as the test gave it, for the record.
+    said: Arc<Said>,
 }
 
 impl<A: Clone + Send + Sync + 'static> Wire<A> {
@@ -66,7 +78,14 @@ impl<A: Clone + Send + Sync + 'static> Wire<A> {
         link: impl Fn(NodeId, NodeId) -> LinkModel + Send + Sync + 'static,
     ) -> Self {
         let config = NetworkConfig { seed, nodes: names.to_vec(), general: false };
-        let (hitting, network) = Hitting::new(&settings.laws, names, seed, Network::on_demand(config, link));
+        let mut network = Network::on_demand(config, link);
+        for (host, lines) in &settings.access {
+            let lines = [(AccessLine::Uplink(*host), &lines.uplink), (AccessLine::Downlink(*host), &lines.downlink)];
+            for (line, model) in lines.into_iter().filter_map(|(line, model)| Some((line, model.clone()?))) {
+                network = network.with_access_line(line, model).expect("the hosts of access lines are checked");
+            }
+        }
+        let (hitting, network) = Hitting::new(&settings.laws, names, seed, network);
         let recording = Recording::new(Arc::clone(names), settings);
         let is_watched = hitting.is_some() || recording.is_on();
         Self {
@@ -79,6 +98,7 @@ impl<A: Clone + Send + Sync + 'static> Wire<A> {
             is_watched,
             recording,
             drawn: Drawn::default(),
+            said: Arc::clone(&settings.said),
         }
     }
 }
@@ -122,16 +142,16 @@ impl<A: Clone> Wire<A> {
         is_due || self.hitting.as_ref().and_then(|hitting| hitting.exits.next()).is_some_and(|at| at <= self.now)
     }
 
-    /// Returns the name that the next packet offered to the link of `path` will have.
+    /// Returns the name that the next packet sent on `path` will have.
     pub(crate) fn next_packet(&self, path: Path) -> PacketName {
-        PacketName { path, sequence: self.network.offered(path.from, path.to).unwrap_or(0), copy: 0 }
+        PacketName { path, sequence: self.network.sent(path.from, path.to).unwrap_or(0), copy: 0 }
     }
 
-    /// Hands a packet to its link. Returns whether [`Wire::poll`] may have a packet now. Fails if the path is cut.
+    /// Hands a packet to its path. Returns whether [`Wire::poll`] may have a packet now. Fails if the path is cut.
     #[inline(always)]
-    pub(crate) fn offer(&mut self, path: Path, parcel: Box<Parcel<A>>) -> Result<bool, Lost> {
+    pub(crate) fn offer(&mut self, path: Path, mut parcel: Box<Parcel<A>>) -> Result<bool, Lost> {
         if self.is_watched || !self.cut.is_empty() {
-            self.note_offer(path, &parcel)?;
+            self.note_offer(path, &mut parcel)?;
         }
         self.held.add(Where::Links, Held::cost(parcel.bytes.len()));
         let info = PacketInfo { size: cohaptic_units::Bytes::new(parcel.bytes.len() as u64), ecn_capable: parcel.ecn_capable };
@@ -141,9 +161,9 @@ impl<A: Clone> Wire<A> {
         Ok(self.is_watched || !matches!(offered, Ok(Some(at)) if at > self.now))
     }
 
-    /// Records that a packet is offered to its link, and asks the laws about the packet. Fails if the path is cut.
+    /// Records that a packet is offered to its path, and asks the laws about the packet. Fails if the path is cut.
     #[inline(never)]
-    fn note_offer(&mut self, path: Path, parcel: &Parcel<A>) -> Result<(), Lost> {
+    fn note_offer(&mut self, path: Path, parcel: &mut Parcel<A>) -> Result<(), Lost> {
         let packet = self.next_packet(path);
         if self.cut.contains(&path) {
             // The packet does not reach the link, so it uses up none of the link's sequence numbers.
@@ -156,6 +176,7 @@ impl<A: Clone> Wire<A> {
         }
         if let Some(hitting) = &mut self.hitting {
             let verdict = hitting.judge(packet, self.now, &parcel.bytes);
+            parcel.is_hit = verdict == Verdict::Drop;
             if verdict != Verdict::Pass {
                 self.note(Happening::Hit { packet, verdict });
             }
@@ -217,7 +238,7 @@ impl<A: Clone> Wire<A> {
                     if cause == DropCause::Loss && self.drawn.lost.len() < MOST_LOST {
                         self.drawn.lost.push(packet);
                     }
-                    self.recording.note(event.at, Happening::Lost { packet, why: Lost::Link(cause) });
+                    self.recording.note(event.at, Happening::Lost { packet, why: Lost::on(event.part, cause) });
                 }
                 Fate::Duplicated => self.recording.note(event.at, Happening::Copied { packet }),
             }
@@ -265,6 +286,12 @@ impl<A: Clone> Wire<A> {
         self.network.link_stats(path.from, path.to)
     }
 
+    /// Returns the statistics of the access lines of a host, or `None` without an access line.
+    pub(crate) fn access_stats(&self, host: NodeId) -> Option<AccessStats> {
+        let [uplink, downlink] = [AccessLine::Uplink(host), AccessLine::Downlink(host)].map(|line| self.network.access_stats(line));
+        (uplink.is_some() || downlink.is_some()).then(|| AccessStats { uplink: uplink.unwrap_or_default(), downlink: downlink.unwrap_or_default() })
+    }
+
     #[inline]
     pub(crate) fn note(&mut self, what: Happening) {
         self.recording.note(self.now, what);
@@ -283,7 +310,14 @@ impl<A: Clone> Wire<A> {
     pub(crate) fn recorded(&self) -> Recorded {
         let exits = self.hitting.as_ref().map(|hitting| hitting.exits.clone()).unwrap_or_default();
         let (packets, ended) = (self.recording.followed_through(&self.network, exits, self.now), self.now);
-        Recorded { trace: self.recording.trace().clone(), packets, ended, hits: self.hit_counts(), drawn: self.drawn.clone() }
+        Recorded {
+            trace: self.recording.trace().clone(),
+            packets,
+            ended,
+            hits: self.hit_counts(),
+            drawn: self.drawn.clone(),
+            said: Arc::clone(&self.said),
+        }
     }
 
     /// Returns what each law has done so far.

@@ -20,6 +20,8 @@ pub(crate) struct Parcel<A> {
     pub(crate) bytes: Octets,
     /// `true` if the sender understands congestion marks.
     pub(crate) ecn_capable: bool,
+    /// `true` if a law drops the packet before its link. Set for every packet of a run with laws.
+    pub(crate) is_hit: bool,
     /// Report of the link. Valid only for a parcel that its link has delivered.
     pub(crate) arrival: Arrival,
 }
@@ -38,7 +40,7 @@ pub(crate) struct Arrival {
 impl<A> Parcel<A> {
     pub(crate) const fn new(addresses: A, bytes: Octets, ecn_capable: bool) -> Self {
         let packet = PacketName { path: Path { from: NodeId(0), to: NodeId(0) }, sequence: 0, copy: 0 };
-        Self { addresses, bytes, ecn_capable, arrival: Arrival { packet, at: Instant::ZERO, marked: false, is_cut: false } }
+        Self { addresses, bytes, ecn_capable, is_hit: false, arrival: Arrival { packet, at: Instant::ZERO, marked: false, is_cut: false } }
     }
 }
 

@@ -8,7 +8,7 @@ use cohaptic_wan::{Fate, Network, PacketEvent, Path};
 
 use super::exits::{Exits, Out};
 use super::{HitCount, Parcel, Settings};
-use crate::again::Drawn;
+use crate::again::{Drawn, Said};
 use crate::names::Names;
 use crate::trace::{Happening, Trace};
 
@@ -37,6 +37,8 @@ pub(crate) struct Recorded {
     /// Reports of the laws.
     pub(crate) hits: Vec<HitCount>,
     pub(crate) drawn: Drawn,
+    /// Description of the network as the test gave it.
+    pub(crate) said: Arc<Said>,
 }
 
 /// Bound for following packets to their ends: after this many events of the network a packet is taken to be stuck.
@@ -99,5 +101,5 @@ impl Recording {
 
 /// Converts an event of a link to a row of the packet log.
 fn seen<A>(out: &Out<A>) -> Seen {
-    PacketEvent { record: out.record, payload: out.payload.bytes.clone().into(), damage: out.damage.clone() }
+    PacketEvent { record: out.record, payload: out.payload.bytes.clone().into(), damage: out.damage.clone(), part: out.part }
 }

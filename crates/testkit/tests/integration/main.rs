@@ -1,6 +1,8 @@
 //! Tests of the test kit.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used, clippy::missing_panics_doc, clippy::cast_possible_truncation, reason = "tests")]
 
+#[cfg(feature = "files")]
+mod access;
 #[cfg(feature = "strategies")]
 mod again;
 mod artefacts;

@@ -38,8 +38,32 @@ impl<L> PacketRecord<L> {
     /// Returns the record without the path: a row of the fate log of this path.
     #[must_use]
     pub fn without_path(self) -> PacketRecord {
+        self.with_path(())
+    }
+
+    /// Returns the record with another place in place of the path.
+    #[must_use]
+    pub fn with_path<M>(self, path: M) -> PacketRecord<M> {
         let Self { path: _, sequence, copy, offered, at, size, fate, marked, damaged } = self;
-        PacketRecord { path: (), sequence, copy, offered, at, size, fate, marked, damaged }
+        PacketRecord { path, sequence, copy, offered, at, size, fate, marked, damaged }
+    }
+}
+
+/// Part of a path: one of the lines that a packet passes one after the other from sender to receiver.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+pub enum PathPart {
+    /// The uplink of the sender: see [`AccessLine::Uplink`](crate::AccessLine::Uplink).
+    Uplink,
+    /// The link from the sender to the receiver.
+    Link,
+    /// The downlink of the receiver: see [`AccessLine::Downlink`](crate::AccessLine::Downlink).
+    Downlink,
+}
+
+impl From<()> for PathPart {
+    /// Returns the link, the only part of a path without access lines.
+    fn from((): ()) -> Self {
+        Self::Link
     }
 }
 
@@ -52,6 +76,8 @@ pub struct PacketEvent<P, L = ()> {
     pub payload: P,
     /// Flipped bits. [`Damage::apply`] flips the bits of a payload.
     pub damage: Option<Damage>,
+    /// Part of the path in which the fate occurred: for a delivery the last part.
+    pub part: PathPart,
 }
 
 impl<P, L> Deref for PacketEvent<P, L> {

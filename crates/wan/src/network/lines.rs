@@ -29,14 +29,19 @@ impl<P> Lines<P> {
         Self { links: Vec::new(), on_demand, uplinks: none(), downlinks: none() }
     }
 
-    /// Returns a link, or `None` if the link was not made yet or does not exist.
-    pub(super) fn find_link(&self, link: LinkId) -> Option<&Line<P, InNetwork<P>>> {
+    /// Returns the index of a link in `links`, or `None` if the link was not made yet or does not exist.
+    pub(super) fn place(&self, link: LinkId) -> Option<usize> {
         // Without links on demand, number and index of a link are equal.
         let place = match &self.on_demand {
             None => link.index(),
             Some(on_demand) => on_demand.place(link)?,
         };
-        self.links.get(place)
+        (place < self.links.len()).then_some(place)
+    }
+
+    /// Returns a link, or `None` if the link was not made yet or does not exist.
+    pub(super) fn find_link(&self, link: LinkId) -> Option<&Line<P, InNetwork<P>>> {
+        self.place(link).map(|place| &self.links[place])
     }
 
     /// Returns an existing link. Panics if the link does not exist.

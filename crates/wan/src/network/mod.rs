@@ -442,7 +442,7 @@ impl<P: Clone> Network<P> {
         // Without inner events, no engine is woken, no packet has passed another line before its link, and no packet is damaged.
         let taken = traffic.pending.take_due(*now, |Pending { at, sequence, offered, entered, turn, path, size, payload }| {
             lines.link_mut(turn.link()).deliver(entered, at);
-            payload.map(|payload| take(InNetwork { sequence, offered, entered, path, size, payload }.event(at, Fate::Delivered(at), None)))
+            payload.map(|payload| take(InNetwork { sequence, offered, entered, path, size, payload }.event(LineId::Link(turn.link()), at, Fate::Delivered(at), None)))
         });
         taken.flatten()
     }
@@ -466,12 +466,15 @@ impl<P: Clone> Network<P> {
         Ok(())
     }
 
-    /// Returns the number of packets offered to a link, or `None` if the link is missing.
+    /// Returns the number of packets sent on a path so far, which is the sequence number of the next packet. `None` if the link is missing. Packets that an
+    /// uplink has lost count, unlike in [`Network::link_stats`].
     #[must_use]
-    pub fn offered(&self, from: NodeId, to: NodeId) -> Option<u64> {
+    pub fn sent(&self, from: NodeId, to: NodeId) -> Option<u64> {
         let path = self.path(from, to).ok()?;
-        // A link that was not made yet was offered no packet.
-        Some(self.lines.find_link(self.link(path)).map_or(0, Line::offered))
+        // No packet was sent on a link that was not made yet.
+        let Some(place) = self.lines.place(self.link(path)) else { return Some(0) };
+        // Without uplinks `paths` is empty, and the link's own counter is the same number.
+        Some(self.paths.get(place).copied().unwrap_or_else(|| self.lines.links[place].offered()))
     }
 
     /// Returns the counters of a link, or `None` if the link is missing.

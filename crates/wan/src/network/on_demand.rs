@@ -116,13 +116,13 @@ mod tests {
     fn a_network_holds_the_links_that_carry_packets() {
         let nodes: Vec<_> = (0..10_000).map(|node| alloc::format!("node-{node}")).collect();
         let mut network: Network<()> = Network::on_demand(NetworkConfig { seed: 1, nodes, general: false }, |_, _| LinkModel::default());
-        assert_eq!((network.lines.links.len(), network.offered(NodeId(3), NodeId(4))), (0, Some(0)));
+        assert_eq!((network.lines.links.len(), network.sent(NodeId(3), NodeId(4))), (0, Some(0)));
         for from in 0..10_000 {
             network
                 .handle_packet(cohaptic_units::Instant::ZERO, NodeId(from), NodeId((from + 1) % 10_000), cohaptic_units::Bytes::new(1), ())
                 .unwrap();
         }
-        assert_eq!((network.lines.links.len(), network.offered(NodeId(3), NodeId(4))), (10_000, Some(1)));
+        assert_eq!((network.lines.links.len(), network.sent(NodeId(3), NodeId(4))), (10_000, Some(1)));
         let places = &network.lines.on_demand.as_ref().unwrap().places;
         assert_eq!((places.len, places.slots.len()), (10_000, 32_768));
     }

@@ -79,14 +79,14 @@ impl<P: Clone> Network<P> {
     /// Ends the way of a packet after the last line: counts and returns the delivery, or the drop of a packet discarded on arrival.
     #[inline(always)]
     fn arrive(&mut self, at: Instant, line: LineId, packet: InNetwork<P>) -> PacketEvent<P, Path> {
-        let line = self.lines.get_mut(line);
+        let last = self.lines.get_mut(line);
         // A checksum is a matter of the receiver: the packet takes its full way before the drop.
         if packet.size.has(SizeAndMarks::DISCARDED_ON_ARRIVAL) {
-            line.drop(DropCause::Checksum);
-            return self.traffic.event(packet, at, Fate::Dropped(DropCause::Checksum));
+            last.drop(DropCause::Checksum);
+            return self.traffic.event(line, packet, at, Fate::Dropped(DropCause::Checksum));
         }
-        line.deliver(packet.entered, at);
-        self.traffic.event(packet, at, Fate::Delivered(at))
+        last.deliver(packet.entered, at);
+        self.traffic.event(line, packet, at, Fate::Delivered(at))
     }
 
     #[cold]
@@ -174,7 +174,7 @@ impl<P: Clone> Network<P> {
     pub(super) fn drop(&mut self, now: Instant, line: LineId, cause: DropCause, packet: InNetwork<P>) {
         self.lines.get_mut(line).drop(cause);
         self.settle(now);
-        let event = self.traffic.event(packet, now, Fate::Dropped(cause));
+        let event = self.traffic.event(line, packet, now, Fate::Dropped(cause));
         self.traffic.happened.push_back(event);
     }
 }

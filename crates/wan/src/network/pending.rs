@@ -8,7 +8,7 @@ use super::id::{LinkId, NodeId, Path};
 use crate::event_queue::Event;
 use crate::fates::damage::Damage;
 use crate::fates::fate::Fate;
-use crate::fates::record::{PacketEvent, PacketRecord};
+use crate::fates::record::{PacketEvent, PacketRecord, PathPart};
 use crate::packet::PacketInfo;
 
 /// A packet on its way through the network.
@@ -24,12 +24,13 @@ pub(super) struct InNetwork<P> {
 }
 
 impl<P> InNetwork<P> {
+    /// Returns the event of a fate that occurred on the line `line`.
     #[inline(always)]
-    pub(super) fn event(self, at: Instant, fate: Fate, damage: Option<Damage>) -> PacketEvent<P, Path> {
+    pub(super) fn event(self, line: LineId, at: Instant, fate: Fate, damage: Option<Damage>) -> PacketEvent<P, Path> {
         let Self { sequence, offered, path, size, payload, .. } = self;
         let (copy, marked, size) = (size.copy(), size.has(SizeAndMarks::MARKED), size.size());
         let record = PacketRecord { path, sequence, copy, offered, at, size, fate, marked, damaged: damage.is_some() };
-        PacketEvent { record, payload, damage }
+        PacketEvent { record, payload, damage, part: line.part() }
     }
 }
 
@@ -104,6 +105,15 @@ impl LineId {
             Self::Uplink(_) => 1,
             Self::Link(_) => 1 << 1,
             Self::Downlink(_) => 1 << 2,
+        }
+    }
+
+    /// Returns the part of a path that the line is.
+    pub(super) const fn part(self) -> PathPart {
+        match self {
+            Self::Uplink(_) => PathPart::Uplink,
+            Self::Link(_) => PathPart::Link,
+            Self::Downlink(_) => PathPart::Downlink,
         }
     }
 }

@@ -64,9 +64,9 @@ impl<P> Traffic<P> {
     }
 
     #[inline(always)]
-    pub(super) fn event(&mut self, packet: InNetwork<P>, at: Instant, fate: Fate) -> PacketEvent<P, Path> {
+    pub(super) fn event(&mut self, line: LineId, packet: InNetwork<P>, at: Instant, fate: Fate) -> PacketEvent<P, Path> {
         let damage = self.take_damage(&packet);
-        packet.event(at, fate, damage)
+        packet.event(line, at, fate, damage)
     }
 
     #[inline(always)]
@@ -116,6 +116,6 @@ impl<P> Sink<InNetwork<P>> for Exits<'_, P> {
         let packet = self.marked(packet, copy, &marks);
         // A copy event is not the end of its packet: packet and copy each get a later event, and the damage goes with the last event only.
         let damage = marks.damage.filter(|_| fate.is_end());
-        self.traffic.happened.push_back(packet.event(at, fate, damage));
+        self.traffic.happened.push_back(packet.event(self.line, at, fate, damage));
     }
 }

@@ -49,7 +49,7 @@ proptest! {
                 network.handle_timeout(next).unwrap();
                 events.extend(drain_network(&mut network));
             }
-            let stats: Vec<_> = paths(&plan).map(|Path { from, to }| (network.offered(from, to), network.link_stats(from, to))).collect();
+            let stats: Vec<_> = paths(&plan).map(|Path { from, to }| (network.sent(from, to), network.link_stats(from, to))).collect();
             (events, stats)
         };
         let (at_the_beginning, on_demand) = (events(plan.build(general)), events(plan.build_on_demand(general)));
