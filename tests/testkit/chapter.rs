@@ -24,6 +24,24 @@ fn programs_meet_in_the_room() {
     });
 }
 
+#[test]
+fn a_phone_in_a_car_asks_a_server_overseas() {
+    let bed = Testbed::new(["phone", "server"]).access("phone", "lte-driving").links("transatlantic").hit("phone", "server", "drop packet 0");
+    bed.run(|bed| async move {
+        let server = bed.host("server").bind("0.0.0.0:7").unwrap();
+        let phone = bed.host("phone").bind("0.0.0.0:0").unwrap();
+        for question in [b"first", b"again"] {
+            phone.send_to(question, "server:7").await.unwrap();
+        }
+        let (_, _, arrived) = server.recv_from_at(&mut [0; 5]).await.unwrap();
+        // 42.4 ms to the network of the provider, 38 ms to the other side, and the time of both on the line of the phone.
+        assert!(arrived > Instant::from_nanos(80_400_000));
+        // The question that was hit has passed the uplink, and not the link behind it.
+        let up = bed.access_stats("phone").unwrap().uplink;
+        assert_eq!((up.delivered(), bed.link_stats("phone", "server").delivered()), (2, 1));
+    });
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 

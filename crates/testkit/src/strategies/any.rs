@@ -19,14 +19,43 @@ pub fn any_link() -> Links {
     links_like(LinkBounds::any())
 }
 
-/// Draws links within bounds. They shrink to the least impaired link on which the test still fails.
+/// Draws links within [`LinkBounds`], or links like one of the library, such as `"lte-driving"` (feature `files`). Links within bounds shrink to the least
+/// impaired link on which the test still fails, and links like one of the library to the link of the library itself: see [`Likeness`].
 ///
 /// # Panics
 ///
-/// If the bounds make no sense; [`LinkBounds::check`] returns an error instead.
+/// If the bounds make no sense, where [`LinkBounds::check`] returns an error instead; or if the library has no such link.
 #[track_caller]
-pub fn links_like(bounds: LinkBounds) -> Links {
-    Links { bounds: checked(bounds) }
+pub fn links_like<L: Likeness>(like: L) -> L::Links {
+    like.links()
+}
+
+/// Description of the links that [`links_like`] draws.
+///
+/// With the feature `files`, a text names a link of the library. A factor is drawn for each number of which the library knows how it differs between the
+/// links of this kind: `lte-driving delay*1.4` has 1.4 times the delay of `lte-driving`. The number lies between the 10th and the 90th percentile, and its
+/// logarithm is uniform. A link of which the library knows no such range, such as `starlink`, is drawn as it is. The drawn link is given to `Testbed::access`
+/// of a host. If the name has a direction, or both directions are equal, [`Testbed::links`](crate::Testbed::links) and the like take the link too.
+pub trait Likeness {
+    /// Strategy of the links.
+    type Links: Strategy;
+
+    /// Returns the strategy.
+    ///
+    /// # Panics
+    ///
+    /// As [`links_like`].
+    #[track_caller]
+    fn links(self) -> Self::Links;
+}
+
+impl Likeness for LinkBounds {
+    type Links = Links;
+
+    #[track_caller]
+    fn links(self) -> Links {
+        Links { bounds: checked(self) }
+    }
 }
 
 /// Draws any network of `hosts` hosts: [`networks_like`] with [`LinkBounds::any`].

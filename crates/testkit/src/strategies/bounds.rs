@@ -95,10 +95,12 @@ impl LinkBounds {
         Self { presence: [Presence::Maybe; Stage::ALL.len()], ..Self::ideal() }
     }
 
-    /// Creates the bounds of a phone: a delay of up to 100 ms, and a rate from 64 kbit/s to 20 Mbit/s.
+    /// Creates the bounds of a phone: a delay from 21.5 to 101.6 ms, half of the round trip, and a rate from 0.5 to 99 Mbit/s. These are the 5th and the 95th
+    /// percentile of the speed tests in the data of ERRANT (Trevisan, Safari Khatouni and Giordano, *ERRANT: Realistic emulation of radio access networks*,
+    /// Computer Networks 176, 2020), which come from phones of several operators on 3G and 4G. That both ways take half of the round trip is assumed.
     #[must_use]
     pub fn phone() -> Self {
-        Self::ideal().delay(Duration::ZERO..=Duration::from_millis(100)).rate(64_000..=20_000_000)
+        Self::ideal().delay(Duration::from_micros(21_500)..=Duration::from_micros(101_600)).rate(500_000..=99_000_000)
     }
 
     /// Creates bounds that permit no stage.

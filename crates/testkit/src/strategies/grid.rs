@@ -76,6 +76,17 @@ impl Dice<'_> {
         place.checked_sub(1).and_then(|place| others.get(place)).copied().unwrap_or(first)
     }
 
+    /// Draws a number of a range, whose logarithm is uniform. The range begins above 0.
+    #[cfg(feature = "files")]
+    pub(super) fn even_in_logarithm(&mut self, range: &std::ops::RangeInclusive<u64>) -> u64 {
+        // 53 bits are a fraction of 1 without rounding.
+        #[expect(clippy::cast_precision_loss, reason = "53 bits are exact, and bounds have few digits")]
+        let (part, low, high) = ((self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64, *range.start() as f64, *range.end() as f64);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between the bounds, which are whole and positive")]
+        let number = (low * (high / low).powf(part)).round() as u64;
+        number.clamp(*range.start(), *range.end())
+    }
+
     /// Draws a number of a range. In a tenth of all cases each the result is the lower end, the upper end, or any number. Otherwise it has two significant
     /// digits; in half of all cases every decade is equally likely.
     pub(super) fn number(&mut self, span: Span) -> u64 {

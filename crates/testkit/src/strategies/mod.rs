@@ -1,8 +1,8 @@
 //! Strategies of proptest: links and networks that shrink to the least impaired links and networks on which a test still fails.
 //!
 //! [`any_hits`] draws packets that are [hit](crate::hit). [`any_link`] and [`any_network`] draw any links and networks; [`links_like`] and [`networks_like`]
-//! stay within [`LinkBounds`]. The output of a failing test can be pasted into a test: an [`ImpairedLink`] is printed as the words of `tc-netem`, an
-//! [`ImpairedNetwork`] as such words for each link that is not ideal.
+//! stay within [`LinkBounds`], and `links_like("lte-driving")` draws links like one of the library (feature `files`). The output of a failing test can be
+//! pasted into a test: an [`ImpairedLink`] is printed as the words of `tc-netem`, an [`ImpairedNetwork`] as such words for each link that is not ideal.
 //!
 //! ```
 //! use cohaptic_testkit::proptest::prelude::*;
@@ -65,6 +65,8 @@ mod draw;
 mod forms;
 mod grid;
 mod hits;
+#[cfg(feature = "files")]
+mod library;
 mod link;
 mod network;
 mod numbers;
@@ -75,10 +77,12 @@ mod space;
 mod stage;
 mod units;
 
-pub use any::{Links, Networks, any_link, any_network, links_like, networks_like};
+pub use any::{Likeness, Links, Networks, any_link, any_network, links_like, networks_like};
 pub use bounds::{LinkBounds, LossModel};
 pub use bounds_error::BoundsError;
 pub use hits::{PacketSets, any_hits};
+#[cfg(feature = "files")]
+pub use library::LibraryLinks;
 pub use link::{ImpairedLink, LinkError};
 pub use network::{ImpairedNetwork, NetworkTextError};
 pub use stage::Stage;

@@ -22,7 +22,7 @@ async fn photo(photo: Body) -> StatusCode {
 fn a_phone_sends_a_photo() {
     proptest!(|(link in links_like(LinkBounds::phone()))| Testbed::new(["phone", "server"]).links(link).on_tokio().run(async |bed| {
         serve(&bed.host("server"), "0.0.0.0:80", Router::new().route("/", post(photo))).unwrap();
-        assert_eq!(client(&bed.host("phone")).request(Request::post("http://server/").body("photo".repeat(20_000)).unwrap()).await.unwrap().status(), 200);
+        assert_eq!(client(&bed.host("phone")).request(Request::post("http://server/").body("photo".repeat(200_000)).unwrap()).await.unwrap().status(), 200);
     }));
 }
 
@@ -34,7 +34,7 @@ fn a_limit_for_the_whole_photo_comes_down_to_a_slow_link() {
     let failed = runner.run(&links_like(LinkBounds::phone()), |link| {
         let status = Testbed::new(["phone", "server"]).links(link).on_tokio().run(async |bed| {
             serve(&bed.host("server"), "0.0.0.0:80", Router::new().route("/", post(photo))).unwrap();
-            let photo = Request::post("http://server/").body("photo".repeat(20_000)).unwrap();
+            let photo = Request::post("http://server/").body("photo".repeat(200_000)).unwrap();
             client(&bed.host("phone")).request(photo).await.unwrap().status()
         });
         prop_assert_eq!(status, StatusCode::OK);
