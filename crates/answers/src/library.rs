@@ -93,6 +93,9 @@ pub fn words(profile: &Profile) -> String {
         profile.method,
         profile.not_modelled.join("; ")
     );
+    if let Some(note) = profile.note() {
+        let _ = writeln!(text, "note: {note}");
+    }
     for direction in Direction::BOTH {
         let _ = writeln!(text, "\n{}/{}", profile.title(), direction.word());
         line_words(&mut text, profile.line(direction));

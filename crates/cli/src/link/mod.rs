@@ -36,6 +36,9 @@ pub(crate) fn link(arguments: &LinkArguments) -> Result<ExitCode, Failure> {
     let document = cohaptic_answers::link::document(&measured, Some(&written));
     let words = || cohaptic_answers::link::words(&measured);
     output::answer(arguments.json, DocumentSchema::LINK, &document, words, &written.files)?;
+    if let Some(note) = spec::note(&arguments.spec).filter(|_| !output::is_quiet()) {
+        let _ = writeln!(io::stderr(), "note: {note}");
+    }
     Ok(if measured.is_interrupted() { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }
 

@@ -57,6 +57,11 @@ fn with_profile(spec: &[String], bare: Option<Direction>) -> Cow<'_, [String]> {
     Cow::Owned([format!("{PROFILE}{}{direction}", name.profile.title())].into_iter().chain(rest.iter().cloned()).collect())
 }
 
+/// Returns a note on a newer version of the link of the [library] that words name, if there is one.
+pub(super) fn note(spec: &[String]) -> Option<String> {
+    spec.first()?.parse::<ProfileName>().ok()?.profile.note()
+}
+
 /// Returns whether a link is written in keys of a scene (`true`) or in words of tc-netem (`false`).
 ///
 /// # Errors

@@ -4,7 +4,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use cohaptic_linkfile::library::{Direction, Grade, ProfileName, names, of_owner, profile, profiles};
-use cohaptic_linkfile::{Fingerprint, LinkKeys, link_from_keys};
+use cohaptic_linkfile::router::RouterFile;
+use cohaptic_linkfile::{Fingerprint, LinkKeys, RelayFile, link_from_keys};
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::{Fate, Link, LinkConfig, LinkModel, LinkName, Modulated};
 
@@ -203,6 +204,85 @@ fn keys_are_laid_over_a_profile() {
     assert_eq!(below.with("profile", "cable/up").with("netem", "delay 5ms").model(std::path::Path::new("")).unwrap(), link(&["netem=delay 5ms"]));
     let wrong = refused(&["profile=cable/up", "queue={ limit = \"9 packets\" }"]);
     assert!(wrong.contains("link.queue"), "{wrong}");
+}
+
+/// A profile stands in `[link]`, in `[[links]]` and in a change of a relay file, and in a link of a router file. Other keys are laid over the profile, and a
+/// bare name of different directions is refused at its place.
+#[test]
+fn files_of_relays_and_routers_have_profiles() {
+    let relay = |text: &str| RelayFile::parse(&format!("{RELAY}{text}"), "relay.toml".as_ref(), &[]);
+    let change = "\n[[timeline]]\nat = \"1s\"\nlink = { from = \"b\", to = \"a\" }\nset = { profile = \"dsl/up\" }";
+    let one = "[[links]]\nfrom = \"a\"\nto = \"b\"\nprofile = \"starlink@1/up\"\nrate = \"5Mbit\"";
+    let file = relay(&format!("[link]\nprofile = \"transatlantic\"\n{one}{change}")).unwrap();
+    assert_eq!(*file.links.between(0, 1), link(&["profile=starlink/up", "rate=5Mbit"]));
+    assert_eq!((file.links.between(1, 0), &*file.timeline[0].link.config), (&link(&["profile=transatlantic"]), &link(&["profile=dsl/up"])));
+    let router = |text: &str| {
+        RouterFile::parse(
+            &format!("[router]\ndefault = \"wan\"\n[left]\ntun = \"l\"\n[right]\ntun = \"r\"\n[links.wan]\n{text}\n"),
+            "router.toml".as_ref(),
+            &[],
+        )
+    };
+    assert_eq!(router("profile = \"cable/down\"\nloss = \"1%\"").unwrap().links[0].model, link(&["profile=cable/down", "loss=1%"]));
+    let bare = "profile = \"starlink\"";
+    let refused = [relay(&format!("[link]\n{bare}")).unwrap_err(), relay(&one.replace("@1/up", "")).unwrap_err(), router(bare).unwrap_err()];
+    for (error, place) in refused.iter().zip(["relay.toml:6:11: link.profile", "relay.toml:8:11: links", "router.toml:8:11: links.wan.profile"]) {
+        let error = error.to_string();
+        assert!(error.starts_with(place) && error.contains("starlink differs by direction: expected starlink/down"), "{error}");
+    }
+}
+
+const RELAY: &str = "programs = [\n    { name = \"a\", port = \"127.0.0.1:7001\" },\n    { name = \"b\", port = \"127.0.0.1:7002\" },\n]\n";
+
+/// In order, a busy Wi-Fi with a packet each 8 ms has a mean delay of about 220 ms, five times that of its law, because a late packet holds back those behind
+/// it. The engine and a few lines written for this test, with other random numbers, agree: a chain of normal numbers with a memory of 100 ms, the lognormal
+/// law of each, and the latest arrival so far. Runs of 4000 s are independent, and give the standard errors.
+#[test]
+fn a_busy_wifi_in_order_is_later_than_its_law() {
+    let (law, every, packets) = (fixed("wifi-busy/down"), Duration::from_millis(8), 500_000_u32);
+    let engine = |seed: u64| {
+        let mut link: Link<()> = Link::new(seed, &LinkName::between("sender", "receiver"), law.clone());
+        for number in 0..packets {
+            link.handle_packet(Instant::ZERO + every * number, Bytes::new(64), ()).unwrap();
+            while link.poll_event().is_some() {}
+        }
+        link.handle_timeout(Instant::MAX).unwrap();
+        while link.poll_event().is_some() {}
+        as_ns(link.stats().mean_delay().unwrap()) / 1e6
+    };
+    let by_hand = |seed: u64| {
+        let (memory, mut state) = ((-8.0_f64 / 100.0).exp(), seed << 32);
+        let mut uniform = || {
+            // Steele, Lea and Flood (2014).
+            state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            let mixed = (state ^ state >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            let mixed = (mixed ^ mixed >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+            #[expect(clippy::cast_precision_loss, reason = "53 bits")]
+            let unit = ((mixed ^ mixed >> 31) >> 11) as f64 / (1_u64 << 53) as f64;
+            unit
+        };
+        let mut normal = || (-2.0 * (1.0 - uniform()).ln()).sqrt() * (2.0 * std::f64::consts::PI * uniform()).cos();
+        let (mut chain, mut latest, mut sum) = (normal(), 0.0_f64, 0.0);
+        for number in 0..packets {
+            let sent = f64::from(number) * 8.0;
+            // 3 ms of round trip, half of them down, and a lognormal of median 17 ms and log-deviation 1.3589.
+            latest = latest.max(sent + 1.5 + 17.0 * (1.3589 * chain).exp());
+            sum += latest - sent;
+            chain = memory * chain + (1.0 - memory * memory).sqrt() * normal();
+        }
+        sum / f64::from(packets)
+    };
+    let of_runs = |mean: &dyn Fn(u64) -> f64| {
+        let means: Vec<f64> = (1..=8).map(mean).collect();
+        let middle = means.iter().sum::<f64>() / 8.0;
+        (middle, (means.iter().map(|mean| (mean - middle).powi(2)).sum::<f64>() / 7.0 / 8.0).sqrt())
+    };
+    let ((found, found_error), (expected, expected_error)) = (of_runs(&engine), of_runs(&by_hand));
+    assert!((found - expected).abs() < 4.0 * found_error.hypot(expected_error), "{found} ± {found_error}, {expected} ± {expected_error}");
+    assert!(
+        found > 190.0 && expected > 190.0 && found_error < 20.0 && expected_error < 20.0,
+        "{found} ± {found_error}, {expected} ± {expected_error}"
+    );
 }
 
 /// The access lines of one peer follow one modulator, and those of two peers follow two.

@@ -17,31 +17,34 @@ use crate::reading::Modulators;
 
 pub use name::{NameError, ProfileName};
 
-/// Names of all profiles, each with its file: profiles with sources first, then tables of tools.
-const FILES: [(&str, &str); 23] = [
-    ("3g", include_str!("profiles/3g.toml")),
-    ("5g-walking", include_str!("profiles/5g-walking.toml")),
-    ("cable", include_str!("profiles/cable.toml")),
-    ("dsl", include_str!("profiles/dsl.toml")),
-    ("geo-satellite", include_str!("profiles/geo-satellite.toml")),
-    ("lte-driving", include_str!("profiles/lte-driving.toml")),
-    ("starlink", include_str!("profiles/starlink.toml")),
-    ("transatlantic", include_str!("profiles/transatlantic.toml")),
-    ("wifi-busy", include_str!("profiles/wifi-busy.toml")),
-    ("apple/3g", include_str!("profiles/apple-3g.toml")),
-    ("apple/edge", include_str!("profiles/apple-edge.toml")),
-    ("devtools/3g", include_str!("profiles/devtools-3g.toml")),
-    ("devtools/slow-4g", include_str!("profiles/devtools-slow-4g.toml")),
-    ("devtools/fast-4g", include_str!("profiles/devtools-fast-4g.toml")),
-    ("wpt/2g", include_str!("profiles/wpt-2g.toml")),
-    ("wpt/3g", include_str!("profiles/wpt-3g.toml")),
-    ("wpt/3g-fast", include_str!("profiles/wpt-3g-fast.toml")),
-    ("wpt/3g-slow", include_str!("profiles/wpt-3g-slow.toml")),
-    ("wpt/4g", include_str!("profiles/wpt-4g.toml")),
-    ("wpt/cable", include_str!("profiles/wpt-cable.toml")),
-    ("wpt/dsl", include_str!("profiles/wpt-dsl.toml")),
-    ("wpt/edge", include_str!("profiles/wpt-edge.toml")),
-    ("wpt/lte", include_str!("profiles/wpt-lte.toml")),
+/// Name, version and file of a profile.
+type File<'a> = (&'a str, u32, &'a str);
+
+/// Files of all profiles: profiles with sources first, then tables of tools. A further version of a profile follows its earlier versions.
+const FILES: [File<'static>; 23] = [
+    ("3g", 1, include_str!("profiles/3g.toml")),
+    ("5g-walking", 1, include_str!("profiles/5g-walking.toml")),
+    ("cable", 1, include_str!("profiles/cable.toml")),
+    ("dsl", 1, include_str!("profiles/dsl.toml")),
+    ("geo-satellite", 1, include_str!("profiles/geo-satellite.toml")),
+    ("lte-driving", 1, include_str!("profiles/lte-driving.toml")),
+    ("starlink", 1, include_str!("profiles/starlink.toml")),
+    ("transatlantic", 1, include_str!("profiles/transatlantic.toml")),
+    ("wifi-busy", 1, include_str!("profiles/wifi-busy.toml")),
+    ("apple/3g", 1, include_str!("profiles/apple-3g.toml")),
+    ("apple/edge", 1, include_str!("profiles/apple-edge.toml")),
+    ("devtools/3g", 1, include_str!("profiles/devtools-3g.toml")),
+    ("devtools/slow-4g", 1, include_str!("profiles/devtools-slow-4g.toml")),
+    ("devtools/fast-4g", 1, include_str!("profiles/devtools-fast-4g.toml")),
+    ("wpt/2g", 1, include_str!("profiles/wpt-2g.toml")),
+    ("wpt/3g", 1, include_str!("profiles/wpt-3g.toml")),
+    ("wpt/3g-fast", 1, include_str!("profiles/wpt-3g-fast.toml")),
+    ("wpt/3g-slow", 1, include_str!("profiles/wpt-3g-slow.toml")),
+    ("wpt/4g", 1, include_str!("profiles/wpt-4g.toml")),
+    ("wpt/cable", 1, include_str!("profiles/wpt-cable.toml")),
+    ("wpt/dsl", 1, include_str!("profiles/wpt-dsl.toml")),
+    ("wpt/edge", 1, include_str!("profiles/wpt-edge.toml")),
+    ("wpt/lte", 1, include_str!("profiles/wpt-lte.toml")),
 ];
 
 /// Direction of a link of a profile.
@@ -216,20 +219,25 @@ impl Line {
     }
 }
 
-/// Returns all profiles of the library: first those with sources, then the tables of tools, each group by name.
+/// Returns all profiles of the library, in all versions: first those with sources, then the tables of tools, each group by name.
 pub fn profiles() -> impl Iterator<Item = Profile> {
-    FILES.iter().map(|(name, text)| read::profile(name, text))
+    FILES.iter().map(|(name, _, text)| read::profile(name, text))
 }
 
 /// Returns the names of all profiles, in the order of [`profiles`].
 pub fn names() -> impl Iterator<Item = &'static str> {
-    FILES.iter().map(|(name, _)| *name)
+    // Every profile has a first version.
+    FILES.iter().filter(|(_, version, _)| *version == 1).map(|(name, ..)| *name)
 }
 
-/// Returns the profile with a name, without version and direction. `None` if the library has no such profile.
+/// Returns the first version of the profile with a name, without version and direction. `None` if the library has no such profile.
 #[must_use]
 pub fn profile(name: &str) -> Option<Profile> {
-    FILES.iter().find(|(known, _)| *known == name).map(|(name, text)| read::profile(name, text))
+    find(&FILES, name, 1)
+}
+
+fn find(files: &[File<'_>], name: &str, version: u32) -> Option<Profile> {
+    files.iter().find(|(known, number, _)| (*known, *number) == (name, version)).map(|(name, _, text)| read::profile(name, text))
 }
 
 /// Returns the name of the library that `given` may mean; `None` if no name is near. Version and direction of `given` do not count.
