@@ -91,6 +91,7 @@
 //! | `COHAPTIC_TEST_LOOPBACK` | words of `tc-netem` for the loopback of tests that make no test bed, under `cohaptic test`: `docs/how-to-existing-program.md` |
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "tests"))]
 
+mod access;
 mod address;
 mod again;
 mod artefacts;
@@ -145,6 +146,7 @@ mod watch;
 mod wire;
 mod words;
 
+pub use access::AccessStats;
 pub use address::{AddressPlan, Addresses};
 pub use artefacts::{ARTEFACTS_VARIABLE, WriteError};
 pub use bed::{Bed, Testbed};
@@ -172,7 +174,6 @@ pub use task::{JoinHandle, TaskStopped};
 pub use tcp::{TcpConfig, TcpListener, TcpSocket, TcpStream};
 pub use trace::{Difference, Happening, Lost, PacketName, Trace, TraceEvent};
 pub use watch::STALL_VARIABLE;
-pub use wire::AccessStats;
 
 /// Runs the code of the README as a doc test.
 #[cfg(doctest)]

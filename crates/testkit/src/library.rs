@@ -11,8 +11,7 @@ use cohaptic_linkfile::link_from_keys;
 use cohaptic_units::parse;
 use cohaptic_wan::LinkModel;
 
-use crate::link::ToLink;
-use crate::settings::AccessLines;
+use crate::access::AccessLines;
 
 /// A link of the library, such as `starlink`, `starlink@1/up` or `lte-driving delay*1.4`.
 ///
@@ -231,17 +230,6 @@ impl fmt::Debug for LibraryLink {
 impl AsRef<str> for LibraryLink {
     fn as_ref(&self) -> &str {
         &self.text
-    }
-}
-
-impl ToLink for LibraryLink {
-    #[expect(clippy::panic, reason = "a test that says nonsense is to fail, with the place")]
-    fn to_link(&self) -> LinkModel {
-        self.one_way().unwrap_or_else(|error| panic!("`{self}` is not a link: {error}"))
-    }
-
-    fn words(&self) -> Option<String> {
-        Some(self.to_string())
     }
 }
 

@@ -99,6 +99,18 @@ pub(crate) fn named(_text: &str) -> Option<Result<LinkModel, String>> {
     None
 }
 
+#[cfg(feature = "files")]
+impl ToLink for LibraryLink {
+    #[expect(clippy::panic, reason = "a test that says nonsense is to fail, with the place")]
+    fn to_link(&self) -> LinkModel {
+        self.one_way().unwrap_or_else(|error| panic!("`{self}` is not a link: {error}"))
+    }
+
+    fn words(&self) -> Option<String> {
+        Some(self.to_string())
+    }
+}
+
 impl ToLink for String {
     fn to_link(&self) -> LinkModel {
         (**self).to_link()

@@ -5,8 +5,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use cohaptic_units::Instant;
-use cohaptic_wan::{LinkModel, NodeId, Path};
+use cohaptic_wan::{NodeId, Path};
 
+use crate::access::AccessLines;
 use crate::again::Said;
 use crate::hit::Laws;
 
@@ -39,15 +40,6 @@ pub(crate) struct Settings {
     pub(crate) access: BTreeMap<NodeId, AccessLines>,
     /// Link that the packets of its sender to itself take; `None` if such packets arrive at once. The receiver of the link is a host without programs.
     pub(crate) loopback: Option<Path>,
-}
-
-/// Lines between a host and all its links.
-#[derive(Clone, PartialEq, Debug, Default)]
-pub(crate) struct AccessLines {
-    /// Line that every packet of the host passes before its link.
-    pub(crate) uplink: Option<LinkModel>,
-    /// Line that every packet to the host passes after its link.
-    pub(crate) downlink: Option<LinkModel>,
 }
 
 /// Limits of a run, beyond which the run fails.

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use cohaptic_units::Instant;
 use cohaptic_wan::{LinkStats, NodeId};
 
+use crate::access::AccessStats;
 use crate::address::AddressPlan;
 use crate::context;
 use crate::core::Shared;
@@ -17,7 +18,6 @@ use crate::link::ToLink;
 use crate::names::Names;
 use crate::task::JoinHandle;
 use crate::trace::{Happening, Trace};
-use crate::wire::AccessStats;
 
 /// Handle of the test bed for a running program: access to hosts, links, faults and the record.
 #[derive(Clone)]

@@ -13,10 +13,10 @@ use std::path::{Path, PathBuf};
 use cohaptic_files::{MOST_TOML_BYTES, read_text, read_text_up_to};
 use cohaptic_wan::LinkModel;
 
+use crate::access::AccessLines;
 use crate::fault::WordsError;
 use crate::hit::PathHit;
 use crate::link::LinkChange;
-use crate::settings::AccessLines;
 use crate::words;
 
 /// Hosts and the links between them, read from a file.

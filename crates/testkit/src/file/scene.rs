@@ -8,8 +8,8 @@ use cohaptic_scene::{ChangeKind, Scene};
 use cohaptic_wan::{LinkConfig, LinkModel};
 
 use super::{LinkFile, LinkFileError};
+use crate::access::AccessLines;
 use crate::link::LinkChange;
-use crate::settings::AccessLines;
 
 /// Returns whether a text is a relay file. A text that is no TOML counts as a scene file, whose parser then reports the place of the error.
 pub(super) fn is_relay(text: &str) -> bool {

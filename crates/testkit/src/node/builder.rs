@@ -83,7 +83,7 @@ impl Nodes {
         self
     }
 
-    /// Sets all links, their changes, and the seed as a file says: see [`LinkFile`]. The hosts of the file are nodes that have been added.
+    /// Sets all links, their changes, the access lines and the seed as a file says: see [`LinkFile`]. The hosts of the file are nodes that have been added.
     ///
     /// # Panics
     ///

@@ -13,6 +13,7 @@ use cohaptic_wan::{LinkStats, NodeId};
 
 use super::deadlines::Deadlines;
 use super::{Node, Packet};
+use crate::access::AccessStats;
 use crate::again::Again;
 use crate::artefacts::Artefacts;
 use crate::failure;
@@ -21,7 +22,7 @@ use crate::record::Record;
 use crate::seed::Seed;
 use crate::setup::Setup;
 use crate::watch::{Kind, Watched};
-use crate::wire::{AccessStats, Wire};
+use crate::wire::Wire;
 
 /// Running nodes.
 ///

@@ -22,6 +22,7 @@ use hitting::Hitting;
 pub(crate) use parcel::{Arrival, Octets, Parcel, Spare};
 pub(crate) use recording::{Recorded, Recording, Seen};
 
+use crate::access::AccessStats;
 use crate::again::{Drawn, MOST_LOST, Said};
 use crate::hit::Verdict;
 use crate::link::LinkChange;
@@ -37,16 +38,6 @@ pub(crate) fn earlier(one: Option<Instant>, other: Option<Instant>) -> Option<In
         (Some(one), Some(other)) => Some(one.min(other)),
         (one, other) => one.or(other),
     }
-}
-
-/// Statistics of the access lines of a host: see `Testbed::access` (feature `files`). A line that the host does not have has counted nothing.
-#[derive(Clone, PartialEq, Debug, Default)]
-#[non_exhaustive]
-pub struct AccessStats {
-    /// Statistics of the line that every packet of the host passes before its link.
-    pub uplink: LinkStats,
-    /// Statistics of the line that every packet to the host passes after its link.
-    pub downlink: LinkStats,
 }
 
 pub(crate) struct Wire<A> {

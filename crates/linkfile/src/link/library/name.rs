@@ -80,9 +80,7 @@ mod tests {
     /// A library whose link has got a second version: a bare name is the first one, and a note tells of the second.
     #[test]
     fn a_bare_name_is_the_first_version_and_a_note_tells_of_newer_ones() {
-        let [(name, version, text)] = FILES.map(|file| file).into_iter().filter(|(name, ..)| *name == "cable").collect::<Vec<_>>()[..] else {
-            panic!()
-        };
+        let [(name, version, text)] = FILES.into_iter().filter(|(name, ..)| *name == "cable").collect::<Vec<_>>()[..] else { panic!() };
         let second = text.replace("version = 1", "version = 2");
         let files = [(name, version, text), (name, 2, second.as_str())];
         let title = |text: &str| version_of(&files, text).map(|profile| profile.title());

@@ -1,0 +1,22 @@
+//! Access lines of hosts. A root module of its own, because names of links and settings of runs both need it.
+
+use cohaptic_wan::{LinkModel, LinkStats};
+
+/// Lines between a host and all its links.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub(crate) struct AccessLines {
+    /// Line that every packet of the host passes before its link.
+    pub(crate) uplink: Option<LinkModel>,
+    /// Line that every packet to the host passes after its link.
+    pub(crate) downlink: Option<LinkModel>,
+}
+
+/// Statistics of the access lines of a host: see `Testbed::access` (feature `files`). A line that the host does not have has counted nothing.
+#[derive(Clone, PartialEq, Debug, Default)]
+#[non_exhaustive]
+pub struct AccessStats {
+    /// Statistics of the line that every packet of the host passes before its link.
+    pub uplink: LinkStats,
+    /// Statistics of the line that every packet to the host passes after its link.
+    pub downlink: LinkStats,
+}
