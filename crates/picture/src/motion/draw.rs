@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::style::{COUNT, PIECE};
+use super::style::COUNT;
 use super::{EDGE, FONT, HEIGHT, MARGIN, Motion, MotionRun, RING, TITLE, View, WIDTH, edge_of};
 use crate::xml::{coordinate, escape};
 
@@ -109,14 +109,11 @@ fn write_path(xml: &mut String, run: &MotionRun, copy: usize, at: impl Fn([f64; 
     let colour = copy % COUNT;
     // A path under others is wider, as the copy under others is larger: where copies move together, each path is seen.
     let width = coordinate(edge_of(copy, run.names.len()) / 12.0);
-    let mut begin = 0;
-    while begin + 1 < places.len() {
-        // A piece ends where the next piece begins, so the path has no gap.
-        let end = (begin + PIECE).min(places.len() - 1);
-        let points = places[begin..=end].iter().map(|point| point.map(coordinate).join(","));
+    for piece in run.pieces(copy) {
+        let end = *piece.end();
+        let points = places[piece].iter().map(|point| point.map(coordinate).join(","));
         let _ =
             writeln!(xml, "<polyline class=\"s{colour} path p{end}\" stroke-width=\"{width}\" points=\"{}\"/>", points.collect::<Vec<_>>().join(" "));
-        begin = end;
     }
 }
 

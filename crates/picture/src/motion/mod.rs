@@ -8,6 +8,8 @@ mod style;
 #[cfg(test)]
 mod tests;
 
+use std::ops::RangeInclusive;
+
 /// An animation of some runs beside each other. All runs have the scale of the first run, so that copies of another run can leave the frame.
 ///
 /// ```
@@ -66,6 +68,8 @@ const RING: f64 = 30.0;
 const GONE: f64 = 2.0 * WIDTH;
 /// Time with the last frame before the animation begins again \[s\].
 const STILL: f64 = 2.5;
+/// Number of steps between frames joined by a piece of a path. A piece appears when the copy has passed the end of the piece.
+const PIECE: usize = 5;
 
 impl Motion {
     /// An animation with `step` seconds between two frames, above zero. The animation lasts as long as the run with the most frames, at least one step, and
@@ -133,6 +137,12 @@ impl MotionRun {
         // The last frame with a copy inside decides, because copies may leave and come back before.
         let seen = self.frames.iter().rposition(|places| !is_out(places)).map_or(0, |last| last + 1);
         (seen < self.frames.len()).then_some(seen)
+    }
+
+    /// Returns the first and the last place of each piece of a copy's path. A piece ends where the next piece begins, so that the path has no gap.
+    fn pieces(&self, copy: usize) -> impl Iterator<Item = RangeInclusive<usize>> {
+        let last = self.frames.iter().filter(|places| copy < places.len()).count().saturating_sub(1);
+        (0..last).step_by(PIECE).map(move |begin| begin..=(begin + PIECE).min(last))
     }
 }
 

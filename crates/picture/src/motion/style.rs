@@ -1,5 +1,6 @@
 //! The style sheet of an animation: colours, and the way of each shape to move or appear.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use super::{Motion, View};
@@ -10,9 +11,6 @@ const COLOURS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#c0609a", "#b88700
 
 /// Number of colours: copy `n` has colour `n % COUNT`.
 pub(super) const COUNT: usize = COLOURS.len();
-
-/// Number of frames joined by a piece of a path. A piece appears when the copy has passed the end of the piece.
-pub(super) const PIECE: usize = 5;
 
 const STYLE: &str = "text{font-family:system-ui,sans-serif}.ink{fill:#1b1f24}.paper{fill:#fff}.frame{fill:none;stroke:#6e7781}
 .copy{opacity:.8}.path{fill:none;opacity:.6}.hand{fill:none;stroke-width:2.5;stroke-dasharray:5 3}.told{stroke:#fff;stroke-width:4;paint-order:stroke}.elapsed{fill:#6e7781;transform-box:fill-box;transform-origin:left}
@@ -39,11 +37,13 @@ impl Motion {
                 self.write_appearance(&mut text, &format!("g{number}"), frame);
             }
         }
-        let frames = self.runs.iter().map(|run| run.frames.len()).max().unwrap_or(0);
-        // Pieces end at multiples of [`PIECE`], as `write_path` cuts the paths, and at the last frame.
-        for end in (1..frames).filter(|end| end % PIECE == 0 || end + 1 == frames) {
+        // Pieces of several copies and runs share their ends, and runs of different lengths have different last ends.
+        let pieces = self.runs.iter().flat_map(|run| (0..run.names.len()).flat_map(|copy| run.pieces(copy)));
+        let ends: BTreeSet<usize> = pieces.map(|piece| *piece.end()).collect();
+        for end in ends {
             self.write_appearance(&mut text, &format!("p{end}"), end);
         }
+        let frames = self.runs.iter().map(|run| run.frames.len()).max().unwrap_or(0);
         let shown = coordinate(self.share_of(frames.max(2) - 1));
         let _ = writeln!(text, "@keyframes elapsed{{0%{{transform:scaleX(0)}}{shown}%,100%{{transform:scaleX(1)}}}}");
         let _ = writeln!(text, ".elapsed{{animation:elapsed {cycle}s linear infinite}}");

@@ -73,6 +73,18 @@ fn a_path_is_whole_and_appears_piece_by_piece() {
     assert_eq!((pieces[0].last(), pieces[1].last()), (pieces[1].first(), pieces[2].first()), "pieces join");
 }
 
+/// Runs of 12 and of 8 frames: the shorter run ends with a piece that the longer run does not have.
+#[test]
+fn each_piece_of_a_shorter_run_appears_too() {
+    let frames: Vec<[f64; 2]> = (0..12).map(|frame| [0.01 * f64::from(frame), 0.0]).collect();
+    let svg = Motion::new("t", "", 0.1, vec![run("AP", &frames), run("PD", &frames[..8])]).svg();
+    let ends: Vec<&str> = svg.split("path p").skip(1).map(|rest| rest.split('"').next().unwrap()).collect();
+    assert_eq!(ends, ["5", "10", "11", "5", "10", "11", "5", "7", "5", "7"]);
+    for end in ends {
+        assert_eq!(svg.matches(&format!("@keyframes p{end}{{")).count(), 1, "{end}: {svg}");
+    }
+}
+
 #[test]
 fn copies_at_one_position_are_all_seen() {
     let svg = both().svg();
