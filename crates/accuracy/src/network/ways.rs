@@ -55,12 +55,13 @@ pub fn next_word(state: &mut u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// Returns the middle of one of 2⁵³ equal parts of (0, 1).
+/// Returns the middle of one of 2⁵² equal parts of (0, 1).
 #[inline]
 #[must_use]
 pub fn unit(word: u64) -> f64 {
-    // The half keeps out 0, where the quantile of some laws is infinite.
-    ((word >> 11) as f64 + 0.5) * (1.0 / 9_007_199_254_740_992.0)
+    // The half keeps out 0, where the quantile of some laws is infinite. 52 bits and the half are exact in `f64`: with 53 bits the last sum would be rounded
+    // to 2⁵³, and the result to 1.
+    ((word >> 12) as f64 + 0.5) * (1.0 / 4_503_599_627_370_496.0)
 }
 
 /// Table in the format of netem: 4096 entries of 16 bits, 8192·(F⁻¹(i/4096) − mean)/sd, of which a draw picks one at random.
@@ -130,4 +131,25 @@ impl Fine {
 pub fn draw(law: &Law, state: &mut u64) -> f64 {
     let word = next_word(state);
     law.draw(word, || next_word(state))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_unit_number_is_neither_0_nor_1() {
+        assert!(unit(0) > 0.0);
+        assert!(unit(u64::MAX) < 1.0);
+    }
+
+    /// The extreme words choose positions in the first and in the last cell of the table.
+    #[test]
+    fn each_word_has_a_place_in_the_table() {
+        let [(_, law), ..] = laws();
+        let table = Fine::new(&law);
+        let [first, last] = [0, u64::MAX].map(|word| table.interpolated(word));
+        assert!((first - table.delays()[0]).abs() < 1e-9, "{first}");
+        assert!((last - table.delays()[65_535]).abs() < 1e-9, "{last}");
+    }
 }
