@@ -81,7 +81,7 @@ impl Watch for AnalysisWatch {
         shown.expected += operations;
         let all = estimate(shown.expected);
         // A part that is long by itself begins the bar. Earlier short parts are in the estimate of the time, and not in the length of the bar.
-        if shown.bar.is_some() || operations / OPERATIONS_A_SECOND > SHORT {
+        if shown.bar.is_some() || is_long(operations) {
             // The bar begins with length 0, because each announced part adds its length.
             let bar = shown.bar.get_or_insert_with(|| {
                 let bar = Progress::new(0, "{bar:30} {percent:>3} %  {elapsed} passed, {msg}");
@@ -95,11 +95,10 @@ impl Watch for AnalysisWatch {
 
     fn done(&self, operations: f64) {
         let mut shown = self.shown();
-        shown.left += operations;
-        let whole = steps(shown.left);
-        if let Some(bar) = shown.bar.as_ref().filter(|_| whole > 0) {
-            bar.more(whole);
-            shown.left = 0.0;
+        let Shown { bar, left, .. } = &mut *shown;
+        *left += operations;
+        if let Some(bar) = bar {
+            bar.more(take_steps(left));
         }
     }
 
@@ -135,8 +134,12 @@ impl<'a> CellWatch<'a> {
         Self { progress, name, stops, operations: std::sync::Mutex::default() }
     }
 
+    fn operations(&self) -> std::sync::MutexGuard<'_, [f64; 3]> {
+        self.operations.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+
     fn count(&self, add: [f64; 2]) {
-        let mut operations = self.operations.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut operations = self.operations();
         let [expected, done, largest] = &mut *operations;
         (*expected, *done, *largest) = (*expected + add[0], *done + add[1], largest.max(add[0]));
         if let Some(note) = note(self.name, *operations) {
@@ -145,11 +148,15 @@ impl<'a> CellWatch<'a> {
     }
 }
 
+/// Returns whether a cell of this cost may take longer than [`SHORT`].
+fn is_long(operations: f64) -> bool {
+    operations / OPERATIONS_A_SECOND > SHORT
+}
+
 /// Returns the note about long cells, or `None` if no begun cell takes longer than [`SHORT`].
 fn note(name: &str, [expected, done, largest]: [f64; 3]) -> Option<String> {
     // The announced cost is an estimate and may be exceeded, so that the share is limited to 100 %.
-    let long = largest / OPERATIONS_A_SECOND > SHORT;
-    long.then(|| format!("; a {name} takes {}, {:.0} % of those begun", estimate(largest), 100.0 * (done / expected).min(1.0)))
+    is_long(largest).then(|| format!("; a {name} takes {}, {:.0} % of those begun", estimate(largest), 100.0 * (done / expected).min(1.0)))
 }
 
 impl Watch for CellWatch<'_> {
@@ -162,8 +169,22 @@ impl Watch for CellWatch<'_> {
     }
 
     fn stops(&self) -> bool {
-        (self.stops)()
+        let stops = (self.stops)();
+        // Short cells end by themselves soon, and the command then answers with the cells of that time. On a busy machine this may be later than the
+        // interruption waits for a command without results.
+        if stops && !is_long(self.operations()[2]) {
+            interrupt::has_results();
+        }
+        stops
     }
+}
+
+/// Returns the whole steps in `left`, and leaves the fraction of a step there, because many parts are shorter than a step.
+#[expect(clippy::cast_precision_loss, reason = "steps of a bar")]
+fn take_steps(left: &mut f64) -> u64 {
+    let whole = steps(*left);
+    *left -= whole as f64 * STEP;
+    whole
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a conversion to the nearest number that there is")]
@@ -183,6 +204,19 @@ mod tests {
             assert_eq!(estimate(seconds * OPERATIONS_A_SECOND), words);
         }
         assert_eq!(estimate(1e6 * OPERATIONS_A_SECOND), "about 12 days");
+    }
+
+    /// Ten parts of 1.7 steps are 17 steps, also if each part is shown by itself.
+    #[test]
+    fn no_fraction_of_a_step_is_lost() {
+        let mut left = 0.0;
+        let shown: u64 = (0..10)
+            .map(|_| {
+                left += 1.7 * STEP;
+                take_steps(&mut left)
+            })
+            .sum();
+        assert_eq!((shown, left.round()), (17, 0.0));
     }
 
     #[test]
