@@ -78,7 +78,7 @@ pub(super) struct PlayStage {
     part: Mutex<Option<Arc<Part>>>,
     links: Mutex<Option<KeyedLinks>>,
     wish: Mutex<Option<Wish>>,
-    /// `true` if `wish` holds a wish. An atomic, so that the real-time thread asks without a lock.
+    /// `true` if `wish` holds a wish. Written with the lock of `wish` held. An atomic, so that the real-time thread asks without a lock.
     is_wished: AtomicBool,
     finished: Mutex<Option<Arc<Finished>>>,
     /// Address for other people, known once the server listens.
@@ -131,8 +131,12 @@ impl PlayStage {
     ///
     /// `fell_apart`: whether the part diverged. The next part then begins from the initial states, as after a reset.
     pub(super) fn finish(&self, part: &Part, inputs: PathBuf, fell_apart: bool) -> PlayedScene {
-        let wish = lock(&self.wish).take().unwrap_or_default();
+        let mut wished = lock(&self.wish);
+        // The flag changes under the lock of the wish. A wish told between two unlocked steps would keep its value and lose its flag, and wait for the end of
+        // another part.
         self.is_wished.store(false, Ordering::Relaxed);
+        let wish = wished.take().unwrap_or_default();
+        drop(wished);
         let next = self.next(part, &Wish { reset: wish.reset || fell_apart, ..wish });
         *lock(&self.finished) = Some(Arc::new(Finished { number: part.number, scene: part.played.clone(), inputs }));
         next
@@ -225,9 +229,11 @@ impl Stage for PlayStage {
         let part = self.running()?;
         // A refused scene must be refused here: after the present part has ended, the session could not go on.
         self.next(&part, &wish).scene().map_err(|error| said(&error))?;
-        *lock(&self.wish) = Some(wish);
-        // The flag ends the present part. `finish` then takes the wish under the lock.
+        let mut wished = lock(&self.wish);
+        *wished = Some(wish);
+        // The flag ends the present part. `finish` then takes wish and flag under the lock.
         self.is_wished.store(true, Ordering::Relaxed);
+        drop(wished);
         Ok(())
     }
 
