@@ -10,12 +10,13 @@ use cohaptic_units::print::Span;
 use super::answer::{self, Identity, Seen, Traffic};
 use super::bench::{Bench, End, Go, Task};
 use super::probe::WITHOUT_FORCE;
-use super::reach::{self, FirmwareState, say};
+use super::reach::{self, FirmwareState};
 use crate::arguments::HomeArguments;
 use crate::document_schema::{DocumentSchema, document};
 use crate::failure::{Failure, INTERRUPTED};
 use crate::output;
 use crate::progress::Progress;
+use crate::realtime::say;
 
 /// Waits until a user has homed the device and pulled the grip out, for at most the time of `--for`. A device that is not active by then is a failure.
 pub(super) fn home(arguments: &HomeArguments) -> Result<ExitCode, Failure> {

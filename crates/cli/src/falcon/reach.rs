@@ -3,7 +3,6 @@
 //! The result is an [`AnyTransport`] with running firmware, which [`Bench`](super::bench::Bench) takes.
 
 use std::fmt;
-use std::io::{self, Write as _};
 use std::path::Path;
 use std::time::Duration;
 
@@ -16,7 +15,7 @@ use cohaptic_units::Instant;
 use crate::arguments::WhichFalcon;
 use crate::failure::Failure;
 use crate::progress::Progress as Bar;
-use crate::realtime::loading;
+use crate::realtime::{loading, say};
 
 /// Amplitudes \[m\] and frequency \[Hz\] of the swaying simulated hand.
 pub(super) const SWAY: ([f64; 3], f64) = ([0.020, 0.015, 0.010], 0.5);
@@ -145,12 +144,6 @@ pub(super) fn make_ready(way: &mut AnyTransport, firmware: Option<&Firmware>) ->
     });
     bar.clear();
     outcome.map(|loaded| if loaded { FirmwareState::Loaded } else { FirmwareState::Running }).map_err(|error| error.to_string())
-}
-
-/// Prints a line for people to standard error, apart from the results on standard output.
-pub(super) fn say(line: &str) {
-    // A closed standard error must not end the work on the device.
-    let _ = writeln!(io::stderr(), "{line}");
 }
 
 /// A transport over USB or to a simulated device, boxed, so that the code after this module has one type for both.
