@@ -39,7 +39,7 @@ pub(crate) fn read_fates(path: &Path, from: impl Read) -> Result<FateLog, Failur
     fates::read(from).map_err(|error| match error {
         ReadError::Io(error) => Failure::File { verb: "read", path: path.to_path_buf(), error },
         ReadError::NotText { line } => not_text(path, line),
-        other @ ReadError::Log(_) => Failure::Input(format!("{}: {other}", output::path(path))),
+        other @ (ReadError::Log(_) | _) => Failure::Input(format!("{}: {other}", output::path(path))),
     })
 }
 

@@ -77,6 +77,7 @@ pub enum Operation {
 /// Reason for the failure of a transfer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
 #[expect(missing_docs, reason = "the messages describe the variants")]
+#[non_exhaustive]
 pub enum Fault {
     #[error("it took too long")]
     TimedOut,

@@ -212,6 +212,7 @@ fn transport_error(during: Operation, error: TransferError) -> TransportError {
 /// Reason why no device could be opened.
 #[derive(Clone, Debug, Error)]
 #[expect(missing_docs, reason = "the messages describe the variants")]
+#[non_exhaustive]
 pub enum UsbError {
     #[error("no Novint Falcon (USB 0403:cb48) is plugged in: check the cable and the power supply")]
     NoDevice,

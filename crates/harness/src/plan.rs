@@ -5,6 +5,7 @@ use cohaptic_scene::{Axes, ChangeKind, PeerSpec, Scene};
 
 /// Extent of the machinery in a run.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[non_exhaustive]
 pub enum Model {
     /// The least that the scene needs.
     #[default]

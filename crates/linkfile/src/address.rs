@@ -4,6 +4,7 @@ use std::net::{Ipv4Addr, SocketAddr};
 
 /// Error: a text is no socket address.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum AddressError {
     /// An address or a name without a port.
     #[error("has no port")]

@@ -47,6 +47,7 @@ impl<W: Write> FateWriter<W> {
 
 /// Error of reading a fate log.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ReadError {
     /// The file cannot be read.
     #[error("cannot be read: {0}")]

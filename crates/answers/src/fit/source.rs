@@ -92,7 +92,7 @@ impl Source {
             let log = fates::read(bytes.chain(from)).map_err(|error| match error {
                 ReadError::Io(error) => SourceError::Io(error),
                 ReadError::NotText { line } => SourceError::NotText { line },
-                other @ ReadError::Log(_) => SourceError::Content(other.to_string()),
+                other @ (ReadError::Log(_) | _) => SourceError::Content(other.to_string()),
             })?;
             return Ok(Self::measured(Measurements::from_fates(&log), None, true));
         }

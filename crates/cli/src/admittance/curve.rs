@@ -43,7 +43,8 @@ impl Subject {
             | AdmittanceError::DoesNotTurn { .. }
             | AdmittanceError::Uncoupled { .. }
             | AdmittanceError::Frequency { .. }
-            | AdmittanceError::Analysis(_)) => not_analysed(file, &error),
+            | AdmittanceError::Analysis(_)
+            | _) => not_analysed(file, &error),
         })?;
         let chance = has_chance(&scene).then(|| mean_square_watched(&scene, &Limits { watch, ..Limits::of_unknowns(QUICK_UNKNOWNS) }));
         // Other errors of the mean-square analysis stay in `chance`: the answer reports them beside the curve, which is valid without the analysis.

@@ -72,7 +72,7 @@ fn of_usb(error: &UsbError) -> Failure {
     let where_to_look = match error {
         UsbError::NoDevice => ". `lsusb -d 0403:cb48` shows whether the system sees it; docs/falcon.md says what else to look at",
         UsbError::System { .. } => ". `lsusb` shows whether this machine has USB at all",
-        UsbError::NoSuchSerial { .. } | UsbError::Several(_) => "",
+        UsbError::NoSuchSerial { .. } | UsbError::Several(_) | _ => "",
     };
     Failure::System(format!("{error}{where_to_look}"))
 }
@@ -117,7 +117,7 @@ pub(super) fn read_firmware(path: Option<&Path>) -> Result<Option<Firmware>, Fai
     Firmware::read(path).map(Some).map_err(|error| match error {
         // An unreadable file and a wrong file have different exit statuses.
         FirmwareError::Read { path, error } => Failure::File { verb: "read", path, error },
-        error @ FirmwareError::Length { .. } => Failure::Input(format!("{}: {error}", path.display())),
+        error @ (FirmwareError::Length { .. } | _) => Failure::Input(format!("{}: {error}", path.display())),
     })
 }
 

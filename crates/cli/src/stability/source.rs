@@ -39,7 +39,8 @@ impl Said<'_> {
             | FamilyError::Keys { .. }
             | FamilyError::Twice { .. }
             | FamilyError::Values { .. }
-            | FamilyError::Outside { .. }) => {
+            | FamilyError::Outside { .. }
+            | _) => {
                 // Errors about a range begin with the key of the range, so that the key finds the option.
                 let about =
                     |(option, range): &&(&'static str, KeyRange)| error.to_string().starts_with(&format!("{} ", range.key)).then_some(*option);

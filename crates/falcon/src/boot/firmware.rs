@@ -54,6 +54,7 @@ impl Firmware {
 /// Error of a file that is no firmware.
 #[derive(Debug, Error)]
 #[expect(missing_docs, reason = "the messages describe the variants")]
+#[non_exhaustive]
 pub enum FirmwareError {
     #[error("the firmware {} cannot be read: {error}", path.display())]
     Read { path: PathBuf, error: io::Error },

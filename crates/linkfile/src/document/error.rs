@@ -8,6 +8,7 @@ use cohaptic_units::{Excerpt, Visible};
 
 /// Reason for refusing a file.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FileError {
     /// The content of the file, of an override, or of a file named in the document is wrong.
     #[error("{0}")]

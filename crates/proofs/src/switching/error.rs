@@ -4,6 +4,7 @@ use cohaptic_stability::AnalysisError;
 
 /// Reasons why [`prove_switching`](super::prove_switching) has no verdict.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SwitchingError {
     /// The scene cannot be analysed.
     #[error(transparent)]

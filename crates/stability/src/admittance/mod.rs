@@ -361,6 +361,7 @@ impl PushedAxis {
 /// Reason for which an admittance cannot be computed.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages describe the variants")]
+#[non_exhaustive]
 pub enum AdmittanceError {
     #[error("no peer in place {peer}: expected one of the {peers} peers of the scene, counted from 0")]
     NoSuchPeer { peer: usize, peers: usize },

@@ -131,6 +131,7 @@ fn by_value(known: &[(f64, Cell)]) -> BTreeMap<u64, Cell> {
 
 /// Why there is no boundary.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum BoundaryError<E> {
     /// The options make no sense.
     #[error("{samples} samples and a tolerance of {tolerance}: expected at least 2 samples, not more than {most}, and a finite tolerance above zero")]

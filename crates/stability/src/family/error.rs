@@ -7,6 +7,7 @@ use crate::AnalysisError;
 
 /// Reason for which a family of scenes cannot be formed, or has no radius for the given values.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FamilyError {
     /// The scene is refused, as it is without the keys or with one of their values: an unknown key or peer, a value out of range.
     #[error(transparent)]

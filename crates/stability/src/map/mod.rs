@@ -25,6 +25,7 @@ pub struct Grid {
 
 /// Why there is no map.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum MapError {
     /// The grid has no cells, or too many.
     #[error("a grid of {columns} x {rows} cells: expected at least 1 and at most {MOST_CELLS} in all")]

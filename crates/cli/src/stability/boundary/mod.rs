@@ -189,7 +189,7 @@ fn failure(arguments: &BoundaryArguments, range: &KeyRange, error: BoundaryError
         BoundaryError::Radius(error) => {
             Said { file: &arguments.scene.scene, ranges: &[("--along", range.clone())], overrides: ("--set", &[]) }.failure(error)
         }
-        error @ (BoundaryError::Options { .. } | BoundaryError::Keys { .. }) => Failure::Input(error.to_string()),
+        error @ (BoundaryError::Options { .. } | BoundaryError::Keys { .. } | _) => Failure::Input(error.to_string()),
     }
 }
 

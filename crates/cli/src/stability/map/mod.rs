@@ -112,7 +112,7 @@ impl Order {
         let said = Said { file: &arguments.scene.scene, ranges: &self.ranges, overrides: (variant.option, &variant.overrides) };
         match error {
             MapError::Family(error) => said.failure(error),
-            error @ (MapError::Grid { .. } | MapError::Keys { .. } | MapError::Known { .. }) => Failure::Input(error.to_string()),
+            error @ (MapError::Grid { .. } | MapError::Keys { .. } | MapError::Known { .. } | _) => Failure::Input(error.to_string()),
         }
     }
 

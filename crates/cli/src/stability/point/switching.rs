@@ -41,7 +41,7 @@ fn prove(scene: &Scene, path: &Path) -> Result<Switching, Failure> {
     prove_switching(scene, &Interruptible).map_err(|error| match error {
         SwitchingError::Analysis(AnalysisError::Stopped) => ended(),
         SwitchingError::Analysis(error) => not_analysed(path, &error),
-        SwitchingError::NoContact | SwitchingError::Chance | SwitchingError::NoSpring { .. } | SwitchingError::TooLarge { .. } => {
+        SwitchingError::NoContact | SwitchingError::Chance | SwitchingError::NoSpring { .. } | SwitchingError::TooLarge { .. } | _ => {
             Failure::Input(format!("{}: --switching: {error}", output::path(input::named(path))))
         }
     })

@@ -33,6 +33,7 @@ pub use recording::{Rate, Recording};
 /// Program that wrote a file.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Program {
     /// `irtt client`.
     Irtt,
