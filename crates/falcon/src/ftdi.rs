@@ -22,9 +22,9 @@ pub const STATUS: usize = 2;
 pub(crate) const PAYLOAD: usize = PACKET - STATUS;
 
 /// Value of a reset that discards bytes from the device.
-pub const PURGE_RX: u16 = 1;
+pub(crate) const PURGE_RX: u16 = 1;
 /// Value of a reset that discards bytes to the device.
-pub const PURGE_TX: u16 = 2;
+pub(crate) const PURGE_TX: u16 = 2;
 /// Value that lowers DTR.
 pub(crate) const DTR_LOW: u16 = 0x0100;
 /// Value that raises DTR.

@@ -25,7 +25,7 @@ impl Fingerprint {
 
     /// Returns the fingerprint of bytes.
     #[must_use]
-    pub fn of_bytes(bytes: &[u8]) -> Self {
+    pub(crate) fn of_bytes(bytes: &[u8]) -> Self {
         Self::NONE.and(bytes)
     }
 

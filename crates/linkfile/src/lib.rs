@@ -39,4 +39,4 @@ pub use fingerprint::{Fingerprint, FingerprintError};
 pub use link::library;
 pub use mesh::{KeysOfLinks, LinkChange, LinkKeys, LinkSelector, LinkTable, link_from_keys};
 pub use quantity_text::{number_and_unit, text_of_quantity};
-pub use relay::{RelayChange, RelayFile, RelayLimits, RelayProgram, relay_link_keys, relay_link_keys_of_text};
+pub use relay::{RelayChange, RelayFile, RelayLimits, RelayProgram, relay_link_keys_of_text};

@@ -29,7 +29,7 @@ impl<const A: usize> State<A> {
 
     /// Replaces the motion along one axis.
     #[inline(always)]
-    pub const fn set_along(&mut self, axis: usize, motion: Motion) {
+    pub(crate) const fn set_along(&mut self, axis: usize, motion: Motion) {
         self.position[axis] = motion.position;
         self.velocity[axis] = motion.velocity;
     }

@@ -130,7 +130,7 @@ impl Scene {
     /// KT and BT, `given` are KR and BR as written; both of the scene or as the timeline sets them.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
-    pub fn rotation_gains(&self, gains: Gains, given: &Gains<Option<Triple>>) -> Option<Gains<Triple>> {
+    pub(crate) fn rotation_gains(&self, gains: Gains, given: &Gains<Option<Triple>>) -> Option<Gains<Triple>> {
         let rotation = self.rotation.as_ref()?;
         let pull = match self.coordination.strategy.pull() {
             Pull::Mean => 1.0,

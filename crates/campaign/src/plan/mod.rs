@@ -25,7 +25,7 @@ pub(crate) use parts::{CHUNK, Parts};
 pub const MOST_COMBINATIONS: u64 = 10_000_000;
 
 /// Greatest number of runs of a campaign.
-pub const MOST_RUNS: u64 = 1_000_000_000;
+pub(crate) const MOST_RUNS: u64 = 1_000_000_000;
 
 /// The request of a user, from which a [`CampaignPlan`] is made.
 #[derive(Clone, Debug)]

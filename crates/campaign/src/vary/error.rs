@@ -3,7 +3,7 @@
 use cohaptic_units::print::SixDigits;
 
 /// Greatest number of values of one key.
-pub const MOST_VALUES: usize = 1_000_000;
+pub(crate) const MOST_VALUES: usize = 1_000_000;
 
 /// Why a text is no variation of a key.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
@@ -33,7 +33,7 @@ pub enum VaryError {
         /// Number of values asked for.
         count: usize,
     },
-    /// The variation has more than [`MOST_VALUES`] values.
+    /// The variation has more than a million values.
     #[error("too many values in \"{text}\": expected at most {MOST_VALUES}")]
     TooMany {
         /// The text of the user.

@@ -14,7 +14,7 @@ use list::List;
 use crate::value::{Kind, Value, value_text};
 
 pub use commas::split_at_commas;
-pub use error::{MOST_VALUES, VaryError};
+pub use error::VaryError;
 pub(crate) use varied::Varied;
 
 /// Key whose values may have settings.

@@ -18,7 +18,7 @@ const PROFILE: [Key; 1] = [usual(
 /// Table of the keys of a link, such as `[link]`.
 pub static LINK_TABLE: Table = Table::of(&LINK);
 /// Table of the changed keys of a link. The table is laid over the keys of the link.
-pub static LINK_CHANGE: Table = Table::over(&LINK);
+pub(crate) static LINK_CHANGE: Table = Table::over(&LINK);
 
 /// Keys of the two ends of a link.
 pub const ENDS: [Key; 2] = [required("from", Form::Text, "Name of the sender"), required("to", Form::Text, "Name of the receiver")];

@@ -39,7 +39,7 @@ pub fn read_peer_name(node: &Node, context: Context<'_>) -> Option<usize> {
 }
 
 /// Reads the keys `from` and `to` of a table that may have further keys. Two equal ends are a fault.
-pub fn read_ends(table: &mut TableReader<'_>, context: Context<'_>) -> Option<(usize, usize)> {
+pub(super) fn read_ends(table: &mut TableReader<'_>, context: Context<'_>) -> Option<(usize, usize)> {
     let to_node = table.get("to");
     let noun = context.names.map_or("peer", Names::noun);
     let from = table.read_expecting("from", &format!("the name of the {noun} that sends"), read_peer_name);

@@ -60,7 +60,7 @@ pub struct FileReader<'a>(pub &'a dyn Fn(&Path) -> io::Result<Vec<u8>>);
 
 impl FileReader<'_> {
     /// Opens any file, for a program whose user wrote the document: [`cohaptic_files::read_bytes`].
-    pub const ANY: Self = FileReader(&cohaptic_files::read_bytes);
+    pub(crate) const ANY: Self = FileReader(&cohaptic_files::read_bytes);
 }
 
 impl fmt::Debug for FileReader<'_> {

@@ -25,7 +25,7 @@ impl Fault {
     /// Returns a fault in a line, counted from 1, or at the beginning of the text without a line. A prefix such as "line 2: " is removed from the message,
     /// because the display form shows the line.
     #[must_use]
-    pub fn in_line(text: &str, line: Option<usize>, error: &dyn core::fmt::Display) -> Self {
+    pub(crate) fn in_line(text: &str, line: Option<usize>, error: &dyn core::fmt::Display) -> Self {
         let message = error.to_string();
         let shown = line.and_then(|line| {
             let rest = message.strip_prefix(&format!("line {line}"))?;
@@ -58,7 +58,7 @@ pub fn file_path(node: &Node, context: Context<'_>, expected: &str) -> Option<Pa
 
 /// Joins the name of a file to the folder of the document. An absolute name stays as it is.
 #[must_use]
-pub fn beside_document(context: Context<'_>, name: &str) -> PathBuf {
+pub(crate) fn beside_document(context: Context<'_>, name: &str) -> PathBuf {
     context.sources.file.parent().unwrap_or_else(|| Path::new("")).join(name)
 }
 

@@ -108,7 +108,7 @@ impl<'a> TableReader<'a> {
 
     /// Like [`read`](Self::read), with another expected text for the message about a missing key. An empty text stands for the text of the declaration.
     #[track_caller]
-    pub fn read_expecting<T>(&mut self, name: &'static str, expected: &str, read: impl FnOnce(&Node, Context<'a>) -> Option<T>) -> Option<T> {
+    pub(crate) fn read_expecting<T>(&mut self, name: &'static str, expected: &str, read: impl FnOnce(&Node, Context<'a>) -> Option<T>) -> Option<T> {
         self.read_key(self.key(name), expected, read)
     }
 

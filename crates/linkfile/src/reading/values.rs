@@ -133,7 +133,7 @@ pub fn integer(node: &Node, context: Context<'_>, range: core::ops::RangeInclusi
 }
 
 /// Reads `true` or `false`.
-pub fn boolean(node: &Node, context: Context<'_>) -> Option<bool> {
+pub(crate) fn boolean(node: &Node, context: Context<'_>) -> Option<bool> {
     let Value::Boolean(value) = node.value else {
         context.fault_at(node, format!("found {}: expected true or false", node.describe()));
         return None;
@@ -179,7 +179,7 @@ pub fn duration(node: &Node, context: Context<'_>) -> Option<Duration> {
 }
 
 /// Reads a duration above zero.
-pub fn positive_duration(node: &Node, context: Context<'_>) -> Option<Duration> {
+pub(crate) fn positive_duration(node: &Node, context: Context<'_>) -> Option<Duration> {
     let value = duration(node, context)?;
     if value.is_zero() {
         context.fault_at(node, "zero is out of range: expected a duration above zero such as \"8ms\"");
@@ -209,7 +209,7 @@ pub fn size(node: &Node, context: Context<'_>) -> Option<Bytes> {
 }
 
 /// Reads a size in bytes that may be negative, such as "28B" or "-14B".
-pub fn signed_size(node: &Node, context: Context<'_>) -> Option<i32> {
+pub(crate) fn signed_size(node: &Node, context: Context<'_>) -> Option<i32> {
     const EXPECTED: &str = "a size such as \"28B\", or \"-14B\" for bytes that are not sent";
     let text = text(node, context, EXPECTED)?;
     let (negative, plain) = match text.trim_start().strip_prefix('-') {

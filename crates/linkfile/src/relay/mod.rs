@@ -147,15 +147,6 @@ impl RelayFile {
 ///
 /// # Errors
 ///
-/// As [`RelayFile::read`].
-pub fn relay_link_keys(path: &Path, overrides: &[String]) -> Result<KeysOfLinks, FileError> {
-    with_text(path, |text| relay_link_keys_of_text(text, path, overrides))
-}
-
-/// Like [`relay_link_keys`], for the text of a relay file.
-///
-/// # Errors
-///
 /// As [`RelayFile::parse`].
 pub fn relay_link_keys_of_text(text: &str, file: &Path, overrides: &[String]) -> Result<KeysOfLinks, FileError> {
     parse(Sources { file, text, overrides }, read_document).map(|parsed| parsed.whole.1.keys(LinkSelector::All))

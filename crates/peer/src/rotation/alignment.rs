@@ -56,13 +56,13 @@ pub fn lever<N: Real>(copy: &Matrix3<N>, grasp: Triple<N>, force: Triple<N>) -> 
 /// Returns the torque \[N·m\] on a device, in handle axes, that belongs to its τC on a copy: −RHᵀ·R·τC.
 #[must_use]
 #[inline(always)]
-pub fn reaction<N: Real>(copy: &Matrix3<N>, device: &Matrix3<N>, torque: Triple<N>) -> Triple<N> {
+pub(super) fn reaction<N: Real>(copy: &Matrix3<N>, device: &Matrix3<N>, torque: Triple<N>) -> Triple<N> {
     in_body_axes(device, apply(copy, torque)).map(|component| -component)
 }
 
 /// Returns a vector of world axes in the axes of a body with the matrix R: Rᵀ·v.
 #[must_use]
 #[inline(always)]
-pub fn in_body_axes<N: Real>(matrix: &Matrix3<N>, vector: Triple<N>) -> Triple<N> {
+pub(super) fn in_body_axes<N: Real>(matrix: &Matrix3<N>, vector: Triple<N>) -> Triple<N> {
     apply_transposed(matrix, vector)
 }

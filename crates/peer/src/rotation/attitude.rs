@@ -100,12 +100,7 @@ impl<N: Real> Attitude<N> {
     /// Turns the attitude by a rotation vector σ in body axes \[rad\], and restores the quaternion's norm of 1 to first order.
     #[inline(always)]
     pub fn turn(&mut self, sigma: Triple<N>) {
-        self.turn_by(sigma, N::half_turn(dot(sigma, sigma)));
-    }
-
-    /// Like [`Attitude::turn`], with the result of [`Real::half_turn`] for |σ|².
-    #[inline(always)]
-    pub fn turn_by(&mut self, sigma: Triple<N>, (cosine, sine): (N, N)) {
+        let (cosine, sine) = N::half_turn(dot(sigma, sigma));
         // The rotation is in body axes, so its quaternion multiplies from the right.
         let (w, u) = (self.orientation[0], [self.orientation[1], self.orientation[2], self.orientation[3]]);
         let by = scale(sigma, sine);
@@ -126,7 +121,7 @@ impl<N: Real> Attitude<N> {
 /// Like [`Attitude::point`], for a body with the matrix R and the angular velocity ω in body axes.
 #[must_use]
 #[inline(always)]
-pub fn point_of<const A: usize>(matrix: &Matrix3, rate: Triple, arm: Triple, centre: &State<A>) -> State<A> {
+pub(super) fn point_of<const A: usize>(matrix: &Matrix3, rate: Triple, arm: Triple, centre: &State<A>) -> State<A> {
     // Both vectors are turned into world axes, in which `centre` is given.
     let (reach, swing) = (apply(matrix, arm), apply(matrix, cross(rate, arm)));
     let moved = |own: &[f64; A], by: Triple| core::array::from_fn(|axis| own[axis] + by.get(axis).copied().unwrap_or(0.0));

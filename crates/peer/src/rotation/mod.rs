@@ -11,12 +11,12 @@ mod law;
 mod real;
 mod step;
 
-pub use alignment::{aligning_torque, in_body_axes, lever, reaction, turning_torque};
-pub use attitude::{Attitude, NORM_TOLERANCE, point_of};
+pub use alignment::{aligning_torque, lever, turning_torque};
+pub use attitude::{Attitude, NORM_TOLERANCE};
 pub use body::{DeviceRotation, Rotation, RotationConfig, Torques};
 pub(crate) use held::HeldAttitude;
 pub use held::HeldAttitudes;
-pub use real::{Real, half_turns};
+pub use real::Real;
 pub use step::{RotationMethod, RotationStep, Spin};
 
 /// Three numbers: a vector, or the principal moments of an inertia.

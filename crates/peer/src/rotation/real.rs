@@ -36,25 +36,6 @@ fn series(square: f64) -> (f64, f64) {
     (nested([132.0, 90.0, 56.0, 30.0, 12.0, 2.0]), 0.5 * nested([156.0, 110.0, 72.0, 42.0, 20.0, 6.0]))
 }
 
-/// Returns [`Real::half_turn`] of each element, equal to the bit. If all angles are below half a radian, no element needs a branch.
-#[must_use]
-#[inline(always)]
-pub fn half_turns<const W: usize>(squares: &[f64; W]) -> ([f64; W], [f64; W]) {
-    let (mut cosines, mut sines) = ([0.0; W], [0.0; W]);
-    let mut all_below = true;
-    for place in 0..W {
-        (cosines[place], sines[place]) = series(squares[place]);
-        all_below &= squares[place] < SERIES_BELOW;
-    }
-    // One large angle sends all elements through the scalar function, which uses the same series below the limit.
-    if !all_below {
-        for place in 0..W {
-            (cosines[place], sines[place]) = f64::half_turn(squares[place]);
-        }
-    }
-    (cosines, sines)
-}
-
 /// Returns the closed form, for angles above the limit of the series.
 #[inline(never)]
 fn closed(square: f64) -> (f64, f64) {
@@ -66,17 +47,6 @@ fn closed(square: f64) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn many_half_turns_are_those_of_each() {
-        for squares in [[0.0, 0.1, 0.249], [0.1, 0.25, 7.0], [f64::NAN, f64::INFINITY, 1e-300]] {
-            let (cosines, sines) = half_turns(&squares);
-            for (place, square) in squares.into_iter().enumerate() {
-                let (cosine, sine) = f64::half_turn(square);
-                assert_eq!((cosines[place].to_bits(), sines[place].to_bits()), (cosine.to_bits(), sine.to_bits()), "{square}");
-            }
-        }
-    }
 
     #[test]
     fn series_and_closed_form_are_one_function() {

@@ -195,7 +195,7 @@ impl Family {
     /// # Errors
     ///
     /// As [`Family::radius_watched`].
-    pub fn bounded_radius_watched(&self, values: &[f64], scratch: &mut FamilyScratch, watch: &dyn Watch) -> Result<Cell<Radius>, FamilyError> {
+    pub(crate) fn bounded_radius_watched(&self, values: &[f64], scratch: &mut FamilyScratch, watch: &dyn Watch) -> Result<Cell<Radius>, FamilyError> {
         self.evaluate::<true>(values, scratch, watch)
     }
 
