@@ -8,17 +8,30 @@ use cohaptic_measure::fit::{Fitted, Measurement, Measurements};
 use cohaptic_measure::steady::SteadyStream;
 use cohaptic_units::Bytes;
 use cohaptic_wan::{Fate, Link, LinkConfig, LinkName, PacketInfo};
+use serde::Serialize;
+
+use super::transfer::Transfers;
 
 /// Packets that are sent over the link to find its figures: so many that chance hardly counts beside that of the measurement.
 const PACKETS: u64 = 400_000;
 /// Seed of the link. Any seed serves.
 const SEED: u64 = 1;
 
+/// Judgement of a link by packets that the fit has not seen.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub(super) struct Judged {
+    #[serde(flatten)]
+    pub(super) held_out: HoldOut,
+    transfer_s: Transfers,
+}
+
 /// Judges the link `fitted`, which a scene reads as `config`, by `rest`.
-pub(super) fn judge(fitted: &Fitted, config: LinkConfig, first: &Measurements, rest: &Measurements) -> HoldOut {
+pub(super) fn judge(fitted: &Fitted, config: LinkConfig, first: &Measurements, rest: &Measurements) -> Judged {
     // The gap between bursts at least is above zero, as the fit has checked.
     let every = Duration::try_from_secs_f64(fitted.goodness.spacing_s).unwrap_or(Duration::from_secs(1)).max(Duration::from_nanos(1));
-    HoldOut::of(first, rest, &packets_of(config, every), fitted.goodness.resolution_s)
+    let held_out = HoldOut::of(first, rest, &packets_of(config.clone(), every), fitted.goodness.resolution_s);
+    let transfer_s = Transfers::of(&config, first, rest, &held_out.replay);
+    Judged { held_out, transfer_s }
 }
 
 /// Sends packets over a link, and returns them as measurements.
@@ -44,8 +57,8 @@ fn packets_of(config: LinkConfig, every: Duration) -> Measurements {
 }
 
 /// Returns the text about the held-out packets.
-pub(super) fn words(judged: &HoldOut) -> String {
-    let HoldOut { fitted, held_out, measured, best, independent, gilbert, replay, refused } = judged;
+pub(super) fn words(judged: &Judged) -> String {
+    let HoldOut { fitted, held_out, measured, best, independent, gilbert, replay, refused } = &judged.held_out;
     let columns = [measured, best, independent, gilbert, replay];
     let mut text = format!("\nfitted to the first {fitted} packets, judged by the {held_out} after them\n");
     text.push_str(&format!("\n  {:<22}{:>14}{:>14}{:>14}{:>14}{:>14}\n", "", "held out", "this link", "independent", "Gilbert", "first part"));
@@ -65,6 +78,11 @@ pub(super) fn words(judged: &HoldOut) -> String {
     row("mean run of losses", &|figures| figures.mean_run.map(|run| format!("{run:.4}")));
     row("runs of 2 or more", &|figures| figures.longer_runs.map(|longer| format!("{:.3}", longer[0])));
     row("runs of 3 or more", &|figures| figures.longer_runs.map(|longer| format!("{:.3}", longer[1])));
+    let Transfers { measured, best, independent, gilbert, replay } = judged.transfer_s;
+    let cells: String = [measured, best, independent, gilbert, replay]
+        .map(|seconds| format!("{:>14}", seconds.map_or_else(|| "-".to_owned(), |seconds| format!("{seconds:.3} s"))))
+        .concat();
+    text.push_str(&format!("  {:<22}{cells}\n", "TCP, 10^6 bytes"));
     for reason in refused {
         text.push_str(&format!("refused: {reason}\n"));
     }

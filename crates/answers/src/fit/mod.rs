@@ -9,12 +9,12 @@ mod probed;
 mod recorded;
 mod scene_link;
 mod source;
+mod transfer;
 mod words;
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use cohaptic_measure::fit::hold_out::HoldOut;
 pub use cohaptic_measure::fit::readers::Direction;
 use cohaptic_measure::fit::readers::Recording;
 use cohaptic_measure::fit::{self, FitError, Fitted, Measurements, MeasurementsError, Skew};
@@ -102,7 +102,7 @@ struct Estimate {
     skew: Option<Skew>,
     matched: Option<Ends>,
     probed: Option<Probed>,
-    held_out: Option<HoldOut>,
+    held_out: Option<hold_out::Judged>,
 }
 
 /// Why no link is estimated.
@@ -154,7 +154,7 @@ impl Source {
         let config = read_again(&scene, Some(&fitted.link), file, beside.as_ref())?;
         // The link is judged as a scene reads it, with rounded numbers, because users run that link.
         let held_out = rest.zip(config).map(|(rest, config)| hold_out::judge(&fitted, config, &measurements, &rest));
-        let has_law = beside.is_none() && held_out.as_ref().is_none_or(|judged| judged.refused.is_empty());
+        let has_law = beside.is_none() && held_out.as_ref().is_none_or(|judged| judged.held_out.refused.is_empty());
         let estimate = Estimate { fitted, measurements, clocks, skew, matched: measured.matched.clone(), probed: measured.probed.clone(), held_out };
         Ok(Answered { scene, beside, has_law, kind: Kind::Estimated(Box::new(estimate)) })
     }
