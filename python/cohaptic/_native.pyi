@@ -73,10 +73,10 @@ class Delays:
         Delays \\[s\\] of packets sent at those instants \\[s\\]; NaN of packets that were lost.
         """
     @staticmethod
-    def read(file: str | PathLike[str], receiver: str | PathLike[str] | None = None, port: SupportsIndex | None = None, direction: str | None = None, split: SupportsFloat | SupportsIndex | None = None) -> Delays:
+    def read(file: str | PathLike[str], receiver: str | PathLike[str] | None = None, port: SupportsIndex | None = None, direction: str | None = None, split: SupportsFloat | SupportsIndex | None = None, instant_bytes: SupportsIndex | None = None, walk: bool = False) -> Delays:
         """
         Reads a table of delays, a log of fates or a file of another program, or the captures of both ends. `direction` is `up`, `down` or `rtt`; `split` is the
-        share of the round trip that is the delay.
+        share of the round trip that is the delay. `instant_bytes` leave at each instant of a line, and `walk` asks for a walk of the rate.
         """
 
 @final

@@ -22,6 +22,8 @@ def fit(
     skew: bool = False,
     direction: Literal["up", "down", "rtt"] | None = None,
     split: float | None = None,
+    instant_bytes: int | None = None,
+    walk: bool = False,
     tick: float | None = None,
     cut: bool = False,
     hold_out: float | None = None,
@@ -38,6 +40,7 @@ def fit(
     drift of one clock against the other, where it is significant.
 
     ``direction`` is the way of the packets in a file that has both ways, and ``split`` the share of a round trip that is the delay of one way, such as 0.5.
+    ``walk`` lets a measured rate change as a walk through five states, and ``instant_bytes`` leave at each instant of a line (1504 of mahimahi, otherwise 1400).
     ``tick`` [s] is the tick of the clock that showed the delays, to which it rounds or, with ``cut``, cuts. ``hold_out`` is the
     share of the time at the end whose packets are not fitted and judge the link, such as 0.5.
 
@@ -48,18 +51,25 @@ def fit(
     >>> round(link["delay_s"], 3), link["jitter"]["distribution"]
     (0.04, 'normal')
     """
+    is_of_other_programs = walk or any(choice is not None for choice in (direction, split, instant_bytes))
     if isinstance(source, tuple):
         if receiver is not None or port is not None:
             raise TypeError("receiver and port are for captures: expected a file too")
-        if direction is not None or split is not None:
-            raise TypeError("direction and split are for files of other programs: expected a file")
+        if is_of_other_programs:
+            raise TypeError("direction, split, instant_bytes and walk are for files of other programs: expected a file")
         at, delays = (np.ascontiguousarray(numbers, dtype=np.float64).reshape(-1) for numbers in source)
         measured = _native.Delays.of(at, delays)
     else:
-        if receiver is not None and (direction is not None or split is not None):
-            raise TypeError("direction and split are for files of other programs: expected one file")
+        if receiver is not None and is_of_other_programs:
+            raise TypeError("direction, split, instant_bytes and walk are for files of other programs: expected one file")
         measured = _native.Delays.read(
-            os.fspath(source), None if receiver is None else os.fspath(receiver), port, direction, split
+            os.fspath(source),
+            None if receiver is None else os.fspath(receiver),
+            port,
+            direction,
+            split,
+            instant_bytes,
+            walk,
         )
     if cut and tick is None:
         raise TypeError("cut is the way of a clock with a known tick: expected tick too")

@@ -7,6 +7,7 @@ use cohaptic_answers::fit::{Corrections, Direction, FitFailure, ReadAs, Source, 
 use cohaptic_files::{LimitedFile, MOST_BYTES, MOST_CAPTURE_BYTES};
 use cohaptic_measure::fit::{Measurement, Measurements};
 use cohaptic_scene::SceneError;
+use cohaptic_units::Bytes;
 use numpy::PyReadonlyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -40,9 +41,10 @@ pub(crate) struct Delays {
 #[pymethods]
 impl Delays {
     /// Reads a table of delays, a log of fates or a file of another program, or the captures of both ends. `direction` is `up`, `down` or `rtt`; `split` is the
-    /// share of the round trip that is the delay.
+    /// share of the round trip that is the delay. `instant_bytes` leave at each instant of a line, and `walk` asks for a walk of the rate.
     #[staticmethod]
-    #[pyo3(signature = (file, receiver = None, port = None, direction = None, split = None))]
+    #[pyo3(signature = (file, receiver = None, port = None, direction = None, split = None, instant_bytes = None, walk = false))]
+    #[expect(clippy::too_many_arguments, reason = "the options of `cohaptic fit`")]
     fn read(
         py: Python<'_>,
         file: PathBuf,
@@ -50,6 +52,8 @@ impl Delays {
         port: Option<u16>,
         direction: Option<&str>,
         split: Option<f64>,
+        instant_bytes: Option<u64>,
+        walk: bool,
     ) -> PyResult<Self> {
         let from = open(py, &file)?;
         let direction = match direction {
@@ -59,7 +63,7 @@ impl Delays {
             Some("rtt") => Some(Direction::Rtt),
             Some(other) => return Err(of_value(&format!("direction: found {other:?}, expected \"up\", \"down\" or \"rtt\""))),
         };
-        let read_as = ReadAs { direction, split };
+        let read_as = ReadAs { direction, split, bytes: instant_bytes.map(Bytes::new), walk };
         let Some(receiver) = receiver else {
             let source = interruptible(py, |_: &Stop| Source::read(from, |rest| rest.limited_to(MOST_BYTES), &read_as))?;
             let source = source.map_err(|error| match error {

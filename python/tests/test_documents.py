@@ -129,6 +129,16 @@ def fates(cohaptic_program: Command, tmp_path: Path) -> str:
     return path
 
 
+def test_a_walk_of_a_rate_is_that_of_the_program(tmp_path, answer) -> None:
+    line = tmp_path / "line"
+    counts = [1 + second // 7 * 5 % 11 for second in range(120)]
+    instants = [1000 * second + 90 * instant for second, count in enumerate(counts) for instant in range(count)]
+    line.write_text("".join(f"{at}\n" for at in instants), encoding="utf-8")
+    fitted = fit(line, instant_bytes=1504, walk=True)
+    assert fitted == without_program(answer("fit", str(line), "--bytes", "1504B", "--walk"))
+    assert fitted["recorded"]["walk"]["seconds"] == 119
+
+
 def test_a_fit_of_a_file_is_that_of_the_program(fates: str, answer) -> None:
     fitted = fit(fates)
     assert fitted == without_program(answer("fit", fates))

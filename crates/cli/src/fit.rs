@@ -58,7 +58,7 @@ fn read(arguments: &FitArguments) -> Result<Source, Failure> {
             .map_err(|error| Failure::Input(format!("{}, {}: {error}", output::path(path), output::path(receiver))));
     }
     let named = |why: &dyn std::fmt::Display| Failure::Input(format!("{}: {why}", output::path(path)));
-    let read_as = ReadAs { direction: arguments.direction.map(Into::into), split: arguments.split };
+    let read_as = ReadAs { direction: arguments.direction.map(Into::into), split: arguments.split, bytes: arguments.bytes, walk: arguments.walk };
     Source::read(file::open_large(path)?, |rest| rest.limited_to(MOST_BYTES), &read_as).map_err(|error| match error {
         SourceError::Io(error) => Failure::File { verb: "read", path: path.clone(), error },
         SourceError::NotText { line } => file::not_text(path, line),

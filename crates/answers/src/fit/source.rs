@@ -6,6 +6,7 @@ use cohaptic_measure::fates::{self, ReadError};
 use cohaptic_measure::fit::Measurements;
 use cohaptic_measure::fit::captures::{self, CaptureError};
 use cohaptic_measure::fit::readers::{self, Content, Direction, Recording};
+use cohaptic_units::Bytes;
 use cohaptic_wan::FateRow;
 
 use super::ends::Ends;
@@ -44,6 +45,10 @@ pub struct ReadAs {
     pub direction: Option<Direction>,
     /// Share of the round trip that is the delay of one way, above 0 and at most 1. A round trip without a share is refused.
     pub split: Option<f64>,
+    /// Bytes that leave at each instant of a recorded line. `None` for those of CellReplay, 1400 bytes.
+    pub bytes: Option<Bytes>,
+    /// `true` if a walk of the rate is estimated from a measured rate.
+    pub walk: bool,
 }
 
 /// Why measurements cannot be read.
@@ -105,12 +110,18 @@ impl Source {
         let refused = |error: &dyn std::fmt::Display| SourceError::Content(error.to_string());
         match readers::read(&text, read_as.direction).map_err(|error| refused(&error))? {
             Some(Content::Delays(delays)) => {
+                read_as.is_without_rates()?;
                 let (measurements, probed) = Probed::of(delays, read_as.split).map_err(|error| refused(&error))?;
                 let has_one_clock = probed.has_one_clock();
                 Ok(Self { found: Found::Measured(Box::new(Measured { measurements, matched: None, probed: Some(probed), has_one_clock })) })
             }
             Some(Content::Link(recording)) => {
-                read_as.is_not_needed()?;
+                read_as.is_without_round_trips()?;
+                let recording = match read_as.bytes {
+                    Some(bytes) => recording.with_bytes(bytes.get()).map_err(|error| refused(&error))?,
+                    None => recording,
+                };
+                let recording = if read_as.walk { recording.with_rate_walk().map_err(|error| refused(&error))? } else { recording };
                 Ok(Self { found: Found::Recorded(Box::new(recording)) })
             }
             None => {
@@ -144,12 +155,33 @@ impl Source {
 }
 
 impl ReadAs {
-    /// Refuses what has no meaning for a file without round trips.
+    /// Refuses choices without a meaning for a table of delays or a log of fates.
     fn is_not_needed(&self) -> Result<(), SourceError> {
-        let asked = [("direction", self.direction.is_some()), ("split", self.split.is_some())];
-        match asked.iter().find(|(_, is_asked)| *is_asked) {
-            Some((name, _)) => Err(SourceError::Content(format!("{name}: the file has no round trips: expected one of IRTT, LENS or ping"))),
-            None => Ok(()),
-        }
+        self.is_without_round_trips()?;
+        self.is_without_rates()
+    }
+
+    /// Refuses choices without a meaning for a file without round trips.
+    fn is_without_round_trips(&self) -> Result<(), SourceError> {
+        none_of(
+            [("direction", self.direction.is_some()), ("split", self.split.is_some())],
+            "the file has no round trips: expected one of IRTT, LENS or ping",
+        )
+    }
+
+    /// Refuses choices without a meaning for a file without rates.
+    fn is_without_rates(&self) -> Result<(), SourceError> {
+        none_of(
+            [("bytes", self.bytes.is_some()), ("walk", self.walk)],
+            "the file has no rates: expected one of iperf3, mahimahi or CellReplay (heavy)",
+        )
+    }
+}
+
+/// Refuses the first choice that was made.
+fn none_of(choices: [(&str, bool); 2], why: &str) -> Result<(), SourceError> {
+    match choices.iter().find(|(_, is_made)| *is_made) {
+        Some((name, _)) => Err(SourceError::Content(format!("{name}: {why}"))),
+        None => Ok(()),
     }
 }

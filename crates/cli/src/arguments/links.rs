@@ -78,6 +78,12 @@ pub(crate) struct FitArguments {
     /// Take this share of each round trip as the delay of one way: even for half, or a share such as 60%; nothing measures it
     #[arg(long, value_name = "SHARE", value_parser = share, conflicts_with = "receiver")]
     pub(crate) split: Option<f64>,
+    /// Let the rate change as a walk through five states, estimated from the rates of whole seconds, of files that measure a rate (iperf3, mahimahi, heavy CellReplay)
+    #[arg(long, conflicts_with = "receiver")]
+    pub(crate) walk: bool,
+    /// Bytes that leave at each instant of a line: 1504B of mahimahi [default: 1400B, of CellReplay]
+    #[arg(long, value_name = "SIZE", value_parser = cohaptic_units::parse::size, conflicts_with = "receiver")]
+    pub(crate) bytes: Option<cohaptic_units::Bytes>,
     /// Tick of the clock that showed the delays [default: as the program prints them, else the greatest step of which all are multiples]
     #[arg(long, value_name = "TIME", value_parser = cohaptic_units::parse::duration)]
     pub(crate) tick: Option<std::time::Duration>,
@@ -99,7 +105,7 @@ pub(crate) struct FitArguments {
     /// Print one JSON document and nothing else
     #[arg(long)]
     pub(crate) json: bool,
-    /// End with status 1, and write nothing, where no law fits the delays, or where the held-out packets refuse the link
+    /// End with status 1, and write nothing, where no law fits the delays, or where the held-out packets refuse the link, or its own measurement the walk of a rate
     #[arg(long)]
     pub(crate) require_law: bool,
     /// Write the link table of a scene into this file, and the delays into a file next to it if no law fits them

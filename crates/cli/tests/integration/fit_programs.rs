@@ -170,6 +170,52 @@ fn rates_and_recorded_links_are_links_of_a_scene() {
     assert!(desk.read("f.csv").contains("\n1,0,250000000,64,286000000,delivered"), "{}", desk.read("f.csv"));
 }
 
+/// A line that the emulator itself makes of a walk gives the walk back, and a rate that goes round gives none.
+#[test]
+fn a_recorded_line_gives_its_walk() {
+    let desk = Desk::new();
+    let record = |link: &str, name: &str| {
+        desk.text(&format!("link {link} --size 1504B --every 1ms --packets 150000 --seed 3 --fates f.csv"));
+        let fates = desk.read("f.csv");
+        let arrived = fates.lines().filter_map(|row| row.split(',').nth(4)?.parse::<u64>().ok()).map(|at| format!("{}\n", at / 1_000_000));
+        desk.write(name, arrived.collect::<String>());
+    };
+    record("lte-driving/down", "lte.line");
+    let document = desk.json("fit lte.line --bytes 1504B --walk --require-law --out walk.toml --json");
+    let walk = &document["recorded"]["walk"];
+    assert_eq!(walk["refused"], json!([]), "{document:#}");
+    // Some 400 s know a sojourn of 2.758 s to about a third: a state is visited 30 times, and the rate is correlated over several visits.
+    assert!((1.8..4.2).contains(&number(&walk["sojourn_s"])), "{document:#}");
+    assert!(desk.read("walk.toml").contains("name = \"rate-walk\"") && !desk.path("walk.line").exists());
+    desk.write("scene.toml", format!("{SCENE}{}", desk.read("walk.toml")));
+    assert!(desk.text("explain scene.toml").contains("as \"rate-walk\" goes"));
+    let text = desk.text("fit lte.line --bytes 1504B --walk");
+    for part in
+        ["read from a file of CellReplay: the walk of the rate is estimated\n", " whole seconds; means of their fifths: ", "walk, fitted at 5 s"]
+    {
+        assert!(text.contains(part), "no {part:?} in:\n{text}");
+    }
+    // Without the number of bytes the rates are those of CellReplay.
+    let of_cellreplay = &desk.json("fit lte.line --walk --json")["recorded"]["walk"]["rates_bps"];
+    assert!((number(&of_cellreplay[0]) / number(&walk["rates_bps"][0]) - 1_400.0 / 1_504.0).abs() < 1e-9, "{of_cellreplay}");
+
+    let in_turns: String = (0..120_u64)
+        .flat_map(|second| (0..if second / 7 % 2 == 0 { 200 } else { 600 }).map(move |instant| format!("{}\n", second * 1_000 + instant)))
+        .collect();
+    desk.write("turns.line", in_turns);
+    let refused = desk.json("fit turns.line --bytes 1504B --walk --json");
+    assert_eq!(refused["recorded"]["walk"]["refused"].as_array().map(Vec::len), Some(1), "{refused:#}");
+    assert_eq!(refused["scene"], "[link]\ntrace = { file = \"link.line\", bytes = \"1504B\" }\n");
+    assert!(desk.text("fit turns.line --walk").contains("refused: the autocorrelation of the rate after 5 s is -"));
+    let outcome = desk.cohaptic("fit turns.line --walk --require-law --out turns.toml.out");
+    assert_eq!((outcome.status, desk.path("turns.toml.out").exists()), (Some(1), false), "{outcome:?}");
+    desk.cohaptic("fit turns.line --walk --split even").assert_refused(2, &["split: the file has no round trips"]);
+    desk.write("m.csv", "t,delay\n0,1\n");
+    for option in ["--walk", "--bytes 1504B"] {
+        desk.cohaptic(&format!("fit m.csv {option}")).assert_refused(2, &["the file has no rates: expected one of iperf3, mahimahi or CellReplay"]);
+    }
+}
+
 /// Scene without links.
 const SCENE: &str = "[scene]\nduration = \"1s\"\ncount = 2\n[object]\nmass = 0.45\n[coordination]\nstrategy = \"average-position\"\nstiffness = 100\n\
                      damping = 5\nupdate = \"8ms\"\n[peer]\ncontact = \"none\"\ndevice = { mass = 0.1, damping = 5 }\n\

@@ -28,6 +28,7 @@ mod link;
 mod link_delay;
 mod loss;
 mod measurements;
+mod rate_walk;
 pub mod readers;
 mod search;
 mod skew;
@@ -48,6 +49,7 @@ pub use law::DelayLaw;
 pub use link::{FittedJitter, FittedLaw, FittedLink};
 pub use loss::{LossFit, LossModel};
 pub use measurements::{Measurement, Measurements, MeasurementsError};
+pub use rate_walk::{RateWalk, RateWalkError};
 pub use skew::{Location, Skew, SkewError};
 pub use steps::Step;
 

@@ -64,14 +64,14 @@ fn light(rows: &[(u64, u64)]) -> Result<Recording, ReaderError> {
         "the link has the base delay, on a line between two rows".to_owned(),
         "left out: when the packets of a train arrive, which CellReplay uses while little is sent; no link depends on the load like this".to_owned(),
     ];
-    Ok(Recording { program: Program::CellReplay, rate: None, notes, link: Link::Delays { text } })
+    Ok(Recording { program: Program::CellReplay, rate: None, walk: None, notes, link: Link::Delays { text }, spans: Vec::new() })
 }
 
 fn heavy(rows: &[(u64, u64)]) -> Recording {
     let text: String = rows.iter().map(|(at_ms, _)| format!("{at_ms}\n")).collect();
     let notes = vec![
-        format!("the link sends {PACKET_BYTES} bytes at each instant; of a trace of mahimahi itself, which looks the same, say 1504 bytes"),
+        format!("the line sends {PACKET_BYTES} bytes at each instant; of a trace of mahimahi itself, which looks the same, say 1504 bytes"),
         "left out: the base delay, which the light trace has, and that CellReplay uses this line only while much is sent".to_owned(),
     ];
-    Recording { program: Program::CellReplay, rate: None, notes, link: Link::Line { text, bytes: PACKET_BYTES } }
+    Recording { program: Program::CellReplay, rate: None, walk: None, notes, link: Link::Line { text, bytes: PACKET_BYTES }, spans: Vec::new() }
 }

@@ -6,7 +6,7 @@
 use serde::Deserialize;
 
 use super::json::parse;
-use super::recording::{Key, Link, Rate, Recording, whole};
+use super::recording::{Key, Link, Rate, RateSpan, Recording, whole};
 use super::{Program, ReaderError};
 use crate::series::count_u64;
 
@@ -59,7 +59,7 @@ pub(super) fn read(text: &str) -> Result<Recording, ReaderError> {
         Some(other) => return Err(ReaderError::found("start.test_start.protocol", format!("\"{other}\""), "\"TCP\" or \"UDP\"")),
         None => report.intervals.iter().any(|interval| interval.sum.packets.is_some()),
     };
-    let (mut seconds, mut bits, mut rates, mut lost, mut packets) = (0.0, 0.0, Vec::new(), 0_u64, 0_u64);
+    let (mut seconds, mut bits, mut rates, mut spans, mut lost, mut packets) = (0.0, 0.0, Vec::new(), Vec::new(), 0_u64, 0_u64);
     // Omitted intervals (`-O`) are the slow start of TCP. Intervals are numbered before the filter, because errors name the index in the file.
     for (number, Interval { sum }) in report.intervals.iter().enumerate().filter(|(_, interval)| !interval.sum.omitted) {
         let place = |key: &str| format!("intervals[{number}].sum.{key}");
@@ -80,6 +80,7 @@ pub(super) fn read(text: &str) -> Result<Recording, ReaderError> {
         // Rates are weighted by time, because the last interval can be shorter than the others.
         bits += sum.bits_per_second * (sum.end - sum.start);
         rates.push(sum.bits_per_second);
+        spans.push(RateSpan { start_s: sum.start, end_s: sum.end, bps: sum.bits_per_second });
     }
     if rates.is_empty() {
         return Err(ReaderError::found("intervals", "none that is not omitted", "at least one"));
@@ -98,11 +99,11 @@ pub(super) fn read(text: &str) -> Result<Recording, ReaderError> {
     }
     let mut keys = vec![Key::Rate(whole(rate.mean_bps))];
     keys.extend(loss.filter(|loss| *loss > 0.0).map(Key::Loss));
-    let mut notes = vec!["the link has the mean rate: changes of the rate, its queue and its delay are not in the file".to_owned()];
+    let mut notes = vec!["the queue and the delay of the link are not in the file".to_owned()];
     if rate.is_lower_bound {
         notes.push("the rate of TCP is a lower bound of the rate of the link".to_owned());
     } else {
         notes.push("if packets were lost because more was sent than the line takes, a queue loses them: leave the key loss out then".to_owned());
     }
-    Ok(Recording { program: Program::Iperf3, rate: Some(rate), notes, link: Link::Constant(keys) })
+    Ok(Recording { program: Program::Iperf3, rate: Some(rate), walk: None, notes, link: Link::Constant(keys), spans })
 }

@@ -52,7 +52,7 @@ fn recording(Turns { turns, forever }: Turns) -> Result<Recording, ReaderError> 
         notes.push("the pattern ends: its last turn holds for ever".to_owned());
     }
     let link = if is_constant { Link::Constant(vec![last.key.clone()]) } else { Link::Turns { turns, forever } };
-    Ok(Recording { program: Program::NetemTrace, rate: None, notes, link })
+    Ok(Recording { program: Program::NetemTrace, rate: None, walk: None, notes, link, spans: Vec::new() })
 }
 
 /// Reads a configuration at `path`. `about`: what the configurations of the same pattern are about.

@@ -6,7 +6,9 @@ use cohaptic_units::print::Span;
 use serde::Serialize;
 use std::time::Duration;
 
-use super::Program;
+use super::{Program, ReaderError};
+use crate::fit::RateWalk;
+use crate::series::{count, count_u64, floor};
 
 /// A link as a file records or describes it.
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -16,10 +18,24 @@ pub struct Recording {
     /// Measured rate; `None` for a file that describes a link.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate: Option<Rate>,
+    /// Estimated walk of the rate; `None` if none was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub walk: Option<RateWalk>,
     /// Properties of the file that the link lacks, and assumptions: sentences without a full stop.
     pub notes: Vec<String>,
     #[serde(skip)]
     pub(super) link: Link,
+    /// Measured rates over time. Empty for a file that does not measure a rate.
+    #[serde(skip)]
+    pub(super) spans: Vec<RateSpan>,
+}
+
+/// A rate over a time.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) struct RateSpan {
+    pub(super) start_s: f64,
+    pub(super) end_s: f64,
+    pub(super) bps: f64,
 }
 
 /// A rate measured in intervals.
@@ -95,11 +111,49 @@ impl Key {
     }
 }
 
+/// Longest measurement for a walk of the rate \[s\]: 115 days. The instants of a file can be further apart than memory has seconds.
+const MOST_SECONDS: f64 = 1e7;
+
 impl Recording {
+    /// Returns a link that changes its rate as a walk which is estimated from the rates of whole seconds ([`RateWalk`]). A refused walk is kept in
+    /// [`walk`](Self::walk) with the reasons, and the link stays as it is recorded.
+    ///
+    /// # Errors
+    ///
+    /// [`ReaderError`] if the file measures no rate, or for too few or too long seconds.
+    pub fn with_rate_walk(self) -> Result<Self, ReaderError> {
+        let refused = |problem: &dyn std::fmt::Display| ReaderError::new("walk", problem);
+        let seconds = match &self.link {
+            Link::Line { text, bytes } => seconds_of_line(text, *bytes)?,
+            _ if self.spans.is_empty() => return Err(refused(&"the file measures no rate: expected one of iperf3, mahimahi or CellReplay (heavy)")),
+            _ => seconds_of_spans(&self.spans)?,
+        };
+        let walk = RateWalk::of(&seconds).map_err(|error| refused(&error))?;
+        Ok(Self { walk: Some(walk), ..self })
+    }
+
+    /// Returns the line with another number of bytes that leave at each instant.
+    ///
+    /// # Errors
+    ///
+    /// [`ReaderError`] if the file has no instants of delivery.
+    pub fn with_bytes(mut self, bytes: u64) -> Result<Self, ReaderError> {
+        let Link::Line { bytes: held, .. } = &mut self.link else {
+            return Err(ReaderError::new("bytes", "the file has no instants of delivery: expected a line of mahimahi or CellReplay (heavy)"));
+        };
+        *held = bytes;
+        // The first note of a line is about the bytes that nobody has named.
+        self.notes[0] = format!("the line sends {bytes} bytes at each instant");
+        Ok(self)
+    }
+
     /// Returns the text of the link for a scene: the `[link]` table and, for a link that changes, its modulator. `beside` is the path of the file of
     /// [`beside`](Self::beside), relative to the folder of the scene.
     #[must_use]
     pub fn to_scene_toml(&self, beside: &str) -> String {
+        if let Some(text) = self.walk.as_ref().and_then(RateWalk::to_scene_toml) {
+            return text;
+        }
         let file = crate::fit::link::text_of(beside);
         let mut text = String::new();
         // Writing to a `String` cannot fail.
@@ -135,10 +189,67 @@ impl Recording {
     /// no file.
     #[must_use]
     pub fn beside(&self) -> Option<(&'static str, &str)> {
+        // A walk has replaced the line.
+        if self.walk.as_ref().is_some_and(|walk| walk.refused.is_empty()) {
+            return None;
+        }
         match &self.link {
             Link::Constant(_) | Link::Turns { .. } => None,
             Link::Line { text, .. } => Some(("line", text)),
             Link::Delays { text } => Some(("delays.csv", text)),
         }
     }
+}
+
+/// Returns the rates of the whole seconds of a line \[bit/s\]. The last second is left out, because the line begins anew within it.
+fn seconds_of_line(text: &str, bytes: u64) -> Result<Vec<Option<f64>>, ReaderError> {
+    // The reader of the line has checked that each line is a number, in ascending order.
+    let instants = || text.lines().filter_map(|line| line.trim().parse::<u64>().ok()).map(|ms| ms / 1_000);
+    let seconds = instants().last().unwrap_or(0);
+    let mut counts = vec![0_u64; whole_seconds(count_u64(seconds))?];
+    for second in instants().filter_map(|second| usize::try_from(second).ok()) {
+        if let Some(found) = counts.get_mut(second) {
+            *found += 1;
+        }
+    }
+    Ok(counts.into_iter().map(|instants| Some(count_u64(instants) * count_u64(bytes) * 8.0)).collect())
+}
+
+/// Returns the rates of the whole seconds from the first interval on \[bit/s\]; `None` for a second of which less than nine tenths were measured.
+fn seconds_of_spans(spans: &[RateSpan]) -> Result<Vec<Option<f64>>, ReaderError> {
+    // An interval longer than a second hides what the rate does within it.
+    if let Some(long) = spans.iter().find(|span| span.end_s - span.start_s > LONGEST_INTERVAL_S) {
+        let found = format!("an interval of {:.3} s", long.end_s - long.start_s);
+        return Err(ReaderError::found("walk", found, "intervals of at most a second, as of iperf3 -i 1"));
+    }
+    let [begin_s, end_s] =
+        [spans.iter().map(|span| span.start_s).reduce(f64::min), spans.iter().map(|span| span.end_s).reduce(f64::max)].map(|end| end.unwrap_or(0.0));
+    let seconds = whole_seconds((end_s - begin_s).ceil())?;
+    let (mut bits, mut measured_s) = (vec![0.0; seconds], vec![0.0; seconds]);
+    for span in spans {
+        let (mut from_s, to_s) = (span.start_s - begin_s, span.end_s - begin_s);
+        // An interval lies in at most three seconds, because it is not longer than the limit above.
+        while from_s < to_s {
+            let second = floor(from_s);
+            let until_s = to_s.min(count(second + 1));
+            if let (Some(bits), Some(measured_s)) = (bits.get_mut(second), measured_s.get_mut(second)) {
+                *bits += span.bps * (until_s - from_s);
+                *measured_s += until_s - from_s;
+            }
+            from_s = until_s;
+        }
+    }
+    Ok(bits.into_iter().zip(measured_s).map(|(bits, measured_s)| (measured_s >= MEASURED).then(|| bits / measured_s)).collect())
+}
+
+/// Longest interval for a walk of the rate \[s\]. The intervals of `iperf3 -i 1` are a little longer or shorter than a second.
+const LONGEST_INTERVAL_S: f64 = 1.5;
+/// Share of a second that must be measured.
+const MEASURED: f64 = 0.9;
+
+fn whole_seconds(seconds: f64) -> Result<usize, ReaderError> {
+    if seconds > MOST_SECONDS {
+        return Err(ReaderError::found("walk", format!("{seconds} s"), format!("at most {MOST_SECONDS} s")));
+    }
+    Ok(floor(seconds))
 }

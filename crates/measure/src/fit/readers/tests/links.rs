@@ -34,6 +34,73 @@ fn iperf3_gives_the_mean_rate() {
     assert_eq!(udp.to_scene_toml(""), "[link]\nrate = \"8000000bit\"\nloss = 0.005\n");
 }
 
+/// 300 s whose rate rests for some seconds. Tenths of a second, and seconds that begin 0.1 ms late, give the rates of the same seconds.
+#[test]
+fn iperf3_gives_a_walk_of_the_rate() {
+    let mut rng = crate::tests::TestRng::new(2);
+    let mut rate = 3.0;
+    let rates: Vec<f64> = (0..300)
+        .map(|_| {
+            rate = if rng.unit() < 0.2 { 1.0 + 5.0 * rng.unit() } else { rate };
+            (rate * 1e6_f64).round()
+        })
+        .collect();
+    let walk = |sums: &[Value]| recording(&iperf3("TCP", sums)).with_rate_walk().unwrap();
+    let seconds = |from: f64| rates.iter().zip(0..).map(|(rate, second)| sum(f64::from(second) + from, *rate)).collect::<Vec<_>>();
+    let found = walk(&seconds(0.0));
+    let estimated = found.walk.clone().unwrap();
+    assert_eq!((estimated.seconds, &estimated.refused), (300, &Vec::new()));
+    assert_eq!(estimated, crate::fit::RateWalk::of(&rates.iter().copied().map(Some).collect::<Vec<_>>()).unwrap());
+    assert_eq!((Some(found.to_scene_toml("x")), found.beside()), (estimated.to_scene_toml(), None));
+    // Seconds count from the first interval on.
+    assert_eq!(walk(&seconds(1e-4)).walk.unwrap().rates_bps.map(f64::round), estimated.rates_bps.map(f64::round));
+    let mut tenths = Vec::new();
+    for (second, rate) in (0..).zip(&rates) {
+        for tenth in 0..10 {
+            let mut part = sum(f64::from(second) + f64::from(tenth) / 10.0, if tenth % 2 == 0 { rate + 9e5 } else { rate - 9e5 });
+            part["end"] = json!(f64::from(second) + f64::from(tenth + 1) / 10.0);
+            tenths.push(part);
+        }
+    }
+    for (found, expected) in walk(&tenths).walk.unwrap().rates_bps.into_iter().zip(estimated.rates_bps) {
+        assert!((found - expected).abs() < 1.0, "{found} {expected}");
+    }
+    // A second that is not there is no second without a rate. The last one is measured for half of a second.
+    let mut gaps = seconds(0.0);
+    gaps.remove(100);
+    gaps.last_mut().unwrap()["end"] = json!(299.5);
+    assert_eq!(walk(&gaps).walk.unwrap().seconds, 298);
+    // A refused walk leaves the mean rate.
+    let constant = walk(&(0..60).map(|second| sum(f64::from(second), 2e6)).collect::<Vec<_>>());
+    assert_eq!((constant.walk.as_ref().unwrap().refused.len(), constant.to_scene_toml("")), (1, "[link]\nrate = \"2000000bit\"\n".to_owned()));
+    let refused = |sums: &[Value]| recording(&iperf3("TCP", sums)).with_rate_walk().unwrap_err().to_string();
+    assert_eq!(refused(&seconds(0.0)[..59]), "walk: found 59 whole seconds with a rate, expected at least 60 for a walk of the rate");
+    let mut long = sum(0.0, 1e6);
+    long["end"] = json!(10.0);
+    assert_eq!(refused(&[long]), "walk: found an interval of 10.000 s, expected intervals of at most a second, as of iperf3 -i 1");
+    assert_eq!(refused(&[sum(0.0, 1e6), sum(1e8, 1e6)]), "walk: found 100000001 s, expected at most 10000000 s");
+}
+
+/// Instants of a second in which n leave are n·bytes, and the last second, in which the line begins anew, does not count.
+#[test]
+fn a_line_gives_a_walk_of_the_rate() {
+    let counts: Vec<u64> = (0..100_u64).map(|second| 1 + (second / 7 * 5) % 11).collect();
+    let text: String =
+        (0..).zip(&counts).flat_map(|(second, count)| (0..*count).map(move |instant| format!("{}\n", second * 1_000 + instant * 90))).collect();
+    let line = recording(&format!("{text}100005\n"));
+    let rates = |bytes: f64| counts.iter().map(|count| Some(crate::series::count_u64(*count) * bytes * 8.0)).collect::<Vec<_>>();
+    assert_eq!(line.clone().with_rate_walk().unwrap().walk, Some(crate::fit::RateWalk::of(&rates(1_400.0)).unwrap()));
+    let of_mahimahi = line.with_bytes(1_504).unwrap();
+    assert_eq!(of_mahimahi.to_scene_toml("a"), "[link]\ntrace = { file = \"a\", bytes = \"1504B\" }\n");
+    assert_eq!(of_mahimahi.notes[0], "the line sends 1504 bytes at each instant");
+    assert_eq!(of_mahimahi.with_rate_walk().unwrap().walk, Some(crate::fit::RateWalk::of(&rates(1_504.0)).unwrap()));
+    let light = || recording("0 30 0 1 1 2\n500 42 0 0 3\n1000 36 0\n");
+    assert!(light().with_rate_walk().unwrap_err().to_string().starts_with("walk: the file measures no rate"));
+    assert!(light().with_bytes(5).unwrap_err().to_string().starts_with("bytes: the file has no instants of delivery"));
+    let far = recording("0\n1000000000000\n").with_rate_walk().unwrap_err().to_string();
+    assert_eq!(far, "walk: found 1000000000 s, expected at most 10000000 s");
+}
+
 #[test]
 fn iperf3_is_refused_at_its_place() {
     let sender = refused(&iperf3("UDP", &[sum(0.0, 1e6)]));
