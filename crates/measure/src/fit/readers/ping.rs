@@ -113,7 +113,7 @@ fn answer(line: usize, text: &str, number: &str, latest: Option<i64>) -> Result<
 }
 
 /// Returns the number of a packet, counted on after 65535: of all numbers with these 16 bits the nearest to the latest.
-fn continued(shown: u16, latest: Option<i64>) -> i64 {
+pub(super) fn continued(shown: u16, latest: Option<i64>) -> i64 {
     let Some(latest) = latest else { return i64::from(shown) };
     // Both differences are below 2^16, so they fit.
     let ahead = (i64::from(shown) - latest).rem_euclid(1 << 16);

@@ -8,7 +8,7 @@ use super::*;
 use crate::fit::fit;
 
 /// Returns instants of sending [ms] and delays [ms], rounded to picoseconds.
-fn packets(delays: &Delays) -> Vec<(f64, Option<f64>)> {
+pub(super) fn packets(delays: &Delays) -> Vec<(f64, Option<f64>)> {
     let millis = |seconds: f64| (seconds * 1e12).round() / 1e9;
     delays.measurements.packets().iter().map(|packet| (millis(packet.sent_s), packet.delay_s.map(millis))).collect()
 }

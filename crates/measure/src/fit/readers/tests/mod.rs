@@ -3,6 +3,7 @@
 mod delays;
 mod edited;
 mod links;
+mod rare;
 
 use super::*;
 
