@@ -15,6 +15,10 @@ pub(super) fn page() -> String {
     for (word, _, meaning) in Grade::WORDS {
         let _ = writeln!(page, "- **{word}**: {meaning}");
     }
+    page.push_str(
+        "\nA source says where it can be read, and how it was read here: as the *source* itself, in a *transcription* of its figures by somebody else, *computed*, or \
+         *recalled*, where the figures were once read and the source was not found again.\n",
+    );
     let (presets, measured): (Vec<Profile>, Vec<Profile>) = profiles().partition(|profile| profile.grade() == Grade::Preset);
     page.push_str("\n## Links with sources\n");
     for profile in &measured {
@@ -23,11 +27,12 @@ pub(super) fn page() -> String {
     page.push_str(
         "\n## Tables of tools\n\nNobody measured these links. A tool names a round trip, and each direction has half of it here; Apple's delays are one-way. The tools \
          themselves do something else: DevTools delays requests and not packets, by 5, 3.75 and 2.75 times the round trip, and uses 0.8 or 0.9 of the rate.\n\n\
-         | name | delay down, up | rate down, up |\n| --- | --- | --- |\n",
+         | name | delay down, up | rate down, up | source |\n| --- | --- | --- | --- |\n",
     );
     for profile in &presets {
         let of = |key: &str| Direction::BOTH.map(|direction| value(profile, direction, key)).join(", ");
-        let _ = writeln!(page, "| `{}` | {} | {} |", profile.title(), of("delay"), of("rate"));
+        let sources = profile.sources.values().map(|source| format!("{} (read: {})", source.cite, source.read)).collect::<Vec<_>>().join("; ");
+        let _ = writeln!(page, "| `{}` | {} | {} | {sources} |", profile.title(), of("delay"), of("rate"));
     }
     page
 }

@@ -143,9 +143,10 @@ pub struct Profile {
 #[derive(Clone, PartialEq, Debug)]
 #[non_exhaustive]
 pub struct Source {
-    /// Authors, title, and where and when it appeared.
+    /// Authors, title, where and when it appeared, and where it can be found.
     pub cite: String,
-    /// Kind of reading: `source` for the source itself, `transcription` for somebody's copy of its figures, `computed` for arithmetic.
+    /// Kind of reading: `source` for the source itself, `transcription` for somebody's copy of its figures, `computed` for arithmetic, `recalled` for figures
+    /// whose source was not found again.
     pub read: String,
     /// Licence of the data of the source, and what of the data is used here.
     pub licence: String,

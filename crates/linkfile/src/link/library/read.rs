@@ -31,7 +31,7 @@ static ROOT: Table = Table::of(&[&[
 static SOURCES: Table = Table::with_others(&[], &Form::Table(&SOURCE));
 static SOURCE: Table = Table::of(&[&[
     required("cite", Form::Text, "Authors, title, where and when"),
-    required("read", Form::Text, "How it was read"),
+    required("read", Form::Text, "How it was read: source, transcription, computed or recalled"),
     required("data-licence", Form::Text, "The licence of its data, and what is used"),
 ]]);
 static BECAUSE: Table = Table::of(&[&of_directions(Form::Table(&REASONS))]);
@@ -146,7 +146,7 @@ mod tests {
     use crate::link::library::{Direction, Grade, profiles};
 
     /// Every number can be followed to its source: each key of each direction, the keys of the states of a modulator among them, has a reason; each source that a
-    /// reason names exists and is used; and only an assumption has no source.
+    /// reason names exists and is used; only an assumption has no source; and a source that was read says where it can be read.
     #[test]
     fn each_key_has_a_grade_and_a_source() {
         for profile in profiles() {
@@ -171,6 +171,16 @@ mod tests {
                     used.extend(reason.sources.iter().cloned());
                 }
                 assert!(line.between.keys().all(|key| keys.contains(key.as_str())), "{}", profile.title());
+            }
+            for (name, source) in &profile.sources {
+                let has_place = ["doi:", "arXiv:", "https://"].iter().any(|place| source.cite.contains(place));
+                match source.read.as_str() {
+                    "source" => assert!(has_place, "{} {name}: {}", profile.title(), source.cite),
+                    // Who copied the figures is not always known. The reader is told that nobody has looked into the source itself.
+                    "transcription" | "computed" => {}
+                    "recalled" => assert!(!has_place && source.cite.contains("not found again"), "{} {name}: {}", profile.title(), source.cite),
+                    other => panic!("{} {name}: {other}", profile.title()),
+                }
             }
             assert_eq!(used, profile.sources.keys().cloned().collect(), "{}", profile.title());
             assert_eq!(profile.grade() == Grade::Preset, profile.name.contains('/'), "{}", profile.title());
