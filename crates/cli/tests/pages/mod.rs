@@ -87,6 +87,7 @@ pages! {
     commands_run: "docs/commands-run.md",
     compare: "docs/compare.md",
     the_book: "docs/README.md",
+    fitted_link: "docs/fitted-link.md",
     emulator: "docs/emulator.md",
     emulator_stages: "docs/emulator-stages.md",
     extending: "docs/extending.md",

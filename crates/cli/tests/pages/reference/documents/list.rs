@@ -507,7 +507,7 @@ pub(super) const DOCUMENTS: [Document; 25] = [
             "python3 programs/captures.py && cohaptic fit sender.pcap receiver.pcap --skew --least 20ms --json",
             "python3 programs/measured.py && cohaptic fit line.json --direction up --json",
             "python3 programs/measured.py && cohaptic fit line.txt --split even --hold-out 50% --json",
-            "python3 programs/measured.py && cohaptic fit rate.json --json",
+            "python3 programs/measured.py && cohaptic fit rate.json --walk --json",
         ],
         rows: &[
             ("link.NAME", "the link that fits best; `link.jitter.distribution` is `empirical` where no law fits"),
@@ -540,6 +540,11 @@ pub(super) const DOCUMENTS: [Document; 25] = [
                  `mean_bps`, `between_bps` (10 % and 90 % of the intervals), `loss`, and whether it `is_lower_bound`; what the link lacks",
             ),
             (
+                "recorded.walk.NAME",
+                "with `--walk`: measured `seconds`, `rates_bps` (means of the fifths), `sojourn_s` in an inner state (half of that at both ends), the autocorrelations of the \
+                 rate after 1, 5 and 10 s (`measured`, and those of the `walk`), and why the walk is `refused`",
+            ),
+            (
                 "hold_out.fitted, hold_out.held_out, hold_out.refused",
                 "with `--hold-out`: packets of both parts, and why the [held-out packets](commands-network.md#packets-that-the-fit-has-not-seen) refuse the link",
             ),
@@ -548,6 +553,11 @@ pub(super) const DOCUMENTS: [Document; 25] = [
                 "figures of the held-out packets, of this link, of independent packets, of Gilbert–Elliott losses with independent delays, and of the first part: \
                  `mean_s`, `quantiles_s` (95 %, 99 %), `wasserstein_s` (W₁ from the held-out delays), `autocorrelation` (1, 10 and 100 packets apart), `loss`, \
                  `mean_run`, `longer_runs` (shares of the runs of two or more and of three or more losses)",
+            ),
+            (
+                "hold_out.transfer_s.measured, hold_out.transfer_s.best, hold_out.transfer_s.independent, hold_out.transfer_s.gilbert, hold_out.transfer_s.replay",
+                "time in which a server that accepts a connection sends 10⁶ bytes over TCP, in both ways over the same link: median of 101 connections, `null` if \
+                 half of the connections end before",
             ),
             ("clocks.added_s", "with `--offset` or `--least`, or where an offset is assumed: what was added to every delay"),
             ("clocks.is_assumed", "`true` where the offset is assumed: the least delays of both ways are then equal"),
