@@ -25,7 +25,7 @@
 //! "#;
 //! let scene = Scene::parse(text, "two.toml".as_ref(), &[])?;
 //! let summary = Simulation::new(&scene, Model::Least).run(&mut NoObserver)?;
-//! let document = serde_json::to_value(run(&scene, &summary, &[], None))?;
+//! let document = serde_json::to_value(run(&scene, &summary, &[], None, None))?;
 //! assert_eq!(document["ticks"], 1000);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -2,8 +2,10 @@
 
 use cohaptic_harness::measures::MeasuredValue;
 use cohaptic_harness::record::Bands;
+use cohaptic_harness::task::{TaskResult, task_words};
 use cohaptic_harness::{DIVERGED_DISTANCE, Ending, LinkQuantiles, Summary};
 use cohaptic_scene::Scene;
+use cohaptic_units::Instant;
 use cohaptic_units::print::{Counted, SixDigits, Span};
 use cohaptic_wan::{DropCause, LinkStats};
 use serde::Serialize;
@@ -11,8 +13,8 @@ use serde::Serialize;
 use crate::parts::{MOST_LINKS, access_line, link_quantiles, link_totals, measures_of, peer, peer_links, rotation};
 use crate::{document, length, text_plot};
 
-/// Returns the document of a run. `wall_s`: wall time of the run \[s\]; `None` leaves the keys of the speed out.
-pub fn run(scene: &Scene, summary: &Summary, measured: &[MeasuredValue], wall_s: Option<f64>) -> impl Serialize {
+/// Returns the document of a run. `task`: result of the task of the scene. `wall_s`: wall time of the run \[s\]; `None` leaves the keys of the speed out.
+pub fn run(scene: &Scene, summary: &Summary, measured: &[MeasuredValue], task: Option<&TaskResult>, wall_s: Option<f64>) -> impl Serialize {
     let duration_s = summary.duration.as_secs_f64();
     document! {
         title: scene.title.clone(),
@@ -31,14 +33,35 @@ pub fn run(scene: &Scene, summary: &Summary, measured: &[MeasuredValue], wall_s:
         #[serde(flatten)]
         rotation: rotation(summary),
         #[serde(flatten)]
+        task: task.map(|task| document! { task: task_of(scene, task) }),
+        #[serde(flatten)]
         measures: measures_of(scene, measured),
+    }
+}
+
+/// Returns the document of the result of a task. `failed_by` and `reason` are present only for a failure.
+fn task_of(scene: &Scene, task: &TaskResult) -> impl Serialize + use<> {
+    document! {
+        kind: scene.task.as_ref().map(|task| task.kind.name()),
+        outcome: task.outcome.name(),
+        time_s: task.time.as_secs_f64(),
+        reached_s: task.reached.iter().map(|at| (*at - Instant::ZERO).as_secs_f64()).collect::<Vec<f64>>(),
+        #[serde(flatten)]
+        failure: task.failure.map(|failure| document! { failed_by: scene.peers[failure.peer].name.clone(), reason: failure.reason.name() }),
     }
 }
 
 /// Returns the text about a run. `wall_s`: wall time of the run \[s\]. `positions`: positions to draw as a text plot, if wanted, best in
 /// [`TEXT_PLOT_SPANS`](crate::TEXT_PLOT_SPANS) spans.
 #[must_use]
-pub fn run_words(scene: &Scene, summary: &Summary, measured: &[MeasuredValue], wall_s: f64, positions: Option<&Bands>) -> String {
+pub fn run_words(
+    scene: &Scene,
+    summary: &Summary,
+    measured: &[MeasuredValue],
+    task: Option<&TaskResult>,
+    wall_s: f64,
+    positions: Option<&Bands>,
+) -> String {
     let mut text = String::new();
     let mut line = |line: String| text.push_str(&format!("{line}\n"));
     if let Some(positions) = positions {
@@ -70,6 +93,7 @@ pub fn run_words(scene: &Scene, summary: &Summary, measured: &[MeasuredValue], w
     if summary.links.len() > MOST_LINKS {
         over_links(summary).into_iter().for_each(|over| line(format!("  {over}")));
     }
+    task.into_iter().for_each(|task| line(format!("  task: {}", task_words(task, scene))));
     measured_lines(scene, measured).into_iter().for_each(|measured| line(format!("  {measured}")));
     text
 }

@@ -5,7 +5,8 @@
 //! [`Simulation`] is the scene in virtual time: N [`cohaptic_peer::Peer`]s that send samples through a [`cohaptic_wan::Network`]. A sample has the size of its
 //! datagram but travels as numbers; bytes are made only for a damaged packet or a socket. A scene without need for events, and with an observer of no more than
 //! ticks, runs in arrays, which hold numbers only: no peers, no datagrams, no packets. An [`Observer`] sees every tick and every packet; [`record`] has
-//! observers that write CSV files and plots during the run. [`check`] compares a run with the scene's expectations. [`mod@explain`] lists the parts that the
+//! observers that write CSV files and plots during the run. [`task`] judges what
+//! the users of a scene are asked to do. [`check`] compares a run with the scene's expectations. [`mod@explain`] lists the parts that the
 //! program models for a scene. [`live`] runs scenes with remote peers.
 //!
 //! This crate reads no clock: the same scene and seed give the same bytes on every machine.
@@ -47,6 +48,7 @@ mod simulation;
 mod size;
 mod spread;
 mod summary;
+pub mod task;
 mod world;
 
 pub use arrays::Ticks;

@@ -1,6 +1,6 @@
 //! Compilation of a scene to the least that its run needs: the model of each part. Every choice gives the same results to the bit.
 
-use cohaptic_peer::{Contact, Drift};
+use cohaptic_peer::Drift;
 use cohaptic_scene::{Axes, ChangeKind, PeerSpec, Scene};
 
 /// Extent of the machinery in a run.
@@ -73,13 +73,6 @@ pub(crate) fn ticking<'a>(peers: impl Iterator<Item = &'a PeerSpec> + Clone) -> 
     if first.is_some() && peers.clone().all(together) { Ticking::Lockstep } else { Ticking::EventDriven }
 }
 
-/// Returns whether the device of a peer touches its copy at any time of the run.
-pub(crate) fn touches(scene: &Scene, peer: usize) -> bool {
-    let touches_later =
-        |what: &ChangeKind| matches!(what, ChangeKind::Contact { peer: changed, contact } if *changed == peer && *contact != Contact::None);
-    scene.peers[peer].contact != Contact::None || scene.timeline.iter().any(|change| touches_later(&change.what))
-}
-
 fn device(scene: &Scene, peer: usize, ticks_are_observed: bool) -> DeviceChoice {
     let spec = &scene.peers[peer];
     // A device that turns, or that starts with the motion of a point of a turning copy, is not at rest.
@@ -89,7 +82,7 @@ fn device(scene: &Scene, peer: usize, ticks_are_observed: bool) -> DeviceChoice 
     let moved_later =
         scene.timeline.iter().any(|change| matches!(&change.what, ChangeKind::Hand { peer: changed, hand: Some(_) } if *changed == peer));
     // The order matters: a device that touches its copy is needed even if no hand moves the device and no observer sees the device.
-    if touches(scene, peer) {
+    if scene.touches(peer) {
         DeviceChoice::Simulated
     } else if spec.hand.is_none() && !moved_later && !moves {
         DeviceChoice::Resting

@@ -45,6 +45,7 @@ pub mod schema;
 mod sections;
 mod strategies;
 mod strategy_limits;
+mod task;
 #[cfg(test)]
 mod tests;
 mod topology;
@@ -58,4 +59,5 @@ pub use read::{at_peer, scene_files};
 pub use rotation::{DeviceRotationSpec, PeerRotation, RotationSpec};
 pub use rotation_parts::{RotationPart, RotationParts};
 pub use strategies::{FromScene, Strategies};
+pub use task::{Hold, Judged, Reach, TaskKind, TaskOutcome, TaskSpec, Track};
 pub use topology::{Topology, TopologyKind, WeightsError, read_weights};

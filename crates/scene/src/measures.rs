@@ -15,7 +15,7 @@ macro_rules! registry {
             /// Every measure, in the order of display.
             pub const ALL: &'static [Self] = &[$(Self::$measure,)+];
 
-            /// Returns the name, which ends in the unit. The full name of a measure of a peer begins with the peer's name: see [`MeasureName::text`].
+            /// Returns the name, which ends in the unit if there is one. The full name of a measure of a peer begins with the peer's name: see [`MeasureName::text`].
             #[must_use]
             pub const fn name(self) -> &'static str {
                 match self {
@@ -98,6 +98,18 @@ registry! {
     BitRate: Run, "sent_bits_per_s", "bit/s", "Bits of the datagrams in these packets per second";
     AgeMean: Run, "age_mean_s", "s", "Mean age of held samples, tick less sampling, over ticks and pairs of peers from the first arrival on";
     AgeP99: Run, "age_p99_s", "s", "Quantile of 99 % of that age";
+    TaskTime: Run, "task_time_s", "s", "Time from the start of the task to its end; no value for a task that is not done";
+    MotionForce: Run, "motion_force_n", "N", "Mean over ticks of the task of the norm of the sum of the coupling forces of all peers";
+    InternalForce: Run, "internal_force_n", "N", "Mean over ticks of the task of the part of the coupling forces that cancels, the smaller of the sums of positive and negative forces along each axis";
+    TaskError: Peer, "error_rms_m", "m", "Root mean square over ticks of the task of the distance between the copy of this peer and the target";
+    Outside: Peer, "outside_s", "s", "Time for which the copy of this peer was outside of the held target after the first entry";
+    Effort: Peer, "effort_n2_s", "N²·s", "Integral over the task of the squared norm of the coupling force of this peer";
+    Given: Peer, "given_j", "J", "Work of the hand and device of this peer on the object over the task, without the negative work";
+    Taken: Peer, "taken_j", "J", "Negative work of the hand and device of this peer on the object over the task";
+    LoadShare: Peer, "load_share", "", "Mean over ticks of the task of this peer's part of the coupling forces that act in the direction of their sum";
+    Submovements: Peer, "submovements", "", "Maxima of the speed of the copy of this peer over the task, each after a rise and before a fall of at least 5 mm/s";
+    Sparc: Peer, "sparc", "", "Smoothness of the motion of the copy of this peer over the task, by the spectral arc length of its speed";
+    Ldlj: Peer, "ldlj", "", "Smoothness of the motion of the copy of this peer over the task, by the logarithm of its dimensionless jerk";
 }
 
 /// A measure of the run, or a measure together with a peer.
@@ -110,11 +122,11 @@ pub struct MeasureName {
 }
 
 impl MeasureName {
-    /// Returns every measure of a scene with this number of peers, in the order of display.
+    /// Returns every measure of a scene with this number of peers, in the order of display. Measures of a task are left out unless the scene has a task.
     #[must_use]
-    pub fn all(peers: usize) -> Vec<Self> {
+    pub fn all(peers: usize, has_task: bool) -> Vec<Self> {
         let mut names = Vec::new();
-        for &measure in Measure::ALL {
+        for &measure in Measure::ALL.iter().filter(|measure| has_task || !measure.is_of_task()) {
             match measure.scope() {
                 Scope::Run => names.push(Self { measure, peer: None }),
                 Scope::Peer => names.extend((0..peers).map(|peer| Self { measure, peer: Some(peer) })),
@@ -138,6 +150,46 @@ impl MeasureName {
 }
 
 impl Measure {
+    /// Returns whether the measure belongs to a task, and has no meaning in a scene without a task.
+    #[must_use]
+    pub const fn is_of_task(self) -> bool {
+        match self {
+            Self::TaskTime
+            | Self::MotionForce
+            | Self::InternalForce
+            | Self::TaskError
+            | Self::Outside
+            | Self::Effort
+            | Self::Given
+            | Self::Taken
+            | Self::LoadShare
+            | Self::Submovements
+            | Self::Sparc
+            | Self::Ldlj => true,
+            Self::DiscrepancyRms
+            | Self::DiscrepancyP50
+            | Self::DiscrepancyP95
+            | Self::DiscrepancyP99
+            | Self::Travel
+            | Self::Settling
+            | Self::ForcePeak
+            | Self::ForceRms
+            | Self::ForceJump
+            | Self::FeltPeak
+            | Self::FeltRms
+            | Self::FeltJump
+            | Self::Energy
+            | Self::EnergyPeak
+            | Self::PeerEnergy
+            | Self::Viscosity
+            | Self::EffectiveMass
+            | Self::PacketRate
+            | Self::BitRate
+            | Self::AgeMean
+            | Self::AgeP99 => false,
+        }
+    }
+
     /// Returns the name of this measure for the peer with this name.
     #[must_use]
     pub fn of_peer(self, peer: &str) -> String {
@@ -159,7 +211,9 @@ mod tests {
             let unit = match measure.unit() {
                 "1/s" => "_per_s".to_owned(),
                 "bit/s" => "_bits_per_s".to_owned(),
-                unit => format!("_{}", unit.replace(['·', '/'], "_").to_lowercase()),
+                // Ratios and counts have no unit.
+                "" => String::new(),
+                unit => format!("_{}", unit.replace(['·', '/'], "_").replace('²', "2").to_lowercase()),
             };
             assert!(measure.name().ends_with(&unit), "{} in {}", measure.name(), measure.unit());
         }

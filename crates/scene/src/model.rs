@@ -15,7 +15,7 @@ use cohaptic_wan::{DropCause, LinkModel};
 use cohaptic_linkfile::{LinkChange, LinkSelector, LinkTable};
 
 use crate::measures::MeasureName;
-use crate::{RotationSpec, Topology};
+use crate::{RotationSpec, TaskOutcome, TaskSpec, Topology};
 
 /// A scene ready to run. Every number is checked, and every named peer exists.
 #[derive(Clone, PartialEq)]
@@ -49,6 +49,8 @@ pub struct Scene {
     pub links: LinkTable,
     /// Changes during the run, in order of time; changes at the same instant are in the order of the file.
     pub timeline: Vec<Change>,
+    /// What the users are asked to do; `None` if the scene has no table `[task]`.
+    pub task: Option<Box<TaskSpec>>,
     /// Measures of a run; `None` if the scene has no table `[measure]`.
     pub measure: Option<MeasureSpec>,
     /// Expected results of a run; `None` if the scene is not a test.
@@ -58,7 +60,7 @@ pub struct Scene {
 }
 
 impl fmt::Debug for Scene {
-    /// Writes rotation, topology, relay, measure and `scaled_for` only where the scene has such a part. Fingerprints of records are made of this text, so that
+    /// Writes rotation, topology, relay, task, measure and `scaled_for` only where the scene has such a part. Fingerprints of records are made of this text, so that
     /// a scene without the part must print as before the part existed.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         // Destructured without `..`: a new field does not compile until this function decides how to show the field.
@@ -77,6 +79,7 @@ impl fmt::Debug for Scene {
             relay,
             links,
             timeline,
+            task,
             measure,
             expect,
             scaled_for,
@@ -93,6 +96,9 @@ impl fmt::Debug for Scene {
         }
         if *relay {
             shown.field("relay", relay);
+        }
+        if let Some(task) = task {
+            shown.field("task", task);
         }
         if let Some(measure) = measure {
             shown.field("measure", measure);
@@ -461,12 +467,23 @@ pub struct Expect {
     pub rotation_discrepancy: Option<Bounds>,
     /// Orientations of copies at given instants.
     pub orientations: Vec<ExpectOrientation>,
+    /// Outcome of the task; `None` if nothing is expected.
+    pub task: Option<ExpectTask>,
+}
+
+/// Expected outcome of a task; at least one field is present.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct ExpectTask {
+    /// The outcome.
+    pub outcome: Option<TaskOutcome>,
+    /// Bounds of the time from the start of the task to its outcome \[s\].
+    pub time: Option<Bounds>,
 }
 
 impl fmt::Debug for Expect {
-    /// Writes measures, the angle and orientations only where the scene expects any: fingerprints of records are made of this text.
+    /// Writes measures, the angle, orientations and the task only where the scene expects any: fingerprints of records are made of this text.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { stable, discrepancy, positions, travel, loss, delay, measures, rotation_discrepancy, orientations } = self;
+        let Self { stable, discrepancy, positions, travel, loss, delay, measures, rotation_discrepancy, orientations, task } = self;
         let mut shown = f.debug_struct("Expect");
         shown.field("stable", stable).field("discrepancy", discrepancy).field("positions", positions).field("travel", travel);
         shown.field("loss", loss).field("delay", delay);
@@ -478,6 +495,9 @@ impl fmt::Debug for Expect {
         }
         if !orientations.is_empty() {
             shown.field("orientations", orientations);
+        }
+        if let Some(task) = task {
+            shown.field("task", task);
         }
         shown.finish()
     }

@@ -28,6 +28,8 @@ pub(crate) const POSITION: Quantity = Quantity::any("m");
 pub(crate) const DISTANCE: Quantity = Quantity::positive("m");
 /// Velocity [m/s], any finite number.
 pub(crate) const VELOCITY: Quantity = Quantity::any("m/s");
+/// Limit of a speed [m/s], above zero.
+pub(crate) const SPEED_LIMIT: Quantity = Quantity::positive("m/s");
 /// Force \[N\], any finite number.
 pub(crate) const FORCE: Quantity = Quantity::any("N");
 /// Limit of a force \[N\], above zero.

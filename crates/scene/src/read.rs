@@ -16,9 +16,9 @@ use cohaptic_units::Instant;
 use crate::context::SceneContext;
 use crate::model::{ChangeKind, Scene};
 use crate::sections::{
-    COORDINATION, EXPECT, Header, MEASURE, Measured, OBJECT, PEER, PEERS, PeerSources, SCENE, SIMULATION, TIMELINE, TOPOLOGY, Ways, check_enough,
-    read_coordination, read_expect, read_header, read_measure, read_names, read_object, read_peers, read_stepping, read_timeline, read_topology,
-    refuse_rotational_keys, refuse_unlinked, rotation,
+    COORDINATION, EXPECT, Header, MEASURE, Measured, OBJECT, Offered, PEER, PEERS, PeerSources, SCENE, SIMULATION, TASK, TIMELINE, TOPOLOGY, Ways,
+    check_enough, read_coordination, read_expect, read_header, read_measure, read_names, read_object, read_peers, read_stepping, read_task,
+    read_timeline, read_topology, refuse_rotational_keys, refuse_unlinked, rotation,
 };
 
 /// Keys at the top level of a scene.
@@ -34,6 +34,7 @@ pub(crate) static ROOT: Table = Table::of(&[&[
     optional("link", Form::Table(&LINK_TABLE), "Keys of every link that does not have them in its own table; links are ideal by default"),
     optional("links", Form::List(&Form::Table(&LINK_ENTRY)), "One direction between two peers per entry: its own keys are laid over those of [link]"),
     optional("timeline", Form::List(&Form::Table(&TIMELINE)), "Changes while the scene runs"),
+    optional("task", Form::Table(&TASK), "What the users are asked to do with the object; a task changes no motion"),
     optional("measure", Form::Table(&MEASURE), "Measures of a run, computed while it runs"),
     optional("expect", Form::Table(&EXPECT), "Expected results, which cohaptic check compares with those of a run"),
 ]]);
@@ -170,15 +171,20 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
             changes.retain(|change| turns || !matches!(change.what, ChangeKind::HandTorque { .. }));
             changes
         });
-    let of = Measured { peers: peers.as_deref(), timeline: timeline.as_deref() };
+    let task_node = root.get("task");
+    // The probe is known after the measures only, which have the key.
+    let offered = Offered { probe: false, task: task_node.is_some() };
+    let of = Measured { peers: peers.as_deref(), timeline: timeline.as_deref(), offered };
     let measure = match root.get("measure") {
         Some(node) => read_measure(node, of, context).map(Some),
         None => Some(None),
     };
+    let walls = object.as_ref().map(|object| object.enclosure);
+    let task = task_node.map_or(Some(None), |node| read_task(node, duration, walls, context).map(Some));
     // A refused probe is a fault already: measures that need a probe must not be refused for a second reason.
     let has_probe = measure.as_ref().is_none_or(|measure| measure.as_ref().is_some_and(|measure| measure.settings.probe.is_some()));
     let expect = match root.get("expect") {
-        Some(node) => read_expect(node, duration, has_probe, peers.as_deref(), context).map(Some),
+        Some(node) => read_expect(node, duration, Offered { probe: has_probe, ..offered }, peers.as_deref(), context).map(Some),
         None => Some(None),
     };
     if let Some(topology) = topology.as_ref().and_then(|ways| ways.neighbours.as_ref()) {
@@ -210,11 +216,18 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
         topology: topology?.neighbours,
         links: links.as_ref().and_then(LinkClasses::table)?,
         timeline: timeline?,
+        task: task?.map(Box::new),
         measure: measure?,
         expect: expect?,
         scaled_for: None,
     };
     // Checks that compare several parts come last, when every part was read.
+    if let (Some(node), Some(task)) = (task_node, &scene.task)
+        && task.judged(&scene).is_empty()
+    {
+        file.fault_at(node, "no device touches the object, so no copy is judged: expected who = the name of a peer, or a peer that touches");
+        return None;
+    }
     if let Some(refused) = scene.refused_topology() {
         file.fault_at(topology_node.unwrap_or(document), refused);
         return None;

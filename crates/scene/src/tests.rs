@@ -3,6 +3,7 @@
 mod access;
 mod form;
 mod strategies;
+mod task;
 mod topologies;
 
 use std::path::Path;
@@ -79,7 +80,7 @@ fn an_unknown_key_is_refused_wherever_it_stands() {
         (
             "[object]",
             "[objekt]",
-            "3:2: objekt: unknown key: expected one of scene, object, coordination, simulation, peer, peers, topology, modulators, link, links, timeline, measure, expect; did you mean \"object\"?",
+            "3:2: objekt: unknown key: expected one of scene, object, coordination, simulation, peer, peers, topology, modulators, link, links, timeline, task, measure, expect; did you mean \"object\"?",
         ),
         ("duration = \"7s\"", "duration = \"7s\"\nspeed = 1", "3:1: scene.speed: unknown key: expected one of title, duration, seed, axes, count"),
         ("mass = 0.45", "mass = 0.45\nmas = 1", "5:1: object.mas: unknown key"),
@@ -408,7 +409,7 @@ fn a_probe_pushes_with_one_sine_all_the_time() {
         format!("{}[measure]\nprobe = {{ peer = \"left\" }}\n{more}", SCENE.replacen("name = \"left\"", &hand, 1))
     };
     let measured = parse(&scene("2", ""), &[]).unwrap().measure.unwrap();
-    assert_eq!((measured.settings.probe, measured.names.len()), (Some(0), crate::MeasureName::all(2).len()));
+    assert_eq!((measured.settings.probe, measured.names.len()), (Some(0), crate::MeasureName::all(2, false).len()));
     check(&scene("0", ""), "20:18: measure.probe.peer: the hand of peer \"left\" is a sine that does not sway");
     let change = "[[timeline]]\nat = \"1s\"\npeer = \"left\"\nset = { hand = \"none\" }\n";
     check(&scene("2", change), "20:18: measure.probe.peer: the hand of peer \"left\" changes in the timeline");

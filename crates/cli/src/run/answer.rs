@@ -13,7 +13,7 @@ use crate::output;
 pub(super) fn of(scene: &Scene, run: &Run, otherwise: &[String], against: Option<impl Serialize>) -> impl Serialize {
     document! {
         #[serde(flatten)]
-        run: cohaptic_answers::run(scene, &run.summary, &run.measured, Some(run.wall_s)),
+        run: cohaptic_answers::run(scene, &run.summary, &run.measured, run.task.as_ref(), Some(run.wall_s)),
         files: run.files.iter().map(|file| output::path(file)).collect::<Vec<_>>(),
         #[serde(flatten)]
         otherwise: (!otherwise.is_empty()).then(|| document! { replayed_otherwise: otherwise }),
@@ -24,5 +24,5 @@ pub(super) fn of(scene: &Scene, run: &Run, otherwise: &[String], against: Option
 
 /// Describes a run as text for a terminal.
 pub(super) fn describe(scene: &Scene, run: &Run) -> String {
-    cohaptic_answers::run_words(scene, &run.summary, &run.measured, run.wall_s, run.positions.as_ref())
+    cohaptic_answers::run_words(scene, &run.summary, &run.measured, run.task.as_ref(), run.wall_s, run.positions.as_ref())
 }

@@ -18,6 +18,7 @@ use cohaptic_harness::check::{ExpectationWatch, Outcome};
 use cohaptic_harness::live::{Inputs, replay};
 use cohaptic_harness::measures::{MeasuredValue, Measures};
 use cohaptic_harness::record::{Bands, RecordError, RecordedPicture, Recorder, links_csv};
+use cohaptic_harness::task::{TaskResult, TaskWatch};
 use cohaptic_harness::{Model, Observer, Simulation, Summary, TickRow, Ticks};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
@@ -112,9 +113,14 @@ const fn is_shown(arguments: &RunArguments) -> bool {
     !arguments.scene.json && !arguments.no_plot
 }
 
-/// Returns whether the run has an observer: the plot in the terminal, a record, a motion picture, a replay or measures.
+/// Returns whether the run has an observer: the plot in the terminal, a record, a motion picture, a replay, measures or a task.
 fn is_watched(arguments: &RunArguments, scene: &Scene) -> bool {
-    is_shown(arguments) || arguments.out.is_some() || arguments.motion.is_some() || arguments.inputs.is_some() || Measures::of(scene).is_some()
+    is_shown(arguments)
+        || arguments.out.is_some()
+        || arguments.motion.is_some()
+        || arguments.inputs.is_some()
+        || Measures::of(scene).is_some()
+        || scene.task.is_some()
 }
 
 /// Returns the overrides of the scene: all `--set`, then the seed and the measures.
@@ -128,6 +134,8 @@ struct Run {
     summary: Summary,
     /// Values of the measures. Empty if the scene measures nothing.
     measured: Vec<MeasuredValue>,
+    /// Result of the task; `None` for a scene without a task.
+    task: Option<TaskResult>,
     wall_s: f64,
     positions: Option<Bands>,
     places: Option<Places>,
@@ -178,25 +186,26 @@ fn run_one(arguments: &RunArguments, scene: &Scene, what: What<'_>, out: Option<
         places: arguments.motion.as_ref().map(|_| Places::new(scene.peers.len())),
     };
     let start = Clock::now();
-    let measures = Measures::of(scene);
+    let (measures, task) = (Measures::of(scene), TaskWatch::of(scene));
     let values = |measures: Option<Measures>, summary: &Summary| measures.map(|measures| measures.values(summary.duration)).unwrap_or_default();
-    let (summary, measured, mut files, page) = match out {
+    let (summary, measured, task, mut files, page) = match out {
         None => {
-            let mut observer = (&mut watch, measures);
+            let mut observer = (&mut watch, (measures, task));
             let summary = execute(arguments, scene, what, &mut observer)?;
-            let measured = values(observer.1, &summary);
-            (summary, measured, Vec::new(), None)
+            let (_, (measures, task)) = observer;
+            let measured = values(measures, &summary);
+            (summary, measured, task, Vec::new(), None)
         }
         Some(folder) => {
             let recorder = Recorder::create(folder, scene)?.sized(arguments.pictures.size());
             let expectations = paged.then(|| ExpectationWatch::new(scene));
-            let mut observer = ((recorder, &mut watch), (measures, expectations));
+            let mut observer = ((recorder, &mut watch), ((measures, task), expectations));
             let summary = execute(arguments, scene, what, &mut observer)?;
-            let ((recorder, _), (measures, expectations)) = observer;
+            let ((recorder, _), ((measures, task), expectations)) = observer;
             let measured = values(measures, &summary);
             let (files, pictures) = recorder.finish_with_pictures(&summary)?;
             let page = expectations.map(|expectations| PageParts { outcomes: expectations.outcomes(&summary), pictures });
-            (summary, measured, files, page)
+            (summary, measured, task, files, page)
         }
     };
     let wall_s = start.elapsed().as_secs_f64();
@@ -205,7 +214,8 @@ fn run_one(arguments: &RunArguments, scene: &Scene, what: What<'_>, out: Option<
         write_whole(path, |file| links_csv(&summary, |rows| file.write_all(rows))).map_err(unwritten(path))?;
         files.push(path.clone());
     }
-    Ok(Run { summary, measured, wall_s, positions: watch.positions, places: watch.places, files, page })
+    let task = task.map(|task| task.result(&summary));
+    Ok(Run { summary, measured, task, wall_s, positions: watch.positions, places: watch.places, files, page })
 }
 
 fn execute<O: Observer>(arguments: &RunArguments, scene: &Scene, what: What<'_>, observer: &mut O) -> Result<Summary, O::Error> {

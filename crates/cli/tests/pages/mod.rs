@@ -131,6 +131,7 @@ pages! {
     scenarios: "scenarios/README.md",
     stability_crate: "crates/stability/README.md",
     tcp_crate: "crates/tcp/README.md",
+    tasks: "docs/tasks.md",
     testing: "docs/testing.md",
     testkit_crate: "crates/testkit/README.md",
     #[ignore = ".ci/nightly runs it: it takes long"]

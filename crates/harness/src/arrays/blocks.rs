@@ -14,7 +14,7 @@ use pulp::NullaryFnOnce;
 use super::lanes::{Lanes, Mask, WIDTH, larger, smaller};
 use super::place::{Places, Spot};
 use super::processor::on_widest;
-use crate::plan::{DeviceChoice, touches};
+use crate::plan::DeviceChoice;
 pub(super) use block::Block;
 use block::{Forces, Late, RESTING, ZERO_MAP, set_map};
 use law::memory_of_lane;
@@ -346,7 +346,7 @@ impl Blocks {
 
 /// Returns whether a device must be moved: the device may touch its copy, or an observer sees the device.
 pub(super) fn moves(scene: &Scene, peer: usize, devices: Option<&[DeviceChoice]>) -> bool {
-    touches(scene, peer) || devices.is_some_and(|devices| devices[peer] == DeviceChoice::Simulated)
+    scene.touches(peer) || devices.is_some_and(|devices| devices[peer] == DeviceChoice::Simulated)
 }
 
 /// Visitor of [`Blocks::advance`] with the law by its own type.

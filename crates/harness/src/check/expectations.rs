@@ -4,7 +4,7 @@ use std::convert::Infallible;
 use std::time::Duration;
 
 use cohaptic_peer::rotation::Attitude;
-use cohaptic_scene::{Bounds, Expect, ExpectDelay, ExpectLoss, ExpectOrientation, LinkSelector, MeasureName, Scene};
+use cohaptic_scene::{Bounds, Expect, ExpectDelay, ExpectLoss, ExpectOrientation, ExpectTask, LinkSelector, MeasureName, Scene, TaskOutcome};
 use cohaptic_units::Instant;
 use cohaptic_units::print::Span;
 use cohaptic_wan::{DropCause, LinkName, LinkStats};
@@ -13,12 +13,13 @@ use super::Outcome;
 use crate::measures::Measures;
 use crate::measures::travel::Travelled;
 use crate::observer::observe_by_field;
+use crate::task::{TaskResult, TaskWatch, task_words};
 use crate::{Ending, Observer, Summary, TickRow, Ticks};
 
 /// Observer for all expectations of a scene.
 #[derive(Debug)]
 pub(crate) struct Watched {
-    seen: (Positions, Option<Measures>),
+    seen: (Positions, (Option<Measures>, Option<TaskWatch>)),
 }
 
 /// Positions and attitudes seen so far.
@@ -120,13 +121,14 @@ impl Watched {
     pub(crate) fn new(scene: &Scene, expect: &Expect) -> Self {
         let names: Vec<MeasureName> = expect.measures.iter().map(|expected| expected.name).collect();
         let measures = (!names.is_empty()).then(|| Measures::new(scene, &names, &scene.measure_settings()));
-        Self { seen: (Positions::new(expect), measures) }
+        let task = expect.task.and_then(|_| TaskWatch::of(scene));
+        Self { seen: (Positions::new(expect), (measures, task)) }
     }
 
     /// Returns the outcome of each expectation, in the order of the sections in the file.
     pub(crate) fn outcomes(&self, scene: &Scene, expect: &Expect, summary: &Summary) -> Vec<Outcome> {
         let name = |peer: usize| &scene.peers[peer].name;
-        let (watched, measures) = &self.seen;
+        let (watched, (measures, task)) = &self.seen;
         let reach = Reach::of(scene, summary);
         let unseen = |peer: usize, at: Instant| reach.why_not(at).unwrap_or_else(|| format!("{} has not ticked by then", name(peer)));
         let mut outcomes = Vec::new();
@@ -174,8 +176,30 @@ impl Watched {
                 Some(value) => Outcome::number("measures", what, unit, &expected.bounds, value),
             })
         }));
+        if let (Some(expected), Some(task)) = (expect.task, task) {
+            outcomes.extend(of_task(expected, &task.result(summary), scene));
+        }
         outcomes
     }
+}
+
+/// Returns the outcomes of the expectations of a task.
+fn of_task(expected: ExpectTask, result: &TaskResult, scene: &Scene) -> Vec<Outcome> {
+    let words = task_words(result, scene);
+    let outcome = expected.outcome.map(|outcome| Outcome {
+        passed: result.outcome == outcome,
+        expected: outcome.name().to_owned(),
+        found: words.clone(),
+        ..Outcome::nothing("task", "outcome of the task".to_owned(), "", &Bounds { min: None, max: None }, "")
+    });
+    let time = expected.time.map(|bounds| {
+        let what = "time from the start of the task to its outcome".to_owned();
+        match result.outcome {
+            TaskOutcome::Diverged | TaskOutcome::Unfinished => Outcome::nothing("task", what, "s", &bounds, &words),
+            TaskOutcome::Done | TaskOutcome::TimedOut | TaskOutcome::Failed => Outcome::number("task", what, "s", &bounds, result.time.as_secs_f64()),
+        }
+    });
+    outcome.into_iter().chain(time).collect()
 }
 
 /// Part of the scene that a run reached. A run with overflowed numbers proves nothing about later instants, nor about the whole scene.

@@ -6,7 +6,7 @@ use cohaptic_units::print::{Number, SixDigits};
 /// Expected and measured values of an expectation, and the verdict.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Outcome {
-    /// Section of `[expect]`: `stable`, `discrepancy`, `position`, `travel`, `rotation-discrepancy`, `orientation`, `loss`, `delay` or `measures`.
+    /// Section of `[expect]`: `stable`, `discrepancy`, `position`, `travel`, `rotation-discrepancy`, `orientation`, `loss`, `delay`, `measures` or `task`.
     pub key: &'static str,
     /// Compared quantity as text: `mean delay on left->right`.
     pub name: String,

@@ -1,4 +1,4 @@
-//! Measures: numbers that summarise a run, computed during the run, in one pass and constant memory. Sums are added in the order of ticks, so a measure has the
+//! Measures: numbers that summarise a run, computed during the run, in one pass and, but for the smoothness of motions, constant memory. Sums are added in the order of ticks, so a measure has the
 //! same bits with every [`Model`].
 //!
 //! [`Measures`] is an [`Observer`]. A scene without measures has no such observer, and its runs are unwatched. [`cohaptic_scene::Measure`] has names, units and
@@ -27,10 +27,13 @@
 
 mod ages;
 mod discrepancy;
+mod effort;
 mod energy;
 mod forces;
 mod impedance;
 mod quantiles;
+mod smoothness;
+mod task;
 mod traffic;
 pub(crate) mod travel;
 
@@ -216,6 +219,9 @@ accumulators! {
     impedance: impedance::Impedance;
     traffic: traffic::Traffic;
     ages: ages::Ages;
+    task: task::TaskFigures;
+    effort: effort::Effort;
+    smoothness: smoothness::Smoothness;
 }
 
 impl Measures {
@@ -260,7 +266,7 @@ fn ratio(sum: u128, count: u64) -> Option<f64> {
 
 /// Returns the root of the mean square; `None` if `count` is 0.
 #[expect(clippy::cast_precision_loss, reason = "fewer rows than 2^53")]
-fn mean_square_root(squares: f64, count: u64) -> Option<f64> {
+pub(crate) fn mean_square_root(squares: f64, count: u64) -> Option<f64> {
     (count > 0).then(|| libm::sqrt(squares / count as f64))
 }
 

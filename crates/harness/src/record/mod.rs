@@ -5,6 +5,7 @@
 //! | `trajectory.csv` | one row a peer and tick: the state at t and the forces computed at t |
 //! | `packets.csv` | one row a packet, in the order of arrival or drop |
 //! | `links.csv` | one row a link or access line: its counters at the end |
+//! | `task.csv`, `task-events.csv` | of a scene with a task: one row a judged instant: target, error; one row an event |
 //! | `inputs.csv` | of a live session: one row a thing that came in from outside |
 //! | `positions.svg`, `forces.svg` | plots over time |
 //! | `orientations.svg`, `views.svg` | of an object that turns: rotation vectors over time; the copies from three sides |
@@ -21,6 +22,7 @@ mod packets;
 mod pictures;
 mod plot;
 mod recorder;
+mod task;
 mod trajectory;
 mod views;
 

@@ -10,6 +10,7 @@ use super::links;
 use super::packets::Packets;
 use super::pictures::{Pictures, RecordedPicture};
 use super::plot;
+use super::task::TaskRecord;
 use super::trajectory::{Trajectory, Turns};
 use crate::{Observer, PacketRow, Summary, TickRow};
 
@@ -19,6 +20,8 @@ pub struct Recorder {
     folder: PathBuf,
     trajectory: Trajectory,
     packets: Packets,
+    /// Files of the task; `None` for a scene without a task.
+    task: Option<TaskRecord>,
     pictures: Pictures,
     size: Size,
 }
@@ -36,6 +39,7 @@ impl Recorder {
             folder: folder.to_path_buf(),
             trajectory: Trajectory::create(folder, names.clone(), scene.axes, Turns::of(scene))?,
             packets: Packets::create(folder, names)?,
+            task: TaskRecord::create(folder, scene)?,
             pictures: Pictures::new(scene),
             size: Size::default(),
         })
@@ -62,9 +66,12 @@ impl Recorder {
     ///
     /// [`RecordError`] if a file cannot be written.
     pub fn finish_with_pictures(self, summary: &Summary) -> Result<(Vec<PathBuf>, Vec<RecordedPicture>), RecordError> {
-        let Self { folder, trajectory, packets, pictures, size } = self;
+        let Self { folder, trajectory, packets, task, pictures, size } = self;
         // Records are completed first: an error in writing a picture leaves the records whole.
         let mut files = vec![trajectory.finish()?, packets.finish()?, links::write(&folder, summary)?];
+        if let Some(task) = task {
+            files.extend(task.finish(summary)?);
+        }
         let pictures = pictures.drawn(size);
         for (file, svg) in &pictures {
             files.push(plot::write(folder.join(file), svg)?);
@@ -85,6 +92,9 @@ impl Observer for Recorder {
     }
 
     fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), RecordError> {
+        if let Some(task) = &mut self.task {
+            task.on_tick(row)?;
+        }
         let Ok(()) = self.pictures.on_tick(row);
         self.trajectory.on_tick(row)
     }

@@ -1,4 +1,5 @@
-//! Live sessions under a clock of the test: against runs in virtual time, against replays of their records, and against the rules of the manual.
+//! Live sessions under a clock of the test: against runs in virtual time, against replays of their records, and against the rules of the manual. Tasks in
+//! whole runs.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail as tests do")]
 #![allow(clippy::float_cmp, reason = "what must agree to the bit is compared so")]
 
@@ -13,6 +14,7 @@ mod replays;
 mod scenes;
 mod seats;
 mod silence;
+mod tasks;
 mod turning_energy;
 mod turning_laws;
 mod virtual_time;

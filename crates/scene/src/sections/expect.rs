@@ -12,13 +12,14 @@ use cohaptic_linkfile::schema::{Choices, Form, Key, Table, number, optional, req
 use cohaptic_units::Probability;
 use cohaptic_wan::DropCause;
 
-use super::measure::MEASURE_NAME_FORM;
+use super::measure::{MEASURE_NAME_FORM, Offered};
 use super::rotation::{QUATERNION, read_orientation};
 use super::timeline::read_instant;
 use crate::context::{AXIS, SceneContext, read_axis};
-use crate::model::{Bounds, Expect, ExpectDelay, ExpectLoss, ExpectMeasure, ExpectOrientation, ExpectPosition, ExpectTravel, PeerSpec};
+use crate::model::{Bounds, Expect, ExpectDelay, ExpectLoss, ExpectMeasure, ExpectOrientation, ExpectPosition, ExpectTask, ExpectTravel, PeerSpec};
 use crate::quantities::{ANGLE_BOUND, DISTANCE, POSITION};
 use crate::sections::read_measure_name;
+use crate::task::TaskOutcome;
 
 pub(crate) static EXPECT: Table = Table::of(&[&[
     optional("stable", Form::Boolean, "Whether a small disturbance dies out"),
@@ -29,6 +30,7 @@ pub(crate) static EXPECT: Table = Table::of(&[&[
     optional("delay", Form::List(&Form::Table(&DELAY)), "Mean delay of the delivered packets"),
     optional("measures", Form::List(&Form::Table(&MEASURE)), "Values of measures"),
     optional("rotation-discrepancy", Form::Table(&RADIANS), "Largest angle between two copies"),
+    optional("task", Form::Table(&TASK), "Outcome of the task"),
     optional("orientation", Form::List(&Form::Table(&ORIENTATION)), "Orientations of copies at given times"),
 ]]);
 static RADIANS: Table = Table::of(&[&[optional("min", number(ANGLE_BOUND), "At least"), optional("max", number(ANGLE_BOUND), "At most")]]);
@@ -65,6 +67,11 @@ static MEASURE: Table = Table::of(&[&[
     optional("min", Form::Number(Quantity::any("")), "At least"),
     optional("max", Form::Number(Quantity::any("")), "At most"),
 ]]);
+static TASK: Table = Table::of(&[&[
+    optional("outcome", Form::Words(const { &words(&TaskOutcome::ALL) }), "Outcome of the task"),
+    optional("time", Form::Table(&TIME), "Time from the start of the task to its outcome"),
+]]);
+static TIME: Table = Table::of(&[&TIME_BOUNDS]);
 const CAUSES: Choices<DropCause, { DropCause::ALL.len() }> = {
     let mut causes = [("", DropCause::ALL[0], "dropped for this cause"); DropCause::ALL.len()];
     let mut place = 0;
@@ -75,11 +82,11 @@ const CAUSES: Choices<DropCause, { DropCause::ALL.len() }> = {
     causes
 };
 
-/// Reads the expectations. `duration` and `peers` are `None` if refused. `has_probe` is true if the scene measures the impedance of a hand.
+/// Reads the expectations. `duration` and `peers` are `None` if refused.
 pub(crate) fn read_expect(
     node: &Node,
     duration: Option<Duration>,
-    has_probe: bool,
+    offered: Offered,
     peers: Option<&[PeerSpec]>,
     context: SceneContext<'_>,
 ) -> Option<Expect> {
@@ -93,7 +100,8 @@ pub(crate) fn read_expect(
     let travel = each(&mut table, "travel", |entry| read_travel(entry, context));
     let loss = each(&mut table, "loss", |entry| read_loss(entry, peers, file));
     let delay = each(&mut table, "delay", |entry| read_delay(entry, peers, file));
-    let measures = each(&mut table, "measures", |entry| read_measure(entry, has_probe, file));
+    let measures = each(&mut table, "measures", |entry| read_measure(entry, offered, file));
+    let task = table.maybe("task", |node, context| read_task(node, offered.task, context));
     table.finish();
     Some(Expect {
         stable: stable?,
@@ -105,6 +113,7 @@ pub(crate) fn read_expect(
         measures: measures?,
         rotation_discrepancy: turned?,
         orientations: orientations?,
+        task: task?,
     })
 }
 
@@ -177,14 +186,37 @@ fn read_delay(node: &Node, peers: Option<&[PeerSpec]>, context: Context<'_>) -> 
     Some(ExpectDelay { link: link?, min, max })
 }
 
-fn read_measure(node: &Node, has_probe: bool, context: Context<'_>) -> Option<ExpectMeasure> {
+fn read_measure(node: &Node, offered: Offered, context: Context<'_>) -> Option<ExpectMeasure> {
     let mut table = TableReader::new(node, context, &MEASURE, "a table such as { name = \"energy_j\", max = 0.01 }")?;
-    let name = table.read("name", |node, context| read_measure_name(node, has_probe, context));
+    let name = table.read("name", |node, context| read_measure_name(node, offered, context));
     // Bounds have the unit of the measure. After a fault in the name the unit does not matter.
     let quantity = Quantity::any(name.map_or("", |name| name.measure.unit()));
     let ends = read_ends(&mut table, node, context, |table, key| table.maybe(key, |node, context| quantity.read(node, context)));
     table.finish();
     Some(ExpectMeasure { name: name?, bounds: bounds(ends)? })
+}
+
+fn read_task(node: &Node, has_task: bool, context: Context<'_>) -> Option<ExpectTask> {
+    let mut table = TableReader::new(node, context, &TASK, "a table such as { outcome = \"done\", time = { max = \"8s\" } }")?;
+    let outcome = table.maybe("outcome", |node, context| values::word(node, context, &TaskOutcome::ALL));
+    let time = table.maybe("time", |node, context| {
+        let mut table = TableReader::new(node, context, &TIME, "a table such as { max = \"8s\" }")?;
+        let ends = read_ends(&mut table, node, context, TableReader::maybe_value);
+        table.finish();
+        let (min, max): (Option<Duration>, Option<Duration>) = ends?;
+        Some(Bounds { min: min.map(|min| min.as_secs_f64()), max: max.map(|max| max.as_secs_f64()) })
+    });
+    table.finish();
+    if !has_task {
+        context.fault_at(node, "the scene has no task: expected a table [task] too");
+        return None;
+    }
+    let expected = ExpectTask { outcome: outcome?, time: time? };
+    if expected == ExpectTask::default() {
+        context.fault_at(node, "neither outcome nor time is given: expected at least one of them");
+        return None;
+    }
+    Some(expected)
 }
 
 /// Reads a link or an access line of the scene. An absent line is a fault, because no packet passes an absent line.

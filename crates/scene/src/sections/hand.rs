@@ -27,7 +27,7 @@ static FORCE_SINE: Table = Table::of(&[
     &SINE,
     &[optional("torque", vector(TORQUE), "Amplitude of a torque that follows the same sine")],
 ]);
-static MOTION_SINE: Table = Table::of(&[&[required("amplitude", vector(POSITION), "Amplitude")], &SINE]);
+pub(super) static MOTION_SINE: Table = Table::of(&[&[required("amplitude", vector(POSITION), "Amplitude")], &SINE]);
 const SINE: [Key; 2] = [
     required("frequency", number(FREQUENCY), "Frequency, below half the rate of ticks"),
     usual("phase", number(ANGLE), "0", "Phase at the beginning of the scene"),
@@ -170,7 +170,7 @@ fn read_follows(node: &Node, context: SceneContext<'_>) -> Option<Signal> {
 }
 
 /// Reads a sine. [`read_hand_torque`] reads the torque of the sine.
-fn read_sine(node: &Node, context: SceneContext<'_>, declaration: &'static Table) -> Option<Signal> {
+pub(super) fn read_sine(node: &Node, context: SceneContext<'_>, declaration: &'static Table) -> Option<Signal> {
     let mut table = TableReader::new(node, *context, declaration, "a table such as { amplitude = 2.0, frequency = 0.7, phase = 0.0 }")?;
     // Marks the key as known, so that `finish` does not refuse the key.
     if declaration.key("torque").is_some() {

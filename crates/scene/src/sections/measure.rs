@@ -56,7 +56,7 @@ impl Default for MeasureSettings {
     fn default() -> Self {
         defaults(|node, file| {
             let context = SceneContext { file, axes: Some(Axes::One), live: false, turns: false };
-            read_measure(node, Measured { peers: Some(&[]), timeline: None }, context).map(|measure| measure.settings)
+            read_measure(node, Measured { peers: Some(&[]), timeline: None, offered: Offered::default() }, context).map(|measure| measure.settings)
         })
     }
 }
@@ -66,6 +66,16 @@ impl Default for MeasureSettings {
 pub(crate) struct Measured<'a> {
     pub(crate) peers: Option<&'a [PeerSpec]>,
     pub(crate) timeline: Option<&'a [Change]>,
+    pub(crate) offered: Offered,
+}
+
+/// Parts of a scene that some measures and expectations need. A refused part counts as offered, so that no second fault is reported.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Offered {
+    /// The scene measures the impedance of a hand.
+    pub(crate) probe: bool,
+    /// The scene has a task.
+    pub(crate) task: bool,
 }
 
 pub(crate) fn read_measure(node: &Node, of: Measured<'_>, context: SceneContext<'_>) -> Option<MeasureSpec> {
@@ -74,17 +84,18 @@ pub(crate) fn read_measure(node: &Node, of: Measured<'_>, context: SceneContext<
     let band = table.value("band");
     let probe = table.maybe("probe", |node, _| read_probe(node, of, context));
     // A refused probe counts as a probe, so that a measure with a probe is not refused for a second reason.
-    let names = table.read("names", |node, context| read_names(node, probe.is_none_or(|probe| probe.is_some()), context));
+    let names =
+        table.read("names", |node, context| read_names(node, Offered { probe: probe.is_none_or(|probe| probe.is_some()), ..of.offered }, context));
     table.finish();
     let names = match names? {
         Some(names) => names,
-        None => MeasureName::all(of.peers?.len()),
+        None => MeasureName::all(of.peers?.len(), of.offered.task),
     };
     Some(MeasureSpec { names, settings: MeasureSettings { travel: travel?, band: band?, probe: probe? } })
 }
 
 /// Reads the names of measures, sorted and without duplicates; `Some(None)` for all measures.
-fn read_names(node: &Node, has_probe: bool, context: Context<'_>) -> Option<Option<Vec<MeasureName>>> {
+fn read_names(node: &Node, offered: Offered, context: Context<'_>) -> Option<Option<Vec<MeasureName>>> {
     const EXPECTED: &str = "\"all\" or a list of names such as [\"energy_j\", \"travel_s\"]";
     match &node.value {
         Value::Text(word) if word == "all" => return Some(None),
@@ -99,25 +110,25 @@ fn read_names(node: &Node, has_probe: bool, context: Context<'_>) -> Option<Opti
         Value::List(_) | Value::Integer(_) | Value::Float(_) | Value::Boolean(_) | Value::Date | Value::Table(_) => {}
     }
     let read: Vec<Option<MeasureName>> =
-        values::list(node, context, EXPECTED)?.into_iter().map(|element| read_measure_name(element, has_probe, context)).collect();
+        values::list(node, context, EXPECTED)?.into_iter().map(|element| read_measure_name(element, offered, context)).collect();
     let mut names: Vec<MeasureName> = read.into_iter().collect::<Option<_>>()?;
     names.sort_unstable();
     names.dedup();
     Some(Some(names))
 }
 
-/// Reads the name of a measure of the scene. `has_probe` is true if the scene has a probe: some measures need a probe.
-pub(crate) fn read_measure_name(node: &Node, has_probe: bool, context: Context<'_>) -> Option<MeasureName> {
+/// Reads the name of a measure of the scene. Some measures need a probe, and some a task.
+pub(crate) fn read_measure_name(node: &Node, offered: Offered, context: Context<'_>) -> Option<MeasureName> {
     let text = values::text(node, context, "the name of a measure such as \"energy_j\"")?;
     let of_run = Measure::ALL.iter().find(|measure| measure.scope() == Scope::Run && measure.name() == text);
     if let Some(&measure) = of_run {
-        if matches!(measure, Measure::Viscosity | Measure::EffectiveMass) && !has_probe {
+        if matches!(measure, Measure::Viscosity | Measure::EffectiveMass) && !offered.probe {
             let message =
                 format!("{text} is that of a probe, and there is none: expected measure.probe = {{ peer = … }} with a peer whose hand is a sine");
             context.fault_at(node, message);
             return None;
         }
-        return Some(MeasureName { measure, peer: None });
+        return has_its_task(measure, node, offered, context).then_some(MeasureName { measure, peer: None });
     }
     let of_peer = text.strip_prefix("peers.").and_then(|rest| rest.rsplit_once('.'));
     // Split at the last point: the name of a measure has no point.
@@ -137,7 +148,16 @@ pub(crate) fn read_measure_name(node: &Node, has_probe: bool, context: Context<'
         let expected = one_of(peers.as_slice().iter().map(String::as_str), peer);
         context.fault_at(node, format!("there is no {} {}: expected {expected}", peers.noun(), quote(peer)));
     }
-    Some(MeasureName { measure, peer: Some(place?) })
+    has_its_task(measure, node, offered, context).then_some(MeasureName { measure, peer: Some(place?) })
+}
+
+/// Returns false after a fault if the measure is that of a task and the scene has none, otherwise true.
+fn has_its_task(measure: Measure, node: &Node, offered: Offered, context: Context<'_>) -> bool {
+    let has = offered.task || !measure.is_of_task();
+    if !has {
+        context.fault_at(node, format!("{} is a measure of a task, and the scene has none: expected a table [task] too", measure.name()));
+    }
+    has
 }
 
 fn read_travel(node: &Node, context: SceneContext<'_>) -> Option<MeasureTravel> {

@@ -16,6 +16,7 @@ pub(super) const DOCUMENTS: [Document; 25] = [
         command: "run",
         lines: &[
             "cohaptic run scenarios/rigid/tray.toml --json",
+            "cohaptic run scenarios/tasks/hold.toml --set task.radius=0.0001 --json",
             "cohaptic run scenarios/network/shared-access-line.toml --against scene.seed=2 --measure all --json --out out",
             "cohaptic live scenarios/live/two-and-a-program.toml --for 50ms --listen 127.0.0.1:0 --no-priority --out session > said && \
              cohaptic run scenarios/live/two-and-a-program.toml --inputs session/inputs.csv --force --json",
@@ -47,6 +48,12 @@ pub(super) const DOCUMENTS: [Document; 25] = [
             ("access_lines[].peer, access_lines[].line, access_lines[].@Counters", "`line` is `uplink` or `downlink`"),
             ("max_discrepancy_m", "[discrepancy](model.md#discrepancy)"),
             ("max_rotation_discrepancy_rad", "where the object turns: the largest angle between two copies"),
+            (
+                "task.kind, task.outcome, task.time_s",
+                "where the scene has a [task](tasks.md): its kind, its outcome, and the time from its start to the outcome",
+            ),
+            ("task.reached_s", "instants at which targets were reached"),
+            ("task.failed_by, task.reason", "of a task that has failed: the name of a peer, and `dropped` or `left`"),
             ("measures.NAME", "each [measure](#measures) that is asked for; `null` where it has no value"),
             ("files", "paths written by `--out` and `--links`"),
             ("replayed_otherwise", "with `--inputs --force`: what differs from the scene of the session, and what the record lacks"),

@@ -1,0 +1,142 @@
+//! Tasks in whole runs.
+
+use std::fs;
+use std::path::Path;
+
+use cohaptic_harness::measures::Measures;
+use cohaptic_harness::record::Recorder;
+use cohaptic_harness::task::TaskWatch;
+use cohaptic_harness::{Model, Simulation};
+use cohaptic_scene::{Scene, TaskOutcome};
+use proptest::prelude::*;
+
+use crate::cases;
+
+const SCENE: &str = r#"
+    scene = { duration = "2s", seed = 5 }
+    object = { mass = 0.45 }
+    coordination = { strategy = "average-position", stiffness = 1000.0, damping = 5.0, update = "8ms" }
+    peer = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
+    peers = [
+        { name = "left", hand = { arm = { mass = 0.5, damping = 20.0, stiffness = 300.0 }, follows = { position = 0.1 } } },
+        { name = "right" },
+    ]
+    link = { delay = "24ms", jitter = "3ms", loss = "5%" }
+"#;
+const REACH: &str = r#"task = { kind = "reach", targets = [0.03, 0.09], radius = 0.005, speed = 0.1, dwell = "20ms" }"#;
+
+fn scene(text: &str) -> Scene {
+    Scene::parse(text, Path::new("test.toml"), &[]).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Files of a run by name.
+fn recorded(scene: &Scene) -> Vec<(String, Vec<u8>)> {
+    let folder = tempfile::tempdir().unwrap();
+    let mut recorder = Recorder::create(folder.path(), scene).unwrap();
+    let summary = Simulation::new(scene, Model::Least).run(&mut recorder).unwrap();
+    let files = recorder.finish(&summary).unwrap();
+    files.iter().map(|file| (file.file_name().unwrap().to_str().unwrap().to_owned(), fs::read(file).unwrap())).collect()
+}
+
+#[test]
+fn a_task_changes_no_byte_of_the_run() {
+    let without = recorded(&scene(SCENE));
+    let with = recorded(&scene(&format!("{SCENE}\n{REACH}")));
+    let (of_task, others): (Vec<_>, Vec<_>) = with.into_iter().partition(|(name, _)| name.starts_with("task"));
+    assert!(others == without, "a file of the run differs");
+    let names: Vec<&str> = of_task.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(names, ["task.csv", "task-events.csv"]);
+}
+
+/// Columns `t`, `peer`, `xo` and `vo` of a trajectory.
+fn states(trajectory: &[u8]) -> Vec<(f64, usize, f64, f64)> {
+    let text = std::str::from_utf8(trajectory).unwrap();
+    let row = |line: &str| {
+        let cells: Vec<&str> = line.split(',').collect();
+        let number = |place: usize| cells[place].parse::<f64>().unwrap();
+        (number(0), usize::from(cells[1] == "right"), number(4), number(5))
+    };
+    text.lines().skip(1).map(row).collect()
+}
+
+/// Instants at which the targets are reached, read from the definition: the first instant t with every state of [t − dwell, t] within radius and speed, where
+/// t − dwell is not before the target before was reached.
+fn reached(states: &[(f64, usize, f64, f64)], targets: &[f64], radius: f64, speed: f64, dwell: f64) -> Vec<f64> {
+    let mut instants: Vec<f64> = states.iter().map(|state| state.0).collect();
+    instants.dedup();
+    let mut reached: Vec<f64> = Vec::new();
+    for target in targets {
+        let begin = reached.last().copied().unwrap_or(0.0);
+        let is_there = |t: f64| {
+            t - dwell >= begin - 1e-9
+                && states
+                    .iter()
+                    .filter(|state| state.0 >= t - dwell - 1e-9 && state.0 <= t)
+                    .all(|(_, _, position, velocity)| (position - target).abs() <= radius && velocity.abs() <= speed)
+        };
+        match instants.iter().find(|t| is_there(**t)) {
+            Some(t) => reached.push(*t),
+            None => break,
+        }
+    }
+    reached
+}
+
+proptest! {
+    #![proptest_config(cases(24))]
+
+    /// The judge says what the definition says of the recorded trajectory, over random targets and networks.
+    #[test]
+    fn the_judge_agrees_with_the_definition(
+        seed in any::<u32>(),
+        first in 0.0..0.1_f64,
+        second in 0.0..0.1_f64,
+        radius in 0.002..0.03_f64,
+        speed in 0.01..0.5_f64,
+        dwell in 0..100_u32,
+    ) {
+        let keys = format!(r#"task = {{ kind = "reach", targets = [{first}, {second}], radius = {radius}, speed = {speed}, dwell = "{dwell}ms" }}"#);
+        let mut scene = scene(&format!("{SCENE}\n{keys}"));
+        scene.seed = u64::from(seed);
+        let files = recorded(&scene);
+        let trajectory = &files.iter().find(|(name, _)| name == "trajectory.csv").unwrap().1;
+        let expected = reached(&states(trajectory), &[first, second], radius, speed, f64::from(dwell) * 1e-3);
+        let mut watch = TaskWatch::of(&scene).unwrap();
+        let Ok(summary) = Simulation::new(&scene, Model::Least).run(&mut watch);
+        let result = watch.result(&summary);
+        let found: Vec<f64> = result.reached.iter().map(|at| (*at - cohaptic_units::Instant::ZERO).as_secs_f64()).collect();
+        prop_assert_eq!(&found, &expected);
+        prop_assert_eq!(result.outcome, if expected.len() == 2 { TaskOutcome::Done } else { TaskOutcome::TimedOut });
+    }
+}
+
+#[test]
+fn measures_of_a_task_are_those_of_the_recorded_rows() {
+    let scene =
+        scene(&format!("{SCENE}\n{REACH}\nmeasure = {{ names = [\"task_time_s\", \"peers.left.error_rms_m\", \"peers.left.effort_n2_s\"] }}"));
+    let files = recorded(&scene);
+    let text = |name: &str| String::from_utf8(files.iter().find(|(file, _)| file == name).unwrap().1.clone()).unwrap();
+    let (_, values) = Measures::run(&scene, Model::Least);
+    let value = |place: usize| values[place].value.unwrap();
+    let events = text("task-events.csv");
+    let end: f64 = events.lines().last().unwrap().split(',').next().unwrap().parse().unwrap();
+    assert!(events.ends_with(",,done,2\n"), "{events}");
+    // Names are sorted as in the registry.
+    assert!((value(0) - end).abs() < 1e-12);
+    let reached: f64 = events.lines().find(|line| line.ends_with(",reached,1")).unwrap().split(',').next().unwrap().parse().unwrap();
+    let (mut squares, mut effort, mut count) = (0.0, 0.0, 0.0);
+    for line in text("trajectory.csv").lines().skip(1) {
+        let cells: Vec<&str> = line.split(',').collect();
+        let at: f64 = cells[0].parse().unwrap();
+        if cells[1] == "left" && at <= end {
+            let target = if at <= reached { 0.03 } else { 0.09 };
+            let error = cells[4].parse::<f64>().unwrap() - target;
+            let force: f64 = cells[8].parse().unwrap();
+            squares += error * error;
+            effort += force * force * 1e-3;
+            count += 1.0;
+        }
+    }
+    assert!((value(1) - (squares / count).sqrt()).abs() < 1e-12, "{} {}", value(1), (squares / count).sqrt());
+    assert!((value(2) / effort - 1.0).abs() < 1e-12);
+}

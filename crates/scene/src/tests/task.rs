@@ -1,0 +1,79 @@
+//! Tests of `[task]` and of what is expected of a task.
+
+use std::time::Duration;
+
+use super::{SCENE, parse, refused};
+use crate::{Judged, Measure, Scope, TaskKind, TaskOutcome};
+
+const REACH: &str = "\n[task]\nkind = \"reach\"\ntargets = [0.1, 0.2]\nradius = 0.01\n";
+
+#[test]
+fn a_task_has_the_keys_of_its_kind() {
+    let of = |text: &str| *parse(&format!("{SCENE}{text}"), &[]).unwrap_or_else(|error| panic!("{error}")).task.unwrap();
+    let reach = of(REACH);
+    let TaskKind::Reach(kind) = &reach.kind else { panic!("{reach:?}") };
+    assert_eq!((kind.targets.as_slice(), kind.speed, kind.dwell), ([[0.1, 0.0, 0.0], [0.2, 0.0, 0.0]].as_slice(), None, Duration::ZERO));
+    assert_eq!((reach.who, reach.timeout, reach.fail_force), (Judged::All, None, None));
+    let hold = of("\n[task]\nkind = \"hold\"\ntarget = 0.1\nradius = 0.01\nwho = \"right\"\ntimeout = \"1s\"\nfail = { force = 3.0 }\n");
+    assert_eq!((hold.who, hold.timeout, hold.fail_force), (Judged::Peer(1), Some(Duration::from_secs(1)), Some(3.0)));
+    let track = of("\n[task]\nkind = \"track\"\nsines = [{ amplitude = 0.02, frequency = 0.25 }, { amplitude = 0.01, frequency = 0.5 }]\n");
+    let TaskKind::Track(kind) = &track.kind else { panic!("{track:?}") };
+    assert_eq!(kind.warm_up, Duration::from_secs(5));
+    // After a second: 0.02·sin(π/2) + 0.01·sin(π).
+    assert!((kind.target(Duration::from_secs(1))[0] - 0.02).abs() < 1e-15);
+}
+
+#[test]
+fn a_wrong_task_is_refused_where_it_stands() {
+    let beginning = |message: &str| message.split_once(": ").map(|(_, rest)| rest.to_owned()).unwrap_or_default();
+    for (text, expected) in [
+        ("\n[task]\nkind = \"reech\"\n", "task.kind: unknown"),
+        ("\n[task]\nradius = 0.1\n", "task.kind: missing key: expected \"reach\", \"track\" or \"hold\""),
+        (&format!("{REACH}grace = \"1s\"\n"), "task.grace: only a task of kind hold takes this key"),
+        (&format!("{REACH}position = 0.1\n"), "task.position: only a task of kind track takes this key: expected target or targets"),
+        ("\n[task]\nkind = \"reach\"\nradius = 0.1\n", "task.targets: missing key: expected a list of targets such as [0.1, 0.0]"),
+        ("\n[task]\nkind = \"hold\"\ntarget = 0.1\n", "task.radius: missing key: expected a distance [m] above zero"),
+        ("\n[task]\nkind = \"reach\"\ntargets = []\nradius = 0.1\n", "task.targets: the list is empty: expected a list of targets"),
+        ("\n[task]\nkind = \"reach\"\ntargets = [0.1]\nradius = 0.0\n", "task.radius: 0.0"),
+        (&format!("{REACH}who = \"nobody\"\n"), "task.who: there is no peer \"nobody\""),
+        (&format!("{REACH}start = \"1h\"\n"), "task.start: 3600s is after the end of the scene"),
+        ("\n[expect]\ntask = { outcome = \"done\" }\n", "expect.task: the scene has no task: expected a table [task] too"),
+        (
+            "\n[measure]\nnames = [\"task_time_s\"]\n",
+            "measure.names.0: task_time_s is a measure of a task, and the scene has none: expected a table [task] too",
+        ),
+        ("\n[expect]\nmeasures = [{ name = \"peers.left.sparc\", max = 0 }]\n", "expect.measures.0.name: sparc is a measure of a task"),
+        (&format!("{REACH}[expect]\ntask = {{}}\n"), "expect.task: neither outcome nor time is given"),
+    ] {
+        let message = refused(&format!("{SCENE}{text}"), &[]).to_string();
+        assert!(beginning(&message).starts_with(expected), "{text}: {message}");
+    }
+    let walls = format!("{SCENE}{REACH}").replace("[object]", "[object]\nenclosure = { min = 0.0, max = 0.15, stiffness = 1000.0, damping = 1.0 }");
+    let message = refused(&walls, &[]).to_string();
+    assert!(beginning(&message).starts_with("task.targets.1: 0.2 is outside of object.enclosure"), "{message}");
+    let message = refused(&format!("{SCENE}{REACH}"), &["peer.contact=none"]).to_string();
+    assert!(beginning(&message).starts_with("task: no device touches the object"), "{message}");
+}
+
+/// Without a task a scene has the measures of before, so columns and documents stay.
+#[test]
+fn measures_of_a_task_are_there_where_a_task_is() {
+    let count = |text: &str| parse(&format!("{SCENE}{text}\n[measure]\n"), &[]).unwrap().measure.unwrap().names.len();
+    let of_task = |per: Scope| Measure::ALL.iter().filter(|measure| measure.is_of_task() && measure.scope() == per).count();
+    assert_eq!(count(REACH), count("") + of_task(Scope::Run) + 2 * of_task(Scope::Peer));
+}
+
+#[test]
+fn expectations_of_a_task() {
+    let scene = parse(&format!("{SCENE}{REACH}[expect]\ntask = {{ outcome = \"timed-out\", time = {{ max = \"2s\" }} }}\n"), &[]).unwrap();
+    let expected = scene.expect.unwrap().task.unwrap();
+    assert_eq!(expected.outcome, Some(TaskOutcome::TimedOut));
+    assert_eq!(expected.time.map(|time| (time.min, time.max)), Some((None, Some(2.0))));
+}
+
+/// Fingerprints of records are made of the debug text of a scene, so a scene without a task prints as before.
+#[test]
+fn a_scene_without_a_task_prints_none() {
+    assert!(!format!("{:?}", parse(SCENE, &[]).unwrap()).contains("task"));
+    assert!(format!("{:?}", parse(&format!("{SCENE}{REACH}"), &[]).unwrap()).contains("task: TaskSpec"));
+}
