@@ -19,6 +19,7 @@ mod datagrams;
 mod settings;
 mod streams;
 mod tasks;
+mod unix;
 
 use std::cell::{Cell, RefCell};
 use std::fmt;
@@ -29,8 +30,9 @@ use std::sync::Arc;
 
 pub use datagrams::{DatagramOption, Datagrams, Membership};
 pub use settings::{Configured, KeepaliveTimes, Setting};
-pub use streams::{Connecting, Flag, Listener, Number, Ready, Socket, Stream};
+pub use streams::{ByteStream, Connecting, Flag, Listener, Number, Ready, Socket, Stream};
 pub use tasks::{Hold, Host, OnHost, Signals, Stop, host, on_host};
+pub use unix::{UnixDatagrams, UnixListener, UnixName, UnixSocket, UnixStream};
 
 thread_local! {
     static BED: RefCell<Option<Arc<dyn Bed>>> = const { RefCell::new(None) };
@@ -134,6 +136,33 @@ pub trait Bed: Send + Sync {
     ///
     /// If the running task lives on no host.
     fn bind(&self, call: Call, at: SocketAddr) -> io::Result<Box<dyn Datagrams>>;
+
+    /// Creates a Unix socket of streams that is neither connected nor listening.
+    ///
+    /// # Errors
+    ///
+    /// If the host is down.
+    ///
+    /// # Panics
+    ///
+    /// If the running task lives on no host.
+    fn unix_socket(&self, call: Call) -> io::Result<Box<dyn UnixSocket>>;
+
+    /// Creates two Unix sockets of streams that are connected to each other. Errors and panics are those of [`Bed::unix_socket`].
+    #[expect(clippy::missing_errors_doc, reason = "those of another method")]
+    fn unix_pair(&self, call: Call) -> io::Result<[Box<dyn UnixStream>; 2]>;
+
+    /// Creates a Unix socket of datagrams that is neither bound nor connected. Errors and panics are those of [`Bed::unix_socket`].
+    #[expect(clippy::missing_errors_doc, reason = "those of another method")]
+    fn unix_datagrams(&self, call: Call) -> io::Result<Box<dyn UnixDatagrams>>;
+
+    /// Creates two Unix sockets of datagrams that are connected to each other. Errors and panics are those of [`Bed::unix_socket`].
+    #[expect(clippy::missing_errors_doc, reason = "those of another method")]
+    fn unix_datagram_pair(&self, call: Call) -> io::Result<[Box<dyn UnixDatagrams>; 2]>;
+
+    /// Creates a pipe: the end that writes, and the end that reads. Errors and panics are those of [`Bed::unix_socket`].
+    #[expect(clippy::missing_errors_doc, reason = "those of another method")]
+    fn pipe(&self, call: Call) -> io::Result<[Box<dyn ByteStream>; 2]>;
 
     /// Returns the host of the task that is being polled, or `None` if that task lives on no host.
     fn host(&self) -> Option<Arc<dyn Host>>;

@@ -26,12 +26,12 @@ pub struct Ready {
     pub write_closed: bool,
 }
 
-/// TCP connection. Dropping the value closes the connection, as dropping a stream of tokio does.
+/// Stream of bytes, or an end of a pipe. Dropping the value closes the stream, as dropping a stream of tokio does.
 ///
 /// Methods named `poll_…` register the waker of the context with [`Poll::Pending`]. Methods named `try_…` return [`io::ErrorKind::WouldBlock`] instead. All
-/// methods fail after the host of the connection has crashed, after the run of the test bed, and on every thread but the thread of the run.
+/// methods fail after the host of the stream has crashed, after the run of the test bed, and on every thread but the thread of the run.
 #[expect(clippy::missing_errors_doc, reason = "the documentation of the trait names the errors of all methods")]
-pub trait Stream: Configured + fmt::Debug + Send + Sync {
+pub trait ByteStream: fmt::Debug + Send + Sync {
     /// Waits until bytes can be read, or the connection is over.
     fn poll_readable(&self, cx: &mut Context<'_>) -> Poll<io::Result<()>>;
     /// Waits until bytes can be written, or the connection is over.
@@ -40,24 +40,29 @@ pub trait Stream: Configured + fmt::Debug + Send + Sync {
     fn ready(&self) -> io::Result<Ready>;
     /// Reads received bytes, and returns the number of bytes; 0 is the end of the stream.
     fn poll_read(&self, cx: &mut Context<'_>, buffer: &mut [u8]) -> Poll<io::Result<usize>>;
-    /// Like [`Stream::poll_read`], but leaves the bytes in the stream.
-    fn poll_peek(&self, cx: &mut Context<'_>, buffer: &mut [u8]) -> Poll<io::Result<usize>>;
     /// Writes bytes, and returns the number of bytes taken by the send buffer.
     fn poll_write(&self, cx: &mut Context<'_>, buffers: &[IoSlice<'_>]) -> Poll<io::Result<usize>>;
     /// Reads received bytes into the buffers, first to last.
     fn try_read(&self, buffers: &mut [IoSliceMut<'_>]) -> io::Result<usize>;
     /// Writes the buffers, first to last.
     fn try_write(&self, buffers: &[IoSlice<'_>]) -> io::Result<usize>;
-    /// Sends FIN after the bytes written so far.
+    /// Ends the stream for the reader after the bytes written so far. TCP sends FIN.
     fn shut_down(&self) -> io::Result<()>;
-    /// Sends FIN for a dropped half. Also works on another thread.
+    /// Like [`ByteStream::shut_down`], for a dropped half. Also works on another thread.
     fn let_write_half_go(&self);
+    /// Takes the error of the next call.
+    fn take_error(&self) -> io::Result<Option<io::Error>>;
+}
+
+/// TCP connection.
+#[expect(clippy::missing_errors_doc, reason = "the documentation of `ByteStream` names the errors of all methods")]
+pub trait Stream: ByteStream + Configured {
+    /// Like [`ByteStream::poll_read`], but leaves the bytes in the stream.
+    fn poll_peek(&self, cx: &mut Context<'_>, buffer: &mut [u8]) -> Poll<io::Result<usize>>;
     /// Returns the address of this end.
     fn local_addr(&self) -> io::Result<SocketAddr>;
     /// Returns the address of the other end.
     fn peer_addr(&self) -> io::Result<SocketAddr>;
-    /// Takes the error of the next call.
-    fn take_error(&self) -> io::Result<Option<io::Error>>;
     /// Returns whether small segments leave while earlier segments are not acknowledged.
     fn nodelay(&self) -> io::Result<bool>;
     /// Sets whether small segments leave while earlier segments are not acknowledged.
@@ -76,7 +81,7 @@ pub trait Stream: Configured + fmt::Debug + Send + Sync {
     fn set_ttl(&self, ttl: u32) -> io::Result<()>;
 }
 
-/// TCP listener. All methods fail as the methods of [`Stream`] do.
+/// TCP listener. All methods fail as the methods of [`ByteStream`] do.
 #[expect(clippy::missing_errors_doc, reason = "the documentation of the trait names the errors of all methods")]
 pub trait Listener: Configured + fmt::Debug + Send + Sync {
     /// Accepts a connection, and returns the address of its other end.
@@ -113,7 +118,7 @@ pub enum Number {
     TypeOfService,
 }
 
-/// TCP socket, neither connected nor listening. All methods fail as the methods of [`Stream`] do.
+/// TCP socket, neither connected nor listening. All methods fail as the methods of [`ByteStream`] do.
 #[expect(clippy::missing_errors_doc, reason = "the documentation of the trait names the errors of all methods")]
 pub trait Socket: Configured + fmt::Debug + Send + Sync {
     /// Binds the socket.

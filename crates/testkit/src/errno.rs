@@ -4,8 +4,14 @@ use std::io;
 
 /// Error of a call, as the system names it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(not(feature = "tcp"), allow(dead_code, reason = "some are of TCP alone"))]
+#[cfg_attr(not(feature = "facade"), allow(dead_code, reason = "some are of TCP or of Unix sockets alone"))]
 pub(crate) enum Errno {
+    /// `EPERM`.
+    NotPermitted,
+    /// `ENOENT`.
+    NoEntry,
+    /// `EAGAIN`.
+    TryAgain,
     /// `EPIPE`.
     BrokenPipe,
     /// `EACCES`.
@@ -16,6 +22,8 @@ pub(crate) enum Errno {
     NoDestination,
     /// `EMSGSIZE`.
     TooLong,
+    /// `EPROTOTYPE`.
+    WrongType,
     /// `EAFNOSUPPORT`.
     OtherVersion,
     /// `EADDRINUSE`.
@@ -41,11 +49,15 @@ impl Errno {
     #[cfg(any(target_os = "linux", target_os = "android"))]
     const fn number(self) -> i32 {
         match self {
+            Self::NotPermitted => 1,
+            Self::NoEntry => 2,
+            Self::TryAgain => 11,
             Self::PermissionDenied => 13,
             Self::InvalidInput => 22,
             Self::BrokenPipe => 32,
             Self::NoDestination => 89,
             Self::TooLong => 90,
+            Self::WrongType => 91,
             Self::OtherVersion => 97,
             Self::AddrInUse => 98,
             Self::AddrNotAvailable => 99,
@@ -62,11 +74,15 @@ impl Errno {
     #[cfg(not(any(target_os = "linux", target_os = "android", windows)))]
     const fn number(self) -> i32 {
         match self {
+            Self::NotPermitted => 1,
+            Self::NoEntry => 2,
             Self::PermissionDenied => 13,
             Self::InvalidInput => 22,
             Self::BrokenPipe => 32,
+            Self::TryAgain => 35,
             Self::NoDestination => 39,
             Self::TooLong => 40,
+            Self::WrongType => 41,
             Self::OtherVersion => 47,
             Self::AddrInUse => 48,
             Self::AddrNotAvailable => 49,
@@ -79,11 +95,15 @@ impl Errno {
         }
     }
 
-    /// Returns the number of Winsock, apart from `ERROR_BROKEN_PIPE`, for which Winsock has none.
+    /// Returns the number of Winsock. `ERROR_ACCESS_DENIED`, `ERROR_FILE_NOT_FOUND` and `ERROR_BROKEN_PIPE` are of the system, since Winsock has none of them.
     #[cfg(windows)]
     const fn number(self) -> i32 {
         match self {
+            Self::NoEntry => 2,
+            Self::NotPermitted => 5,
             Self::BrokenPipe => 109,
+            Self::TryAgain => 10_035,
+            Self::WrongType => 10_041,
             Self::PermissionDenied => 10_013,
             Self::InvalidInput => 10_022,
             Self::NoDestination => 10_039,
@@ -122,6 +142,9 @@ mod tests {
     fn numbers_have_the_kinds_of_the_standard_library() {
         for (errno, kind) in [
             (Errno::BrokenPipe, io::ErrorKind::BrokenPipe),
+            (Errno::NotPermitted, io::ErrorKind::PermissionDenied),
+            (Errno::NoEntry, io::ErrorKind::NotFound),
+            (Errno::TryAgain, io::ErrorKind::WouldBlock),
             (Errno::PermissionDenied, io::ErrorKind::PermissionDenied),
             (Errno::InvalidInput, io::ErrorKind::InvalidInput),
             (Errno::AddrInUse, io::ErrorKind::AddrInUse),

@@ -17,6 +17,8 @@ mod sockets;
 #[cfg(feature = "tcp")]
 mod tcp;
 mod timers;
+#[cfg(feature = "facade")]
+mod unix;
 mod waking;
 
 use std::sync::Arc;
@@ -45,6 +47,8 @@ pub(crate) use socket_name::SocketName;
 #[cfg(feature = "tcp")]
 pub(crate) use tcp::{ConnId, HoldId, Inherited, ListenId, Sharing};
 pub(crate) use timers::{TimerId, Timers};
+#[cfg(feature = "facade")]
+pub(crate) use unix::UnixId;
 pub(crate) use waking::{Registered, registered};
 
 pub(crate) struct Core {
@@ -59,6 +63,8 @@ pub(crate) struct Core {
     spare: wire::Spare<Ends>,
     #[cfg(feature = "tcp")]
     tcp: tcp::Tcp,
+    #[cfg(feature = "facade")]
+    unix: unix::Unix,
     pub(crate) woken: Woken,
     face: Arc<Face>,
     /// Number of the run whose state this is. 0 until [`Shared`] gives the number.
@@ -88,6 +94,8 @@ impl Core {
             spare: wire::Spare::default(),
             #[cfg(feature = "tcp")]
             tcp: tcp::Tcp::new(seed, names.len()),
+            #[cfg(feature = "facade")]
+            unix: unix::Unix::default(),
             woken: Woken::default(),
             run: 0,
         }
@@ -234,6 +242,8 @@ impl Core {
         }
         #[cfg(feature = "tcp")]
         self.crash_tcp(host);
+        #[cfg(feature = "facade")]
+        self.end_unix(host, tcp::Gone { at: now, is_killed: false });
         self.wire.note(Happening::Crashed(host));
     }
 
@@ -253,6 +263,8 @@ impl Core {
         }
         #[cfg(feature = "tcp")]
         self.kill_tcp(host);
+        #[cfg(feature = "facade")]
+        self.end_unix(host, tcp::Gone { at: now, is_killed: true });
     }
 
     /// Brings the host up again. Returns whether its program must start anew.

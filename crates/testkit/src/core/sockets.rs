@@ -169,6 +169,8 @@ impl Core {
         let lines = waiting.map(|socket| format!("host `{}`: UDP {} waits for a datagram", self.plan.names()[socket.host.index()], socket.local()));
         #[cfg(feature = "tcp")]
         let lines = lines.chain(self.tcp_waits());
+        #[cfg(feature = "facade")]
+        let lines = lines.chain(self.unix_waits());
         lines.collect()
     }
 
@@ -178,6 +180,8 @@ impl Core {
         let mut awaited: Vec<String> = sockets.map(|socket| format!("a datagram at UDP {}", socket.local())).collect();
         #[cfg(feature = "tcp")]
         awaited.extend(self.tcp_awaited_by(waker));
+        #[cfg(feature = "facade")]
+        awaited.extend(self.unix_awaited_by(waker));
         awaited.extend(self.timers.deadline_of(waker).map(|deadline| format!("{} s of the run", Seconds(deadline))));
         awaited
     }

@@ -4,12 +4,15 @@
 //! for the test bed of the thread, which `crate::runtime` registers for each run.
 
 mod settings;
+mod unix;
 
 use std::io;
 use std::net::SocketAddr;
 use std::sync::Arc;
 
-use cohaptic_sockets::{Bed, Call, Connecting, Datagrams, Hold, Host, Listener, Socket, Stream, Version};
+use cohaptic_sockets::{
+    Bed, ByteStream, Call, Connecting, Datagrams, Hold, Host, Listener, Socket, Stream, UnixDatagrams, UnixSocket, UnixStream, Version,
+};
 
 use crate::context;
 use crate::core::Shared;
@@ -57,6 +60,36 @@ impl Bed for BedOfThread {
     fn bind(&self, call: Call, at: SocketAddr) -> io::Result<Box<dyn Datagrams>> {
         let (shared, host) = context::Call::from(call).host(HOW);
         Ok(Box::new(UdpSocket::bind_on(shared, host, at)?))
+    }
+
+    fn unix_socket(&self, call: Call) -> io::Result<Box<dyn UnixSocket>> {
+        let (shared, host) = context::Call::from(call).host(HOW);
+        let id = unix::open(&shared, host, |core| core.unix_stream(host))?;
+        Ok(Box::new(unix::Stream::new(shared, host, id)))
+    }
+
+    fn unix_pair(&self, call: Call) -> io::Result<[Box<dyn UnixStream>; 2]> {
+        let (shared, host) = context::Call::from(call).host(HOW);
+        let ends = unix::open(&shared, host, |core| core.unix_pair(host))?;
+        Ok(ends.map(|id| Box::new(unix::Stream::new(Arc::clone(&shared), host, id)) as _))
+    }
+
+    fn unix_datagrams(&self, call: Call) -> io::Result<Box<dyn UnixDatagrams>> {
+        let (shared, host) = context::Call::from(call).host(HOW);
+        let id = unix::open(&shared, host, |core| core.unix_datagrams(host))?;
+        Ok(Box::new(unix::Datagrams::new(shared, host, id)))
+    }
+
+    fn unix_datagram_pair(&self, call: Call) -> io::Result<[Box<dyn UnixDatagrams>; 2]> {
+        let (shared, host) = context::Call::from(call).host(HOW);
+        let sockets = unix::open(&shared, host, |core| core.unix_datagram_pair(host))?;
+        Ok(sockets.map(|id| Box::new(unix::Datagrams::new(Arc::clone(&shared), host, id)) as _))
+    }
+
+    fn pipe(&self, call: Call) -> io::Result<[Box<dyn ByteStream>; 2]> {
+        let (shared, host) = context::Call::from(call).host(HOW);
+        let ends = unix::open(&shared, host, |core| core.pipe(host))?;
+        Ok(ends.map(|id| Box::new(unix::Stream::new(Arc::clone(&shared), host, id)) as _))
     }
 
     fn host(&self) -> Option<Arc<dyn Host>> {

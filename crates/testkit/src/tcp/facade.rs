@@ -5,11 +5,11 @@ use std::net::SocketAddr;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
-use cohaptic_sockets::{Connecting, Flag, Listener, Number, Ready, Socket, Stream};
+use cohaptic_sockets::{ByteStream, Connecting, Flag, Listener, Number, Ready, Socket, Stream};
 
 use super::{TcpListener, TcpSocket, TcpStream};
 
-impl Stream for TcpStream {
+impl ByteStream for TcpStream {
     fn poll_readable(&self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         self.poll_read_ready(cx)
     }
@@ -27,10 +27,6 @@ impl Stream for TcpStream {
 
     fn poll_read(&self, cx: &mut Context<'_>, buffer: &mut [u8]) -> Poll<io::Result<usize>> {
         self.poll_read_into(cx, buffer)
-    }
-
-    fn poll_peek(&self, cx: &mut Context<'_>, buffer: &mut [u8]) -> Poll<io::Result<usize>> {
-        self.poll_peek_into(cx, buffer)
     }
 
     fn poll_write(&self, cx: &mut Context<'_>, buffers: &[IoSlice<'_>]) -> Poll<io::Result<usize>> {
@@ -53,16 +49,22 @@ impl Stream for TcpStream {
         Self::let_write_half_go(self);
     }
 
+    fn take_error(&self) -> io::Result<Option<io::Error>> {
+        Self::take_error(self)
+    }
+}
+
+impl Stream for TcpStream {
+    fn poll_peek(&self, cx: &mut Context<'_>, buffer: &mut [u8]) -> Poll<io::Result<usize>> {
+        self.poll_peek_into(cx, buffer)
+    }
+
     fn local_addr(&self) -> io::Result<SocketAddr> {
         Self::local_addr(self)
     }
 
     fn peer_addr(&self) -> io::Result<SocketAddr> {
         Self::peer_addr(self)
-    }
-
-    fn take_error(&self) -> io::Result<Option<io::Error>> {
-        Self::take_error(self)
     }
 
     fn nodelay(&self) -> io::Result<bool> {

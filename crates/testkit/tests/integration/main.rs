@@ -32,4 +32,6 @@ mod stall;
 mod strategies;
 #[cfg(feature = "tcp")]
 mod tcp;
+#[cfg(all(feature = "facade", any(target_os = "linux", target_os = "android")))]
+mod unix;
 mod waiting;

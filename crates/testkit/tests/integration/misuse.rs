@@ -242,6 +242,17 @@ fn a_socket_of_the_real_tokio_is_told_the_way_out() {
     let connect = async || drop(tokio::net::TcpStream::connect("127.0.0.1:9").await);
     says(|| bed().on_tokio().run(move |_| bind()), &way_out);
     says(|| bed().on_tokio().run(move |bed| async move { bed.host("a").spawn(connect()).await.unwrap() }), &way_out);
+    #[cfg(unix)]
+    {
+        let pair = async || drop(tokio::net::UnixStream::pair());
+        says(|| bed().on_tokio().run(move |_| pair()), &way_out);
+        #[allow(deprecated, reason = "newer versions of tokio deprecate the safe function")]
+        let descriptor = async || drop(tokio::io::unix::AsyncFd::new(std::os::unix::net::UnixStream::pair().unwrap().0));
+        says(
+            || bed().on_tokio().run(move |_| descriptor()),
+            &["An `AsyncFd` waits for a descriptor of the system: replace it by a socket or a channel"],
+        );
+    }
     // Tokio catches the panic of its own task, and the run fails all the same.
     let caught = |_| async move {
         let _ = tokio::task::spawn_local(bind()).await;

@@ -105,10 +105,10 @@ struct End {
 
 /// Instant and cause of the end of a socket whose host crashed or whose program was killed.
 #[derive(Clone, Copy, Debug)]
-struct Gone {
-    at: Instant,
+pub(in crate::core) struct Gone {
+    pub(in crate::core) at: Instant,
     /// `true` if only the program was killed. If false, the host has crashed.
-    is_killed: bool,
+    pub(in crate::core) is_killed: bool,
 }
 
 /// A listening socket.

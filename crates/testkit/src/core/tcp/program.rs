@@ -1,5 +1,6 @@
 //! Calls of programs on connections.
 
+use std::fmt::Display;
 use std::io::{self, IoSlice, IoSliceMut};
 use std::net::SocketAddr;
 use std::task::Waker;
@@ -40,7 +41,7 @@ impl End {
 
 impl Core {
     /// Checks that the socket lives. It does not after a crash of its host, or after the program of the host was killed.
-    pub(super) fn check_gone(&self, gone: Option<Gone>, host: NodeId, local: SocketAddr) -> io::Result<()> {
+    pub(in crate::core) fn check_gone(&self, gone: Option<Gone>, host: NodeId, local: impl Display) -> io::Result<()> {
         let Some(Gone { at, is_killed }) = gone else { return Ok(()) };
         let name = &self.plan.names()[host.index()];
         let (what, after) = if is_killed { ("the program of host", " was killed") } else { ("host", " crashed") };
