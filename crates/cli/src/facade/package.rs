@@ -24,12 +24,14 @@ macro_rules! files {
 }
 
 /// Sources of the package that stands in for tokio.
-const SOURCES: [(&str, &str); 31] = files![
+const SOURCES: [(&str, &str); 39] = files![
     "hosted.rs",
     "lib.rs",
     "net/addr.rs",
     "net/bed_socket.rs",
+    "net/bytes.rs",
     "net/descriptors.rs",
+    "net/halves.rs",
     "net/listener.rs",
     "net/lookup.rs",
     "net/mod.rs",
@@ -37,12 +39,17 @@ const SOURCES: [(&str, &str); 31] = files![
     "net/ready.rs",
     "net/socket.rs",
     "net/stream.rs",
-    "net/tcp/mod.rs",
-    "net/tcp/owned.rs",
-    "net/tcp/split.rs",
+    "net/tcp.rs",
     "net/udp.rs",
     "net/udp_options.rs",
     "net/udp_receiving.rs",
+    "net/unix/datagrams.rs",
+    "net/unix/halves.rs",
+    "net/unix/listener.rs",
+    "net/unix/mod.rs",
+    "net/unix/pipe.rs",
+    "net/unix/socket.rs",
+    "net/unix/stream.rs",
     "process.rs",
     "runtime/builder.rs",
     "runtime/handle.rs",
@@ -51,6 +58,7 @@ const SOURCES: [(&str, &str); 31] = files![
     "runtime/rt.rs",
     "signal/mod.rs",
     "signal/unix.rs",
+    "task/builder.rs",
     "task/join_set.rs",
     "task/local.rs",
     "task/mod.rs",
@@ -58,16 +66,17 @@ const SOURCES: [(&str, &str); 31] = files![
     "time.rs",
 ];
 
-/// Code that is appended to files of the real tokio: what the package needs and the real tokio offers to itself only. The second text must be in the file.
-const APPENDED: [(&str, &str, &str); 3] = [
-    (
-        "net/tcp/stream.rs",
-        "fn poll_read_priv(",
-        r"
+/// Reading and writing a stream of the real tokio through a shared reference, as the halves of a stream do.
+macro_rules! shared_calls {
+    ($stream:literal) => {
+        concat!(
+            "
 /// Reading and writing through a shared reference, for the package `tokio` of `cohaptic tokio`.
 #[doc(hidden)]
 #[allow(missing_docs)]
-impl TcpStream {
+impl ",
+            $stream,
+            " {
     #[inline]
     pub fn cohaptic_read(&self, cx: &mut Context<'_>, buf: &mut ReadBuf<'_>) -> Poll<io::Result<()>> {
         self.poll_read_priv(cx, buf)
@@ -85,6 +94,41 @@ impl TcpStream {
 
     pub fn cohaptic_shut_down(&self) -> io::Result<()> {
         self.shutdown_std(std::net::Shutdown::Write)
+    }
+}
+"
+        )
+    };
+}
+
+/// Code that is appended to files of the real tokio: what the package needs and the real tokio offers to itself only. The second text must be in the file.
+const APPENDED: [(&str, &str, &str); 6] = [
+    ("net/tcp/stream.rs", "fn poll_read_priv(", shared_calls!("TcpStream")),
+    ("net/unix/stream.rs", "fn poll_read_priv(", shared_calls!("UnixStream")),
+    (
+        "net/unix/ucred.rs",
+        "pid: Option<unix::pid_t>",
+        r"
+/// Credentials of a process, for the package `tokio` of `cohaptic tokio`.
+#[doc(hidden)]
+#[allow(missing_docs)]
+impl UCred {
+    pub fn cohaptic_of(pid: Option<unix::pid_t>, uid: unix::uid_t, gid: unix::gid_t) -> Self {
+        Self { pid, uid, gid }
+    }
+}
+",
+    ),
+    (
+        "net/unix/socketaddr.rs",
+        "pub struct SocketAddr(",
+        r"
+/// The address of the standard library, for the package `tokio` of `cohaptic tokio`.
+#[doc(hidden)]
+#[allow(missing_docs)]
+impl SocketAddr {
+    pub fn cohaptic_of(address: std::os::unix::net::SocketAddr) -> Self {
+        Self(address)
     }
 }
 ",

@@ -9,7 +9,11 @@ pub use addr::ToSocketAddrs;
 #[cfg(feature = "net")]
 mod bed_socket;
 #[cfg(feature = "net")]
+mod bytes;
+#[cfg(feature = "net")]
 mod descriptors;
+#[cfg(feature = "net")]
+mod halves;
 #[cfg(feature = "net")]
 mod listener;
 #[cfg(feature = "net")]
@@ -26,7 +30,11 @@ mod stream;
 pub mod tcp;
 #[cfg(feature = "net")]
 mod udp;
+#[cfg(all(feature = "net", unix))]
+pub mod unix;
 
+#[cfg(all(feature = "net", unix))]
+pub use unix::{UnixDatagram, UnixListener, UnixSocket, UnixStream};
 #[cfg(feature = "net")]
 pub use {listener::TcpListener, lookup::lookup_host, socket::TcpSocket, stream::TcpStream, udp::UdpSocket};
 

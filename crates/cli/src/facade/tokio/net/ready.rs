@@ -1,5 +1,7 @@
 //! Readiness of sockets of a test bed, in the types of tokio.
 
+use std::task::Poll;
+
 use real::io::{Interest, Ready};
 
 /// Returns the part of a readiness for which the interest asks.
@@ -13,6 +15,25 @@ pub(super) fn ready(interest: Interest, now: cohaptic_sockets::Ready) -> Ready {
         ready = ready | flag(now.writable, Ready::WRITABLE) | flag(now.write_closed, Ready::WRITE_CLOSED);
     }
     ready
+}
+
+/// Waits until a stream of a test bed is ready for something of the interest.
+pub(super) async fn until(stream: &(impl cohaptic_sockets::ByteStream + ?Sized), interest: Interest) -> std::io::Result<Ready> {
+    std::future::poll_fn(|cx| {
+        let ready = ready(interest, stream.ready()?);
+        if !ready.is_empty() {
+            return Poll::Ready(Ok(ready));
+        }
+        // Nothing is ready, so these calls register the task.
+        if interest.is_readable() {
+            let _ = stream.poll_readable(cx)?;
+        }
+        if interest.is_writable() {
+            let _ = stream.poll_writable(cx)?;
+        }
+        Poll::Pending
+    })
+    .await
 }
 
 /// Most bytes that are read at once into a buffer which may grow.

@@ -2,6 +2,8 @@
 
 use std::fmt;
 use std::future::Future;
+#[cfg(all(tokio_unstable, feature = "tracing"))]
+use std::io;
 use std::ops::{Deref, DerefMut};
 use std::task::{Context, Poll};
 
@@ -32,6 +34,12 @@ impl<T> JoinSet<T> {
 }
 
 impl<T: 'static> JoinSet<T> {
+    /// See `tokio::task::JoinSet::build_task`.
+    #[cfg(all(tokio_unstable, feature = "tracing"))]
+    pub fn build_task(&mut self) -> Builder<'_, T> {
+        Builder { set: self, name: None }
+    }
+
     /// See `tokio::task::JoinSet::spawn`.
     #[track_caller]
     pub fn spawn<F>(&mut self, task: F) -> AbortHandle
@@ -190,6 +198,102 @@ where
     fn extend<I: IntoIterator<Item = F>>(&mut self, tasks: I) {
         for task in tasks {
             self.spawn(task);
+        }
+    }
+}
+
+/// See `tokio::task::join_set::Builder`.
+#[cfg(all(tokio_unstable, feature = "tracing"))]
+#[derive(Debug)]
+#[must_use = "builders do nothing unless used to spawn a task"]
+pub struct Builder<'a, T> {
+    set: &'a mut JoinSet<T>,
+    name: Option<&'a str>,
+}
+
+#[cfg(all(tokio_unstable, feature = "tracing"))]
+impl<'a, T: 'static> Builder<'a, T> {
+    /// See `tokio::task::join_set::Builder::name`.
+    pub fn name(self, name: &'a str) -> Self {
+        Self { name: Some(name), ..self }
+    }
+
+    /// Returns the builder of the real tokio.
+    fn real(&mut self) -> real::task::join_set::Builder<'_, T> {
+        let builder = self.set.0.build_task();
+        match self.name {
+            Some(name) => builder.name(name),
+            None => builder,
+        }
+    }
+
+    /// See `tokio::task::join_set::Builder::spawn`.
+    #[track_caller]
+    pub fn spawn<F>(mut self, task: F) -> io::Result<AbortHandle>
+    where
+        F: Future<Output = T> + Send + 'static,
+        T: Send,
+    {
+        Ok(hosted::start!(task, self.real().spawn(task)?, |started| started.clone()))
+    }
+
+    /// See `tokio::task::join_set::Builder::spawn_on`.
+    #[track_caller]
+    pub fn spawn_on<F>(mut self, task: F, handle: &Handle) -> io::Result<AbortHandle>
+    where
+        F: Future<Output = T> + Send + 'static,
+        T: Send,
+    {
+        Ok(hosted::start!(task, self.real().spawn_on(task, handle)?, |started| started.clone()))
+    }
+
+    /// See `tokio::task::join_set::Builder::spawn_local`.
+    #[track_caller]
+    pub fn spawn_local<F>(mut self, task: F) -> io::Result<AbortHandle>
+    where
+        F: Future<Output = T> + 'static,
+    {
+        Ok(hosted::start!(task, self.real().spawn_local(task)?, |started| started.clone()))
+    }
+
+    /// See `tokio::task::join_set::Builder::spawn_local_on`.
+    #[track_caller]
+    pub fn spawn_local_on<F>(mut self, task: F, local: &LocalSet) -> io::Result<AbortHandle>
+    where
+        F: Future<Output = T> + 'static,
+    {
+        Ok(hosted::start!(task, self.real().spawn_local_on(task, local.real())?, |started| started.clone()))
+    }
+
+    /// See `tokio::task::join_set::Builder::spawn_blocking`. In a test bed the virtual time waits for the function.
+    #[track_caller]
+    pub fn spawn_blocking<F>(mut self, function: F) -> io::Result<AbortHandle>
+    where
+        F: FnOnce() -> T + Send + 'static,
+        T: Send,
+    {
+        match cohaptic_sockets::bed() {
+            None => self.real().spawn_blocking(hosted::with_host(function)),
+            Some(_) => {
+                let work = super::spawn_blocking(function);
+                self.spawn(hosted::outcome_of(work))
+            }
+        }
+    }
+
+    /// See `tokio::task::join_set::Builder::spawn_blocking_on`. In a test bed the virtual time waits for the function.
+    #[track_caller]
+    pub fn spawn_blocking_on<F>(mut self, function: F, handle: &Handle) -> io::Result<AbortHandle>
+    where
+        F: FnOnce() -> T + Send + 'static,
+        T: Send,
+    {
+        match cohaptic_sockets::bed() {
+            None => self.real().spawn_blocking_on(hosted::with_host(function), handle),
+            Some(_) => {
+                let work = handle.spawn_blocking(function);
+                self.spawn_on(hosted::outcome_of(work), handle)
+            }
         }
     }
 }

@@ -2,7 +2,11 @@
 
 pub use real::task::*;
 
-#[cfg(feature = "rt")]
+#[cfg(all(feature = "rt", tokio_unstable, feature = "tracing"))]
+mod builder;
+#[cfg(all(feature = "rt", tokio_unstable))]
+pub mod join_set;
+#[cfg(all(feature = "rt", not(tokio_unstable)))]
 mod join_set;
 #[cfg(feature = "rt")]
 mod local;
@@ -18,3 +22,6 @@ pub use {
 
 #[cfg(feature = "rt-multi-thread")]
 pub use spawn::block_in_place;
+
+#[cfg(all(feature = "rt", tokio_unstable, feature = "tracing"))]
+pub use builder::Builder;

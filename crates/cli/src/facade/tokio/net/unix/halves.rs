@@ -1,0 +1,5 @@
+//! Halves of Unix streams.
+
+use super::{SocketAddr, UnixStream};
+
+crate::net::halves::halves!(UnixStream, SocketAddr, {});
