@@ -27,8 +27,8 @@ pub use cohaptic_benches_common::mesh::Mesh;
 /// The damping of every copy [N·s/m].
 pub const COPY_DAMPING: f64 = 0.0;
 
-/// Links by name: their keys beside a delay of 24 ms.
-pub const LINKS: [(&str, &str); 8] = [
+/// Links by name: their keys beside a delay of 24 ms, or a link of the library, which has a delay of its own.
+pub const LINKS: [(&str, &str); 12] = [
     ("constant", ""),
     ("jitter and loss", Mesh::IMPAIRMENTS),
     ("rate and queue", "jitter = \"2ms\"\nloss = \"1%\"\nrate = \"10Mbit\"\nqueue = { limit = \"100 packets\" }"),
@@ -40,6 +40,10 @@ pub const LINKS: [(&str, &str); 8] = [
         "jitter = \"2ms\"\nloss = \"1%\"\nrate = \"60kbit\"\nqueue = { limit = \"100 packets\", discipline = { codel = { mtu = \"100B\" } } }",
     ),
     ("token bucket", "jitter = \"2ms\"\nloss = \"1%\"\ntoken-bucket = { rate = \"10Mbit\", burst = \"3kB\", limit = \"100 packets\" }"),
+    ("starlink", "profile = \"starlink/down\""),
+    ("lte-driving", "profile = \"lte-driving/down\""),
+    ("wifi-busy", "profile = \"wifi-busy/down\""),
+    ("dsl", "profile = \"dsl/down\""),
 ];
 
 #[cfg(test)]

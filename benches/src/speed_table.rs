@@ -115,7 +115,17 @@ fn one_run(work: Work) {
 }
 
 /// How many times as long a packet may take over such links as over those with jitter and loss.
-const ASKED_OF_LINKS: [(&str, f64); 5] = [("rate and queue", 1.6), ("full line", 1.6), ("chains", 1.2), ("CoDel", 4.0), ("full line, CoDel", 4.0)];
+const ASKED_OF_LINKS: [(&str, f64); 9] = [
+    ("rate and queue", 1.6),
+    ("full line", 1.6),
+    ("chains", 1.2),
+    ("CoDel", 4.0),
+    ("full line, CoDel", 4.0),
+    ("starlink", 1.3),
+    ("lte-driving", 1.3),
+    ("wifi-busy", 1.3),
+    ("dsl", 1.3),
+];
 
 /// Links that have queues or memory, beside links without, in the program and, as far as they have one, in the bare loop.
 fn queues(work: Work) {
@@ -125,6 +135,9 @@ fn queues(work: Work) {
     );
     println!(
         "gamma jitter with a correlation of 0.5 and Gilbert-Elliott loss (*chains*). No sample waits for 10 Mbit/s, which the program knows beforehand; a *full line* has 60 kbit/s for 64, and a queue of 8 packets, or of 100 with CoDel."
+    );
+    println!(
+        "The last rows are [links of the library](how-to-named-link.md), down: a modulator of delays and losses in bursts (*starlink*), of the rate (*lte-driving*), correlated lognormal delays (*wifi-busy*), and a gamma law that is nearly always at its floor (*dsl*)."
     );
     println!(
         "Figures are processor time a packet offered, and its multiple of jitter and loss. The bare loop is the one above, with Lindley's recursion over departures for the queue. The median of {} rounds in which all alternate.\n",

@@ -94,9 +94,10 @@ impl Mesh {
         if self.impaired { Self::IMPAIRMENTS } else { "" }
     }
 
-    /// The scene of that number of peers as a file, with these keys of links beside the delay.
+    /// The scene of that number of peers as a file, with these keys of links beside the delay. A profile has a delay of its own.
     #[must_use]
     pub fn text_over(peers: usize, links: &str, ticks: u64, seed: u64) -> String {
+        let delay = if links.starts_with("profile") { "" } else { "delay = \"24ms\"" };
         format!(
             r#"
             [scene]
@@ -118,7 +119,7 @@ impl Mesh {
             name = "peer1"
             hand = {{ force = {HAND_FORCE} }}
             [link]
-            delay = "24ms"
+            {delay}
             {links}
             "#,
             GAINS.stiffness, GAINS.damping, DEVICE.mass, DEVICE.damping, COUPLING.stiffness, COUPLING.damping,

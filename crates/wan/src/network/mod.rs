@@ -442,7 +442,9 @@ impl<P: Clone> Network<P> {
         // Without inner events, no engine is woken, no packet has passed another line before its link, and no packet is damaged.
         let taken = traffic.pending.take_due(*now, |Pending { at, sequence, offered, entered, turn, path, size, payload }| {
             lines.link_mut(turn.link()).deliver(entered, at);
-            payload.map(|payload| take(InNetwork { sequence, offered, entered, path, size, payload }.event(LineId::Link(turn.link()), at, Fate::Delivered(at), None)))
+            payload.map(|payload| {
+                take(InNetwork { sequence, offered, entered, path, size, payload }.event(LineId::Link(turn.link()), at, Fate::Delivered(at), None))
+            })
         });
         taken.flatten()
     }

@@ -232,6 +232,8 @@ enum StageLaw {
     Normal {
         sd_nanos: f64,
     },
+    /// Laws drawn from a normal number: lognormal and gamma.
+    FromNormal(Arc<Checked>),
     Independent(Arc<Checked>),
     /// Boxed, because few links have correlated delays and an unboxed chain would enlarge the delay stage of every link.
     Correlated(Box<Correlated>),
@@ -242,6 +244,30 @@ struct Correlated {
     checked: Arc<Checked>,
     /// Latest value of the Gaussian chain and its instant, or `None` before the first packet.
     chain: Option<(f64, Instant)>,
+    weights: Weights,
+}
+
+/// Shares of the latest value and of a fresh normal number in the next value of a Gaussian chain. Kept from packet to packet, because most streams have equal
+/// spans between packets, and a share takes an exponential.
+#[derive(Clone, Copy, Debug)]
+struct Weights {
+    /// Time since the packet before \[ns\]. Without meaning under [`Memory::PerPacket`].
+    span: u64,
+    phi: f64,
+    fresh: f64,
+}
+
+impl Weights {
+    fn new(memory: Memory, span: u64) -> Self {
+        // The law of a value stays standard normal, because φ² and the square of the fresh share add up to one.
+        let phi = match memory {
+            Memory::None => 0.0,
+            Memory::PerPacket(phi) => phi,
+            // φ = e^(−Δ/τ) of an Ornstein–Uhlenbeck process.
+            Memory::InTime { tau_nanos } => libm::exp(-nanos(Duration::from_nanos(span)) / tau_nanos),
+        };
+        Self { span, phi, fresh: fresh_share(phi) }
+    }
 }
 
 impl DelayStage {
@@ -253,18 +279,16 @@ impl DelayStage {
                 (Jitter { sd, distribution: Distribution::Normal, floor: Duration::ZERO, .. }, Memory::None) => {
                     StageLaw::Normal { sd_nanos: nanos(*sd) }
                 }
+                (Jitter { distribution: Distribution::LogNormal | Distribution::Gamma, .. }, Memory::None) => {
+                    StageLaw::FromNormal(Arc::clone(checked))
+                }
                 (_, Memory::None) => StageLaw::Independent(Arc::clone(checked)),
                 (_, Memory::PerPacket(_) | Memory::InTime { .. }) => {
-                    StageLaw::Correlated(Box::new(Correlated { checked: Arc::clone(checked), chain: None }))
+                    StageLaw::Correlated(Box::new(Correlated { checked: Arc::clone(checked), chain: None, weights: Weights::new(checked.memory, 0) }))
                 }
             },
         };
         Self { mean_nanos: u64::try_from(delay.mean.as_nanos()).unwrap_or(u64::MAX), law }
-    }
-
-    /// Returns whether a delay depends on earlier delays.
-    pub(crate) const fn remembers(&self) -> bool {
-        matches!(self.law, StageLaw::Correlated(_))
     }
 
     /// Sets the delay of later packets. A chain of correlated delays continues from its present value.
@@ -293,15 +317,11 @@ impl DelayStage {
         match &self.law {
             StageLaw::Constant => self.mean_nanos,
             StageLaw::Normal { sd_nanos } => {
-                // Nearly all normal numbers follow from the first word alone. Only numbers outside the core need further words.
-                let normal = in_the_core(word).unwrap_or_else(|| {
-                    let mut more = packet.more(purpose);
-                    outside_the_core(word, || more.next_word())
-                });
-                let deviation = sd_nanos * normal;
+                let deviation = sd_nanos * normal(purpose, word, packet);
                 // A large negative deviation ends at a delay of zero: the floor of this law.
                 self.mean_nanos.saturating_add_signed(nearest(deviation))
             }
+            StageLaw::FromNormal(checked) => at_normal(&checked.law, normal(purpose, word, packet)),
             StageLaw::Independent(_) | StageLaw::Correlated(_) => self.draw_by_law(purpose, now, word, packet),
         }
     }
@@ -312,22 +332,19 @@ impl DelayStage {
         let mut more = packet.more(purpose);
         match &mut self.law {
             StageLaw::Constant | StageLaw::Normal { .. } => self.mean_nanos,
-            StageLaw::Independent(checked) => count(checked.law.draw(word, || more.next_word())),
+            StageLaw::FromNormal(checked) | StageLaw::Independent(checked) => count(checked.law.draw(word, || more.next_word())),
             StageLaw::Correlated(correlated) => {
-                let Correlated { checked, chain } = &mut **correlated;
+                let Correlated { checked, chain, weights } = &mut **correlated;
                 let fresh = standard_normal(word, || more.next_word());
                 let z = chain.map_or(fresh, |(before, at)| {
-                    // The law of z stays standard normal, because φ² and the square of the fresh share add up to one.
-                    let phi = match checked.memory {
-                        Memory::None => 0.0,
-                        Memory::PerPacket(phi) => phi,
-                        // φ = e^(−Δ/τ) of an Ornstein–Uhlenbeck process, with Δ the time since the packet before.
-                        Memory::InTime { tau_nanos } => libm::exp(-nanos(now.saturating_duration_since(at)) / tau_nanos),
-                    };
-                    phi * before + fresh_share(phi) * fresh
+                    let span = now.as_nanos().saturating_sub(at.as_nanos());
+                    if span != weights.span && matches!(checked.memory, Memory::InTime { .. }) {
+                        *weights = Weights::new(checked.memory, span);
+                    }
+                    weights.phi * before + weights.fresh * fresh
                 });
                 *chain = Some((z, now));
-                count(checked.law.at_normal(z))
+                at_normal(&checked.law, z)
             }
         }
     }
@@ -337,8 +354,8 @@ impl DelayStage {
 #[derive(Clone, Debug)]
 pub(crate) struct CorrelatedDelays {
     marginal: Marginal,
-    phi: f64,
-    fresh_share: f64,
+    memory: Memory,
+    weights: Weights,
 }
 
 /// Law of a single delay.
@@ -349,28 +366,48 @@ enum Marginal {
 }
 
 impl CorrelatedDelays {
-    /// Returns the law of `delay` if its delays are correlated from packet to packet, and `None` otherwise.
+    /// Returns the law of `delay` if its delays are correlated, and `None` otherwise.
     pub(crate) fn new(delay: &Delay) -> Option<Self> {
         let checked = delay.jitter.as_ref()?;
-        let Memory::PerPacket(phi) = checked.memory else { return None };
+        let memory = checked.memory;
+        if memory == Memory::None {
+            return None;
+        }
         // A gamma law gets a separate form, without the choice between laws at each packet.
         let marginal = checked.law.as_gamma().map_or_else(|| Marginal::Other(Arc::clone(checked)), Marginal::Gamma);
-        Some(Self { marginal, phi, fresh_share: fresh_share(phi) })
+        Some(Self { marginal, memory, weights: Weights::new(memory, 0) })
     }
 
-    /// Returns the delay of a packet \[ns\]. `chain` is the latest value of its link's chain, or NaN before the first packet; the call replaces the value.
+    /// Returns whether the correlation depends on the time between packets.
+    pub(crate) const fn is_in_time(&self) -> bool {
+        matches!(self.memory, Memory::InTime { .. })
+    }
+
+    /// Returns the delay \[ns\] of a packet that begins to propagate `now`. `chain` is the latest value of its link's chain and the instant of the value, or NaN
+    /// before the first packet; the call replaces both.
     #[inline(always)]
-    pub(crate) fn draw_nanos(&self, chain: &mut f64, word: u64, packet: PacketDraws) -> u64 {
-        let fresh = in_the_core(word).unwrap_or_else(|| {
-            let mut more = packet.more(Purpose::Jitter);
-            outside_the_core(word, || more.next_word())
-        });
+    pub(crate) fn draw_nanos(&mut self, now: Instant, (chain, at): (&mut f64, &mut Instant), word: u64, packet: PacketDraws) -> u64 {
+        if self.is_in_time() {
+            let span = now.as_nanos().saturating_sub(at.as_nanos());
+            // Links that are offered packets together share the weights, so that they are computed once for all of them.
+            if span != self.weights.span {
+                self.weights = Weights::new(self.memory, span);
+            }
+            *at = now;
+        }
+        self.next_nanos(chain, word, packet)
+    }
+
+    /// Returns the delay of a packet \[ns\], with the present weights. `chain` is as for [`draw_nanos`](Self::draw_nanos).
+    #[inline(always)]
+    pub(crate) fn next_nanos(&self, chain: &mut f64, word: u64, packet: PacketDraws) -> u64 {
+        let fresh = normal(Purpose::Jitter, word, packet);
         // The first value has the stationary law of the chain, so no start-up transient exists.
-        *chain = if chain.is_nan() { fresh } else { self.phi * *chain + self.fresh_share * fresh };
-        count(match &self.marginal {
-            Marginal::Gamma(law) => law.at_normal(*chain),
-            Marginal::Other(checked) => checked.law.at_normal(*chain),
-        })
+        *chain = if chain.is_nan() { fresh } else { self.weights.phi * *chain + self.weights.fresh * fresh };
+        match &self.marginal {
+            Marginal::Gamma(law) => count(law.at_normal(*chain)),
+            Marginal::Other(checked) => at_normal(&checked.law, *chain),
+        }
     }
 
     /// Returns the cubics for most delays of several links at once, or `None` if the law has no cubics.
@@ -388,7 +425,7 @@ impl CorrelatedDelays {
         // A loop instead of `map`: the compiler does not inline `map` of an array here, and a call prevents vector instructions.
         let mut following = [0.0; N];
         for (following, (before, word)) in following.iter_mut().zip(chains.iter().zip(words)) {
-            *following = self.phi * before + self.fresh_share * in_the_core_or_nan(*word);
+            *following = self.weights.phi * before + self.weights.fresh * in_the_core_or_nan(*word);
         }
         following
     }
@@ -425,6 +462,21 @@ fn nearest(number: f64) -> i64 {
 fn with_room(number: f64) -> i64 {
     const ROOM: f64 = 6_755_399_441_055_744.0;
     (number + ROOM).to_bits().wrapping_sub(ROOM.to_bits()) as i64
+}
+
+/// Returns the standard normal number of a packet. Nearly all numbers follow from the first word alone. Only numbers outside the core need further words.
+#[inline(always)]
+fn normal(purpose: Purpose, word: u64, packet: PacketDraws) -> f64 {
+    in_the_core(word).unwrap_or_else(|| {
+        let mut more = packet.more(purpose);
+        outside_the_core(word, || more.next_word())
+    })
+}
+
+/// Returns the delay of a normal number as a whole number of nanoseconds.
+#[inline(always)]
+fn at_normal(law: &Law, z: f64) -> u64 {
+    law.whole_at_normal(z).unwrap_or_else(|| count(law.at_normal(z)))
 }
 
 /// Returns a delay as a whole number of nanoseconds. The delay is not negative, because no law is below its floor.

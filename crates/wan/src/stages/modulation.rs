@@ -290,6 +290,11 @@ impl ModulationStage {
         self.until = self.end_of_state(self.until);
     }
 
+    /// Returns the index of the present state.
+    pub(crate) const fn state(&self) -> usize {
+        self.state
+    }
+
     /// Returns the configuration of the present state.
     pub(crate) fn config(&self) -> &LinkConfig {
         &self.modulated.configs[self.state]

@@ -54,6 +54,7 @@ mod pareto_normal;
 mod special;
 mod standard;
 mod tail;
+mod whole;
 
 impl Distribution {
     /// Returns the name of the law.

@@ -49,8 +49,12 @@ const fn is_below(word: u64, threshold: u64) -> bool {
 }
 
 impl Chains {
-    /// Returns `None` if a loss needs more than one random word, or if the law of the delays cannot be computed for eight links at once.
+    /// Returns `None` if a loss needs more than one random word, if the correlation depends on time, or if the law of the delays cannot be computed for eight
+    /// links at once.
     pub(super) fn new(losses: &Losses, delays: &CorrelatedDelays) -> Option<Self> {
+        if delays.is_in_time() {
+            return None;
+        }
         let (leaves, loses) = match losses {
             Losses::None => ([Probability::ZERO; 2], [Probability::ZERO; 2]),
             Losses::Independent(probability) => ([Probability::ZERO; 2], [*probability; 2]),
@@ -81,7 +85,7 @@ impl Chains {
         if is_below(loss_word, self.loses[state]) {
             return Verdict::Lost;
         }
-        Verdict::Arrives(now.saturating_add_nanos(self.delays.draw_nanos(&mut states.normals[place], jitter_word, packet)))
+        Verdict::Arrives(now.saturating_add_nanos(self.delays.next_nanos(&mut states.normals[place], jitter_word, packet)))
     }
 
     /// Offers a packet to each of these neighbouring links, from number `first` on. Links with their bit set in `excluded` are left out.
@@ -150,7 +154,7 @@ impl Chains {
             // The number was noted before the count moved on.
             let packet = link.draws.packet(arrivals.sequences[place]);
             let [_, word] = packet.loss_and_jitter();
-            let at = now.saturating_add_nanos(self.delays.draw_nanos(&mut normals[place], word, packet));
+            let at = now.saturating_add_nanos(self.delays.next_nanos(&mut normals[place], word, packet));
             arrivals.at[place] = at;
             arrivals.arrive |= 1 << place;
             arrivals.overtake |= u8::from(link.count_arrival(now, until, at)) << place;

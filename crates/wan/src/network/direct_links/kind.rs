@@ -17,6 +17,8 @@ use crate::stages::queue::{EqualPackets, Load, nanos};
 pub(super) struct Kind {
     /// `true` if the links draw random numbers.
     pub(super) is_random: bool,
+    /// `true` if no packet arrives before an earlier packet. The latest arrival stands with the counters of each link.
+    pub(super) keeps_order: bool,
     loss: Losses,
     delay: Delays,
     line: Line,
@@ -44,8 +46,9 @@ enum Delays {
 pub(super) struct Remembered {
     /// Instant at which the previous packet leaves the queue.
     departure: Instant,
-    /// Latest value of the chain of delays; NaN before the first packet.
+    /// Latest value of the chain of delays, NaN before the first packet, and its instant where the correlation depends on time.
     normal: f64,
+    normal_at: Instant,
     state: GilbertElliottState,
     /// Packets without room in the queue.
     pub(super) found_full: u64,
@@ -64,18 +67,18 @@ impl Kind {
             Some(correlated) => Delays::Correlated(correlated),
             None => Delays::Independent(DelayStage::new(&config.delay)),
         };
-        let remembers_more = matches!(&delay, Delays::Independent(delay) if delay.remembers());
-        // Outages, order and some delays have state beyond `Remembered`.
-        if !config.outages.is_empty() || config.order != Order::AllowReordering || remembers_more {
+        // Outages have state beyond `Remembered`.
+        if !config.outages.is_empty() {
             return None;
         }
         let line = Line::new(config, load)?;
-        // `Chains` adds the delay to the instant of the offer, so the transmitter must take no time.
+        let keeps_order = config.order == Order::InOrder;
+        // `Chains` adds the delay to the instant of the offer, so the transmitter must take no time, and no packet may wait for another one.
         let chains = match (&delay, line) {
-            (Delays::Correlated(delays), Line::Free(0)) => Chains::new(&loss, delays),
+            (Delays::Correlated(delays), Line::Free(0)) if !keeps_order => Chains::new(&loss, delays),
             (Delays::Correlated(_) | Delays::Independent(_), _) => None,
         };
-        Some(Self { is_random: config.is_random(), loss, delay, line, chains })
+        Some(Self { is_random: config.is_random(), keeps_order, loss, delay, line, chains })
     }
 
     /// Returns whether links of this kind have state.
@@ -136,7 +139,7 @@ impl Kind {
         };
         let delay = match &mut self.delay {
             Delays::Independent(delay) => delay.draw_nanos(leaves, jitter_word, packet),
-            Delays::Correlated(delays) => delays.draw_nanos(&mut link.normal, jitter_word, packet),
+            Delays::Correlated(delays) => delays.draw_nanos(leaves, (&mut link.normal, &mut link.normal_at), jitter_word, packet),
         };
         Verdict::Arrives(leaves.saturating_add_nanos(delay))
     }
@@ -144,7 +147,8 @@ impl Kind {
 
 impl Remembered {
     /// The state of a link without state.
-    pub(super) const NOTHING: Self = Self { departure: Instant::ZERO, normal: f64::NAN, state: GilbertElliottState::Good, found_full: 0 };
+    pub(super) const NOTHING: Self =
+        Self { departure: Instant::ZERO, normal: f64::NAN, normal_at: Instant::ZERO, state: GilbertElliottState::Good, found_full: 0 };
 }
 
 impl Line {

@@ -20,3 +20,14 @@ pub(super) enum Verdict {
     /// Dropped, but not by loss. The returning function has counted the drop.
     Dropped,
 }
+
+impl Verdict {
+    /// Returns the verdict with the arrival changed by `change`.
+    #[inline(always)]
+    pub(super) fn map(self, change: impl FnOnce(Instant) -> Instant) -> Self {
+        match self {
+            Self::Arrives(at) => Self::Arrives(change(at)),
+            Self::Lost | Self::Dropped => self,
+        }
+    }
+}

@@ -3,7 +3,9 @@
 mod chains;
 mod kind;
 mod losses;
+mod switching;
 
+use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use cohaptic_units::Instant;
@@ -11,6 +13,7 @@ use cohaptic_units::Instant;
 use chains::ChainStates;
 use kind::{Kind, Line, Remembered};
 use losses::Verdict;
+use switching::Switching;
 
 use super::id::LinkId;
 use crate::fates::fate::DropCause;
@@ -24,13 +27,14 @@ use crate::stages::queue::Load;
 
 /// Links with the arrival of a packet known at its offer. Possible parts are outages, loss, a tail-drop queue before a transmitter of constant rate, a queue of
 /// any discipline without waiting packets, delay with jitter, and order. Each link is a function from a packet to its arrival, with the state for bursts of
-/// loss, correlated delays and the transmitter. All links have one [`Load`].
+/// loss, correlated delays and the transmitter. All links have one [`Load`]. A modulator may change these parts where no packet waits in any state.
 ///
 /// Random numbers, their addresses and the counters are equal to [`crate::Network`] with the same links. The queue of packets on the way is left to the driver:
 /// a driver with arrivals on a lattice can use a simpler queue. The driver gives the end of its interest, so a packet is counted as delivered or not at its
 /// offer.
 ///
-/// Links are numbered from 0 in the order of addition. A link without state takes one cache line, and most links with state take one and a half.
+/// Links are numbered from 0 in the order of addition. A link without state takes one cache line, and most links with state take 40 bytes
+/// besides.
 #[derive(Clone, Debug)]
 pub struct DirectLinks {
     /// End of the run. Packets with a later arrival do not count as delivered.
@@ -95,13 +99,20 @@ enum Memory {
 #[derive(Clone, Debug)]
 struct Other {
     direct: Direct,
-    line: Line,
-    /// Instant at which the latest packet leaves the queue.
-    departure: Instant,
+    line: OtherLine,
     /// Packets dropped in outages.
     outage: u64,
     /// Packets without room in the queue.
     found_full: u64,
+}
+
+/// Transmitter of a link of no kind.
+#[derive(Clone, Debug)]
+enum OtherLine {
+    /// A transmitter that does not change, and the instant at which the latest packet leaves the queue.
+    Constant(Line, Instant),
+    /// A transmitter that changes, with all other stages of the link, as a modulator says. Boxed, because few links have a modulator.
+    Switching(Box<Switching>),
 }
 
 impl DirectLinks {
@@ -128,7 +139,11 @@ impl DirectLinks {
     /// damage packets.
     #[must_use]
     pub fn takes(model: &LinkModel, load: Load) -> bool {
-        model.as_fixed().is_some_and(|config| config.is_direct_but_for_queue(load) && Line::new(config, load).is_some())
+        match model {
+            LinkModel::Modulated(modulated) => Switching::takes(modulated, load),
+            LinkModel::Fixed(config) => config.is_direct_but_for_queue(load) && Line::new(config, load).is_some(),
+            LinkModel::Replay(_) | LinkModel::Kernel(_) => false,
+        }
     }
 
     /// Adds a link, and returns true. If [`takes`](DirectLinks::takes) refuses the model, because the link needs an engine, nothing is added and false is
@@ -139,6 +154,13 @@ impl DirectLinks {
     /// With more than 2^32 links.
     #[must_use]
     pub fn add(&mut self, seed: u64, name: &LinkName, model: &LinkModel) -> bool {
+        if let LinkModel::Modulated(modulated) = model {
+            let Some((switching, direct)) = Switching::new(seed, name, modulated, self.load) else { return false };
+            let draws = direct.draws;
+            let memory = self.other(direct, OtherLine::Switching(Box::new(switching)));
+            self.links.push(LinkState::new(draws, memory));
+            return true;
+        }
         let Some(config) = model.as_fixed() else { return false };
         // A configuration in `kinds` was checked with its first link, and needs no second check.
         let known = self.kinds.iter().position(|(other, _)| other == config);
@@ -163,13 +185,17 @@ impl DirectLinks {
             Some((place, _)) => Memory::Plain(place),
             None => {
                 let line = Line::new(config, self.load).expect("such a link is taken");
-                let direct = Direct::new(seed, name, config);
-                self.others.push(Other { direct, line, departure: Instant::ZERO, outage: 0, found_full: 0 });
-                Memory::Other(u32::try_from(self.others.len() - 1).expect("fewer than 2^32 links fit into memory"))
+                self.other(Direct::new(seed, name, config), OtherLine::Constant(line, Instant::ZERO))
             }
         };
-        self.links.push(LinkState { draws, offered: 0, latest: Instant::ZERO, delivered: 0, delay_nanos: 0, lost: 0, memory });
+        self.links.push(LinkState::new(draws, memory));
         true
+    }
+
+    /// Adds a link of no kind, and returns its place.
+    fn other(&mut self, direct: Direct, line: OtherLine) -> Memory {
+        self.others.push(Other { direct, line, outage: 0, found_full: 0 });
+        Memory::Other(u32::try_from(self.others.len() - 1).expect("fewer than 2^32 links fit into memory"))
     }
 
     /// Offers a packet to each of `count` links from `first` on, at most [`DirectLinks::AT_ONCE`] links, and writes the fates of the packets into `arrivals`.
@@ -281,8 +307,14 @@ impl DirectLinks {
         let link = &mut self.links[place];
         let (words, draws) = (link.words(&self.kinds), link.draws.packet(link.offered));
         let verdict = match link.memory {
-            Memory::Plain(kind) => self.kinds[usize::from(kind)].1.fate(now, words, draws),
-            Memory::Remembering(kind) => self.kinds[usize::from(kind)].1.verdict(now, &mut self.remembered[place], words, draws),
+            Memory::Plain(kind) => {
+                let kind = &mut self.kinds[usize::from(kind)].1;
+                kind.fate(now, words, draws).map(|at| link.in_order(kind.keeps_order, at))
+            }
+            Memory::Remembering(kind) => {
+                let kind = &mut self.kinds[usize::from(kind)].1;
+                kind.verdict(now, &mut self.remembered[place], words, draws).map(|at| link.in_order(kind.keeps_order, at))
+            }
             Memory::Chained(kind) => match &self.kinds[usize::from(kind)].1.chains {
                 Some(chains) => chains.verdict(now, &mut self.chained, place, words, draws),
                 None => unreachable!("links of its kind have chains"),
@@ -342,12 +374,24 @@ impl DirectLinks {
 
 impl Other {
     fn verdict(&mut self, now: Instant, number: u64, words: Words) -> Verdict {
-        let Self { direct, line, departure, .. } = self;
+        let Self { direct, line, .. } = self;
         // The queue stands between loss and delay, as in the general pipeline.
-        let fate = direct.offer_through(now, number, words, |now| match line {
-            Line::Free(nanos) => Ok(now.saturating_add_nanos(*nanos)),
-            Line::Queued(queue) => queue.offer(now, departure).ok_or(DropCause::QueueFull),
-        });
+        let fate = match line {
+            OtherLine::Constant(line, departure) => direct.offer_through(now, number, words, |now| match line {
+                Line::Free(nanos) => Ok(now.saturating_add_nanos(*nanos)),
+                Line::Queued(queue) => queue.offer(now, departure).ok_or(DropCause::QueueFull),
+            }),
+            OtherLine::Switching(switching) => {
+                switching.pass(now, direct);
+                match direct.dropped(now, number, words) {
+                    Some(cause) => Err(cause),
+                    None => {
+                        let leaves = switching.departure(now, direct);
+                        Ok(direct.arrival(leaves, number, words))
+                    }
+                }
+            }
+        };
         match fate {
             Ok(at) => Verdict::Arrives(at),
             Err(DropCause::Outage) => {
@@ -399,6 +443,7 @@ fn alike<const REMEMBER: bool>(
             link.offered += 1;
             match verdict {
                 Verdict::Arrives(arrival) => {
+                    let arrival = link.in_order(kind.keeps_order, arrival);
                     arrivals.at[place] = arrival;
                     arrive |= bit;
                     overtake |= if link.count_arrival(now, until, arrival) { bit } else { 0 };
@@ -436,6 +481,11 @@ impl Arrivals {
 }
 
 impl LinkState {
+    /// Returns a link that was offered no packet.
+    const fn new(draws: Stream, memory: Memory) -> Self {
+        Self { draws, offered: 0, latest: Instant::ZERO, delivered: 0, delay_nanos: 0, lost: 0, memory }
+    }
+
     /// Counts a packet, and returns the packet's arrival and whether the packet overtakes. Returns `None` if the packet does not arrive.
     #[inline(always)]
     fn count(&mut self, now: Instant, until: Instant, verdict: Verdict) -> Option<(Instant, bool)> {
@@ -448,6 +498,12 @@ impl LinkState {
             }
             Verdict::Dropped => None,
         }
+    }
+
+    /// Returns the arrival of a packet, not before an earlier packet if `keeps_order` is set.
+    #[inline(always)]
+    fn in_order(&self, keeps_order: bool, at: Instant) -> Instant {
+        if keeps_order { at.max(self.latest) } else { at }
     }
 
     /// Counts the arrival of a packet, and returns whether the packet overtakes an earlier packet.

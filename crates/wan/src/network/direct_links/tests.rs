@@ -4,11 +4,14 @@ use cohaptic_units::{Bytes, Probability, Rate};
 
 use super::*;
 use crate::laws::delay::Distribution;
+use crate::laws::sojourn::Sojourn;
 use crate::link::Link;
 use crate::netem::Netem;
 use crate::packet::PacketInfo;
 use crate::stages::config::Layout;
 use crate::stages::delay::{Correlation, Delay, Jitter};
+use crate::stages::modulation::{Modulated, Modulator, ModulatorState};
+use crate::stages::order::Order;
 use crate::stages::queue::{Bottleneck, CoDel, Discipline, Framing, QueueLimit, Red, TokenBucket, nanos};
 
 /// Packets of 64 bytes, with any gaps.
@@ -36,6 +39,33 @@ const DIRECT: [&str; 9] = [
     "delay 24ms 4ms 50% loss gemodel 5% 20% 30% 2%",
     "delay 24ms 4ms 50%",
 ];
+
+/// The same links in order, with and without a queue: a packet arrives with the latest packet before it at the earliest.
+#[test]
+fn links_in_order_decide_what_whole_links_decide() {
+    let in_order = |model: LinkModel| LinkModel::from(LinkConfig { order: Order::InOrder, ..model.as_fixed().unwrap().clone() });
+    let direct = DIRECT.map(|words| in_order(model(words)));
+    let full =
+        ["delay 24ms 9ms loss 10%", "delay 24ms 4ms 50% loss gemodel 5% 20%"].map(|words| in_order(queued(words, Some(QueueLimit::Packets(3)))));
+    // Correlated in time, over packets at distances of 8 and 4 ms and, where some are left out, of more.
+    let in_time = [Distribution::LogNormal, Distribution::Gamma, Distribution::Uniform].map(|law| {
+        let correlation = Correlation::InTime(Duration::from_millis(50));
+        let jitter = Jitter { correlation, ..Jitter::new(Duration::from_millis(9), law) };
+        let delay = Delay::with_jitter(Duration::from_millis(24), jitter).unwrap();
+        let LinkModel::Fixed(config) = model("loss 10%") else { panic!("words are a configuration") };
+        LinkModel::from(LinkConfig { delay, ..config })
+    });
+    compare(&direct[..8]);
+    compare(&full);
+    compare(&in_time);
+    compare(&in_time.clone().map(in_order));
+    for model in &in_time {
+        compare(&[const { None }; 8].map(|_: Option<()>| model.clone()));
+    }
+    for model in direct.into_iter().chain(full) {
+        compare(&[const { None }; 8].map(|_: Option<()>| model.clone()));
+    }
+}
 
 #[test]
 fn they_decide_what_whole_links_decide() {
@@ -132,6 +162,52 @@ fn chains_decide_what_whole_links_decide() {
         compare(&[const { None }; 8].map(|_: Option<()>| model.clone()));
         compare(&[const { None }; 11].map(|_: Option<()>| model.clone()));
         compare(&[DIRECT.map(self::model).as_slice(), &[model.clone(), model]].concat());
+    }
+}
+
+/// Links that change with a modulator: the rate, also while a packet is in transmission, the law of the delay, the losses, and the order. Packets come every
+/// 6 ms, and each takes at most 5.12 ms. The links of one modulator change together.
+#[test]
+fn links_with_a_modulator_decide_what_whole_links_decide() {
+    let load = Load { gap: Duration::from_millis(6), ..OF_TESTS };
+    let config = |words: &str, rate: Option<u64>, order: Order| {
+        let bottleneck =
+            rate.map(|rate| Bottleneck { limit: Some(QueueLimit::Packets(0)), ..Bottleneck::at_rate(Rate::bits_per_sec(rate).unwrap()) });
+        let config = Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap();
+        LinkConfig { bottleneck, layout: Layout::Physical, order, ..config }
+    };
+    let modulated = |name: &str, sojourn: Sojourn, configs: Vec<LinkConfig>| {
+        let states = configs.len();
+        let state =
+            |place: usize| ModulatorState { sojourn: Some(sojourn), next: (0..states).map(|next| f64::from(u8::from(next != place))).collect() };
+        LinkModel::from(Modulated::new(Modulator::new(name, (0..states).map(state).collect()).unwrap(), configs).unwrap())
+    };
+    let (jumps, keeps) = (Order::AllowReordering, Order::InOrder);
+    let walk = |order| [100_000, 250_000, 800_000].map(|rate| config("delay 24ms", Some(rate), order)).to_vec();
+    let laws = vec![
+        config("delay 24ms 9ms loss 10%", None, keeps),
+        config("delay 5ms", None, keeps),
+        config("delay 24ms 4ms 50% loss gemodel 5% 20% 30% 2%", None, keeps),
+        config("delay 20ms 5ms distribution normal loss state 5% 20%", None, jumps),
+    ];
+    let stops = vec![config("delay 24ms 9ms", Some(100_000), jumps), config("delay 5ms loss 50%", None, jumps)];
+    let links = [
+        // A state lasts for 17 ms, so that every third change falls into a transmission.
+        modulated("walk", Sojourn::Fixed(Duration::from_millis(17)), walk(jumps)),
+        modulated("walk", Sojourn::Fixed(Duration::from_millis(17)), walk(keeps)),
+        modulated("fast", Sojourn::Exponential(Duration::from_millis(7)), walk(keeps)),
+        modulated("laws", Sojourn::Exponential(Duration::from_millis(40)), laws),
+    ];
+    compare_under(load, &links);
+    for link in links {
+        compare_under(load, &[const { None }; 8].map(|_: Option<()>| link.clone()));
+    }
+    // One state has a rate and the other none; a packet takes the whole gap but for half a microsecond; a state lasts for less than a gap.
+    let stops = modulated("stops", Sojourn::Fixed(Duration::from_millis(17)), stops);
+    let slow = modulated("slow", Sojourn::Fixed(Duration::from_millis(17)), vec![config("", Some(85_340), jumps), config("", Some(100_000), jumps)]);
+    let flaps = modulated("flaps", Sojourn::Fixed(Duration::from_millis(5)), walk(jumps));
+    for refused in [stops, slow, flaps] {
+        assert!(!DirectLinks::takes(&refused, load), "{}", refused.words());
     }
 }
 

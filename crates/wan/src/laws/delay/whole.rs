@@ -1,0 +1,132 @@
+//! Delays in whole nanoseconds, for laws whose delays take long to compute to the last digit.
+//!
+//! A delay of a link is rounded to a nanosecond. A delay with a small error therefore suffices wherever it is further than the error from the half between two
+//! whole numbers. For the few other delays, the caller computes the delay itself and rounds it, so that the answer is the same in every case.
+
+use super::Law;
+use super::standard::Standard;
+
+/// Least distance from a half \[ns\]. One delay in five hundred is closer.
+const MARGIN: f64 = 1.0 / 1024.0;
+/// Bounds of lognormal and gamma delays \[ns\]. Below the bound, a relative error of 10⁻¹⁴ or of 10⁻¹² is less than half of the margin.
+const LARGEST: [f64; 2] = [4e10, 4e8];
+/// 1.5·2^52. The sum with a smaller number leaves no bits for a fraction.
+const ROOM: f64 = 6_755_399_441_055_744.0;
+
+impl Law {
+    /// Returns [`Law::at_normal`], rounded to a whole number, or `None` where that is not certain without computing the delay itself. The law is in
+    /// nanoseconds.
+    #[inline(always)]
+    pub(crate) fn whole_at_normal(&self, z: f64) -> Option<u64> {
+        let (x, largest) = match &self.fit.standard {
+            Standard::LogNormal { sigma } => (exp_nearly(sigma * z), LARGEST[0]),
+            Standard::Gamma(map) => (map.nearly(z), LARGEST[1]),
+            Standard::Constant
+            | Standard::Normal
+            | Standard::Uniform
+            | Standard::Pareto
+            | Standard::ParetoNormal
+            | Standard::Laplace
+            | Standard::Weibull { .. }
+            | Standard::Empirical(_)
+            | Standard::Table(_) => return None,
+        };
+        let delay = self.fit.origin + self.fit.scale * x;
+        let nearest = delay + ROOM;
+        // A NaN fails the first comparison.
+        let is_certain = delay < largest && (delay - (nearest - ROOM)).abs() < 0.5 - MARGIN;
+        is_certain.then(|| nearest.to_bits().wrapping_sub(ROOM.to_bits()))
+    }
+}
+
+/// 2^(n/16) for n from 0 to 15.
+const ROOTS: [f64; 16] = [
+    1.0,
+    1.044_273_782_427_413_8,
+    1.090_507_732_665_257_7,
+    1.138_788_634_756_691_6,
+    1.189_207_115_002_721,
+    1.241_857_812_073_484,
+    1.296_839_554_651_009_6,
+    1.354_255_546_936_892_7,
+    1.414_213_562_373_095_1,
+    1.476_826_145_939_499_3,
+    1.542_210_825_407_940_7,
+    1.610_490_331_949_254_3,
+    1.681_792_830_507_429,
+    1.756_252_160_373_299_5,
+    1.834_008_086_409_342_4,
+    1.915_206_561_397_147_4,
+];
+
+/// Returns eˣ with a relative error below 10⁻¹⁴, or NaN beyond ±700.
+#[inline(always)]
+pub(super) fn exp_nearly(x: f64) -> f64 {
+    // ln 2/16 in two parts. The upper part has so few bits that its product with k is exact.
+    const STEP_HIGH: f64 = 0.043_321_697_041_392_326;
+    const STEP_LOW: f64 = 1.743_604_255_483_596_6e-9;
+    const STEPS_A_UNIT: f64 = 23.083_120_654_223_414;
+    // x = k·ln 2/16 + r, where |r| is at most 0.022.
+    let sum = x * STEPS_A_UNIT + ROOM;
+    let k = sum - ROOM;
+    let r = (x - k * STEP_HIGH) - k * STEP_LOW;
+    let r2 = r * r;
+    // The first omitted term of the series is below 10⁻¹⁵. Pairs are added first, with less latency than Horner's rule.
+    let series = ((1.0 + r) + (1.0 / 2.0 + r * (1.0 / 6.0)) * r2) + ((1.0 / 24.0 + r * (1.0 / 120.0)) + r2 * (1.0 / 720.0)) * (r2 * r2);
+    // The lower bits of `sum` hold k, whose upper part is added to the exponent of a number between ½ and 4.
+    let k = sum.to_bits().wrapping_sub(ROOM.to_bits()).cast_signed();
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 15")]
+    let root = ROOTS[(k & 15) as usize];
+    let power = f64::from_bits((root * series).to_bits().wrapping_add((k >> 4).cast_unsigned() << 52));
+    // A NaN fails the comparison.
+    if x.abs() < 700.0 { power } else { f64::NAN }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Distribution;
+    use super::*;
+    use crate::random::{Purpose, Stream, unit};
+
+    #[test]
+    fn the_exponential_is_near_the_exact_one() {
+        let drawn = (0..200_000).map(|number| 1400.0 * unit(Stream::new(3, b"exp").packet(number).first(Purpose::Jitter)) - 700.0);
+        let small = (0..2_000).map(|number| f64::from(number - 1_000) / 1_000.0);
+        for x in drawn.chain(small).chain([0.0, 699.9, -699.9]) {
+            let error = exp_nearly(x) / libm::exp(x) - 1.0;
+            assert!(error.abs() < 1e-14, "{x}: {error:e}");
+        }
+        for x in [f64::NAN, 700.0, -700.0, f64::INFINITY, f64::NEG_INFINITY] {
+            assert!(exp_nearly(x).is_nan(), "{x}");
+        }
+    }
+
+    /// Delays of lognormal and gamma laws of all widths, the narrowest and the widest among them, over the whole range of normal numbers.
+    #[test]
+    fn whole_delays_are_rounded_delays() {
+        let numbers: Vec<f64> =
+            (0..200_000).map(|number| 17.0 * unit(Stream::new(7, b"whole").packet(number).first(Purpose::Jitter)) - 8.5).collect();
+        for (distribution, mean, sd, floor, usual) in [
+            (Distribution::LogNormal, 44.3e6, 98.89e6, 1.5e6, 0.98),
+            (Distribution::LogNormal, 24e6, 2e6, 20e6, 0.99),
+            (Distribution::LogNormal, 24e6, 2e9, 0.0, 0.9),
+            (Distribution::Gamma, 11.35e6, 6.3e6, 9.95e6, 0.99),
+            (Distribution::Gamma, 24e6, 2e6, 0.0, 0.99),
+            (Distribution::Gamma, 24e6, 2.4e9, 0.0, 0.97),
+            (Distribution::Gamma, 20e6, 20e6, 0.0, 0.99),
+        ] {
+            let law = Law::new(&distribution, mean, sd, Some(floor)).unwrap();
+            let (mut known, mut all) = (0, 0);
+            for z in numbers.iter().copied().chain([-40.0, 40.0, f64::NAN]) {
+                let found = law.whole_at_normal(z);
+                if let Some(found) = found {
+                    assert_eq!(found, libm::rint(law.at_normal(z)) as u64, "{z} around {mean} ± {sd}");
+                }
+                let is_usual = z.abs() < 3.0;
+                (known, all) = (known + u32::from(is_usual && found.is_some()), all + u32::from(is_usual));
+            }
+            assert!(f64::from(known) > usual * f64::from(all), "{known} of {all} around {mean} ± {sd}");
+        }
+        assert_eq!(Law::new(&Distribution::Pareto, 24e6, 2e6, None).unwrap().whole_at_normal(0.0), None);
+    }
+}
