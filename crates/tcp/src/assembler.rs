@@ -48,7 +48,7 @@ struct Held {
 
 impl Assembler {
     /// Takes in `data`, whose first octet is at `start`. Moves `next`, the position of the first missing octet, over all octets now in order.
-    pub(crate) fn insert(&mut self, next: &mut Position, start: Position, data: Bytes) {
+    pub(crate) fn insert(&mut self, next: &mut Position, start: Position, mut data: Bytes) {
         let end = start + data.len() as u64;
         if end <= *next {
             return;
@@ -68,7 +68,9 @@ impl Assembler {
             self.remember(start);
             return;
         }
-        self.hold(data.slice(offset(*next)..));
+        let known = offset(*next);
+        data.advance(known);
+        self.hold(data);
         *next = end;
         if !self.ranges.is_empty() {
             self.join(next);
@@ -100,13 +102,14 @@ impl Assembler {
     /// Moves the pieces from `next` up to the first gap to the octets in order.
     fn join(&mut self, next: &mut Position) {
         while let Some(first) = self.pieces.first_entry().filter(|first| first.key() <= next) {
-            let (start, piece) = first.remove_entry();
+            let (start, mut piece) = first.remove_entry();
             self.waiting -= piece.len();
             self.waiting_memory -= memory::of_received(piece.len()).0;
             // The data in order may have ended inside this piece: its first `known` octets are already there.
             let known = usize::try_from(*next - start).map_or(piece.len(), |known| known.min(piece.len()));
             *next += (piece.len() - known) as u64;
-            self.hold(piece.slice(known..));
+            piece.advance(known);
+            self.hold(piece);
         }
         self.ranges.remove_below(*next);
         if self.ranges.is_empty() {

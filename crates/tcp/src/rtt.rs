@@ -58,11 +58,12 @@ impl RoundTrips {
 
     /// Returns SRTT + 4·RTTVAR within the bounds of `config`, without doubling. Before the first sample, returns the initial timeout.
     pub(crate) fn base_timeout(&self, config: &TcpConfig) -> Duration {
-        let timeout = match self.srtt() {
-            Some(srtt) => srtt + Duration::from_nanos(self.var_4).max(config.least_variance),
-            None => config.initial_timeout,
+        // In whole nanoseconds, because every segment asks for the timeout, and sums of `Duration`s carry between seconds and nanoseconds.
+        let timeout = match self.srtt_8 / 8 {
+            0 => nanos(config.initial_timeout),
+            srtt => srtt + self.var_4.max(nanos(config.least_variance)),
         };
-        timeout.clamp(config.least_timeout, config.greatest_timeout)
+        Duration::from_nanos(timeout.clamp(nanos(config.least_timeout), nanos(config.greatest_timeout)))
     }
 
     /// Returns the timeout with its doublings, at most the greatest timeout of `config`.

@@ -312,11 +312,19 @@ impl<E: Event> EventQueue<E> {
         let mut events = core::mem::take(&mut self.ring[place]);
         self.brought = (self.brought.0 + 1, self.brought.1 + events.len() as u64);
         let mut few = [0; FEW];
-        let sorted = sort(&mut events, &mut few);
-        if sorted.windows(2).any(|pair| pair[0] >> 32 == pair[1] >> 32) {
-            // Words sort by instant and then by index in the slab. Keys are read from the slab only in the rare case of two equal instants.
-            sorted.sort_unstable_by_key(|packed| self.slab.key(place_of(*packed)));
-        }
+        let is_tie = |pair: &[Packed]| pair[0] >> 32 == pair[1] >> 32;
+        let sorted = if events.windows(2).any(is_tie) {
+            // Events of one instant, such as a flight of segments, are pushed in few ascending runs of keys. A stable sort merges the runs.
+            events.sort_by_key(|packed| self.slab.key(place_of(*packed)));
+            &mut events
+        } else {
+            let sorted = sort(&mut events, &mut few);
+            if sorted.windows(2).any(is_tie) {
+                // Words sort by instant and then by index in the slab. Keys are read from the slab only for two equal instants.
+                sorted.sort_unstable_by_key(|packed| self.slab.key(place_of(*packed)));
+            }
+            sorted
+        };
         let start = bucket << self.width;
         self.front.extend(sorted.iter().map(|&packed| (Instant::from_nanos(start + (packed >> 32)), place_of(packed))));
         // Buckets without any event so far have no memory to keep.

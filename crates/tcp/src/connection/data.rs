@@ -83,8 +83,9 @@ impl Connection {
         } else {
             self.receive.pushed = (self.receive.pushed + 1).min(2);
         }
-        let timeout = self.round_trips.base_timeout(&self.config);
-        let was_idle = self.receive.last_data_at.is_none_or(|at| now.saturating_duration_since(at) > timeout);
+        // Most segments arrive with the segment before.
+        let is_pause = |at: Instant| at != now && now.saturating_duration_since(at) > self.round_trips.base_timeout(&self.config);
+        let was_idle = self.receive.last_data_at.is_none_or(is_pause);
         // After a pause of more than a timeout, the peer has a small window again and needs quick acknowledgements to let the window grow.
         if was_idle {
             self.receive.quick = self.config.quick_acks;

@@ -61,9 +61,10 @@ pub(super) struct Tcp {
     listeners: Slots<Listener>,
     /// Connections that packets can find.
     routes: BTreeMap<Route, ConnId>,
+    /// Entry of `routes` that was found last.
+    latest: Option<(Route, ConnId)>,
     ports: ports::Ports,
-    /// Deadlines of connections; at most one entry per connection.
-    timers: BTreeSet<(Instant, NodeId, ConnId)>,
+    timers: timers::Timers,
     /// Connections in TIME-WAIT, roughly sorted by its end. The end has no visible effect, and so is no event.
     time_waits: VecDeque<(Instant, ConnId)>,
     /// Packets that do not leave their host, with the host, in the order of sending.
@@ -93,8 +94,10 @@ struct End {
     listener: Option<ListenId>,
     /// Port to which the socket of the connection was bound.
     hold: Option<HoldId>,
-    /// Deadline of the entry in [`Tcp::timers`], if there is an entry.
-    timer: Option<Instant>,
+    /// Next deadline of the connection.
+    due: Option<Instant>,
+    /// Instant of the entry in [`Tcp::timers`], if there is an entry: not after `due`.
+    entry: Option<Instant>,
     is_in_time_wait: bool,
     gone: Option<Gone>,
     /// Bytes of this end in [`Held`](crate::wire::Held).
@@ -138,8 +141,9 @@ impl Tcp {
             connections: Slots::default(),
             listeners: Slots::default(),
             routes: BTreeMap::new(),
+            latest: None,
             ports: ports::Ports::new(hosts),
-            timers: BTreeSet::new(),
+            timers: Default::default(),
             time_waits: VecDeque::new(),
             loopback: VecDeque::new(),
             calls: 0,
@@ -169,14 +173,26 @@ impl Tcp {
             linger: None,
             listener: None,
             hold: None,
-            timer: None,
+            due: None,
+            entry: None,
             is_in_time_wait: false,
             gone: None,
             counted: 0,
             looked_at: (u64::MAX, None),
         })));
         self.routes.insert(route, id);
+        self.latest = None;
         id
+    }
+
+    /// Returns the connection that packets of `route` find. Packets mostly arrive in flights of one connection, so the latest answer is tried first.
+    fn routed(&mut self, route: &Route) -> Option<ConnId> {
+        if let Some((_, id)) = self.latest.filter(|(latest, _)| latest == route) {
+            return Some(id);
+        }
+        let id = *self.routes.get(route)?;
+        self.latest = Some((*route, id));
+        Some(id)
     }
 
     /// Removes the route of a connection, so that packets no longer find the connection.
@@ -186,6 +202,7 @@ impl Tcp {
         // The route may belong to a newer connection with the same addresses by now.
         if self.routes.get(&route) == Some(&id) {
             self.routes.remove(&route);
+            self.latest = None;
         }
     }
 
@@ -219,7 +236,7 @@ impl Core {
     /// Removes an end with its route, timer and port.
     fn remove_connection(&mut self, id: ConnId) {
         self.tcp.unroute(id);
-        self.tcp.set_timer(id, None);
+        self.tcp.remove_timer(id);
         let Some(end) = self.tcp.connections.remove(id.0) else { return };
         self.wire.held.remove(Where::Streams, end.counted);
         end.hold.into_iter().for_each(|hold| self.tcp.ports.release(hold));

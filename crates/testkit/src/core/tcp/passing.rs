@@ -37,7 +37,7 @@ impl Core {
         // Only an opening segment may find a listener.
         let listener = if is_first(segment) { self.listener_at(host, segment.destination) } else { None };
         let route = super::route(host, segment.destination, segment.source);
-        if let Some(id) = self.tcp.routes.get(&route).copied() {
+        if let Some(id) = self.tcp.routed(&route) {
             let (now, end) = (self.now(), self.tcp.end(id));
             if let (Some(waited_at), State::SynReceived, false) = (end.listener, end.machine.state(), segment.flags.has(Flags::RST)) {
                 self.check_backlog(waited_at)?;
@@ -76,9 +76,8 @@ impl Core {
             let Some(receiver) = self.plan.owner_node(to).filter(|_| self.plan.of(host).has(from)) else { return };
             Path { from: host, to: receiver }
         };
-        let packet = self.wire.next_packet(path);
         let addresses = Ends::new(segment.source, segment.destination, Kind::Segment);
-        let happening = self.wire.recording().traces.then(|| self.described(packet, connection, &segment));
+        let happening = self.wire.recording().traces.then(|| self.described(self.wire.next_packet(path), connection, &segment));
         let is_capable = segment.ecn != Ecn::NotCapable;
         let parcel = self.spare.wrapped(addresses, segment, is_capable);
         // A segment over a path that is cut is lost like any other packet.

@@ -36,6 +36,11 @@ impl<T> Slots<T> {
         self.places.get(place)?.as_ref()
     }
 
+    /// Like [`Slots::find`], to change the value.
+    pub(super) fn find_mut(&mut self, place: usize) -> Option<&mut T> {
+        self.places.get_mut(place)?.as_mut()
+    }
+
     pub(super) fn remove(&mut self, place: usize) -> Option<T> {
         let value = self.places[place].take();
         if value.is_some() {

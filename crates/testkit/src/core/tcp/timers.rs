@@ -1,31 +1,73 @@
 //! Timers of connections, and the removal of connections whose TIME-WAIT has ended.
 
+use std::collections::BTreeSet;
+
 use cohaptic_tcp::State;
 use cohaptic_units::Instant;
+use cohaptic_wan::NodeId;
 
 use super::{ConnId, Core, Tcp};
 
+/// Deadlines of connections, sorted by time, host and connection.
+///
+/// Most deadlines move on with each segment, and few are reached. So the entry of a connection may lie before its deadline: such an entry moves when it comes to
+/// the front. A deadline that moves back moves its entry at once, so that no entry lies after its deadline.
+#[derive(Debug, Default)]
+pub(super) struct Timers(BTreeSet<(Instant, NodeId, ConnId)>);
+
 impl Tcp {
+    /// Sets the deadline of a connection.
     pub(super) fn set_timer(&mut self, id: ConnId, due: Option<Instant>) {
-        let Some(end) = self.connections.find(id.0) else { return };
-        let (host, before) = (end.host, end.timer);
-        if before == due {
-            return;
+        let end = self.connections.get_mut(id.0);
+        end.due = due;
+        if due.is_some_and(|due| end.entry.is_none_or(|entry| due < entry)) {
+            self.move_entry(id);
         }
+    }
+
+    /// Removes the entry of a connection with its deadline.
+    pub(super) fn remove_timer(&mut self, id: ConnId) {
+        if let Some(end) = self.connections.find_mut(id.0) {
+            end.due = None;
+            self.move_entry(id);
+        }
+    }
+
+    /// Moves the entry of a connection to its deadline, or removes the entry if there is no deadline.
+    fn move_entry(&mut self, id: ConnId) {
+        let end = self.connections.get_mut(id.0);
+        let before = std::mem::replace(&mut end.entry, end.due);
         if let Some(before) = before {
-            self.timers.remove(&(before, host, id));
+            self.timers.0.remove(&(before, end.host, id));
         }
-        if let Some(due) = due {
-            self.timers.insert((due, host, id));
+        if let Some(due) = end.due {
+            self.timers.0.insert((due, end.host, id));
         }
-        self.end_mut(id).timer = due;
+    }
+
+    /// Returns the first deadline and its connection.
+    fn first_timer(&mut self) -> Option<(Instant, ConnId)> {
+        loop {
+            let (at, _, id) = *self.timers.0.first()?;
+            if self.end(id).due == Some(at) {
+                return Some((at, id));
+            }
+            self.move_entry(id);
+        }
+    }
+
+    /// Returns all deadlines, in their order.
+    fn all_timers(&mut self) -> Vec<(Instant, NodeId, ConnId)> {
+        let old: Vec<_> = self.timers.0.iter().filter(|(at, _, id)| self.end(*id).due != Some(*at)).map(|(.., id)| *id).collect();
+        old.into_iter().for_each(|id| self.move_entry(id));
+        self.timers.0.iter().copied().collect()
     }
 }
 
 impl Core {
     /// Returns the next event. `others` is the next event of the network and of the timers of programs.
     pub(in crate::core) fn with_tcp_timers(&mut self, others: Option<Instant>) -> Option<Instant> {
-        let first = self.tcp.timers.first().map(|(at, ..)| *at);
+        let first = self.tcp.first_timer().map(|(at, _)| at);
         // Only probes of stuck connections are left. They would let time pass for ever, so the run counts as having no event.
         match (first, others) {
             (Some(_), None) if self.is_stuck() => None,
@@ -40,16 +82,15 @@ impl Core {
     /// A connection must have been seen twice with a different deadline since the last call: the deadline moves when a probe was answered.
     fn is_stuck(&mut self) -> bool {
         let calls = self.tcp.calls;
-        let Tcp { timers, connections, .. } = &mut self.tcp;
         let mut is_stuck = true;
-        for (at, _, id) in &*timers {
-            let end = connections.get_mut(id.0);
+        for (at, _, id) in self.tcp.all_timers() {
+            let end = self.tcp.end_mut(id);
             // A connection that no program holds gives up by itself, so it is not stuck.
             let is_answered = end.is_held && (end.machine.is_held_by_window() || end.machine.is_only_kept_alive());
             if !is_answered || end.looked_at.0 != calls {
-                end.looked_at = (calls, Some(*at));
+                end.looked_at = (calls, Some(at));
             }
-            is_stuck &= is_answered && end.looked_at != (calls, Some(*at));
+            is_stuck &= is_answered && end.looked_at != (calls, Some(at));
             if !is_answered {
                 break;
             }
@@ -60,14 +101,14 @@ impl Core {
     /// Fires the timers that are due, sorted by time, host and connection.
     pub(in crate::core) fn fire_tcp_timers(&mut self) {
         let now = self.now();
-        if self.tcp.timers.first().is_none_or(|(at, ..)| *at > now) {
+        if self.tcp.first_timer().is_none_or(|(at, _)| at > now) {
             return;
         }
         // Tokio's clock may have jumped to a timer that the test bed does not know. Connections that are stuck stay so until a program calls.
         if self.wire.next().is_none() && self.timers.next().is_none() && self.is_stuck() {
             return;
         }
-        while let Some((_, _, id)) = self.tcp.timers.first().copied().filter(|(at, ..)| *at <= now) {
+        while let Some((_, id)) = self.tcp.first_timer().filter(|(at, _)| *at <= now) {
             self.tcp.set_timer(id, None);
             let end = self.tcp.end_mut(id);
             end.machine.handle_timeout(now);
@@ -97,5 +138,40 @@ impl Core {
                 None => {}
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use cohaptic_tcp::{Connection, TcpConfig};
+
+    use super::*;
+
+    /// Deadlines move on, move back and vanish, and mostly change several times before anybody asks for the first one.
+    #[test]
+    fn the_first_deadline_is_the_least_of_all() {
+        const COUNT: usize = 5;
+        let mut tcp = Tcp::new(1, COUNT);
+        let address = "10.0.0.1:1".parse().unwrap();
+        let connection = || Connection::connect(Instant::ZERO, TcpConfig::default(), address, address, 0).unwrap();
+        let ids: Vec<ConnId> = (0..COUNT).map(|host| tcp.insert(NodeId::new(host), connection())).collect();
+        let mut dues = [None; COUNT];
+        let mut state = 1u32;
+        for _ in 0..5000 {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let draw = (state >> 4) as usize;
+            let (index, is_none, at) = (draw % COUNT, draw / 5 % 4 == 0, draw / 20 % 50);
+            dues[index] = (!is_none).then_some(Instant::from_nanos(at as u64));
+            tcp.set_timer(ids[index], dues[index]);
+            let mut all: Vec<_> = (0..COUNT).filter_map(|index| Some((dues[index]?, NodeId::new(index), ids[index]))).collect();
+            all.sort_unstable();
+            match draw / 1000 % 8 {
+                0 => assert_eq!(tcp.all_timers(), all),
+                1 | 2 => assert_eq!(tcp.first_timer(), all.first().map(|(at, _, id)| (*at, *id))),
+                _ => {}
+            }
+        }
+        ids.into_iter().for_each(|id| tcp.remove_timer(id));
+        assert!(tcp.timers.0.is_empty() && tcp.first_timer().is_none());
     }
 }
