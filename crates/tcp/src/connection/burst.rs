@@ -63,25 +63,35 @@ impl Connection {
         u32::try_from(by_rate.max(2)).unwrap_or(u32::MAX)
     }
 
-    /// Returns the number of segments in the burst that begins now: what the windows and the data allow, at most half of the congestion window, and at most
-    /// what fits into half of the peer's largest window (`tcp_bound_to_half_wnd`).
-    fn burst_length(&self) -> u32 {
-        let mss = self.segment_size().max(1) as u64;
+    /// Returns the most segments of the burst that begins now: what the rate and the congestion window allow, at most half of the congestion window.
+    fn quota(&self) -> u32 {
         let window = self.congestion.window;
         let quota = window.saturating_sub(self.send.board.in_flight()).min((window / 2).max(1));
+        quota.min(self.longest_burst(self.segment_size().max(1) as u64)).max(1)
+    }
+
+    /// Returns the number of segments in the burst that begins now: at most `quota`, and what the peer's window and the data allow.
+    fn burst_length(&self, quota: u32) -> u32 {
+        let mss = self.segment_size().max(1) as u64;
         let (unsent, open) = (self.send.buffer.end().saturating_sub(self.send.next), self.send.window_end().saturating_sub(self.send.next));
         // A last segment below the full size belongs to the burst if neither the window nor Nagle's algorithm holds it back.
         let takes_rest = unsent <= open && (self.config.nodelay || self.send.is_shut || self.send.small_end <= self.send.una);
         let segments = if takes_rest { unsent.div_ceil(mss) } else { unsent.min(open) / mss };
-        let by_octets = u32::try_from(segments.min(self.half_window() / mss)).unwrap_or(u32::MAX);
-        quota.min(self.longest_burst(mss)).min(by_octets).max(1)
+        // What leaves while the program writes is one buffer, of at most half of the peer's largest window (`tcp_bound_to_half_wnd`). Later a buffer takes
+        // octets of the next one (`tcp_grow_skb`).
+        let most = if self.send.pushes.is_writing { self.half_window() / mss } else { u64::MAX };
+        u32::try_from(segments.min(most)).unwrap_or(u32::MAX).min(quota).max(1)
     }
 
     /// Notes that the new segment from `start` to `end` leaves at `now`. Returns whether the segment is the last of a burst, and whether the burst has several
     /// segments. Called before the segment counts as sent.
     pub(super) fn ends_burst(&mut self, now: Instant, start: Position, end: Position) -> (bool, bool) {
         if self.send.burst.is_over(now, start) {
-            self.send.burst = Burst::begin(now, start, self.burst_length());
+            let quota = self.quota();
+            self.send.burst = Burst::begin(now, start, self.burst_length(quota));
+            if !self.send.pushes.is_writing {
+                self.send.pushes.grow(start + u64::from(quota) * self.segment_size() as u64, self.send.buffer.end());
+            }
         }
         (self.send.burst.takes(end), self.send.burst.has_several)
     }

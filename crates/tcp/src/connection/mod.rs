@@ -10,6 +10,7 @@ mod loss;
 mod open;
 mod parts;
 mod program;
+mod push;
 mod receive;
 mod recovery;
 mod timers;

@@ -6,6 +6,7 @@ use core::time::Duration;
 use cohaptic_units::Instant;
 
 use super::parts::{Receive, Send};
+use super::push::Pushes;
 use super::{Connection, Timer};
 use crate::config::{ConfigError, EcnFallback, TcpConfig};
 use crate::congestion::Congestion;
@@ -75,6 +76,7 @@ impl Connection {
             board: Scoreboard::default(),
             mss: DEFAULT_MSS,
             small_end: first,
+            pushes: Pushes::new(first + 1),
             burst: Default::default(),
             repetition: Default::default(),
             is_shut: false,

@@ -5,6 +5,7 @@ use core::time::Duration;
 use cohaptic_units::Instant;
 
 use super::burst::Burst;
+use super::push::Pushes;
 use crate::assembler::Assembler;
 use crate::congestion::Reduction;
 use crate::info::CaState;
@@ -38,6 +39,8 @@ pub(super) struct Send {
     pub(super) mss: usize,
     /// End of the last segment below the full size (for Minshall's form of Nagle's algorithm).
     pub(super) small_end: Position,
+    /// Marks of the flag PSH in the data that waits.
+    pub(super) pushes: Pushes,
     /// Burst of new segments that is leaving.
     pub(super) burst: Burst,
     /// Burst of lost segments that is leaving again.

@@ -80,6 +80,7 @@ impl Connection {
         if count == 0 && !data.is_empty() {
             return Err(Error::WouldBlock);
         }
+        self.note_write(count);
         self.send.buffer.write(&data[..count]);
         self.calls.has_written |= self.send.board.is_empty();
         Ok(count)

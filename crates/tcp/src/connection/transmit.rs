@@ -36,6 +36,7 @@ impl Connection {
                 return Some(self.build(now, self.send.next, self.send.next));
             }
         }
+        self.send.pushes.is_writing = false;
         None
     }
 
@@ -66,8 +67,9 @@ impl Connection {
         self.counters.retransmissions += 1;
         self.recovery.again_at.get_or_insert(now);
         self.recovery.undo_left = Some(self.recovery.undo_left.unwrap_or(0) + 1);
-        let segment = self.build(now, start, end);
-        Segment { flags: segment.flags.with_if(Flags::PSH, pushes), ..segment }
+        let mut segment = self.build(now, start, end);
+        segment.flags = segment.flags.with_if(Flags::PSH, pushes);
+        segment
     }
 
     /// Returns the end of the next new segment, if the peer's window has room for a full segment or for all remaining data. A smaller part is not sent, so that
@@ -124,10 +126,10 @@ impl Connection {
         let was_empty = self.send.board.is_empty();
         // New data soon after the arrival of data is an answer.
         let has_answered = self.receive.last_data_at.is_some_and(|at| now.saturating_duration_since(at) < self.config.delayed_ack);
-        let segment = self.build(now, start, end);
+        let mut segment = self.build(now, start, end);
         let has_data = !segment.payload.is_empty();
-        let pushes = has_data && start + segment.payload.len() as u64 == self.send.buffer.end();
         let (is_last, has_several) = self.ends_burst(now, start, end);
+        let pushes = has_data && self.send.pushes.take(start + segment.payload.len() as u64);
         if self.send.board.in_flight() == 0 {
             // The curve of CUBIC must not rise during the pause that ends here.
             self.congestion.shift(now.saturating_duration_since(self.send.last_data_at));
@@ -146,9 +148,11 @@ impl Connection {
             self.set_retransmission_timer(now, was_empty);
         }
         self.set_tail_timer(now, false);
-        let ecn = if self.send.has_ecn && has_data { Ecn::Capable0 } else { Ecn::NotCapable };
-        let flags = segment.flags.with_if(Flags::PSH, pushes || (has_data && is_last && has_several));
-        Segment { ecn, flags, ..segment }
+        if self.send.has_ecn && has_data {
+            segment.ecn = Ecn::Capable0;
+        }
+        segment.flags = segment.flags.with_if(Flags::PSH, pushes || (has_data && is_last && has_several));
+        segment
     }
 
     /// Sets the timer for a probe of the peer's window, unless a segment is on the way whose answer will tell the window.

@@ -58,15 +58,29 @@ const KINDS: [(&str, &[&str]); 9] = [
     ("ends: TIME-WAIT, orphans, resets, the user timeout, keep-alive", &["close", "orphan", "reset", "time", "user", "keepalive"]),
 ];
 
+/// Returns the kind of source of a script: 0 for a standard or a paper alone, 1 for both, 2 for functions of Linux alone.
+fn source(text: &str) -> usize {
+    let source = text.lines().find_map(|line| line.strip_prefix("// Source: ")).unwrap();
+    let is_standard = |part: &str| part.starts_with("RFC") || part.starts_with("Ha & Rhee");
+    let (has_standard, has_function) = (source.split("; ").any(is_standard), source.contains('_'));
+    assert!(has_standard || has_function, "`{source}` is neither a standard nor a function");
+    if has_standard { usize::from(has_function) } else { 2 }
+}
+
 #[test]
 fn the_readme_counts_the_scripts() {
-    let (mut table, scripts) = (String::new(), scripts());
+    let (mut table, scripts, mut all) = (String::new(), scripts(), [0; 3]);
     let first = |path: &Path| name(path).split(['-', '.']).next().unwrap().to_owned();
     for (kind, beginnings) in KINDS {
-        let of_kind = scripts.iter().filter(|path| beginnings.contains(&first(path).as_str()));
-        writeln!(table, "| {kind} | {} |", of_kind.count()).unwrap();
+        let mut counts = [0; 3];
+        for path in scripts.iter().filter(|path| beginnings.contains(&first(path).as_str())) {
+            counts[source(&fs::read_to_string(path).unwrap())] += 1;
+        }
+        writeln!(table, "| {kind} | {} | {} | {} | {} |", counts.iter().sum::<usize>(), counts[0], counts[1], counts[2]).unwrap();
+        all.iter_mut().zip(counts).for_each(|(all, count)| *all += count);
     }
-    writeln!(table, "| all | {} |", scripts.len()).unwrap();
+    writeln!(table, "| all | {} | {} | {} | {} |", scripts.len(), all[0], all[1], all[2]).unwrap();
+    assert_eq!(all.iter().sum::<usize>(), scripts.len(), "every script is of one kind");
     assert!(include_str!("../../README.md").contains(&table), "{table}");
 }
 
