@@ -213,5 +213,10 @@ fn explain() {
     );
     println!("  burst, which a short queue may drop.");
     println!("- **Pacing.** The test kit paces nothing. Linux paces only under the queue `fq`.\n");
-    println!("What single segments do, and not only their sums, is compared by [scripts](../crates/tcp/README.md#scripts-of-segments).");
+    println!("## Single segments\n");
+    println!(
+        "What single segments do, and not only their sums, is compared by [scripts](../crates/tcp/README.md#scripts-of-segments). The test kit and Linux 6.18"
+    );
+    println!("follow all of them alike, but for the initial sequence number of one connection. A script has one of three kinds of source.\n");
+    include_str!("../../../../crates/tcp/README.md").lines().filter(|line| line.starts_with("| ")).for_each(|line| println!("{line}"));
 }

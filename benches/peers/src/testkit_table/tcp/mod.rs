@@ -143,13 +143,17 @@ fn closed_forms(effort: Effort) {
     println!("- slow start: the last of N octets comes at R·(1 + ⌈log₂(N/(10·MSS) + 1)⌉);");
     println!("- Reno, where every *n*-th packet is lost: MSS/R·√(3·*n*/2) (Mathis, Semke, Mahdavi & Ott, 1997);");
     println!("- CUBIC there: MSS/R·(0.4·3.7/1.2)^¼·(R·*n*)^¾ (RFC 9438, section 5.2).\n");
-    println!("Both of the latter are means of a sawtooth, measured over the last 60 % of the octets.\n");
+    println!("Both of the latter are means of a sawtooth, measured over the last 60 % of the octets.");
+    println!("The form of slow start knows no window of the receiver, so its rows have one of 6 MiB from the beginning.\n");
     println!("| | closed form | seen | seen / closed form |");
     println!("| --- | ---: | ---: | ---: |");
-    for octets in [100_000, 1_000_000] {
+    let wide = TcpConfig { receive_buffer: Some(6 << 20), ..TcpConfig::default() };
+    for (octets, config, buffers) in
+        [(100_000, &wide, ""), (1_000_000, &wide, ""), (1_000_000, &TcpConfig::default(), ", with a window that grows as Linux's does")]
+    {
         let expected = 0.2 * (1.0 + (f64::from(octets) / (10.0 * MSS) + 1.0).log2().ceil());
-        let seen = on_testkit::bulk(false, "delay 100ms", octets as usize)[1].as_secs_f64();
-        println!("| slow start, {} kB, R = 200 ms | {expected:.3} s | {seen:.9} s | {:.4} |", octets / 1000, seen / expected);
+        let seen = on_testkit::transfer(config.clone(), "delay 100ms", octets as usize)[1].as_secs_f64();
+        println!("| slow start, {} kB, R = 200 ms{buffers} | {expected:.3} s | {seen:.9} s | {:.4} |", octets / 1000, seen / expected);
     }
     let reno = |every: f64, round_trip: f64| MSS * 8.0 / round_trip * (1.5 * every).sqrt();
     let cubic = |every: f64, round_trip: f64| MSS * 8.0 / round_trip * (0.4f64 * 3.7 / 1.2).powf(0.25) * (round_trip * every).powf(0.75);
@@ -157,6 +161,8 @@ fn closed_forms(effort: Effort) {
         ("Reno", CongestionControl::Reno, 400, 50, reno(400.0, 0.1)),
         ("Reno", CongestionControl::Reno, 1600, 10, reno(1600.0, 0.02)),
         ("CUBIC", CongestionControl::Cubic, 1000, 100, cubic(1000.0, 0.2)),
+        ("CUBIC", CongestionControl::Cubic, 4000, 100, cubic(4000.0, 0.2)),
+        ("CUBIC", CongestionControl::Cubic, 16_000, 100, cubic(16_000.0, 0.2)),
     ];
     for (name, congestion, every, delay, expected) in laws {
         let config = TcpConfig { congestion, ..TcpConfig::default() };
@@ -165,4 +171,20 @@ fn closed_forms(effort: Effort) {
         let seen = f64::from(octets) * 0.6 * 8.0 / (end - middle).as_secs_f64();
         println!("| {name}, n = {every}, R = {} ms | {:.2} Mbit/s | {:.2} Mbit/s | {:.2} |", 2 * delay, expected / 1e6, seen / 1e6, seen / expected);
     }
+    println!(
+        "\nLinux 6.18 takes 1.64 s for the 1000 kB, over two TUN devices that delay each packet by 100 ms. With the window that grows, the test kit needs a round"
+    );
+    println!(
+        "trip more, because a flight arrives at one instant, and the program reads only afterwards: the segments that it has not read take memory of the"
+    );
+    println!(
+        "receive buffer, and the acknowledgements offer what is left. In Linux the flight is spread over milliseconds, and the program reads meanwhile.\n"
+    );
+    println!(
+        "CUBIC is above its form where windows are small, and so is Linux: 1.22 to 1.25 for *n* = 1000 over the same TUN devices with the same losses. The form is"
+    );
+    println!(
+        "the limit of large windows. Windows are whole segments, the law of Linux rounds the distance of the curve from its plateau down, and it aims a round trip"
+    );
+    println!("ahead. A model of that law by round trips gives 1.18, 1.07 and 1.03 for the three *n*.");
 }

@@ -102,6 +102,15 @@ pub fn bulk(on_tokio: bool, links: &str, octets: usize) -> [Instant; 2] {
     taken(bed(on_tokio, links), octets)
 }
 
+/// As [`bulk`], with these constants of TCP.
+///
+/// # Panics
+///
+/// If the connection gives an error.
+pub fn transfer(config: TcpConfig, links: &str, octets: usize) -> [Instant; 2] {
+    taken(bed(false, links).tcp(config), octets)
+}
+
 /// As [`bulk`], where the server's every n-th packet is lost.
 ///
 /// # Panics
