@@ -1,5 +1,5 @@
 //! Crates outside of the workspace that depend on the test kit alone, as those of somebody else would: one finds the bug planted in its protocol, one has tokio's
-//! sockets in production (docs/how-to-dev-dependency.md), one is the first test of docs/tutorial-network-test.md, one is its last, and one is an existing program (docs/how-to-existing-program.md).
+//! sockets in production (docs/how-to-dev-dependency.md), one is the first test of docs/tutorial-network-test.md, one is its last, and one is an existing program (docs/tutorial-existing-program.md).
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
 
 use std::path::{Path, PathBuf};
@@ -91,7 +91,7 @@ fn the_planted_bug_is_found_and_the_others_fail_as_their_pages_say() {
     assert_shown("tutorial-network-test.md", 3, &text);
 }
 
-/// The program of docs/how-to-existing-program.md is built from the real tokio, and its tests from the package that `cohaptic tokio` writes.
+/// The program of docs/tutorial-existing-program.md is built from the real tokio, and its tests from the package that `cohaptic tokio` writes.
 #[test]
 fn an_existing_program_runs_unchanged() {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("../Cargo.toml");
@@ -105,10 +105,10 @@ fn an_existing_program_runs_unchanged() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let (has_passed, text) = test("existing-program/sim");
     assert!(!has_passed, "the test of one order is to fail:\n{text}");
-    for test in ["an_order_is_taken_over_a_lossy_link ... ok", "an_order_is_taken_once ... FAILED"] {
+    for test in ["an_order_is_cooked_over_a_lossy_link ... ok", "an_order_is_cooked_once ... FAILED"] {
         assert!(text.contains(&format!("test {test}\n")), "expected {test}:\n{text}");
     }
-    assert_shown("how-to-existing-program.md", 1, &text);
+    assert_shown("tutorial-existing-program.md", 1, &text);
 }
 
 /// Fails unless the n-th block of text on a page, which begins with the minimal input or the test that fails again, is among what a test has printed.

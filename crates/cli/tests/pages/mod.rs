@@ -134,6 +134,7 @@ pages! {
     tasks: "docs/tasks.md",
     testing: "docs/testing.md",
     testkit_crate: "crates/testkit/README.md",
+    tutorial_existing_program: "docs/tutorial-existing-program.md",
     #[ignore = ".ci/nightly runs it: it takes long"]
     tutorial_laboratory: "docs/tutorial-laboratory.md",
     tutorial_network_test: "docs/tutorial-network-test.md",

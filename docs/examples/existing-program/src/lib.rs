@@ -1,39 +1,40 @@
-//! A shop that takes orders over WebSockets, and its client.
+//! A shop and its kitchen, which talk through Redis.
 
 use std::time::Duration;
 
-use futures_util::{SinkExt, StreamExt};
-use tokio::net::TcpListener;
-use tokio::time::timeout;
-use tokio_tungstenite::tungstenite::{Error, Message};
-use tokio_tungstenite::{accept_async, connect_async};
+use futures_util::StreamExt;
+use redis::{AsyncCommands, AsyncConnectionConfig, Client, RedisResult};
 
-/// Calls `take` for each order that comes.
-pub async fn serve(listener: TcpListener, take: impl Fn(&str) + Clone + Send + 'static) {
-    while let Ok((stream, _)) = listener.accept().await {
-        let take = take.clone();
-        tokio::spawn(async move {
-            let mut stream = accept_async(stream).await?;
-            while let Some(Ok(Message::Text(order))) = stream.next().await {
-                take(&order);
-                stream.send(Message::text("taken")).await?;
-            }
-            Ok::<(), Error>(())
-        });
-    }
-}
-
-/// Orders, and orders again on a new connection if no answer comes within half a second.
+/// Publishes an order, and publishes it again on a new connection if no answer comes within half a second.
 ///
 /// # Errors
 ///
-/// If no connection can be opened, or the connection ends.
-pub async fn order(url: &str, order: &str) -> Result<(), Error> {
+/// Those of Redis, other than that no answer comes in time.
+pub async fn order(redis: &Client, order: &str) -> RedisResult<()> {
+    let config = AsyncConnectionConfig::new().set_response_timeout(Some(Duration::from_millis(500)));
     loop {
-        let (mut stream, _) = connect_async(url).await?;
-        stream.send(Message::text(order)).await?;
-        if timeout(Duration::from_millis(500), stream.next()).await.is_ok() {
-            return Ok(());
+        let published = async {
+            let mut connection = redis.get_multiplexed_async_connection_with_config(&config).await?;
+            connection.publish("orders", order).await
+        };
+        match published.await {
+            Err(error) if error.is_timeout() => {}
+            outcome => return outcome,
         }
     }
+}
+
+/// Calls `cook` for each order.
+///
+/// # Errors
+///
+/// Those of Redis, and if an order is not text.
+pub async fn kitchen(redis: &Client, mut cook: impl FnMut(String)) -> RedisResult<()> {
+    let mut subscription = redis.get_async_pubsub().await?;
+    subscription.subscribe("orders").await?;
+    let mut orders = subscription.on_message();
+    while let Some(order) = orders.next().await {
+        cook(order.get_payload()?);
+    }
+    Ok(())
 }

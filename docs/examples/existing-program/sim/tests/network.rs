@@ -1,38 +1,55 @@
 //! An order over bad networks.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::cell::Cell;
+use std::future::pending;
+use std::rc::Rc;
+use std::time::Duration;
 
 use cohaptic_testkit::proptest::prelude::*;
 use cohaptic_testkit::strategies::{LinkBounds, links_like};
-use cohaptic_testkit::{Bed, Testbed};
-use orders::{order, serve};
+use cohaptic_testkit::{Bed, Testbed, ToLink};
+use orders::{kitchen, order};
+use redis::Client;
 use tokio::net::TcpListener;
+use tokio::time::sleep;
+
+fn redis() -> Client {
+    Client::open("redis://redis:6379/").unwrap()
+}
 
 async fn one_order(bed: Bed) {
-    let taken = Arc::new(AtomicU32::new(0));
-    let count = Arc::clone(&taken);
-    bed.host("shop").spawn(async move {
-        let listener = TcpListener::bind("0.0.0.0:80").await.unwrap();
-        let take = move |_: &str| {
-            count.fetch_add(1, Ordering::Relaxed);
-        };
-        serve(listener, take).await;
+    bed.host("redis").spawn(async {
+        let listener = TcpListener::bind("0.0.0.0:6379").await.unwrap();
+        mini_redis::server::run(listener, pending::<()>()).await.unwrap();
     });
-    bed.host("phone").spawn(order("ws://shop:80/", "one pizza")).await.unwrap().unwrap();
-    assert_eq!(taken.load(Ordering::Relaxed), 1);
+    let cooked = Rc::new(Cell::new(0));
+    let count = Rc::clone(&cooked);
+    bed.host("kitchen").spawn(async move {
+        kitchen(&redis(), |_| count.set(count.get() + 1)).await.unwrap();
+    });
+    // The kitchen opens before the shop.
+    sleep(Duration::from_secs(1)).await;
+    bed.host("shop").spawn(async { order(&redis(), "one pizza").await }).await.unwrap().unwrap();
+    // Time for what is still under way.
+    sleep(Duration::from_secs(60)).await;
+    assert_eq!(cooked.get(), 1);
+}
+
+/// The link between the shop and Redis is bad. The kitchen is beside Redis.
+fn shop_behind(link: impl ToLink + Clone) -> Testbed {
+    Testbed::new(["shop", "redis", "kitchen"]).link("shop", "redis", link.clone()).link("redis", "shop", link).on_tokio()
 }
 
 #[test]
-fn an_order_is_taken_over_a_lossy_link() {
+fn an_order_is_cooked_over_a_lossy_link() {
     for seed in 0..20 {
-        Testbed::new(["phone", "shop"]).links("delay 30ms loss 3%").seed(seed).on_tokio().run(one_order);
+        shop_behind("delay 30ms loss 3%").seed(seed).run(one_order);
     }
 }
 
 proptest! {
     #[test]
-    fn an_order_is_taken_once(link in links_like(LinkBounds::phone().loss(0.0..=20.0))) {
-        Testbed::new(["phone", "shop"]).links(link).on_tokio().run(one_order);
+    fn an_order_is_cooked_once(link in links_like(LinkBounds::phone().loss(0.0..=20.0)), seed: u64) {
+        shop_behind(link).seed(seed).run(one_order);
     }
 }
