@@ -34,9 +34,7 @@ macro_rules! handle {
                 Self { shared, host, id }
             }
 
-            /// Asks the state. Each call counts, so that a task that tries again and again at one instant is noticed.
             fn ask<T>(&self, ask: impl FnOnce(&mut Core) -> io::Result<T>) -> io::Result<T> {
-                self.shared.note_call();
                 self.shared.open(self.host, KIND, ask)?
             }
         }
@@ -98,11 +96,14 @@ impl ByteStream for Stream {
         self.poll(cx, Core::wait_to_write_unix, |core, id| core.write_unix(id, buffers))
     }
 
+    /// Each attempt counts, so that a task that tries again and again at one instant is noticed.
     fn try_read(&self, buffers: &mut [IoSliceMut<'_>]) -> io::Result<usize> {
+        self.shared.note_call();
         self.ask(|core| core.read_unix(self.id, buffers))
     }
 
     fn try_write(&self, buffers: &[IoSlice<'_>]) -> io::Result<usize> {
+        self.shared.note_call();
         self.ask(|core| core.write_unix(self.id, buffers))
     }
 
@@ -172,7 +173,6 @@ impl UnixSocket for Stream {
 
 impl UnixListener for Listener {
     fn poll_accept(&self, cx: &mut Context<'_>) -> Poll<io::Result<(Box<dyn UnixStream>, UnixName)>> {
-        self.shared.note_call();
         let polled = self.shared.open(self.host, KIND, |core| core.accept_unix(self.id, cx.waker()).map_ok(|id| (id, core.unix_names(id))));
         let accepted = match polled {
             Ok(Poll::Pending) => return Poll::Pending,
@@ -190,6 +190,15 @@ impl UnixListener for Listener {
     }
 }
 
+impl Datagrams {
+    /// Counts a call that does not wait, so that a task that tries again and again at one instant is noticed.
+    fn note_attempt(&self, waker: Option<&Waker>) {
+        if waker.is_none() {
+            self.shared.note_call();
+        }
+    }
+}
+
 impl UnixDatagrams for Datagrams {
     fn bind(&self, name: &UnixName) -> io::Result<()> {
         self.ask(|core| core.bind_unix_datagrams(self.id, name))
@@ -200,10 +209,12 @@ impl UnixDatagrams for Datagrams {
     }
 
     fn send(&self, waker: Option<&Waker>, bytes: &[u8], to: Option<&UnixName>) -> io::Result<usize> {
+        self.note_attempt(waker);
         self.ask(|core| core.send_unix(self.id, waker, bytes, to))
     }
 
     fn receive(&self, waker: Option<&Waker>, buffer: &mut [u8]) -> io::Result<(usize, UnixName)> {
+        self.note_attempt(waker);
         self.ask(|core| core.receive_unix(self.id, waker, buffer))
     }
 

@@ -410,3 +410,25 @@ fn a_socket_needs_a_host_and_its_own_thread() {
     let error = write(&*one, b"x").unwrap_err().to_string();
     assert!(error.starts_with("a Unix socket or a pipe of host `a` is used after the run of its test bed has ended"), "{error}");
 }
+
+#[test]
+fn a_task_that_tries_again_and_again_is_noticed() {
+    let again = |attempt: fn(&dyn UnixStream, &dyn UnixDatagrams)| {
+        let panicked = std::panic::catch_unwind(|| {
+            two().patience(1000).run(move |bed: Bed| async move {
+                let tries = bed.host("a").spawn(async move {
+                    let ([stream, _other], [datagrams, _peer]) = (here().unix_pair(call()).unwrap(), here().unix_datagram_pair(call()).unwrap());
+                    for _ in 0..100_000 {
+                        attempt(&*stream, &*datagrams);
+                    }
+                });
+                tries.await.unwrap();
+            });
+        });
+        let text = *panicked.unwrap_err().downcast::<String>().unwrap();
+        assert!(text.starts_with("time stands still at 0 s"), "{text}");
+    };
+    again(|stream, _| blocks(read(stream)));
+    again(|stream, _| drop(write(stream, b"")));
+    again(|_, datagrams| blocks(datagrams.receive(None, &mut [0; 9])));
+}
