@@ -7,17 +7,23 @@ mod beds;
 mod descriptors;
 mod foreign;
 mod h2;
+mod hickory;
 mod http_client;
 mod linux;
 mod loopback;
 mod mini_redis;
+mod mongodb;
+mod nats;
 mod ping_pong;
+mod postgres;
 mod redis;
 mod refused;
 mod signals;
 mod sockets;
 mod tasks;
+mod tokio_rustls;
 mod tonic;
+mod unix;
 mod websocket;
 
 /// Seeds with which each program runs.
