@@ -89,7 +89,7 @@ impl Unix {
         // A socket that is connected to another one takes datagrams of that one alone.
         match self.socket(to).peer {
             Peer::Socket(peer) if peer != from => Errno::NotPermitted.fail(),
-            _ => Ok(to),
+            Peer::Nobody | Peer::Socket(_) | Peer::Gone => Ok(to),
         }
     }
 
@@ -243,7 +243,7 @@ impl Core {
         let socket = self.unix.socket(id);
         let full = match socket.peer {
             Peer::Socket(peer) if peer != id && self.unix.socket(peer).is_full_for(id) => Some(peer),
-            _ => None,
+            Peer::Nobody | Peer::Socket(_) | Peer::Gone => None,
         };
         let socket = self.unix.socket_mut(id);
         let ready = Ready {
