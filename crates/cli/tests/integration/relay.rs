@@ -275,6 +275,8 @@ fn bad_arguments_are_refused() {
         (&format!("{proxy} delay 24 parsecs"), &["these words do not describe a link", "^"]),
         (&format!("{proxy} los=1%"), &["los=1%", "unknown key"]),
         (&format!("{proxy} delay=1ms --back delay=1"), &["delay=1", "expected"]),
+        (&format!("{proxy} starlink"), &["starlink differs by direction", "starlink/down, towards the user, or starlink/up"]),
+        (&format!("{proxy} starlink/down --back starlnk/up"), &["did you mean starlink, a link of the library"]),
         (&format!("{proxy} --set link.delay=1ms"), &["--set", "cannot be used with"]),
         (&format!("{proxy} --token-file token"), &["--control"]),
         ("relay --listen 0.0.0.0:0 --to 127.0.0.1:9", &["--listen 0.0.0.0:0 is not on loopback", "--allow-remote"]),

@@ -321,7 +321,7 @@ impl DelayStage {
                 // A large negative deviation ends at a delay of zero: the floor of this law.
                 self.mean_nanos.saturating_add_signed(nearest(deviation))
             }
-            StageLaw::FromNormal(checked) => at_normal(&checked.law, normal(purpose, word, packet)),
+            StageLaw::FromNormal(checked) => from_normal(&checked.law, purpose, word, packet),
             StageLaw::Independent(_) | StageLaw::Correlated(_) => self.draw_by_law(purpose, now, word, packet),
         }
     }
@@ -471,6 +471,12 @@ fn normal(purpose: Purpose, word: u64, packet: PacketDraws) -> f64 {
         let mut more = packet.more(purpose);
         outside_the_core(word, || more.next_word())
     })
+}
+
+/// Returns a delay of a law that is drawn from a normal number. Not inlined, so that the draw of the normal law, the most frequent one, stays small enough to be.
+#[inline(never)]
+fn from_normal(law: &Law, purpose: Purpose, word: u64, packet: PacketDraws) -> u64 {
+    at_normal(law, normal(purpose, word, packet))
 }
 
 /// Returns the delay of a normal number as a whole number of nanoseconds.

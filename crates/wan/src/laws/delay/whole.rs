@@ -49,7 +49,7 @@ const ROOTS: [f64; 16] = [
     1.241_857_812_073_484,
     1.296_839_554_651_009_6,
     1.354_255_546_936_892_7,
-    1.414_213_562_373_095_1,
+    core::f64::consts::SQRT_2,
     1.476_826_145_939_499_3,
     1.542_210_825_407_940_7,
     1.610_490_331_949_254_3,
@@ -75,7 +75,7 @@ pub(super) fn exp_nearly(x: f64) -> f64 {
     let series = ((1.0 + r) + (1.0 / 2.0 + r * (1.0 / 6.0)) * r2) + ((1.0 / 24.0 + r * (1.0 / 120.0)) + r2 * (1.0 / 720.0)) * (r2 * r2);
     // The lower bits of `sum` hold k, whose upper part is added to the exponent of a number between ½ and 4.
     let k = sum.to_bits().wrapping_sub(ROOM.to_bits()).cast_signed();
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 15")]
+    #[expect(clippy::cast_sign_loss, reason = "from 0 to 15")]
     let root = ROOTS[(k & 15) as usize];
     let power = f64::from_bits((root * series).to_bits().wrapping_add((k >> 4).cast_unsigned() << 52));
     // A NaN fails the comparison.
