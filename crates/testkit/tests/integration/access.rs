@@ -71,7 +71,7 @@ fn a_packet_that_is_hit_passes_the_uplink_and_not_the_link() {
         assert_eq!(lost, [(us(75_800), Lost::Link(DropCause::Filter))]);
         // The fates of the whole path repeat the run, without access lines.
         let folder = tempfile::tempdir().unwrap();
-        record.write(&folder.path().join("kept")).unwrap();
+        record.write(folder.path().join("kept")).unwrap();
         let links = folder.path().join("kept/links.txt");
         let text = fs::read_to_string(&links).unwrap();
         assert!(text.contains("# all: delay 10ms\n# access of phone: devtools/slow-4g@1\n"), "{text}");
@@ -177,7 +177,8 @@ fn a_host_has_a_modulator_of_its_own_for_both_directions() {
                                 Fate::Dropped(_) | Fate::Duplicated => None,
                             })
                             .collect();
-                        let mean = spans.iter().sum::<f64>() / spans.len() as f64;
+                        let (sum, count) = spans.iter().fold((0.0_f64, 0.0_f64), |(sum, count), span| (sum + span, count + 1.0));
+                        let mean = sum / count;
                         (0..5).min_by(|one: &usize, other| (means[*one] - mean).abs().total_cmp(&(means[*other] - mean).abs())).unwrap()
                     })
                     .collect::<Vec<usize>>()

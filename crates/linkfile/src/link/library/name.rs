@@ -73,6 +73,23 @@ impl Profile {
     }
 }
 
+impl ProfileName {
+    /// Returns the direction of the name. A name without direction stands for both directions of a symmetric profile.
+    ///
+    /// # Errors
+    ///
+    /// [`NameError`] if the name has no direction and the directions of the profile differ.
+    pub fn one_direction(&self) -> Result<Direction, NameError> {
+        let name = &self.profile.name;
+        match self.direction {
+            Some(direction) => Ok(direction),
+            // Either direction is right for a symmetric profile, and the answer must not depend on which one a caller prefers.
+            None if self.profile.is_symmetric() => Ok(Direction::Down),
+            None => Err(NameError(format!("{name} differs by direction: expected {name}/down, towards the user, or {name}/up"))),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -98,23 +115,6 @@ mod tests {
     fn files_have_the_versions_of_the_list() {
         for (name, version, _) in FILES {
             assert_eq!(find(&FILES, name, version).unwrap().title(), format!("{name}@{version}"));
-        }
-    }
-}
-
-impl ProfileName {
-    /// Returns the direction of the name. A name without direction stands for both directions of a symmetric profile.
-    ///
-    /// # Errors
-    ///
-    /// [`NameError`] if the name has no direction and the directions of the profile differ.
-    pub fn one_direction(&self) -> Result<Direction, NameError> {
-        let name = &self.profile.name;
-        match self.direction {
-            Some(direction) => Ok(direction),
-            // Either direction is right for a symmetric profile, and the answer must not depend on which one a caller prefers.
-            None if self.profile.is_symmetric() => Ok(Direction::Down),
-            None => Err(NameError(format!("{name} differs by direction: expected {name}/down, towards the user, or {name}/up"))),
         }
     }
 }
