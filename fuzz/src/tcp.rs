@@ -1,6 +1,5 @@
 //! A connection of TCP over a network that loses, repeats, reorders and forges: what is read is what was written, in order, and both ends always come to rest.
 
-use std::borrow::Cow;
 use std::sync::OnceLock;
 use std::time::Duration;
 
@@ -194,7 +193,7 @@ impl World {
         }
         let from = i64::from(segment.sequence.wrapping_sub(self.sides[1 - side].first).cast_signed());
         let length = if what & 4 != 0 { usize::from(input.byte()) * 8 } else { segment.payload.len() };
-        segment.payload = Cow::Owned(octets(from, length));
+        segment.payload = octets(from, length).into();
         let known = &mut self.sides[side].known;
         *known = (*known).max(u64::try_from(from + i64::try_from(length).unwrap()).unwrap_or(0));
         self.deliver(side, &segment);
@@ -260,7 +259,10 @@ impl World {
             assert!(acknowledged > 1 << 31 || u64::from(acknowledged) <= known + u64::from(*heard_end), "octets acknowledged that have not come");
         }
         let info = end.info();
-        assert!(info.unread <= end.config().receive_buffer.unwrap_or(end.config().greatest_receive_buffer).max(65_535), "more unread than the receive buffer holds");
+        assert!(
+            info.unread <= end.config().receive_buffer.unwrap_or(end.config().greatest_receive_buffer).max(65_535),
+            "more unread than the receive buffer holds"
+        );
     }
 }
 

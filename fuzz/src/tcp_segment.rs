@@ -15,8 +15,9 @@ pub fn run(data: &[u8]) {
     assert!(segment.payload.len() <= packet.len() && segment.sequence_length() <= segment.payload.len() + 2);
     // Options that nobody knows are not written again, and selective acknowledgements where there is room.
     let mut segment = segment.into_owned();
-    while segment.packet_length() > usize::from(u16::MAX) {
-        segment.payload.to_mut().pop();
+    let too_long = segment.packet_length().saturating_sub(usize::from(u16::MAX));
+    if too_long > 0 {
+        segment.payload = segment.payload[..segment.payload.len() - too_long].to_vec().into();
     }
     let written = segment.to_packet();
     assert_eq!(written.len(), segment.packet_length());
