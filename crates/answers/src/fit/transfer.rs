@@ -252,7 +252,7 @@ mod tests {
     /// Slow seconds come together: a recording of the first part shows it, and independent delays, of which each flight of packets has slow ones, do not.
     #[test]
     fn delays_without_order_are_another_connection() {
-        let delay = |number: u32| Some(if number / 500 % 2 == 0 { 0.02 } else { 0.08 });
+        let delay = |number: u32| Some(if (number / 500).is_multiple_of(2) { 0.02 } else { 0.08 });
         let part = packets((0..10_000).map(delay));
         let figures = Figures {
             mean_s: 0.05,

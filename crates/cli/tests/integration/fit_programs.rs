@@ -201,7 +201,7 @@ fn a_recorded_line_gives_its_walk() {
     assert!((number(&of_cellreplay[0]) / number(&walk["rates_bps"][0]) - 1_400.0 / 1_504.0).abs() < 1e-9, "{of_cellreplay}");
 
     let in_turns: String = (0..120_u64)
-        .flat_map(|second| (0..if second / 7 % 2 == 0 { 200 } else { 600 }).map(move |instant| format!("{}\n", second * 1_000 + instant)))
+        .flat_map(|second| (0..if (second / 7).is_multiple_of(2) { 200 } else { 600 }).map(move |instant| format!("{}\n", second * 1_000 + instant)))
         .collect();
     desk.write("turns.line", in_turns);
     let refused = desk.json("fit turns.line --bytes 1504B --walk --json");

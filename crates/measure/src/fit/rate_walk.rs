@@ -152,9 +152,12 @@ mod tests {
     use super::*;
     use crate::tests::TestRng;
 
+    /// Figures of a recorded line.
+    type Line = ([f64; STATES], f64, [f64; 2], [f64; 2]);
+
     /// Rates of the states \[Mbit/s\], the sojourn \[s\], and the autocorrelations after 1 and 10 s of the recording and of the walk, of recorded mobile lines
     /// (mahimahi's `ATT-LTE-driving` and `TMobile-UMTS-driving`, down and up, and low-band 5G on foot, down and up), as another program computed them.
-    const LINES: [([f64; 5], f64, [f64; 2], [f64; 2]); 6] = [
+    const LINES: [Line; 6] = [
         ([1.212, 3.185, 5.412, 7.072, 9.034], 2.758, [0.924, 0.598], [0.930, 0.495]),
         ([0.101, 0.743, 1.044, 1.112, 1.177], 2.011, [0.840, 0.400], [0.858, 0.309]),
         ([0.192, 0.959, 1.880, 2.635, 4.449], 1.629, [0.897, 0.276], [0.867, 0.292]),

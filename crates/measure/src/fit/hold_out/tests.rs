@@ -267,7 +267,7 @@ fn losses_are_compared_with_their_errors() {
     assert!(!lost(&judged(0.1)) && !lost(&judged(0.105)), "{:#?}", judged(0.105).refused);
     assert!(lost(&judged(0.12)) && lost(&judged(0.08)));
     // Runs of two and of four losses alike have the same share, and another mean run.
-    let runs = |length: u32, shift: u32| plain(10_000, 37, move |number| (number / length * 7_919 + shift) % 10 == 0);
+    let runs = |length: u32, shift: u32| plain(10_000, 37, move |number| (number / length * 7_919 + shift).is_multiple_of(10));
     let judged = HoldOut::of(&runs(2, 1), &runs(2, 5), &runs(4, 1), 1.0);
     assert!(judged.refused.iter().any(|reason| reason.starts_with("its runs of losses have")), "{:#?}", judged.refused);
     // The error of the mean of n runs is their deviation over √n.
@@ -275,7 +275,7 @@ fn losses_are_compared_with_their_errors() {
     let expected = (series::variance(&run).unwrap() / run.len() as f64).sqrt();
     assert_near(run_error.unwrap(), expected, 1e-12);
     // Losses that come together have a larger error than single ones, which batches of packets find.
-    let together = plain(10_000, 37, |number| number / 100 % 10 == 0);
+    let together = plain(10_000, 37, |number| (number / 100).is_multiple_of(10));
     assert!(errors(together.packets()).0 > 3.0 * errors(first.packets()).0);
 }
 

@@ -125,8 +125,10 @@ impl Recording {
         let refused = |problem: &dyn std::fmt::Display| ReaderError::new("walk", problem);
         let seconds = match &self.link {
             Link::Line { text, bytes } => seconds_of_line(text, *bytes)?,
-            _ if self.spans.is_empty() => return Err(refused(&"the file measures no rate: expected one of iperf3, mahimahi or CellReplay (heavy)")),
-            _ => seconds_of_spans(&self.spans)?,
+            Link::Constant(_) | Link::Turns { .. } | Link::Delays { .. } if self.spans.is_empty() => {
+                return Err(refused(&"the file measures no rate: expected one of iperf3, mahimahi or CellReplay (heavy)"));
+            }
+            Link::Constant(_) | Link::Turns { .. } | Link::Delays { .. } => seconds_of_spans(&self.spans)?,
         };
         let walk = RateWalk::of(&seconds).map_err(|error| refused(&error))?;
         Ok(Self { walk: Some(walk), ..self })
@@ -205,7 +207,7 @@ impl Recording {
 fn seconds_of_line(text: &str, bytes: u64) -> Result<Vec<Option<f64>>, ReaderError> {
     // The reader of the line has checked that each line is a number, in ascending order.
     let instants = || text.lines().filter_map(|line| line.trim().parse::<u64>().ok()).map(|ms| ms / 1_000);
-    let seconds = instants().last().unwrap_or(0);
+    let seconds = instants().next_back().unwrap_or(0);
     let mut counts = vec![0_u64; whole_seconds(count_u64(seconds))?];
     for second in instants().filter_map(|second| usize::try_from(second).ok()) {
         if let Some(found) = counts.get_mut(second) {
