@@ -33,7 +33,7 @@ impl Rate {
         self.transmission_time(u128::from(size.get()) * 8 * 1_000_000_000)
     }
 
-    /// Returns the time for sending the rest of a packet, rounded up to a nanosecond. `giga_bits` is the rest in units of 10⁻⁹ bit, as returned by
+    /// Returns the time for sending the rest of a packet, rounded up to a nanosecond. `giga_bits` is the rest \[bit\] times 10⁹, as returned by
     /// [`Rate::bits_sent`], so that a change of the rate in the middle of a packet rounds nothing. Saturates at 584 years.
     #[must_use]
     pub fn transmission_time(self, giga_bits: u128) -> Duration {
