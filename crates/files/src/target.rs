@@ -37,7 +37,7 @@ impl Target {
         }
     }
 
-    /// Follows links by hand, because `canonicalize` fails for a target that does not exist yet.
+    /// Returns the target to which the links of `path` lead. Follows the links one by one, because `canonicalize` fails for a file that does not exist yet.
     fn followed(path: &Path) -> io::Result<Self> {
         let mut name = path.to_path_buf();
         for _ in 0..MOST_LINKS {
