@@ -39,7 +39,8 @@ pub(super) fn measure(effort: Effort, done: &mut RowSink<'_>) -> Result<(), Accu
     of_table(effort, done)
 }
 
-/// Measures the rows of one law.
+/// Measures the rows of one law. The distribution function of `normal`, a normal law with the same mean and deviation, maps a standard normal number to a
+/// probability.
 fn of_law(name: &'static str, law: &Law, normal: &Law, effort: Effort, done: &mut RowSink<'_>) -> Result<(), AccuracyError> {
     let look = effort.look;
     let (netem, fine) = (Netem::new(law), Fine::new(law));
