@@ -7,7 +7,7 @@ use cohaptic_stability::{AnalysisError, Judgement, Limits, Method, NOMINAL, QUIC
 /// square with bursts on six links, 1.7 for an admittance, 5 for the eigenvalues of 400 rows. The number tells seconds from hours, and nothing finer.
 pub const OPERATIONS_A_SECOND: f64 = 1e9;
 
-/// Result of the analysis.
+/// Result of [`quick_verdict`]: a judgement by analysis, or that a simulation must decide.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Quick {
     /// The judgement, which leaves nothing out.

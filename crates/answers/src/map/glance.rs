@@ -14,7 +14,8 @@ pub(super) struct Axis<'a> {
     pub(super) values: &'a [f64],
 }
 
-/// Draws the stable region. Each dot shows the cell at the place of the dot.
+/// Draws the stable region in characters of Braille, two by four dots each. A dot is set if the cell at the place of the dot is stable. `stable` takes the
+/// indices of the values along `x` and along `y`.
 pub(super) fn draw(x: &Axis<'_>, y: &Axis<'_>, stable: impl Fn(usize, usize) -> bool) -> String {
     let (columns, rows) = (2 * WIDTH, 4 * HEIGHT);
     let mut text = format!("  {}\n", y.label);

@@ -143,7 +143,7 @@ impl List<'_> {
         methods
     }
 
-    /// Only links written in words of netem have a choice. All other links follow their exact laws.
+    /// Returns the ways to draw the delays of the links. Only links written in words of netem have a choice; all other links follow their exact laws.
     fn samplings(&self) -> Vec<Method> {
         let variants = PROFILES.map(|(name, word)| {
             let key = format!("link.netem-profile={word}");

@@ -31,7 +31,7 @@ pub(super) enum Keys {
     Grid(Box<(Along, Along)>),
 }
 
-/// A key along an axis.
+/// A key of the plan whose values lie along an axis of the picture.
 pub(crate) struct Along {
     /// Index of the key in the plan.
     pub(crate) key: usize,
