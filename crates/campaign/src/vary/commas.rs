@@ -1,4 +1,4 @@
-//! Texts with commas between their parts.
+//! Splits texts at the commas between their parts, as in `--vary KEY=1,2,3`.
 
 /// Splits a text at commas, except within brackets, braces and quotes, because values may be lists, tables and texts. Space around the parts is removed.
 #[must_use]
