@@ -130,7 +130,8 @@ impl<T: Transport, const A: usize> Turns<T, A> {
         }
     }
 
-    /// Returns the force with the springs along the axes that the peer does not use.
+    /// Returns `force` with each component along an axis that the peer does not use replaced by the force of the holding spring. Without a spring in the
+    /// configuration, or without a reading, `force` stays as given.
     fn held(&self, mut force: Triple) -> Triple {
         if let (Some(hold), Some(reading)) = (self.config.hold, self.driver.status().reading) {
             for (axis, unused) in self.config.axes.unused().into_iter().enumerate() {
@@ -169,7 +170,7 @@ pub struct Snapshot {
     pub phase: Phase,
     /// `true` if the device is homed, and the user has switched forces on since then.
     pub armed: bool,
-    /// Homed encoders.
+    /// `true` for each encoder that is homed.
     pub homed: [bool; 3],
     /// Counts of the encoders.
     pub encoders: [i16; 3],

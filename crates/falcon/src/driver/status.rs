@@ -73,7 +73,7 @@ pub struct Status {
     pub phase: Phase,
     /// `true` if the device is homed and the user has switched forces on since then, so that forces go out.
     pub armed: bool,
-    /// Homed encoders, as reported by the device; all false before the first report.
+    /// `true` for each encoder that is homed, as reported by the device. All `false` before the first report.
     pub homed: [bool; 3],
     /// Counts of the encoders in the last report.
     pub encoders: [i16; 3],

@@ -25,7 +25,7 @@ pub enum Activity {
     Running,
 }
 
-/// Observations of the device on its host.
+/// Counts of packets and faults of the host, and the largest motor counts, as observed by the simulated device.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Observed {
     /// Complete packets.
