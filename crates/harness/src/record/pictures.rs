@@ -21,7 +21,7 @@ pub struct Pictures {
     names: Vec<String>,
     /// Positions of the copies \[m\]. Curves are ordered by axis, then peer.
     positions: Bands,
-    /// Coordination forces on the copies \[N\], in the same order.
+    /// Coordination forces on the copies \[N\], in the order of `positions`.
     forces: Bands,
     network: Network,
     /// Rotation vectors of the copies and their lengths \[rad\], ordered by component as in [`TURNS`], then peer. `None` if the object does not turn.
