@@ -1,7 +1,7 @@
 //! Pointers: mice, pens, fingers and sticks for pulling the simulated device of a peer.
 //!
 //! The program of a pointer tells the position to a [`Pointer`], at the rate of a display. The session's thread reads the pointer at each tick, as the thread
-//! reads a device. Between two told positions, the read position moves on a straight line at constant speed, so that the hand has a velocity and makes no
+//! reads a device. Between two given positions, the read position moves on a straight line at constant speed, so that the hand has a velocity and makes no
 //! steps.
 
 use std::sync::{Arc, Mutex, PoisonError, TryLockError};
@@ -31,7 +31,7 @@ const CATCHES_UP: f64 = 0.85;
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
 #[error("a pointer at {found:?} m: expected numbers from -{REACH} to {REACH}")]
 pub struct BeyondReach {
-    /// Told position \[m\].
+    /// Refused position \[m\].
     pub found: [f64; 3],
 }
 
@@ -51,10 +51,10 @@ struct Shared {
     force: [f64; 3],
 }
 
-/// Position told last.
+/// Position that the program gave last.
 #[derive(Clone, Copy, Debug, Default)]
 struct Told {
-    /// Number of told positions and releases so far. A changed number marks news, even if the position is the same.
+    /// Number of positions and releases given so far. A changed number tells the session of a new position, even if the position is the same as before.
     number: u64,
     /// Position \[m\]. `None`: the pointer has let go.
     position: Option<[f64; 3]>,

@@ -13,8 +13,8 @@ impl Driven for Session {
     type Clock = MonotonicClock;
     type Error = SessionError;
 
-    /// `None`, for two reasons. A tick reads the devices of its peers, and must not read them before its time. A flood of forged datagrams can make one
-    /// reading take as long as a tick may be late, so no reading may begin shortly before a tick.
+    /// `None`: nothing is made ready before a deadline, for two reasons. A tick reads the devices of its peers, and must not read the devices before its time.
+    /// A flood of forged datagrams can make one reading of the socket take as long as a tick may be late, so no such reading may begin shortly before a tick.
     const AHEAD: Option<Duration> = None;
     /// `false`: a rest between two readings would make ticks late.
     const RESTS: bool = false;
