@@ -83,8 +83,8 @@ pub(crate) fn share(part: usize, whole: usize) -> f64 {
     number(part) / number(whole.max(1))
 }
 
-/// Returns the parameters of all regions, in the order of the computation.
 impl Atlas {
+    /// Returns setting, strategy and number of peers of all regions, in the order of the computation.
     fn wanted() -> Vec<(Setting, Strategy, usize)> {
         let strategies =
             |setting| Strategy::BOTH.into_iter().flat_map(move |strategy| PEERS.into_iter().map(move |peers| (setting, strategy, peers)));
