@@ -8,12 +8,12 @@ use super::{Coefficients, Law, LawForm, LawKind, LawParameter, LawParameters, La
 use crate::gains::coordinate;
 use crate::{Gains, Number};
 
-/// The law with damping of the own copy towards ground.
+/// The average-position law without damping between copies, and with a damper from the peer's copy to ground.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LocalDamping<C = f64> {
     /// Gain KT [N/m]; the damping between copies is zero.
     gains: Gains<C>,
-    /// β [N·s/m].
+    /// Damping β of the copy towards ground [N·s/m].
     damping: f64,
 }
 

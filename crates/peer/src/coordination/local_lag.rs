@@ -8,7 +8,7 @@ use super::{Coefficients, Law, LawForm, LawKind, LawParameter, LawParameters, La
 use crate::gains::coordinate;
 use crate::{Gains, Number};
 
-/// The average-position law with an own state of the past.
+/// The average-position law with the peer's own state of L ticks ago in place of the present state.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LocalLag<C = f64> {
     /// Gains KT [N/m] and BT [N·s/m].

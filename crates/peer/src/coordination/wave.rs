@@ -24,11 +24,11 @@ const NEVER: u64 = u64::MAX;
 /// Series junction of a copy.
 #[derive(Clone, Debug)]
 pub struct Wave<const A: usize> {
-    /// ρ [√(N·s/m)].
+    /// Factor ρ from a wave to the force of a line [√(N·s/m)].
     root: f64,
     /// M, the number of ticks between samples.
     every: u64,
-    /// 1/M.
+    /// Factor 1/M from the sum of a wave over the ticks between two samples to the mean wave.
     share: f64,
     /// ρ/(M·h), the wave of a motion of one metre in the ticks between samples [√W/m].
     rate: f64,

@@ -41,9 +41,9 @@ pub struct RotationStep<C = f64> {
     h: C,
     /// (Jy − Jz)/Jx and its cyclic permutations: γ(ω) = gyration∘(ωy·ωz, ωz·ωx, ωx·ωy).
     gyration: Triple<C>,
-    /// 1/J [1/(kg·m²)].
+    /// Inverse of each principal moment of inertia, 1/J [1/(kg·m²)].
     mobility: Triple<C>,
-    /// b/J [1/s].
+    /// Rate b/J at which the rotational damping slows a free turn about each axis [1/s].
     decay: Triple<C>,
     /// e = φ0 and g = h·φ1 over the step.
     whole: [Triple<C>; 2],
