@@ -19,7 +19,7 @@ pub(crate) struct EndLabel {
 }
 
 impl EndLabel {
-    /// Returns whether a content can have its name at its end.
+    /// Returns whether the content is a line with a name that can be written at the end of the line, in place of an entry in the legend.
     pub(crate) fn is_labelled(content: &Content) -> bool {
         matches!(content, Content::Line(line) if line.joined && line.look.colour.is_some() && !line.name.is_empty() && !line.runs.is_empty())
     }

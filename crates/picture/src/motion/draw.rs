@@ -7,7 +7,7 @@ use super::{EDGE, FONT, HEIGHT, MARGIN, Motion, MotionRun, RING, TITLE, View, WI
 use crate::xml::{coordinate, escape};
 
 impl Motion {
-    /// The document, a file of its own. Where a reader has turned animations off, the document shows the last frame.
+    /// Returns the animation as an SVG document. For a reader who has turned animations off, the document shows the last frame.
     #[must_use]
     pub fn svg(&self) -> String {
         let view = self.view();
@@ -35,7 +35,7 @@ impl Motion {
         xml
     }
 
-    /// One run: title, frame, paths, copies, hands and legend. `corner` is the upper left corner.
+    /// Writes a run: title, frame, paths, copies, hands and legend. `left` and `top` are the upper left corner \[px\].
     fn write_run(&self, xml: &mut String, number: usize, [left, top]: [f64; 2], view: &View) {
         let run = &self.runs[number];
         write_text(xml, &run.title, [left, top + 1.4 * FONT], FONT, "");
@@ -93,7 +93,7 @@ impl Motion {
         run.left_at(view).map(|frame| format!("All copies are outside this frame from {:.1} s on.", self.time_of(frame)))
     }
 
-    /// The content in words, for readers who do not see the picture.
+    /// Returns the content in words, for readers who do not see the picture.
     fn spoken(&self, view: &View) -> String {
         let runs = self.runs.iter().map(|run| {
             let departure = self.departure(run, view).map_or(String::new(), |text| format!(" {text}"));
@@ -103,7 +103,7 @@ impl Motion {
     }
 }
 
-/// The path of a copy, in pieces that appear one after the other.
+/// Writes the path of a copy, in pieces that appear one after the other. `at` maps a position \[m\] to the picture \[px\].
 fn write_path(xml: &mut String, run: &MotionRun, copy: usize, at: impl Fn([f64; 2]) -> [f64; 2]) {
     let places: Vec<[f64; 2]> = run.frames.iter().filter_map(|places| places.get(copy)).map(|place| at(*place)).collect();
     let colour = copy % COUNT;
@@ -117,7 +117,7 @@ fn write_path(xml: &mut String, run: &MotionRun, copy: usize, at: impl Fn([f64; 
     }
 }
 
-/// The names of the copies, each with colour and size, and the meaning of a ring.
+/// Writes the names of the copies, each with colour and size, and the meaning of a ring.
 fn write_legend(xml: &mut String, run: &MotionRun, [mut x, y]: [f64; 2]) {
     for (copy, name) in run.names.iter().enumerate() {
         // Sizes in the legend have the proportions of the sizes in the frame.
@@ -134,12 +134,13 @@ fn write_legend(xml: &mut String, run: &MotionRun, [mut x, y]: [f64; 2]) {
     }
 }
 
-/// The width of a text, not exceeded by any common font.
+/// Returns a width \[px\] that the text does not exceed in any common font.
 fn width_of(text: &str) -> f64 {
     u32::try_from(text.chars().count()).map_or(0.0, f64::from) * 0.7 * FONT
 }
 
-/// A text with further classes, each after a space. An empty text is not written.
+/// Writes a text of font size `size` \[px\] at a position \[px\]. `classes` are further classes of the style sheet, each after a space. Writes nothing for an
+/// empty text.
 fn write_text(xml: &mut String, text: &str, [x, y]: [f64; 2], size: f64, classes: &str) {
     if !text.is_empty() {
         let [x, y, size] = [x, y, size].map(coordinate);

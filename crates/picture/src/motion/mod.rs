@@ -72,30 +72,30 @@ const STILL: f64 = 2.5;
 const PIECE: usize = 5;
 
 impl Motion {
-    /// An animation with `step` seconds between two frames, above zero. The animation lasts as long as the run with the most frames, at least one step, and
-    /// then shows the last frame for 2.5 s. `note` stands below the title.
+    /// Creates an animation. `step` is the time between two frames \[s\], above zero. The animation lasts as long as the run with the most frames, at least one
+    /// step, and then shows the last frame for 2.5 s. `note` stands below the title.
     #[must_use]
     pub fn new(title: impl Into<String>, note: impl Into<String>, step: f64, runs: Vec<MotionRun>) -> Self {
         Self { title: title.into(), note: note.into(), step, runs }
     }
 
-    /// Duration of the runs, without the still \[s\].
+    /// Returns the duration of the longest run \[s\], without the time for which the last frame then stays.
     fn seconds(&self) -> f64 {
         let frames = self.runs.iter().map(|run| run.frames.len()).max().unwrap_or(1).max(2);
         self.time_of(frames - 1)
     }
 
-    /// Instant of a frame \[s\].
+    /// Returns the instant of a frame \[s\].
     fn time_of(&self, frame: usize) -> f64 {
         u32::try_from(frame).map_or(1.0, f64::from) * self.step
     }
 
-    /// Share of the cycle, still included, at which a frame is shown \[%\].
+    /// Returns the point of the cycle at which a frame is shown \[%\]. The cycle includes the time for which the last frame stays.
     fn share_of(&self, frame: usize) -> f64 {
         100.0 * self.time_of(frame) / self.cycle()
     }
 
-    /// Duration of one cycle of the animation \[s\].
+    /// Returns the duration of one cycle of the animation \[s\]: the longest run, and the time for which the last frame stays.
     fn cycle(&self) -> f64 {
         self.seconds() + STILL
     }
@@ -105,7 +105,7 @@ impl Motion {
         (WIDTH - MARGIN * (columns + 1.0)) / columns
     }
 
-    /// Maps positions to the frame: the first run fills the frame.
+    /// Returns the map from positions to the frame. The first run fills the frame.
     fn view(&self) -> View {
         let first = self.runs.iter().take(1);
         let copies = first.clone().flat_map(|run| run.frames.iter().flatten());
@@ -131,7 +131,7 @@ impl Motion {
 }
 
 impl MotionRun {
-    /// First frame from which on every copy is outside the frame of the picture, until the end of the run.
+    /// Returns the frame from which on every copy stays outside the frame of the picture until the end of the run; `None` if a copy is seen at the end.
     fn left_at(&self, view: &View) -> Option<usize> {
         let is_out = |places: &Vec<[f64; 2]>| !places.is_empty() && places.iter().all(|place| view.is_outside(*place));
         // The last frame with a copy inside decides, because copies may leave and come back before.
@@ -146,7 +146,7 @@ impl MotionRun {
     }
 }
 
-/// Edge of a copy \[px\]: the first copy is the largest.
+/// Returns the edge of the copy with index `copy` among `copies` \[px\]. The first copy is the largest.
 fn edge_of(copy: usize, copies: usize) -> f64 {
     let count = |number: usize| u32::try_from(number).map_or(f64::INFINITY, f64::from);
     EDGE - (EDGE - LEAST_EDGE) * count(copy) / count(copies.max(2) - 1)
@@ -155,14 +155,14 @@ fn edge_of(copy: usize, copies: usize) -> f64 {
 struct View {
     /// Position in the middle of the frame \[m\].
     middle: [f64; 2],
-    /// \[px/m\]
+    /// Scale \[px/m\].
     scale: f64,
     /// Half of the width and of the height of the frame \[px\].
     half: [f64; 2],
 }
 
 impl View {
-    /// Shift from the middle of the frame \[px\], y downwards as in a picture.
+    /// Returns the shift of a position from the middle of the frame \[px\], with y downwards as in a picture.
     fn shift(&self, place: [f64; 2]) -> [f64; 2] {
         let along = |axis: usize| (self.scale * (place[axis] - self.middle[axis])).clamp(-GONE, GONE);
         // `clamp` keeps NaN, so NaN is moved out of the frame here.

@@ -18,7 +18,7 @@ const STYLE: &str = "text{font-family:system-ui,sans-serif}.ink{fill:#1b1f24}.pa
 ";
 
 impl Motion {
-    /// The whole style sheet. Without animations (a reader may have turned animations off) the last frame is shown.
+    /// Returns the style sheet. For a reader who has turned animations off, the style sheet shows the last frame.
     pub(super) fn style(&self, view: &View) -> String {
         let mut text = STYLE.to_owned();
         for (number, colour) in COLOURS.iter().enumerate() {
@@ -51,7 +51,7 @@ impl Motion {
         text
     }
 
-    /// The class `name`, with a shape that goes from place to place and rests at the last place during the still.
+    /// Writes the class `name`, which moves a shape from place to place and leaves the shape at the last place while the last frame stays.
     fn write_way(&self, text: &mut String, name: &str, places: impl Iterator<Item = Option<[f64; 2]>>, view: &View) {
         let _ = write!(text, "@keyframes {name}{{");
         let mut last = String::new();
@@ -63,7 +63,7 @@ impl Motion {
         let _ = writeln!(text, "100%{last}}}\n.{name}{{animation:{name} {}s linear infinite}}", coordinate(self.cycle()));
     }
 
-    /// The class `name`, with a shape shown from a frame on.
+    /// Writes the class `name`, which shows a shape from a frame on.
     fn write_appearance(&self, text: &mut String, name: &str, frame: usize) {
         let (share, cycle) = (coordinate(self.share_of(frame)), coordinate(self.cycle()));
         // The keyframes end without an opacity, so that the shape then has the opacity of the shape's other class, at once (`step-start`).
