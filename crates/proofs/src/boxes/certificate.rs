@@ -136,7 +136,7 @@ pub struct PartCertificate {
     /// States in the order of the rows of the coordinates. Positions are counted from the first copy if nothing ties the scene to ground. Velocities are
     /// multiplied by `time`.
     pub states: Vec<FrameState>,
-    /// Gains K and B of a sample as the one number (K·x + B·v)/(K + B/time); `None`: a sample is a position and a velocity.
+    /// Gains K and B if a sample is the single number (K·x + B·v)/(K + B/time); `None` if a sample is a position and a velocity.
     pub heard: Option<Gains>,
     /// Time by which velocities are multiplied \[s\].
     pub time: f64,

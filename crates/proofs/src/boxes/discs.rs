@@ -37,9 +37,9 @@ pub(super) struct Decision {
 /// Numbers that satisfy inequality (1), with W the inverse of V.
 #[derive(Clone, Debug)]
 pub(super) struct Witness {
-    /// V.
+    /// Coordinates V in which the matrices are nearly diagonal.
     pub(super) coordinates: ComplexMatrix,
-    /// d.
+    /// Weights d in inequality (1), one per coordinate.
     pub(super) weights: Vec<f64>,
     pub(super) circle: FreeCircle,
 }
@@ -86,7 +86,7 @@ pub(crate) fn stable_difference(members: &[usize], node: &Node, weight: f64, tim
 
 /// W·M·V over a box, nearly diagonal, and W·V, nearly the unit matrix.
 pub(super) struct NearlyDiagonal {
-    /// V.
+    /// Coordinates V.
     coordinates: ComplexMatrix,
     mean: ComplexMatrix,
     pub(super) slopes: Vec<ComplexMatrix>,

@@ -221,7 +221,8 @@ impl<'a> Followed<'a> {
     }
 }
 
-/// Returns the motions of a family. `delayed`: the place of the key of a delay, and its value.
+/// Returns the motions of a family. `delayed` gives the key with this index, a delay, the given value in place of its range. `every` marks a proof for all
+/// numbers of peers.
 fn motions(family: &Family, delayed: Option<(usize, f64)>, every: Option<(u64, Option<u64>)>) -> Result<Vec<Motion>, ProofError> {
     let keys = family.keys();
     let at = |value: &dyn Fn(usize) -> f64| {

@@ -63,11 +63,11 @@ struct Margin<'a> {
     multipliers: usize,
     /// Number of unknowns; the margin is the last unknown.
     unknowns: usize,
-    /// R.
+    /// Bound R of the sum of the traces of the shapes and of the multipliers that must be positive.
     bound: f64,
     /// Upper bound of η times the amount by which the largest margin exceeds the margin of a centre.
     parameter: f64,
-    /// η.
+    /// Weight η of the margin against the barriers. Grows from centre to centre.
     pull: f64,
 }
 

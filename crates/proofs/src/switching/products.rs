@@ -31,17 +31,17 @@ const PRODUCTS: usize = 7;
 /// The rows of a contact at one tick, as indices among the rows of the part. Let f be the force divided by the stiffness, p = max(0, depth), v the velocity of
 /// the depth times B/K, and b = p − depth.
 struct Tick {
-    /// f.
+    /// Row of the force divided by the stiffness, f.
     force: usize,
-    /// p.
+    /// Row of the positive part of the depth, p.
     pressed: usize,
-    /// p of the next tick.
+    /// Row of p at the next tick.
     pressed_next: usize,
-    /// f − p − v.
+    /// Row of f − p − v, zero in contact.
     rest: usize,
-    /// b of the next tick less b of this tick.
+    /// Row of the change of b to the next tick.
     opening: usize,
-    /// depth − p. Held as a row, because only some products need it.
+    /// Row of depth − p. Held as a row and not as an index, because only some products need this row.
     inside: Row,
 }
 

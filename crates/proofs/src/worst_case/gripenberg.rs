@@ -268,7 +268,7 @@ impl Search {
         bound <= self.lower + self.accuracy
     }
 
-    /// The steps of a path, in order of time.
+    /// Returns the steps of a path, in order of time. `trail` is the index of the last step; `None` is the empty path.
     fn path(&self, trail: Option<usize>) -> Vec<usize> {
         let mut path = Vec::new();
         let mut next = trail;
@@ -344,7 +344,7 @@ fn steps(automaton: &Automaton, certificate: Option<&Certificate>, watch: &dyn W
 /// A computed inverse Z of an upper triangle R.
 #[derive(Clone)]
 struct Inverse {
-    /// Z.
+    /// The inverse Z.
     matrix: Matrix,
     /// Upper bound of g/(1 − g), with g >= ‖I − RZ‖₂; zero if the inverse is exact.
     gap: f64,
