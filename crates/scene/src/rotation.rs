@@ -126,8 +126,9 @@ impl Scene {
         Some(inertia.map(|moment| (6.0 * (twice - 2.0 * moment).max(0.0) / self.object.mass).sqrt()))
     }
 
-    /// Returns KR and BR about the body axes on the mean of the other peers, scaled by the number of peers; `None` if the object does not turn. `gains` are
-    /// KT and BT, `given` are KR and BR as written; both of the scene or as the timeline sets them.
+    /// Returns the gains KR and BR about the body axes on the difference to the mean of the other peers, scaled by the number of peers. Returns `None` if the
+    /// object does not turn. `gains` are KT and BT, and `given` are KR and BR as written. Both come from the scene, or from an event of the timeline. A gain
+    /// that is not given follows from KT or BT.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "the number of peers is far below 2^53")]
     pub(crate) fn rotation_gains(&self, gains: Gains, given: &Gains<Option<Triple>>) -> Option<Gains<Triple>> {
