@@ -66,23 +66,24 @@ fn on_topology(scene: &Scene, topology: &Topology, method: Method, watch: &dyn W
     }
 }
 
-/// [`analyse_watched`] about the rest that the constant forces and torques of the hands, and their arms, leave the object at: copies are then some way apart,
-/// and a turn changes the moment of the forces. An object that does not turn moves about it as it does without.
+/// Analyses small motions about the state of rest under the constant forces and torques of the hands and the springs of their arms. The copies rest at
+/// different positions there, and a rotation of the object changes the moments of the forces. For an object that does not turn the result equals the result of
+/// [`analyse_watched`].
 ///
 /// # Errors
 ///
-/// As [`analyse_watched`]; if hands do not stay as they are, and if nothing rests under what they do.
+/// The errors of [`analyse_watched`]. Further errors: a force or torque of a hand is not constant, or no state of rest exists under the forces.
 pub fn analyse_loaded(scene: &Scene, method: Method, watch: &dyn Watch) -> Result<Analysis, AnalysisError> {
     if scene.rotation.is_some() { turning::analyse_loaded(scene, watch) } else { analyse_watched(scene, method, watch) }
 }
 
-/// [`analyse_watched`] about the steady spin that constant torques of the hands drive about one axis of the world, near the attitude in which the object
-/// begins, and near its angular velocity if it has one. The samples that copies hold are behind by their age, which brakes; the rate is the one at which
-/// torques make up for that and for the damping.
+/// Analyses small motions about the steady spin that constant torques of the hands drive about one axis of the world. The spin is searched near the initial
+/// attitude of the object, and near its initial angular velocity if that is not zero. A held sample shows an attitude of the past, and so pulls the copy back
+/// against the spin. The rate of the steady spin is the rate at which the torques balance this pull and the damping.
 ///
 /// # Errors
 ///
-/// As [`analyse_watched`]; if the object does not turn, or nothing drives a steady spin.
+/// The errors of [`analyse_watched`]. Further errors: the object does not turn, or no steady spin exists under the torques.
 pub fn analyse_spinning(scene: &Scene, watch: &dyn Watch) -> Result<Analysis, AnalysisError> {
     if scene.rotation.is_none() {
         return Err(AnalysisError::NoSpin { why: "the object has no inertia".to_owned() });

@@ -13,7 +13,7 @@ pub struct Combination {
     /// The contacts that are closed.
     pub contacts: Contacts,
     pub(crate) axes: usize,
-    /// See [`ContactMode::motion`](crate::ContactMode::motion).
+    /// Name of the motion, as in [`ContactMode::motion`](crate::ContactMode::motion).
     pub(crate) motion: String,
     pub(crate) words: String,
 }

@@ -106,7 +106,7 @@ impl Kinds {
         Self(counts)
     }
 
-    /// Returns the kinds that there are, each with its number of things.
+    /// Returns the kinds with a count above zero, each with its count.
     pub fn present(self) -> impl Iterator<Item = (VerdictKind, usize)> {
         VerdictKind::ALL.into_iter().map(move |kind| (kind, self.0[kind as usize])).filter(|(_, count)| *count > 0)
     }

@@ -44,7 +44,7 @@ impl<T: Copy + Default> Dense<T> {
         self.columns
     }
 
-    /// A row.
+    /// Returns a row.
     ///
     /// # Panics
     ///
@@ -55,7 +55,7 @@ impl<T: Copy + Default> Dense<T> {
         &self.entries[row * self.columns..(row + 1) * self.columns]
     }
 
-    /// A row, to be changed.
+    /// Returns a row for changes.
     ///
     /// # Panics
     ///

@@ -6,8 +6,8 @@ pub enum Method {
     /// Peers that are equal are treated together: see [`Part`](crate::Part). For scenes with the strategies of this workspace.
     #[default]
     Reduced,
-    /// As [`Method::Reduced`], and where samples are on their way for frames, the roots of a small determinant instead of the eigenvalues of a large
-    /// matrix. Chosen where the matrix would be large.
+    /// Like [`Method::Reduced`], but finds the roots of a small determinant instead of the eigenvalues of a large matrix where samples are in flight for
+    /// several frames. [`Method::Reduced`] switches to this method where the matrix would be large.
     Determinant,
     /// Unit vectors of the whole state are pushed through the code that simulates. For any linear strategy.
     Full,

@@ -204,7 +204,7 @@ pub(crate) struct PartsRadius {
     /// Frame of the averages, if the frame fits on the stack.
     together: Option<StackFrame>,
     apart: Vec<Option<Apart>>,
-    /// −1/(N−1).
+    /// Weight −1/(N−1) with which a difference of equal peers receives its own samples, as a matrix of one entry.
     difference: Matrix,
     /// Method for the second moment, or the error with the reason for the absence of a method.
     followed: Result<Followed, AnalysisError>,

@@ -18,7 +18,7 @@ const MOST_SAMPLES: usize = 4;
 /// The largest number of states: positions and velocities of a device and a copy.
 const MOST_STATES: usize = 4;
 
-/// The steps of a frame of one node hearing its own samples.
+/// Steps of a frame of a single node that receives its own samples. All numbers fit on the stack, within [`MOST_SAMPLES`] and [`MOST_STATES`].
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct StackFrame {
     steps: Vec<Step>,

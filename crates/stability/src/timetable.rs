@@ -51,7 +51,7 @@ impl NodeClock {
         first.div_euclid(every) + i128::from(first.rem_euclid(every) != 0)
     }
 
-    /// 10⁹ + drift, the denominator of the instants.
+    /// Returns the rate of the clock in parts per billion of true time: 10⁹ plus the drift. Instants on the clock are divided by this number.
     fn speed(&self) -> u128 {
         u128::from(1_000_000_000_u64.saturating_add_signed(self.clock.drift.parts_per_billion()))
     }

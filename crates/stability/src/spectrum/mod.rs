@@ -121,7 +121,7 @@ pub fn radius_small<const N: usize>(matrix: &mut [[f64; N]; N]) -> f64 {
 }
 
 impl Workspace {
-    /// [`eigenvalues`].
+    /// Like the function [`eigenvalues`], in the memory of the workspace. The slice holds until the next call.
     ///
     /// # Panics
     ///
@@ -153,7 +153,7 @@ impl Workspace {
         &self.eigenvalues
     }
 
-    /// [`radius`].
+    /// Like the function [`radius`], in the memory of the workspace.
     ///
     /// # Panics
     ///
@@ -163,7 +163,7 @@ impl Workspace {
         on_the_stack!(matrix, array => radius_small(&mut array)).unwrap_or_else(|| self.large_radius(matrix))
     }
 
-    /// [`bounded_radius`].
+    /// Like the function [`bounded_radius`], in the memory of the workspace.
     ///
     /// # Panics
     ///
