@@ -71,9 +71,9 @@ pub trait Stream: ByteStream + Configured {
     fn quickack(&self) -> io::Result<bool>;
     /// Sets whether acknowledgements leave at once.
     fn set_quickack(&self, quickack: bool) -> io::Result<()>;
-    /// Returns the time to linger.
+    /// Returns the time for which closing waits for unsent bytes (`SO_LINGER`), or `None` if closing does not wait.
     fn linger(&self) -> io::Result<Option<Duration>>;
-    /// Sets the time to linger.
+    /// Sets the time for which closing waits for unsent bytes (`SO_LINGER`). `None`: closing does not wait.
     fn set_linger(&self, linger: Option<Duration>) -> io::Result<()>;
     /// Returns the time to live of packets, from 1 to 255.
     fn ttl(&self) -> io::Result<u32>;
@@ -129,16 +129,16 @@ pub trait Socket: Configured + fmt::Debug + Send + Sync {
     fn listen(self: Box<Self>, backlog: u32) -> io::Result<Box<dyn Listener>>;
     /// Returns the socket's local address.
     fn local_addr(&self) -> io::Result<SocketAddr>;
-    /// Returns an option with the values on and off.
+    /// Returns whether an option is on.
     fn flag(&self, flag: Flag) -> io::Result<bool>;
-    /// Sets an option on or off.
+    /// Switches an option on or off.
     fn set_flag(&self, flag: Flag, on: bool) -> io::Result<()>;
-    /// Returns an option with a number.
+    /// Returns the value of an option with a number.
     fn number(&self, number: Number) -> io::Result<u32>;
     /// Sets an option with a number.
     fn set_number(&self, number: Number, value: u32) -> io::Result<()>;
-    /// Returns the time to linger.
+    /// Returns the time for which closing waits for unsent bytes (`SO_LINGER`), or `None` if closing does not wait.
     fn linger(&self) -> io::Result<Option<Duration>>;
-    /// Sets the time to linger.
+    /// Sets the time for which closing waits for unsent bytes (`SO_LINGER`). `None`: closing does not wait.
     fn set_linger(&self, linger: Option<Duration>) -> io::Result<()>;
 }
