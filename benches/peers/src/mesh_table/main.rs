@@ -59,7 +59,7 @@ fn mesh() {
         "Nothing in this scene happens between ticks but packets on their way. cohaptic sees that, and runs it in arrays, tick by tick, as long as nobody watches"
     );
     println!(
-        "([architecture.md](architecture.md#compiled-to-the-least)). If all links have one constant delay, a sample on its way is one for all its receivers, so that its time"
+        "([architecture.md](architecture.md#only-what-the-scene-needs)). If all links have one constant delay, a sample on its way is one for all its receivers, so that its time"
     );
     println!(
         "a packet is less than any program can move one in. Its second row is the same scene with an observer that is shown every packet: event by event, as any scene"
