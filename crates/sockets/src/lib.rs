@@ -186,6 +186,7 @@ pub struct Entered {
 
 /// Declares that `bed` runs on this thread until the returned guard is dropped.
 pub fn enter(bed: Arc<dyn Bed>) -> Entered {
+    // Guards nest: the test bed that ran here before is in force again when the guard is dropped.
     Entered { before: BED.with_borrow_mut(|here| here.replace(bed)) }
 }
 
@@ -201,6 +202,7 @@ impl Drop for Entered {
 /// Returns the test bed that runs on this thread, or `None` if there is none or the thread ends.
 #[must_use]
 pub fn bed() -> Option<Arc<dyn Bed>> {
+    // `try_with` fails only while an ending thread destroys its locals. No test bed runs on that thread any more.
     BED.try_with(|bed| bed.borrow().clone()).ok().flatten()
 }
 

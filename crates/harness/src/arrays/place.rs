@@ -20,7 +20,7 @@ pub(super) struct Places {
 }
 
 impl Places {
-    /// Number of blocks of an axis.
+    /// Returns the number of blocks of an axis.
     pub(super) const fn blocks(self) -> usize {
         (self.peers * self.runs).div_ceil(WIDTH)
     }

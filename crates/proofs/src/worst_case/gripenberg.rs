@@ -391,7 +391,7 @@ fn absolute(matrix: &Matrix) -> Matrix {
 }
 
 impl Ord for Leaf {
-    /// The leaf with the larger bound is greater, so that the heap yields it first; of equal bounds the older leaf.
+    /// Compares two leaves. The leaf with the larger bound is greater, so that the heap yields this leaf first. Of equal bounds the older leaf is greater.
     fn cmp(&self, other: &Self) -> Ordering {
         self.bound.total_cmp(&other.bound).then(other.order.cmp(&self.order))
     }
