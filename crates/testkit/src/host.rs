@@ -155,7 +155,7 @@ impl Host {
     pub fn kill(&self) {
         let running = self.running("programs are killed");
         if self.is_up() {
-            // The tasks first, which drop the sockets that they hold; then the sockets of this host that others hold.
+            // Tasks are stopped first, and drop the sockets that they hold. Sockets of this host that other tasks hold are closed after that.
             running.tasks.stop_all_of(self.node);
             self.shared.with(|core| core.kill(self.node));
         }

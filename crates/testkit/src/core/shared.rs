@@ -222,12 +222,12 @@ impl Shared {
         (self.is_at_hand() || self.may_be_had()) && HERE.with(|here| here.try_borrow().is_ok())
     }
 
-    /// Like [`Shared::with`], but returns `None` if the state may not be asked.
+    /// Like [`Shared::with`], but returns `None` if the state may not be accessed now.
     pub(crate) fn try_with<T>(&self, ask: impl FnOnce(&mut Core) -> T) -> Option<T> {
         self.may_be_asked().then(|| self.with(ask))
     }
 
-    /// Brings the state to this thread for one question, unless the state lies here, and lets time pass until the time of the clock.
+    /// Brings the state to this thread for one access, unless the state is on this thread already, and lets time pass until the time of the clock.
     #[inline(never)]
     #[expect(clippy::panic, reason = "a misuse, and the way out")]
     pub(super) fn visit(&self) -> Visit<'_> {
@@ -279,14 +279,14 @@ impl Shared {
     }
 }
 
-/// Wakes the tasks that could not be woken while the state was asked.
+/// Wakes the tasks that could not be woken during the access to the state.
 #[cold]
 #[inline(never)]
 fn wake(woken: Vec<Waker>) {
     woken.into_iter().for_each(Waker::wake);
 }
 
-/// Guard of one question: the state is on this thread until the guard is dropped.
+/// Guard of one access to the state of the run. The state stays on this thread until the guard is dropped.
 pub(super) struct Visit<'a> {
     /// Lock of the place to which the state returns; `None` if the state stays here.
     home: Option<MutexGuard<'a, Option<Box<Core>>>>,

@@ -6,7 +6,7 @@ use cohaptic_units::Instant;
 /// nodes are at the end.
 #[derive(Debug)]
 pub(super) struct Deadlines {
-    /// Entries of the tree. The children of entry `i` are the entries `2 * i` and `2 * i + 1`.
+    /// Entries of the tree: the earliest deadline below each. The children of entry `i` are the entries `2 * i` and `2 * i + 1`; entry 0 is unused.
     least: Vec<Instant>,
     /// Index of the entry of node 0.
     first: usize,

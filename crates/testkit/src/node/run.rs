@@ -31,7 +31,7 @@ use crate::wire::Wire;
 /// instant over links without delay. If the test fails while the run exists, the seed is printed, and the record is written where [`Nodes::artefacts`](super::Nodes::artefacts) says.
 pub struct NodeRun {
     pub(super) names: Arc<Names>,
-    /// Nodes by index. `None` while a node is down or is being asked.
+    /// Nodes by index. `None` while a node is down, or while one of its own methods runs.
     pub(super) nodes: Vec<Option<Box<dyn Node>>>,
     pub(super) up: Vec<bool>,
     pub(super) wire: Wire<Ports>,
@@ -39,7 +39,7 @@ pub struct NodeRun {
     pub(super) counts: Vec<NodeCounts>,
     /// Packets that have arrived and are not handed over yet, with the receiver.
     pub(super) arrived: VecDeque<(NodeId, Packet)>,
-    /// Nodes that the test has touched and that must be asked.
+    /// Nodes that the test has changed, and whose packets and deadlines must be polled again.
     touched: Vec<NodeId>,
     /// Number of events since time last passed.
     pub(super) done: u64,
@@ -240,7 +240,8 @@ impl NodeRun {
         self.now()
     }
 
-    /// Lets time pass while `is_so` returns true. It is called after every instant with an event. Returns the instant at which `is_so` is false.
+    /// Lets time pass while `is_so` returns true, and returns the first instant at which `is_so` returns false. `is_so` is called after every instant with an
+    /// event.
     ///
     /// # Panics
     ///
@@ -283,7 +284,7 @@ impl NodeRun {
         self.now().saturating_duration_since(Instant::ZERO) > self.time_limit
     }
 
-    /// Asks the nodes that the test has touched for packets and deadlines.
+    /// Polls packets and deadlines of the nodes that the test has changed.
     pub(super) fn ask_touched(&mut self) {
         if self.touched.is_empty() {
             return;
