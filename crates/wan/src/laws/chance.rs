@@ -103,7 +103,7 @@ impl ChanceStage {
         Some(Self { before: before.and_then(|stage| stage.before), ..Self::new(chance)? })
     }
 
-    /// Answers for the next packet, given the packet's random word.
+    /// Returns whether the event happens to the next packet, given the packet's random word, and remembers the answer for the packet after.
     pub(crate) fn happens(&mut self, word: u64) -> bool {
         let (p, rho) = (self.chance.probability.get(), self.chance.correlation);
         // DAR(1): for ρ ≥ 0 the previous answer is repeated with probability ρ, else a new answer is drawn.

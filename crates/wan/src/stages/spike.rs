@@ -93,8 +93,8 @@ pub(crate) struct SpikeStage {
 impl ImpairmentStage for SpikeStage {
     type Config = Spike;
 
-    /// Begun spikes continue from their present level with the new decay. If the rate changes, the next gap is drawn anew. This keeps the law, because
-    /// exponential gaps have no memory. Without a configuration no packet is late.
+    /// Returns the stage for a new configuration. Begun spikes continue from their present level with the new decay. If the rate changes, the next gap is drawn
+    /// anew. This keeps the law, because exponential gaps have no memory. Without a configuration no packet is late.
     fn reconfigured(before: Option<Self>, now: Instant, config: Option<&Spike>, draws: Stream, code: u8) -> Option<Self> {
         if before.is_none() && config.is_none() {
             return None;
