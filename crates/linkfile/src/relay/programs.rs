@@ -25,7 +25,7 @@ pub(super) static PROGRAM: Table = Table::of(&[&[
     ),
 ]]);
 
-/// Entry of a program, with the nodes for faults.
+/// Entry of a program, with the nodes of the file to which messages about its addresses point.
 #[derive(Debug)]
 struct Written<'a> {
     program: RelayProgram,

@@ -135,7 +135,7 @@ pub struct Profile {
     pub up: Line,
     /// Modulators of both directions as TOML, in the order of the file.
     pub chains: Vec<String>,
-    /// Modulators of both directions.
+    /// Modulators of both directions, as read from [`chains`](Self::chains).
     pub(crate) modulators: Arc<Modulators>,
 }
 
