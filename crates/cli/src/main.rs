@@ -67,6 +67,7 @@ fn main() -> ExitCode {
     if arguments.quiet {
         output::be_quiet();
     }
+    // After the parsing of arguments: until here Ctrl-C ends the program at once, and nothing has been begun.
     interrupt::listen();
     let done = match arguments.command {
         Command::Run(arguments) => run::run(&arguments),

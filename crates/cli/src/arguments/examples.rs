@@ -3,7 +3,7 @@
 const EXIT_STATUS: &str = "Exit status: 0 done, 1 an expectation failed, 2 a bad argument or scene, 3 an input or output error, 130 interrupted, \
     141 standard output was closed.";
 
-/// The examples of a command, and the exit status.
+/// Returns the examples of a command, and the meanings of the exit status.
 pub(super) fn after(examples: &[&str]) -> String {
     let mut text = "Examples:\n".to_owned();
     for example in examples {
@@ -26,12 +26,12 @@ Programs whose files are read, and the command that makes a good measurement:
 CSV files of LENS, traces of CellReplay (light and heavy) and JSON of netem-trace are read too.
 ";
 
-/// The examples of `fit`, the programs whose files it reads, and the exit status.
+/// Returns the examples of `fit`, the programs whose files `fit` reads, and the meanings of the exit status.
 pub(super) fn after_measurements(examples: &[&str]) -> String {
     after(examples).replace(EXIT_STATUS, &format!("{MEASUREMENTS}\n{EXIT_STATUS}"))
 }
 
-/// The examples of the program, the exit status, and on systems other than Linux the commands that need Linux.
+/// Returns the examples of the program, the meanings of the exit status, and on systems other than Linux the commands that need Linux.
 pub(super) fn of_program() -> String {
     let needs = if cfg!(target_os = "linux") { "" } else { "\n\nThese commands need Linux: falcon, live, play, relay, router." };
     after(PROGRAM) + needs

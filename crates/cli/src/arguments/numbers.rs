@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 
 use cohaptic_units::{Probability, parse};
 
-/// An integer in a range, both ends included.
+/// Returns a reader of integers from `least` to `most`, both included.
 pub(crate) fn integer<T: TryFrom<u64>>(least: u64, most: u64) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static {
     move |text| {
         let number = text.parse().ok().filter(|number| (least..=most).contains(number));
@@ -12,12 +12,12 @@ pub(crate) fn integer<T: TryFrom<u64>>(least: u64, most: u64) -> impl Fn(&str) -
     }
 }
 
-/// Any integer that is not negative.
+/// Reads an integer that is not negative.
 pub(crate) fn any_integer(text: &str) -> Result<u64, String> {
     integer(0, u64::MAX)(text)
 }
 
-/// An integer of at least one.
+/// Reads an integer of at least one.
 pub(crate) fn some(text: &str) -> Result<NonZeroUsize, String> {
     let number = text.parse().ok();
     number.ok_or_else(|| expected(1, u64::MAX))
@@ -28,7 +28,7 @@ pub(crate) fn threads(text: &str) -> Result<u16, String> {
     integer(1, 1024)(text)
 }
 
-/// An amount of memory in bytes: a whole number with MiB or GiB.
+/// Reads an amount of memory, written as a whole number with MiB or GiB, and returns the number of bytes. Zero is refused.
 pub(crate) fn memory(text: &str) -> Result<u64, String> {
     let text = text.trim();
     let of_unit = |unit: &str, shift: u32| {
@@ -38,7 +38,7 @@ pub(crate) fn memory(text: &str) -> Result<u64, String> {
     of_unit("MiB", 20).or_else(|| of_unit("GiB", 30)).ok_or_else(|| "expected an amount of memory such as 512MiB or 16GiB".to_owned())
 }
 
-/// A duration, perhaps with a sign, in seconds.
+/// Reads a duration with or without a sign, and returns seconds.
 pub(crate) fn signed_duration(text: &str) -> Result<f64, String> {
     let text = text.trim();
     let (sign, rest) = match text.strip_prefix('-') {
@@ -49,24 +49,24 @@ pub(crate) fn signed_duration(text: &str) -> Result<f64, String> {
     Ok(sign * duration.as_secs_f64())
 }
 
-/// A number, whatever its range.
+/// Reads a number of any range. Takes infinity and NaN too.
 pub(crate) fn real(text: &str) -> Result<f64, String> {
     text.trim().parse().map_err(|_| "expected a number such as 0.25, 100 or 1e-3".to_owned())
 }
 
-/// A probability, as a number from 0 to 1 or in percent.
+/// Reads a probability, as a number from 0 to 1 or in percent.
 pub(crate) fn probability(text: &str) -> Result<Probability, String> {
     let number = || text.trim().parse().ok().and_then(|number| Probability::new(number).ok());
     parse::probability(text).ok().or_else(number).ok_or_else(|| "expected a probability such as 0.015 or 1.5%".to_owned())
 }
 
-/// A share of a round trip: `even`, a number above 0 and at most 1, or a percentage.
+/// Reads a share of a round trip: `even` for one half, a number above 0 and at most 1, or a percentage.
 pub(crate) fn share(text: &str) -> Result<f64, String> {
     let read = if text.trim() == "even" { Some(0.5) } else { probability(text).ok().map(Probability::get) };
     read.filter(|share| *share > 0.0).ok_or_else(|| "expected even, or a share above 0 such as 0.4 or 60%".to_owned())
 }
 
-/// A part of a whole: a number above 0 and below 1, or a percentage.
+/// Reads a part of a whole: a number above 0 and below 1, or a percentage.
 pub(crate) fn part(text: &str) -> Result<f64, String> {
     let read = probability(text).ok().map(Probability::get).filter(|part| *part > 0.0 && *part < 1.0);
     read.ok_or_else(|| "expected a part above 0 and below 1, such as 0.5 or 50%".to_owned())

@@ -16,18 +16,18 @@ const GROUPS: [(&str, &[&str]); 5] = [
     ("Commands for other programs", &["schema", "completions", "man"]),
 ];
 
-/// Options that have one letter too, whichever command they are of.
+/// Options with a second name of one letter, in every command that has the option.
 const SHORT: [(&str, char); 3] = [("set", 's'), ("out", 'o'), ("threads", 'j')];
 
 impl Arguments {
-    /// The program with all its commands, as help, completions and manual pages show it.
+    /// Returns the description of the program with all commands, from which help, completions and manual pages are made.
     pub(crate) fn program() -> Command {
         let program = with_short_options(Self::command());
         let groups: String = GROUPS.iter().map(|(title, names)| group(&program, title, names)).collect();
         program.help_template(format!("{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{groups}Options:\n{{options}}{{after-help}}"))
     }
 
-    /// Arguments as they were typed, the name of the program first.
+    /// Parses arguments as the user typed them. The first word is the name of the program.
     pub(crate) fn of(words: impl IntoIterator<Item = OsString>) -> Result<Self, clap::Error> {
         let mut program = Self::program();
         let matches = program.try_get_matches_from_mut(with_point(words.into_iter().collect()))?;
@@ -46,7 +46,7 @@ fn with_short_options(command: Command) -> Command {
     command.mut_subcommands(with_short_options)
 }
 
-/// A title, and below it a line of at most 100 columns for each command, or several.
+/// Returns a title, and below the title each command with its description, in lines of at most 100 columns.
 fn group(program: &Command, title: &str, names: &[&str]) -> String {
     let mut text = format!("{title}:\n");
     for name in names {
@@ -66,7 +66,8 @@ fn group(program: &Command, title: &str, names: &[&str]) -> String {
     text
 }
 
-/// `stability FILE` is `stability point FILE`. A word that is no file stays, so that a command with a slip of the finger is told as one.
+/// Inserts `point` into `stability FILE`, which stands for `stability point FILE`. A word that names no file stays as the command, so that the error message
+/// for a mistyped command speaks of a command and not of a file.
 fn with_point(mut words: Vec<OsString>) -> Vec<OsString> {
     let is_option = |word: &OsString| word.to_string_lossy().starts_with('-');
     let Some(place) = (1..words.len()).find(|place| !is_option(&words[*place])) else { return words };

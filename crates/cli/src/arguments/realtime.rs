@@ -134,7 +134,7 @@ pub(crate) struct RelayArguments {
 
 const USAGE: &str = "cohaptic relay [OPTIONS] <FILE>\n       cohaptic relay [OPTIONS] --listen <ADDRESS> --to <ADDRESS> [SPEC]... [--back <SPEC>...]";
 
-/// One datagram at least.
+/// Reads an amount of memory for datagrams, at least the size of the largest datagram.
 fn room(text: &str) -> Result<Bytes, String> {
     let size = parse::size(text).map_err(|error| error.to_string())?;
     if size.get() < 65_535 { Err("expected at least 65535B, one datagram".to_owned()) } else { Ok(size) }
@@ -160,7 +160,8 @@ pub(crate) struct RouterArguments {
     pub(crate) length: Option<Duration>,
 }
 
-/// An address with a port. Of several that a name has, the first of IPv4 is taken, or else the first: both ends of a relay are then of one kind.
+/// Reads an address with a port, and looks up a name. Takes the first IPv4 address of a name, or the first address if the name has no IPv4 address. Two names
+/// with addresses of both versions then give the two ends of a relay the same version.
 fn looked_up(text: &str) -> Result<SocketAddr, String> {
     const EXPECTED: &str = "expected an address with a port, such as 127.0.0.1:7000, [::1]:7000 or localhost:7000";
     match address(text) {

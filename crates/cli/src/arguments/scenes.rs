@@ -141,12 +141,12 @@ pub(crate) struct MeasureArguments {
 }
 
 impl MeasureArguments {
-    /// All, as by `--measure all`.
+    /// Returns the arguments that `--measure all` gives.
     pub(crate) fn all() -> Self {
         Self { measure: Some("all".to_owned()) }
     }
 
-    /// As it was given.
+    /// Returns the value of `--measure` as the user wrote it; `None` without `--measure`.
     pub(crate) fn word(&self) -> Option<&str> {
         self.measure.as_deref()
     }

@@ -28,6 +28,7 @@ pub(super) fn asked<'a>(program: &'a Command, words: &'a [String]) -> Option<Ask
         Word::Positional => (state.positional(last)?, ""),
         Word::End => return None,
     };
+    // A shell replaces the whole last word, so that the part with the option is returned beside the typed value.
     let typed = last[option.len()..].to_owned();
     Some(Asked { command: state.command.get_name(), arg, option: option.to_owned(), typed, file: state.positionals.first().copied() })
 }
@@ -82,6 +83,7 @@ impl<'a> State<'a> {
             let found = self.command.get_arguments().find(|arg| arg.get_short() == Some(letter));
             if let Some(arg) = found.filter(|arg| arg.get_action().takes_values()) {
                 let value = &letters[place + letter.len_utf8()..];
+                // The rest of the word is the value, as in `-j4`. Without a rest the value is the next word.
                 return Word::Option(Some(arg), (!value.is_empty()).then_some(value));
             }
         }

@@ -195,6 +195,7 @@ fn write_real(folder: &Path, version: &str, sources: &Path, manifest: &Table) ->
     for target in manifest.get_mut("target").and_then(Value::as_table_mut).into_iter().flat_map(|targets| targets.iter_mut()) {
         target.1.as_table_mut().map(|target| target.remove("dev-dependencies"));
     }
+    // Without this table, cargo would look for the workspace of the package in the folders above, and find the workspace of the user.
     manifest.insert("workspace".to_owned(), Value::Table(Table::new()));
     let mut files = Files::new(folder);
     files.write("Cargo.toml", &manifest.to_string())?;
@@ -207,6 +208,7 @@ fn write_real(folder: &Path, version: &str, sources: &Path, manifest: &Table) ->
         }
         files.write(&format!("src/{path}"), &text)?;
     }
+    // Where a text is missing, the code that the appended code calls has changed, and the package would fail to compile without a hint.
     if appended < APPENDED.len() {
         let text = format!(
             "tokio {version} is built in another way than the versions that this program knows: expected a newer cohaptic, or an older tokio"
@@ -225,6 +227,7 @@ fn chosen(text: &str, sources: &Path) -> Result<String, Failure> {
             Some((file, needed)) => {
                 let path = sources.join("src").join(file);
                 if !path.exists() || !read_text(&path)?.contains(needed) {
+                    // `any()` of nothing is false: the compiler leaves the item out, and a reader still finds the item in the file.
                     chosen.push_str("#[cfg(any())]\n");
                 }
             }
@@ -253,7 +256,7 @@ fn standing_in(version: &str, real: &Table, sockets: &str) -> String {
     for (name, list) in &features {
         let mut own = vec![format!("real/{name}")];
         own.extend(parts(list).into_iter().filter(is_feature));
-        // Packages that the package itself uses, where no feature of their name brings them.
+        // The generated package uses these two packages itself. A feature that carries the name of the package already brings the dependency.
         for (feature, package) in [("io-util", "bytes"), ("net", "socket2")] {
             if name == feature && !implicit.contains(package) {
                 own.push(format!("dep:{package}"));

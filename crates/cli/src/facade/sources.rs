@@ -39,7 +39,8 @@ pub(super) fn find(workspace: &Workspace, version: Option<&str>) -> Result<Sourc
     // In the folder of the workspace, whose configuration of cargo may name other registries or vendored sources.
     let path = folder.join("Cargo.toml").display().to_string();
     let purpose = format!("cargo has no sources of tokio {}", version.unwrap_or("1"));
-    // Offline first: cargo then asks no registry for what it has. The newest version must be asked for.
+    // A given version is first looked for offline, so that cargo needs no registry for sources that are on this machine. Without a given version only the
+    // registry knows the newest version.
     let offline = version.map(|_| metadata(&workspace.root, &["--offline", "--manifest-path", &path], &purpose));
     let known = match offline {
         Some(Ok(known)) => known,

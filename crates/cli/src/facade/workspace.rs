@@ -14,7 +14,7 @@ const FOLDER: &str = "target/cohaptic";
 /// Folder in which the workspace with the tests is looked for.
 const SIM: &str = "sim";
 
-/// Second number of the oldest version of tokio whose functions the package has.
+/// Minor version of the oldest tokio 1 that the package can replace.
 const OLDEST: u32 = 47;
 
 /// Workspace whose programs are tested.
@@ -88,6 +88,7 @@ impl Workspace {
         }
         let lock: toml::Table = read_text(&path)?.parse().map_err(|error| Failure::Input(format!("{} cannot be read: {error}", path.display())))?;
         let text = |package: &toml::Value, key: &str| package.get(key).and_then(toml::Value::as_str).map(str::to_owned);
+        // A lock file may name several major versions of tokio. Only version 1 can be replaced.
         let packages = lock.get("package").and_then(toml::Value::as_array).map_or(&[][..], Vec::as_slice);
         let found = packages.iter().find(|package| {
             text(package, "name").as_deref() == Some("tokio") && text(package, "version").is_some_and(|version| version.starts_with("1."))
@@ -100,6 +101,7 @@ impl Workspace {
             return Err(Failure::Input(format!("tokio comes from {source}: expected a version of a registry")));
         }
         let version = text(found, "version").unwrap_or_default();
+        // The major version is 1, as searched for above.
         let minor = version.split('.').nth(1).and_then(|minor| minor.parse::<u32>().ok());
         if minor.is_none_or(|minor| minor < OLDEST) {
             return Err(Failure::Input(format!(
@@ -130,6 +132,7 @@ fn source(kit: &Value, folder: &str) -> Result<String, Failure> {
     match kit["source"].as_str().and_then(|source| source.strip_prefix("git+")) {
         Some(git) => {
             let (url, which) = git.split_once('?').unwrap_or((git, ""));
+            // The query of the address, such as `rev=abc` or `branch=main`, has the form of the key that cargo reads in a manifest.
             let which = which.split_once('=').map_or_else(String::new, |(key, value)| format!(", {key} = {}", quoted(value)));
             Ok(format!("git = {}{which}", quoted(url)))
         }

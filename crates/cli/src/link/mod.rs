@@ -51,6 +51,7 @@ fn drive(arguments: &LinkArguments, spec: Spec) -> Result<(Measured, Written), F
         return Err(Failure::Input(why.to_owned()));
     }
     let mut link = Link::new(arguments.seed, &LinkName::between("sender", "receiver"), spec.model);
+    // The files are created before the stream begins, so that a path that cannot be written is refused before a long run.
     let mut sinks = Sinks::create(arguments)?;
     let mut meter = Meter::default();
     let progress = Progress::new(wanted, "{bar:30} {percent:>3} %  {pos}/{len} packets, {eta} left");
@@ -100,6 +101,7 @@ impl Sinks {
             writer.write(record).map_err(unwritten(path))?;
         }
         if let Some((path, writer)) = &mut self.capture {
+            // A link knows sizes and no content, so that the capture has frames without payload.
             writer.write(record, &[]).map_err(unwritten(path))?;
         }
         if let Some((.., picture)) = &mut self.picture {

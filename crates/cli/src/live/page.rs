@@ -42,6 +42,7 @@ pub(super) fn html(arguments: &LiveArguments, path: &Path, played: &Played<'_>, 
         Ending::Complete | Ending::Diverged(_) => format!("the session lasted {lasted}, {ticks}"),
         Ending::Interrupted(_) => format!("the session was ended after {lasted} of {}, {ticks}", Span(scene.duration)),
     };
+    // A session that is not valid has a warning above, with the numbers.
     let valid = if report.validity.is_valid() { ", and was on time (valid)" } else { "" };
     let sentences = vec![
         format!("{lasted}{valid}"),

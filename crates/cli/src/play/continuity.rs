@@ -62,7 +62,7 @@ fn run(played: &PlayedScene, pointer: &Pointer, begin: u64, ticks: u64) -> (Felt
     (felt, (0..scene.peers.len()).map(stands).collect())
 }
 
-/// The largest change of force \[N\] and of place \[m\] from one tick to the next.
+/// Returns the largest change of force \[N\] and of position \[m\] from one tick to the next.
 fn largest(felt: &[[f64; 6]]) -> [f64; 2] {
     let change = |pair: &[[f64; 6]], of: usize| (pair[1][of] - pair[0][of]).hypot(pair[1][of + 1] - pair[0][of + 1]);
     felt.windows(2).fold([0.0, 0.0], |[force, way], pair| [change(pair, 0).max(force), change(pair, 2).max(change(pair, 4)).max(way)])

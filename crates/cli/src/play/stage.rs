@@ -124,6 +124,7 @@ impl PlayStage {
 
     /// Returns whether a page wants another part. Called on the real-time thread.
     pub(super) fn is_wished(&self) -> bool {
+        // The flag carries no data: `finish` takes the wish itself under the lock, so that no ordering is needed here.
         self.is_wished.load(Ordering::Relaxed)
     }
 
@@ -145,6 +146,7 @@ impl PlayStage {
     /// Returns the scene of the next part after `part` by `wish`. Links of removed peers are left out.
     fn next(&self, part: &Part, wish: &Wish) -> PlayedScene {
         let peers: Vec<PeerStatus> = self.frames.last().map(|motion| motion.peers.clone()).unwrap_or_default();
+        // A key that the wish leaves out keeps the value of the present part, and not the value of the scene file.
         let number = wish.peers.unwrap_or(part.scene.peers.len());
         let stood = if wish.reset { self.beginning.clone() } else { part.played.clone().standing(&peers, &part.scene) };
         let strategy = wish.strategy.as_deref().unwrap_or_else(|| part.scene.coordination.strategy.name());
@@ -187,6 +189,7 @@ impl Stage for PlayStage {
             "walls": scene.object.enclosure.map(|walls| [walls.min, walls.max]),
             "guided": self.is_guided,
             "host": is_host,
+            // The address holds the token of guests, so that only the host hands out the address.
             "join": self.join.get().filter(|_| is_host),
             "recorded": self.last_finished().map(|finished| finished.number),
         })
@@ -249,6 +252,7 @@ impl Stage for PlayStage {
             if began.elapsed() > PATIENCE {
                 return Err("the session does not end its part: it hangs, or it has ended".to_owned());
             }
+            // `finish` notifies nobody, so that this thread looks again until the part has ended.
             thread::sleep(Duration::from_millis(5));
         };
         compare(&finished)

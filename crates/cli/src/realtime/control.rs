@@ -34,6 +34,7 @@ impl LiveControl {
         let config = ServerConfig { token: token_of(arguments)?, allow_remote: arguments.allow_remote, ..ServerConfig::new(address) };
         let server = serve(config, Arc::clone(&board), editor).map_err(|error| refused_server(&error))?;
         say(&format!("live control: {}", server.url()));
+        // The address above names the loopback interface, which other machines cannot reach.
         let elsewhere = reached_from_elsewhere(server.address(), server.url());
         if elsewhere != server.url() {
             say(&format!("live control, from other machines: {elsewhere}"));
@@ -43,6 +44,7 @@ impl LiveControl {
 
     /// Returns the run's handle for publishing snapshots, or `None` if neither a server nor a terminal shows snapshots.
     pub(crate) fn look(&self) -> Option<Look> {
+        // A snapshot takes time on the real-time thread, so that none is made that nobody sees.
         let is_looked_at = self.server.is_some() || io::stderr().is_terminal();
         is_looked_at.then(|| Look(Arc::clone(&self.board)))
     }

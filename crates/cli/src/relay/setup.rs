@@ -56,6 +56,7 @@ impl Setup {
         lay("most-bytes", arguments.bytes.map(|bytes| format!("\"{}B\"", bytes.get())));
         lay("allow-remote", arguments.real_time.allow_remote.then(|| "true".to_owned()));
         let file = input::with(path, |text, file| RelayFile::parse(text, file, &overrides))?;
+        // The configuration has models of links without the keys. Live control shows and changes keys, so that these are read from the text once more.
         let keys = input::with(path, |text, file| relay_link_keys_of_text(text, file, &overrides))?;
         let tolerance = arguments.real_time.tolerance.unwrap_or(file.limits.tolerance);
         Ok(Self {
@@ -133,6 +134,7 @@ impl Setup {
                 Form::Mesh(mesh) => ConfiguredDelay::of(mesh.links.between(from.index(), to.index())),
                 Form::Proxy(proxy) => ConfiguredDelay::of(if from.0 == 0 { &proxy.forth } else { &proxy.back }),
             };
+            // A run that ended early did not reach the later changes of the timeline.
             let planned = self.config.changes.iter().filter(|change| change.at <= end && (change.from, change.to) == (*from, *to)).count();
             ConfiguredDelay { changes: edits + planned as u64, ..begun }
         };

@@ -129,7 +129,7 @@ macro_rules! start_blocking {
 }
 pub(crate) use start_blocking;
 
-/// Waits for blocking work, whose panic goes on here.
+/// Waits for blocking work, and resumes a panic of the work in the caller.
 pub(crate) async fn outcome_of<T>(work: JoinHandle<T>) -> T {
     match work.await {
         Ok(outcome) => outcome,

@@ -81,7 +81,7 @@ fn failure(order: &Order, arguments: &BoundaryArguments, error: ProofError) -> F
     guarantee::failure(error, "--prove", &arguments.scene.scene, of_family)
 }
 
-/// The answer of `cohaptic stability boundary --prove --json`.
+/// Returns the answer of `cohaptic stability boundary --prove --json`. `uncertified`: number of stretches with a verdict but without a certificate.
 fn answer(order: &Order, line: &ProvenLine, uncertified: Option<usize>, files: &[String]) -> impl Serialize {
     let stretches = line.stretches.iter().map(|stretch| document! { low: stretch.low, high: stretch.high, verdict: stretch.guarantee.word() });
     document! {

@@ -131,7 +131,7 @@ fn failure(order: &Order, arguments: &MapArguments, variant: usize, error: Proof
     guarantee::failure(error, "--prove", &arguments.scene.scene, |error| order.failure(variant, arguments, error.into()))
 }
 
-/// The answer of `cohaptic stability map --prove --json`.
+/// Returns the answer of `cohaptic stability map --prove --json`.
 fn answer(order: &Order, arguments: &MapArguments, proofs: &[Proof], wall_s: f64, files: &[String]) -> impl Serialize {
     let (x, y) = (order.x(), order.y());
     let regions = proofs.iter().map(|proof| {

@@ -65,7 +65,7 @@ impl Target {
     }
 }
 
-/// The error of the real tokio for a target without addresses.
+/// Returns the error of the real tokio for a target without addresses.
 #[cfg(feature = "net")]
 pub(super) fn no_address(text: &str) -> std::io::Error {
     std::io::Error::new(std::io::ErrorKind::InvalidInput, text)
