@@ -52,7 +52,7 @@ impl Spread {
         4.0 * libm::asin((0.5 * libm::sqrt(self.longest)).min(1.0))
     }
 
-    /// Takes all pairs of the present copies.
+    /// Updates the largest angle by all pairs of `copies`, the quaternions of the present copies.
     pub(crate) fn take(&mut self, copies: impl Iterator<Item = [f64; 4]>) {
         self.copies.clear();
         self.copies.extend(copies);
