@@ -154,8 +154,8 @@ fn describe(scene: &Scene, explanation: &Explanation) -> String {
     );
     let _ = writeln!(
         text,
-        "\nCost\n  {:.0} control ticks and {:.0} packets a simulated second: about {:.0} times real time with nothing recorded\n  \
-         records (--out): about {:.1} MB a simulated second",
+        "\nCost\n  {:.0} control ticks and {:.0} packets per simulated second: about {:.0} times real time with nothing recorded\n  \
+         records (--out): about {:.1} MB per simulated second",
         cost.peer_ticks_per_s,
         cost.packets_per_s,
         cost.realtime_factor,

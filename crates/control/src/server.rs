@@ -42,7 +42,7 @@ pub enum ServeError {
     /// The address is reachable from other machines, and remote access is not allowed.
     #[error(
         "live control would be open to other machines at {address}: listen on 127.0.0.1 or [::1] and reach it from elsewhere through `ssh -L`, or allow \
-         remote access (--allow-remote); it is not encrypted"
+         remote access (--allow-remote); the traffic is not encrypted"
     )]
     NotLoopback {
         /// Address asked for.

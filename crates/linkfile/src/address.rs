@@ -13,7 +13,7 @@ pub enum AddressError {
     #[error("names a host that would need a look-up")]
     Name,
     /// The text has another form.
-    #[error("is not an address with a port")]
+    #[error("is no address")]
     Form,
 }
 

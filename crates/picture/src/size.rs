@@ -39,7 +39,9 @@ const ON_SCREEN: f64 = 13.0;
 #[non_exhaustive]
 pub enum SizeError {
     /// The word is not a size.
-    #[error("`{0}` is not a size of a picture: one-column, two-columns, page, WIDTHxHEIGHT in pixels (960x400), or WIDTHxHEIGHTmm (85x60mm)")]
+    #[error(
+        "`{0}` is not a size of a picture: expected one-column, two-columns, page, WIDTHxHEIGHT in pixels (960x400), or WIDTHxHEIGHTmm (85x60mm)"
+    )]
     Unknown(String),
     /// The size is too small for text, or too large for any page.
     #[error("a picture is 160 px (42 mm) to 10000 px (2645 mm) wide, and 100 px (26 mm) to 10000 px high")]

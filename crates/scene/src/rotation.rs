@@ -237,10 +237,10 @@ const fn why_no_torque(strategy: Coordination) -> Option<&'static str> {
         | Coordination::LocalDamping
         | Coordination::LocalLag => None,
         Coordination::PassivityControl | Coordination::SetPosition => {
-            Some("it keeps energies along axes that all copies have in common, and copies that turn have none")
+            Some("it keeps energies along axes that all copies share, and copies that turn share no axis")
         }
-        Coordination::Wave => Some("both ends of a line have its axis in common, and copies that turn have none"),
-        Coordination::ClientServer => Some("samples of its clients are those of devices, and say nothing of their turns"),
+        Coordination::Wave => Some("both ends of a wave line share its axis, and copies that turn share no axis"),
+        Coordination::ClientServer => Some("its clients send the states of their devices, without orientations"),
     }
 }
 

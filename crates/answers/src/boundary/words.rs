@@ -1,7 +1,7 @@
 //! The text about a boundary.
 
 use cohaptic_stability::{Crossing, VerdictKind, nominal_head};
-use cohaptic_units::print::Counted;
+use cohaptic_units::print::{Counted, SixDigits};
 
 use super::Searched;
 use crate::crossing_in_words;
@@ -57,11 +57,11 @@ pub(super) fn limits(searched: &Searched<'_>, is_ended: bool) -> Vec<String> {
     let mut line = |line: String| lines.push(line);
     let unit = &searched.range.unit;
     line(format!(
-        "{} checked, {:.3e}{unit} to {:.3e}{unit} apart; each crossing is located to {:.1e}{unit}. An island narrower than that spacing can be missed",
+        "{} checked, with neighbours {}{unit} to {}{unit} apart; each crossing is located to {}{unit}. An island narrower than this spacing can be missed",
         Counted(found.samples, "value"),
-        found.finest,
-        found.coarsest,
-        searched.options.tolerance
+        SixDigits(found.finest),
+        SixDigits(found.coarsest),
+        SixDigits(searched.options.tolerance)
     ));
     if !found.is_settled() {
         // With the limit of samples reached, a request of the user did not shorten the search.

@@ -26,7 +26,7 @@ pub fn words(finished: &Finished, wall_s: f64) -> String {
     } else {
         let before = report.runs - report.computed;
         let kept = if before > 0 { format!(", {before} {} there already", if before == 1 { "was" } else { "were" }) } else { String::new() };
-        line(&format!("  {} run in {wall_s:.3} s: {:.0} per second{kept}", report.computed, finished.runs_per_s(wall_s)));
+        line(&format!("  {} took {wall_s:.3} s: {:.0} per second{kept}", Counted(report.computed, "run"), finished.runs_per_s(wall_s)));
     }
     line(&format!("  {}", outcome(finished)));
     if !plan.variations().is_empty() || !report.judgements.is_empty() {

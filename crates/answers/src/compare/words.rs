@@ -57,7 +57,7 @@ fn head(finished: &Finished, wall_s: f64) -> Vec<String> {
     lines.push(if report.computed == 0 {
         "  all results were in the folder already: nothing was run".to_owned()
     } else {
-        format!("  {} run in {wall_s:.3} s", report.computed)
+        format!("  {} took {wall_s:.3} s", Counted(report.computed, "run"))
     });
     lines.push(format!(
         "  ± is the interval of 95 % of the mean (Student); a difference is that to {}, over the seeds of which neither run diverged",

@@ -96,7 +96,7 @@ fn worst_case(worst: &SceneWorstCase, said: &[String], line: &mut impl FnMut(Str
     };
     line(String::new());
     line(format!("worst case: {verdict}"));
-    line(format!("  growth a sending period between {} and {}", figure(worst.lower, 6), figure(worst.upper, 6)));
+    line(format!("  growth per sending period between {} and {}", figure(worst.lower, 6), figure(worst.upper, 6)));
     if worst.is_open() {
         let apart = 100.0 * (worst.upper / worst.lower - 1.0);
         line(format!("  open: the bounds are {} % apart, more than 1 %; a larger --products may bring them closer", figure(apart, 1)));

@@ -17,9 +17,7 @@ pub struct Strategies {
 #[non_exhaustive]
 pub enum StrategiesError {
     /// The list has fewer than two strategies.
-    #[error(
-        "{found} cannot be compared with another: expected at least two strategies with a comma between them, such as average-position,extrapolated"
-    )]
+    #[error("{found} names fewer than two strategies: expected at least two with a comma between them, such as average-position,extrapolated")]
     TooFew {
         /// The text of the user.
         found: String,
@@ -191,7 +189,7 @@ mod tests {
     fn what_cannot_be_compared_is_refused_and_says_why() {
         for (text, part) in [
             ("", "unknown strategy"),
-            ("average-position", "cannot be compared with another"),
+            ("average-position", "names fewer than two strategies"),
             ("average-position,", "unknown strategy"),
             ("average-position,extrapolatd", "did you mean \"extrapolated\"?"),
             ("average-position,extrapolated{horzon=50ms}", "extrapolated has no parameter \"horzon\": expected horizon"),

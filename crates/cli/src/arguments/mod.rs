@@ -61,7 +61,7 @@ pub(crate) enum Command {
     Campaign(CampaignArguments),
     /// Compares strategies over values of keys and with the same seeds: measures with their intervals, a table and a page
     Compare(CompareArguments),
-    /// Says whether a scene is stable without simulating it, maps where it is, and finds where that changes
+    /// Says without a simulation whether a scene is stable, maps the stable region, and finds where the verdict changes
     Stability(StabilityArguments),
     /// Says what the hand of one peer feels, frequency by frequency, without simulating it
     Admittance(AdmittanceArguments),
@@ -75,7 +75,7 @@ pub(crate) enum Command {
     Router(RouterArguments),
     /// Writes a package that stands in for tokio, so that programs run on the test kit unchanged, with their dependencies
     Tokio(TokioArguments),
-    /// Runs cargo test with that package in the place of tokio, and leaves Cargo.lock as it was
+    /// Runs cargo test with the package of cohaptic tokio in the place of tokio, and leaves Cargo.lock as it was
     Test(TestArguments),
     /// Looks at a Novint Falcon, homes it, watches and pushes it, or simulates one
     Falcon(FalconArguments),
@@ -138,12 +138,12 @@ impl std::str::FromStr for NamedSize {
 }
 
 impl PictureArguments {
-    /// The size that was asked for.
+    /// Returns the size of the pictures; the default size without `--size`.
     pub(crate) fn size(&self) -> Size {
         self.size.as_ref().map(|asked| asked.size).unwrap_or_default()
     }
 
-    /// The word that asked for it, if one did.
+    /// Returns the size as the user wrote it, or `None` without `--size`.
     pub(crate) fn word(&self) -> Option<&str> {
         self.size.as_ref().map(|asked| asked.word.as_str())
     }

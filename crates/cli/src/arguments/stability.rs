@@ -112,12 +112,12 @@ pub(crate) enum LinksName {
     Each,
 }
 
-/// Two durations, as `20ms..26ms`.
+/// Reads two durations in the form `20ms..26ms`. The first may not exceed the second.
 fn delays(text: &str) -> Result<(Duration, Duration), String> {
     let (low, high) = text.split_once("..").ok_or("expected LO..HI, such as 20ms..26ms")?;
     let parse = |text: &str| cohaptic_units::parse::duration(text.trim()).map_err(|error| error.to_string());
     let (low, high) = (parse(low)?, parse(high)?);
-    if low <= high { Ok((low, high)) } else { Err("the shorter delay comes first".to_owned()) }
+    if low <= high { Ok((low, high)) } else { Err("expected the shorter delay first, such as 20ms..26ms".to_owned()) }
 }
 
 /// Numbers of peers, as `2..` or `2..100`.
@@ -129,7 +129,7 @@ fn numbers(text: &str) -> Result<(u64, Option<u64>), String> {
     if from < 2 {
         return Err("a scene has at least 2 peers".to_owned());
     }
-    if to.is_some_and(|to| to < from) { Err("the smaller number comes first".to_owned()) } else { Ok((from, to)) }
+    if to.is_some_and(|to| to < from) { Err("expected the smaller number first, such as 2..10".to_owned()) } else { Ok((from, to)) }
 }
 
 /// Method by which a verdict is reached.
@@ -178,7 +178,7 @@ pub(crate) struct MapArguments {
     /// --curve scene.count=3,coordination.strategy=proportional-derivative
     #[arg(long, value_name = "KEY=VALUE,...")]
     pub(crate) curve: Vec<String>,
-    /// Another map in the same picture, with this key overridden too; said again, all for the same map
+    /// Draw one more map into the same picture, with this key overridden too; all --against together make one map
     #[arg(long, value_name = "KEY=VALUE")]
     pub(crate) against: Vec<String>,
     /// Write map.csv, map-2.csv ..., map.svg and map.html, a page of all, into this folder, and keep the finished part there if it is interrupted

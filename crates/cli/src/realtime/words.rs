@@ -45,7 +45,7 @@ pub(crate) fn notes(prepared: &Prepared, validity: Validity) -> String {
         };
         let _ = writeln!(
             text,
-            "  what to do: this machine was too busy to be on time. End other programs{missing}, try --spin, or accept later ones with --tolerance"
+            "  what to do: this machine was too busy to be on time. End other programs{missing}, try --spin, or accept more lateness with --tolerance"
         );
     }
     text

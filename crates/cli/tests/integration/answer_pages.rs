@@ -140,7 +140,7 @@ fn a_page_names_what_was_left_out_and_what_was_not_settled() {
     // 20 values, and those by which the crossing was found.
     desk.text("stability boundary two.toml --along coordination.stiffness=100..6000 --samples 20 --out settled");
     let page = desk.read("settled/boundary.html");
-    assert!(page.contains("<h2>Notes</h2>") && page.contains(" values checked, ") && !page.contains("\"warning\""), "{page}");
+    assert!(page.contains("<h2>Notes</h2>") && page.contains(" values checked, with neighbours ") && !page.contains("\"warning\""), "{page}");
 }
 
 /// The second moment of random outages is not followed, so that every verdict is nominal.

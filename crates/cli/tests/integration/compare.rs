@@ -208,7 +208,7 @@ fn the_field_preset_compares_every_strategy() {
 fn what_makes_no_sense_is_refused_and_nothing_is_written() {
     let desk = desk();
     for (rest, parts) in [
-        ("--strategies average-position --out out", &["--strategies: \"average-position\" cannot be compared with another", "such as"][..]),
+        ("--strategies average-position --out out", &["--strategies: \"average-position\" names fewer than two strategies", "such as"][..]),
         (
             "--strategies average-position,extrapolatd --out out",
             &["--strategies: unknown strategy \"extrapolatd\"", "did you mean \"extrapolated\"?"],

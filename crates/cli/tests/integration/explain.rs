@@ -48,7 +48,7 @@ fn measures_of_more_than_ticks_need_events() {
         document["models"].as_array().unwrap().iter().map(|row| row["part"].as_str().unwrap().to_owned()).collect()
     };
     let has = |parts: &[String], part: &str| parts.iter().any(|found| found == part);
-    let arrays = "runs of which nobody watches more than ticks";
+    let arrays = "engine, unless packets are recorded";
     let (without, all, some) = (parts(""), parts("--set measure.names=all"), parts("--set 'measure.names=[\"force_peak_n\",\"discrepancy_rms_m\"]'"));
     assert!(has(&without, arrays) && !has(&without, "measures"), "{without:?}");
     assert!(has(&all, "measures") && !has(&all, arrays), "{all:?}");

@@ -48,7 +48,7 @@ const ARGUMENTS: &[Bad] = &[
     ),
     bad(
         "relay --listen localhost:0 --to 127.0.0.1:65536",
-        "invalid value '127.0.0.1:65536' for '--to <ADDRESS>': is not an address with a port: expected an address with a port, such as 127.0.0.1:7000, [::1]:7000 \
+        "invalid value '127.0.0.1:65536' for '--to <ADDRESS>': is no address: expected an address with a port, such as 127.0.0.1:7000, [::1]:7000 \
          or localhost:7000",
     ),
     bad("check two.toml --jobs 1\u{202e}0", "invalid value '1\\u{202e}0' for '--threads <N>': expected an integer from 1 to 1024"),

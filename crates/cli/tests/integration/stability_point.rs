@@ -172,7 +172,7 @@ fn the_worst_case_is_bounded_from_both_sides() {
     assert!(nominal <= upper && lower <= upper && lower > nominal - 2e-3, "{worst:#}");
     assert!(worst["sequence"].as_str().is_some_and(|words| !words.is_empty()));
     let text = desk.text("stability point paper.toml --losses-in-a-row 1 --delay-within 8ms..10ms");
-    assert!(text.contains("worst case: ") && text.contains("growth a sending period between"), "{text}");
+    assert!(text.contains("worst case: ") && text.contains("growth per sending period between"), "{text}");
     // Bounds that are more than 1 % apart are said to be so.
     for (effort, is_open) in [("", false), ("--accuracy 1 --products 1 --set coordination.stiffness=1500", true)] {
         let command = format!("stability point paper.toml --losses-in-a-row 2 {effort}");
@@ -196,7 +196,7 @@ fn peers_may_hear_only_their_neighbours() {
         ("--graph words.csv", 2, "words.csv:1: found \"one\""),
         ("--graph none.csv", 3, "cannot read none.csv"),
         ("--graph ring --set peers.peer2.device.mass=0.2", 2, "peer2"),
-        ("--delay-within 9ms..8ms", 2, "the shorter delay comes first"),
+        ("--delay-within 9ms..8ms", 2, "expected the shorter delay first"),
         ("--losses-in-a-row 1 --accuracy 0", 2, "--accuracy 0"),
     ] {
         let outcome = desk.cohaptic(&format!("stability point paper.toml {options}"));

@@ -225,7 +225,7 @@ fn sets_that_cannot_be_proven_are_refused_with_a_way_out() {
     let desk = Desk::with("equal.toml", EQUAL);
     for (line, words) in [
         ("stability point equal.toml --every-number 1..", "at least 2 peers"),
-        ("stability point equal.toml --every-number 9..8", "the smaller number comes first"),
+        ("stability point equal.toml --every-number 9..8", "expected the smaller number first"),
         ("stability point equal.toml --every-number some", "expected FROM.. or FROM..TO"),
         ("stability point equal.toml --every-number --set link.loss=5% --set peers.peer1.contact=none", "leave something to chance"),
         ("stability point equal.toml --certificate numbers.json", "expected --every-number or --switching"),

@@ -118,16 +118,16 @@ pub fn explain(scene: &Scene) -> Explanation {
     };
     if let Some(shape) = arrays {
         rows.model(
-            "runs of which nobody watches more than ticks",
-            "in arrays: binary64 in eight lanes, eight peers of one run or one peer of eight runs",
-            "all tick together, and the fate of each packet is known before the next one comes; a run that is recorded has events, since packets are recorded",
+            "engine, unless packets are recorded",
+            "arrays: binary64 in eight lanes, for eight peers of one run or for one peer of eight runs",
+            "all peers tick together, and the fate of each packet is known before the next packet comes; a run whose packets are recorded has events",
         );
         // Only a bottleneck or a token bucket has a queue, so the row may be absent.
         if let Some((queues, why)) = shape.queues(&used_links(scene)) {
-            rows.model("queues of such a run", queues, why);
+            rows.model("queues in arrays", queues, why);
         }
         let (threads, why) = shape.threads();
-        rows.model("threads of such a run, if nobody watches", if threads == 1 { "one".to_owned() } else { format!("up to {threads}") }, why);
+        rows.model("threads in arrays, without an observer", if threads == 1 { "one".to_owned() } else { format!("up to {threads}") }, why);
     }
     Explanation { dimensions: dimensions(scene, &plan), cost: cost(scene, &nanos), models: rows.models, left_out: rows.left_out }
 }
@@ -224,7 +224,7 @@ impl Rows {
             Integrator::SemiImplicitEuler { .. } => "explicit Euler on quaternion and angular velocity",
             Integrator::RungeKutta4 { .. } => "Runge-Kutta of order 4 on quaternion and angular velocity",
         };
-        self.model("turns", format!("{method}, {} a tick", Counted(rotation.steps, "step")), "torques are held in body axes over a tick");
+        self.model("turns", format!("{method}, {} per tick", Counted(rotation.steps, "step")), "torques are held in body axes over a tick");
         let turning = rotation.peers.iter().filter(|peer| peer.device.is_some()).count();
         if turning == 0 {
             self.leave_out("turns of devices: no device has an inertia");
@@ -319,7 +319,7 @@ impl Rows {
         for (config, count) in &used {
             let part = format!("{count} {}", if *count == 1 { "link" } else { "links" });
             if config.is_constant_delay() {
-                self.model(&part, format!("constant delay {}", Span(config.mean_delay())), "one addition a packet: nothing else is configured");
+                self.model(&part, format!("constant delay {}", Span(config.mean_delay())), "one addition per packet: nothing else is configured");
             } else {
                 self.model(&part, config.words(), "a chain of the stages that are configured");
             }

@@ -27,7 +27,7 @@ fn queues_in_which_no_sample_waits_are_left_out() {
     let queues = |keys: &str| {
         let found = explain(&scene(keys)).models;
         let row = |part: &str| found.iter().find(|row| row.part == part).map(|row| (row.model.clone(), row.reason.clone()));
-        (row("queues of such a run"), row("packets on the way").map(|(model, _)| model))
+        (row("queues in arrays"), row("packets on the way").map(|(model, _)| model))
     };
     let told = |keys: &str, model: &str, reason: &str, way: &str| {
         let expected = (Some((model.to_owned(), reason.to_owned())), Some(way.to_owned()));

@@ -71,7 +71,7 @@ pub enum SessionError {
     /// The session would listen without a key at an address within reach of other machines, and [`SessionConfig::allow_remote`] is not set.
     #[error(
         "anybody who reaches {address} could take part: expected an address of this computer such as 127.0.0.1:7400, or a session key (--key-file), or \
-         --allow-remote if everybody there may"
+         --allow-remote if all of them may"
     )]
     NotLoopback {
         /// Address in [`SessionConfig::listen`].

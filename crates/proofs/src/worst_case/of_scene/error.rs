@@ -37,7 +37,7 @@ pub enum SceneWorstCaseError {
     },
     /// The interval of delays is as long as the period of sending or longer, so that samples could overtake each other.
     #[error(
-        "delays from {} to {} with a sample every {}: expected an interval shorter than that, so that no sample overtakes another",
+        "delays from {} to {} with a sample every {}: expected an interval shorter than the time between two samples, so that no sample overtakes another",
         Span(*.least), Span(*.most), Span(*.update)
     )]
     Overtaking {

@@ -317,7 +317,7 @@ fn what_cannot_be_looked_at_is_refused() {
     assert_eq!(error, SceneWorstCaseError::Overtaking { least: millis(1), most: millis(9), update: millis(8) });
     assert_eq!(
         error.to_string(),
-        "delays from 1ms to 9ms with a sample every 8ms: expected an interval shorter than that, so that no sample overtakes another"
+        "delays from 1ms to 9ms with a sample every 8ms: expected an interval shorter than the time between two samples, so that no sample overtakes another"
     );
     let drift = refused(&["peers=[{ name = \"peer1\", clock = { drift = 0.1 } }]"], patterns(1, None, Links::Together));
     assert!(matches!(drift, SceneWorstCaseError::Frame { .. }), "{drift}");
