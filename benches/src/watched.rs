@@ -96,6 +96,6 @@ pub fn checked(scene: &Scene) {
 /// The scene with every measure.
 #[must_use]
 pub fn with_all_measures(scene: Scene) -> Scene {
-    let names = MeasureName::all(scene.peers.len());
+    let names = MeasureName::all(scene.peers.len(), scene.task.is_some());
     Scene { measure: Some(MeasureSpec { names, settings: MeasureSettings::default() }), ..scene }
 }

@@ -17,7 +17,7 @@ use super::count;
 
 /// The scene with all measures.
 fn measuring(mut scene: Scene, settings: MeasureSettings) -> Scene {
-    scene.measure = Some(MeasureSpec { names: MeasureName::all(scene.peers.len()), settings });
+    scene.measure = Some(MeasureSpec { names: MeasureName::all(scene.peers.len(), scene.task.is_some()), settings });
     scene
 }
 

@@ -179,7 +179,7 @@ pub fn duration(node: &Node, context: Context<'_>) -> Option<Duration> {
 }
 
 /// Reads a duration above zero.
-pub(crate) fn positive_duration(node: &Node, context: Context<'_>) -> Option<Duration> {
+pub fn positive_duration(node: &Node, context: Context<'_>) -> Option<Duration> {
     let value = duration(node, context)?;
     if value.is_zero() {
         context.fault_at(node, "zero is out of range: expected a duration above zero such as \"8ms\"");

@@ -137,7 +137,7 @@ impl Cubic {
 
     /// Returns the smaller of `step` and the step with which the window keeps up with Reno (RFC 9438, section 4.3).
     fn at_least_reno(&mut self, window: u32, step: u32) -> u32 {
-        // Reno's estimate grows by one segment per window·(1 + β)/(3·(1 − β)) acknowledged segments, a factor that Linux rounds down to eighths (`beta_scale`).
+        // Reno's estimate grows by one segment per window·(1 + β)/(3·(1 − β)) acknowledged segments. Linux rounds the factor down to eighths (`beta_scale`).
         const EIGHTHS: u64 = 8 * (BETA.1 + BETA.0) / 3 / (BETA.1 - BETA.0);
         let share = u32::try_from(u64::from(window) * EIGHTHS / 8).unwrap_or(u32::MAX).max(1);
         // As in Linux, the estimate grows with the first segment beyond a share.

@@ -26,8 +26,8 @@ impl Pushes {
         Self { is_writing: false, begin: start, marks: VecDeque::new(), pushed: start }
     }
 
-    /// Sorts the octets from `start` to `end` (exclusive), at least one, into buffers of `full` octets. All octets below `next` were sent. A full buffer is marked
-    /// if more than `most` octets were written since the last mark.
+    /// Sorts the octets from `start` to `end` (exclusive), at least one, into buffers of `full` octets. All octets below `next` were sent. A full buffer is
+    /// marked if more than `most` octets were written since the last mark.
     fn write(&mut self, [start, end]: [Position; 2], next: Position, full: u64, most: u64) {
         self.begin = self.begin.max(next);
         // The last buffer grows beyond the end of the earlier call, unless the buffer is full.

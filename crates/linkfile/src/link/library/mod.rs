@@ -194,7 +194,7 @@ impl Profile {
 
     /// Returns whether both directions are equal.
     #[must_use]
-    pub(crate) fn is_symmetric(&self) -> bool {
+    pub fn is_symmetric(&self) -> bool {
         self.down.keys() == self.up.keys()
     }
 

@@ -10,8 +10,8 @@ use super::{ConnId, Core, Tcp};
 
 /// Deadlines of connections, sorted by time, host and connection.
 ///
-/// Most deadlines move on with each segment, and few are reached. So the entry of a connection may lie before its deadline: such an entry moves when it comes to
-/// the front. A deadline that moves back moves its entry at once, so that no entry lies after its deadline.
+/// Most deadlines move on with each segment, and few are reached. So the entry of a connection may lie before its deadline: such an entry moves when it comes
+/// to the front. A deadline that moves back moves its entry at once, so that no entry lies after its deadline.
 #[derive(Debug, Default)]
 pub(super) struct Timers(BTreeSet<(Instant, NodeId, ConnId)>);
 
@@ -160,7 +160,7 @@ mod tests {
         for _ in 0..5000 {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             let draw = (state >> 4) as usize;
-            let (index, is_none, at) = (draw % COUNT, draw / 5 % 4 == 0, draw / 20 % 50);
+            let (index, is_none, at) = (draw % COUNT, (draw / 5).is_multiple_of(4), draw / 20 % 50);
             dues[index] = (!is_none).then_some(Instant::from_nanos(at as u64));
             tcp.set_timer(ids[index], dues[index]);
             let mut all: Vec<_> = (0..COUNT).filter_map(|index| Some((dues[index]?, NodeId::new(index), ids[index]))).collect();
