@@ -189,7 +189,7 @@ impl Link {
             };
             let Ok(sent) = stream.over(&mut link, record, |_| !stop.is_asked());
             let asked = Asked::of(&self.model, every, stream.info.size);
-            json(&document(&meter.finish(said, asked, [sent, packets]), None))
+            json(&document(&meter.finish(said, asked, [sent, packets], link.stats().cross_traffic()), None))
         })
     }
 

@@ -6,7 +6,7 @@ use cohaptic_harness::measures::MeasuredValue;
 use cohaptic_harness::{AccessSummary, LinkQuantiles, PeerSummary, Summary};
 use cohaptic_scene::Scene;
 use cohaptic_stability::VerdictKind;
-use cohaptic_wan::{DropCause, LinkStats};
+use cohaptic_wan::{CrossCounts, DropCause, LinkStats};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
@@ -118,8 +118,15 @@ fn counters(stats: &LinkStats) -> impl Serialize + use<> {
         in_flight: stats.in_flight(),
         marked: stats.marked(),
         damaged: stats.damaged(),
+        #[serde(flatten)]
+        cross: cross_counts(stats.cross_traffic()),
         mean_delay_s: stats.mean_delay().map(|delay| delay.as_secs_f64()),
     }
+}
+
+/// Returns the key `cross_traffic` with the counts of a line; `None` leaves the key out, if the packets of the line met no cross-traffic.
+pub(crate) fn cross_counts(counts: CrossCounts) -> Option<impl Serialize + use<>> {
+    (counts.offered > 0).then(|| document! { cross_traffic: document! { offered: counts.offered, dropped: counts.dropped } })
 }
 
 /// Returns the measures of a run by name; `None` if the scene has no measures.

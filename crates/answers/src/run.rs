@@ -160,6 +160,9 @@ pub fn packets(summary: &Summary) -> String {
         }
     }
     parts.push(format!("{} on the way at the end", everywhere.in_flight()));
+    if everywhere.cross_traffic().offered > 0 {
+        parts.push(format!("beside {}", everywhere.cross_traffic()));
+    }
     let stale: u64 = summary.peers.iter().map(|peer| peer.stale_samples).sum();
     if stale > 0 {
         parts.push(format!("{stale} of those delivered came too late to be used"));

@@ -67,7 +67,7 @@ pub use fates::damage::Damage;
 pub use fates::fate::{DropCause, Fate};
 pub use fates::log::{FateLog, FateLogError, FateLogReader, FateRow};
 pub use fates::record::{PacketEvent, PacketRecord, PathPart};
-pub use fates::stats::LinkStats;
+pub use fates::stats::{CrossCounts, LinkStats};
 pub use laws::chance::{Chance, ChanceError};
 pub use laws::delay as law;
 pub use laws::delay::Distribution;
@@ -95,8 +95,8 @@ pub use stages::order::Order;
 pub use stages::outage::{IdleOutages, Outage, Outages, OutagesError, RandomOutages};
 pub use stages::path_trace::{Between, PathTrace, PathTraceError};
 pub use stages::queue::{
-    Bottleneck, Cells, CoDel, DeliveryTrace, DeliveryTraceError, Discipline, Framing, Load, MAHIMAHI_BYTES, Peak, QueueLimit, Red, RedError, Service,
-    TokenBucket,
+    Bottleneck, Cells, CoDel, CrossRecording, CrossRecordingError, CrossTraffic, CrossTrafficError, DeliveryTrace, DeliveryTraceError, Discipline,
+    Framing, Load, MAHIMAHI_BYTES, OnOff, Peak, Poisson, QueueLimit, Red, RedError, Service, TokenBucket,
 };
 pub use stages::reorder::{Displacement, Reorder};
 pub use stages::slots::{SlotGap, Slots, SlotsError};

@@ -36,6 +36,8 @@ pub enum Purpose {
     TraceLoss,
     /// Durations of up and down in turn. The n-th span has the draws of packet n.
     Outage,
+    /// Packets of cross-traffic: distances, spans of sources, and decisions of an active queue. The draws have addresses counted by the cross-traffic.
+    CrossTraffic,
     /// Instants and next states of a modulator. The n-th change has the draws of packet n.
     Modulation,
     /// Instants of opening slots. The n-th slot has the draws of packet n.
@@ -57,6 +59,7 @@ impl Purpose {
             Self::InitialState => 6,
             Self::TraceLoss => 7,
             Self::Outage => 8,
+            Self::CrossTraffic => 9,
             Self::Modulation => 10,
             Self::Slot => 12,
             Self::Listed(code) => code as u64,
@@ -291,7 +294,9 @@ mod tests {
 
     #[test]
     fn no_two_draws_share_an_address() {
-        use Purpose::{Corruption, Duplication, InitialState, Jitter, Listed, Loss, Modulation, Outage, Queue, Reordering, Slot, TraceLoss};
+        use Purpose::{
+            Corruption, CrossTraffic, Duplication, InitialState, Jitter, Listed, Loss, Modulation, Outage, Queue, Reordering, Slot, TraceLoss,
+        };
         let mut words = std::collections::BTreeSet::new();
         let mut count = 0;
         for (seed, label) in [(1, "a->b"), (2, "a->b"), (1, "b->a"), (1, "a->b\0")] {
@@ -307,6 +312,7 @@ mod tests {
                     InitialState,
                     TraceLoss,
                     Outage,
+                    CrossTraffic,
                     Modulation,
                     Slot,
                     Listed(14),

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::{MOST_MEASURED, Measured};
 use crate::document;
+use crate::parts::cross_counts;
 
 /// Speed of the emulator, and the written files.
 #[derive(Clone, PartialEq, Debug)]
@@ -26,6 +27,8 @@ pub fn document(measured: &Measured, written: Option<&Written>) -> impl Serializ
         compared: measured.figures.as_slice(),
         measured_packets: measured.sent.min(MOST_MEASURED),
         fates: &measured.achieved.fates,
+        #[serde(flatten)]
+        cross: cross_counts(measured.cross_traffic),
         #[serde(flatten)]
         speed: written.map(|written| document! { packets_per_s: written.packets_per_s }),
         interrupted: measured.is_interrupted(),

@@ -8,7 +8,7 @@ use cohaptic_measure::achieved::{Accumulator, Achieved};
 use cohaptic_measure::asked::Asked;
 use cohaptic_measure::comparison::{Comparison, Figure};
 use cohaptic_measure::steady::SteadyStream;
-use cohaptic_wan::PacketRecord;
+use cohaptic_wan::{CrossCounts, PacketRecord};
 
 pub use document::{Written, document};
 pub use picture::LinkPicture;
@@ -35,6 +35,8 @@ pub struct Measured {
     pub achieved: Achieved,
     /// Figures both requested and achieved, with their distance.
     pub figures: Vec<Figure>,
+    /// Packets of the cross-traffic up to the last packet at the queue.
+    pub cross_traffic: CrossCounts,
     /// Number of sent packets.
     pub sent: u64,
     /// Number of packets to send; larger than `sent` if the stream was interrupted.
@@ -66,11 +68,12 @@ impl Meter {
         }
     }
 
-    /// Returns the figures. `said`: the link in words or keys. `sent`, `wanted`: numbers of sent packets and of packets to send.
+    /// Returns the figures. `said`: the link in words or keys. `sent`, `wanted`: numbers of sent packets and of packets to send. `cross_traffic`: the counts of
+    /// the link.
     #[must_use]
-    pub fn finish(self, said: String, asked: Asked, [sent, wanted]: [u64; 2]) -> Measured {
+    pub fn finish(self, said: String, asked: Asked, [sent, wanted]: [u64; 2], cross_traffic: CrossCounts) -> Measured {
         let figures = self.comparison.figures(&asked);
-        Measured { said, asked, achieved: self.accumulator.finish(), figures, sent, wanted }
+        Measured { said, asked, achieved: self.accumulator.finish(), figures, cross_traffic, sent, wanted }
     }
 }
 

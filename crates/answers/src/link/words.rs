@@ -42,6 +42,9 @@ pub fn words(measured: &Measured) -> String {
     parts.extend(counts.into_iter().filter(|(_, count)| *count > 0).map(|(name, count)| format!("{count} {name}")));
     parts.extend(fates.dropped.iter().filter(|(_, count)| **count > 0).map(|(cause, count)| format!("{count} dropped ({cause})")));
     line(format!("  {}", parts.join(", ")));
+    if measured.cross_traffic.offered > 0 {
+        line(format!("  beside {}", measured.cross_traffic));
+    }
     text
 }
 

@@ -74,7 +74,7 @@ fn drive(arguments: &LinkArguments, spec: Spec) -> Result<(Measured, Written), F
     let files = sinks.finish(&spec.said)?;
     #[expect(clippy::cast_precision_loss, reason = "for people")]
     let packets_per_s = sent as f64 / wall_s;
-    Ok((meter.finish(spec.said, spec.asked, [sent, wanted]), Written { packets_per_s, files }))
+    Ok((meter.finish(spec.said, spec.asked, [sent, wanted], link.stats().cross_traffic()), Written { packets_per_s, files }))
 }
 
 /// Files for the packets of a link.

@@ -128,6 +128,9 @@ pub(crate) fn carried(stats: &LinkStats, asked: &ConfiguredDelay, beside: &[(&st
             let _ = write!(text, ", {count} {what}");
         }
     }
+    if stats.cross_traffic().offered > 0 {
+        let _ = write!(text, ", beside {}", stats.cross_traffic());
+    }
     if let Some(delays) = asked.beside(stats) {
         let _ = write!(text, "; {delays}");
     }

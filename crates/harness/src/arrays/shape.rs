@@ -96,7 +96,11 @@ impl Shape {
             Way::Direct => {
                 ("when the sample before left the line", "samples have one size, and the newest is dropped where there is no room".to_owned())
             }
-            Way::Stepped => ("from one sample of a link to its next", format!("{}: until then nothing new can be known", apart())),
+            Way::Stepped => {
+                let beside = links.iter().any(|(link, _)| link.has_cross_traffic());
+                let cross = if beside { "; cross packets are computed one by one when a sample meets them" } else { "" };
+                ("from one sample of a link to its next", format!("{}: until then nothing new can be known{cross}", apart()))
+            }
         })
     }
 
@@ -208,8 +212,11 @@ fn why_known_late(link: &LinkModel) -> Option<&'static str> {
     (!SteppedLinks::takes(link)).then_some(match link {
         LinkModel::Replay(_) => "a link replays a log",
         LinkModel::Kernel(_) => "a link is netem as a kernel computes it",
-        // Besides damage, the limit is the only stage that stepped links refuse.
-        LinkModel::Fixed(_) | LinkModel::Modulated(_) => "a link has a limit, and counts packets until they arrive",
+        // Besides damage, stepped links refuse a limit, and cross-traffic behind another queue.
+        LinkModel::Fixed(_) | LinkModel::Modulated(_) if link.has_limit() => "a link has a limit, and counts packets until they arrive",
+        LinkModel::Fixed(_) | LinkModel::Modulated(_) => {
+            "a link has cross-traffic behind a token bucket, so that a sample meets it later than it is sent"
+        }
     })
 }
 
@@ -263,6 +270,7 @@ coordination = { strategy = "average-position", stiffness = 1, update = "8ms" }
         for fits in [
             String::new(),
             change("link = \"all\", set = { rate = \"1Mbit\" }"),
+            "link={ rate = \"1Mbit\", cross-traffic.poisson.rate = \"100kbit\" }".to_owned(),
             change("peer = \"peer1\", set = { hand = { force = 1 } }"),
             change("coordination = { stiffness = 2 }"),
         ] {
@@ -273,6 +281,10 @@ coordination = { strategy = "average-position", stiffness = 1, update = "8ms" }
             ("peer.uplink={ rate = \"1Mbit\" }".to_owned(), "share an access line"),
             ("peer.downlink={ corrupt = 0.1 }".to_owned(), "share an access line"),
             ("link.limit=\"9 packets\"".to_owned(), "a link has a limit"),
+            (
+                "link={ rate = \"1Mbit\", cross-traffic.poisson.rate = \"1kbit\", token-bucket = { rate = \"1Mbit\", burst = \"1kB\" } }".to_owned(),
+                "cross-traffic behind a token bucket",
+            ),
             (change("link = \"all\", set = { limit = \"9 packets\" }"), "a link has a limit"),
             (format!("link={{ replay = '{SHIPPED}/network/data/fates.csv' }}"), "a link replays a log"),
             ("link={ netem = \"delay 20ms\", netem-profile = \"kernel-6.6\" }".to_owned(), "netem as a kernel computes it"),

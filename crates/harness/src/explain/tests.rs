@@ -42,6 +42,9 @@ fn queues_in_which_no_sample_waits_are_left_out() {
     told("rate = \"63kbit\"", "when the sample before left the line", one_size, "a calendar queue");
     let until = "samples of a link come at least 8ms apart: until then nothing new can be known";
     told(&format!("rate = \"63kbit\"\n{codel}"), "from one sample of a link to its next", until, "a calendar queue");
+    // Samples that would never wait for each other wait for cross packets.
+    let beside = format!("{until}; cross packets are computed one by one when a sample meets them");
+    told("rate = \"64Mbit\"\ncross-traffic.poisson.rate = \"6Mbit\"", "from one sample of a link to its next", &beside, "a calendar queue");
     assert_eq!(queues("delay = \"9ms\"").0, None);
     // A limit needs events, and runs with events have no such row.
     assert_eq!(queues("rate = \"64kbit\"\nlimit = \"9 packets\""), (None, Some("a calendar queue".to_owned())));
@@ -73,6 +76,11 @@ fn every_stage_is_described_with_its_numbers() {
         (
             "rate = \"1Mbit\"\noverhead = \"-14B\"\ncells.payload = \"48B\"\nqueue = { limit = \"9 packets\", discipline = \"codel\" }",
             "queue (9 packets, CoDel 5ms in 100ms) before 1Mbit, -14 bytes a packet, in cells of 48+0 bytes, then delay 0s",
+        ),
+        (
+            "rate = \"10Mbit\"\ncross-traffic = { on-off = { sources = 10, peak = \"2Mbit\", on = \"200ms\", off = \"800ms\" } }",
+            "queue (unlimited) before 10Mbit, shared with cross-traffic (10 on-off sources, 2Mbit in packets of 1500B for 200ms, then silent for 800ms on average, \
+             Pareto of shape 1.5), then delay 0s",
         ),
         ("slots = { min = \"10ms\", packets = 2 }", "slots every 10ms for 2 packets, then delay 0s"),
         ("reorder = { probability = \"5%\", behind = 1, at-most = \"50ms\" }", "5% held until 1 have passed, at most 50ms, then delay 0s"),

@@ -1,11 +1,12 @@
-//! Readers of `rate`, `queue`, `overhead`, `cells` and `token-bucket`: the serialiser, the queue before the serialiser, and the shaper of bursts.
+//! Readers of `rate`, `queue`, `overhead`, `cells`, `cross-traffic` and `token-bucket`: the serialiser, the queue before the serialiser and its other packets,
+//! and the shaper of bursts.
 
 use core::num::NonZeroU32;
 
-use cohaptic_wan::{Bottleneck, Cells, DeliveryTrace, Discipline, Framing, Peak, Service, TokenBucket};
+use cohaptic_wan::{Bottleneck, Cells, CrossTraffic, DeliveryTrace, Discipline, Framing, Peak, Service, TokenBucket};
 
 use super::queue::{Queue, read_limit, read_queue};
-use super::{NONE, UNLIMITED, unless, written_together};
+use super::{NONE, UNLIMITED, cross_traffic, is_none, unless, written_together};
 use crate::document::Node;
 use crate::link::keys::LINK_TABLE;
 use crate::reading::{Context, TableReader, values};
@@ -13,7 +14,8 @@ use crate::reading::{Context, TableReader, values};
 /// Reads the bottleneck: a line with a rate, or with the instants `recorded` of sending. Returns `Some(None)` for a link without a bottleneck.
 pub(super) fn read_bottleneck(table: &mut TableReader<'_>, recorded: Option<DeliveryTrace>, context: Context<'_>) -> Option<Option<Bottleneck>> {
     let (rate_entry, trace_entry) = (table.entry("rate"), table.entry("trace"));
-    let parts = [table.entry("queue"), table.entry("overhead"), table.entry("cells")];
+    let cross_traffic = table.entry("cross-traffic").filter(|entry| !is_none(&entry.node));
+    let parts = [table.entry("queue"), table.entry("overhead"), table.entry("cells"), cross_traffic];
     let rate = table.read("rate", unless(UNLIMITED, values::rate));
     let queue = table.maybe("queue", read_queue);
     let overhead = table.read("overhead", values::signed_size);
@@ -54,6 +56,23 @@ pub(super) fn read_bottleneck(table: &mut TableReader<'_>, recorded: Option<Deli
         }
     }
     Some(None)
+}
+
+/// Reads the cross-traffic of `bottleneck`. Returns `Some(None)` for a link without cross-traffic, or without a bottleneck.
+pub(super) fn read_cross_traffic(table: &mut TableReader<'_>, bottleneck: Option<&Bottleneck>, context: Context<'_>) -> Option<Option<CrossTraffic>> {
+    let node = table.get("cross-traffic");
+    let traffic = table.read("cross-traffic", unless(NONE, cross_traffic::read_cross_traffic))?;
+    let (Some(traffic), Some(bottleneck), Some(node)) = (traffic, bottleneck, node) else { return Some(None) };
+    let load = traffic.load(bottleneck);
+    if load >= 1.0 && bottleneck.limit.is_none() {
+        let message = format!(
+            "cross-traffic alone needs {:.0} % of the line, and a queue without a limit would grow for ever: expected less traffic, or a limit such as queue = {{ limit = \"100 packets\" }}",
+            load * 100.0
+        );
+        context.fault_at(node, message);
+        return None;
+    }
+    Some(Some(traffic))
 }
 
 /// Reads the cells of a link layer: payload and overhead per cell \[bytes\].

@@ -5,7 +5,7 @@ use cohaptic_wan::parameters::{Form, Key, Table, Words, joined, optional, requir
 use cohaptic_wan::{LINK_KIND_PARAMETERS, LINK_PARAMETERS};
 
 /// Keys of a link of any kind, in the order of the reference.
-pub const LINK: [&[Key]; 16] = joined(&[&LINK_PARAMETERS, &[&LINK_KIND_PARAMETERS, &PROFILE]]);
+pub const LINK: [&[Key]; 17] = joined(&[&LINK_PARAMETERS, &[&LINK_KIND_PARAMETERS, &PROFILE]]);
 
 /// Key that takes a link of the [library](crate::link::library).
 const PROFILE: [Key; 1] = [usual(
@@ -23,7 +23,7 @@ pub(crate) static LINK_CHANGE: Table = Table::over(&LINK);
 /// Keys of the two ends of a link.
 pub const ENDS: [Key; 2] = [required("from", Form::Text, "Name of the sender"), required("to", Form::Text, "Name of the receiver")];
 /// Table of an entry `[\[links\]]`: both ends, and keys laid over those of `[link]`.
-pub static LINK_ENTRY: Table = Table::over(&joined::<17>(&[&[&ENDS], &LINK]));
+pub static LINK_ENTRY: Table = Table::over(&joined::<18>(&[&[&ENDS], &LINK]));
 
 /// Word for every link.
 pub const ALL_LINKS: Words = &[("all", "every link")];

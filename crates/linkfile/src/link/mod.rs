@@ -2,6 +2,7 @@
 
 mod bottleneck;
 mod corrupt;
+mod cross_traffic;
 mod delay;
 mod distribution;
 pub(crate) mod keys;
@@ -77,6 +78,7 @@ fn read_config(keys: &Node, context: Context<'_>) -> Option<LinkConfig> {
         Some(None) | None => (None, None),
     };
     let bottleneck = bottleneck::read_bottleneck(&mut table, delivery, context);
+    let cross_traffic = bottleneck::read_cross_traffic(&mut table, bottleneck.as_ref().and_then(Option::as_ref), context);
     let token_bucket = table.read("token-bucket", unless(NONE, bottleneck::read_token_bucket));
     let slots = table.read("slots", unless(NONE, slots::read_slots));
     let mtu = table.read("mtu", unless(UNLIMITED, values::size));
@@ -95,6 +97,7 @@ fn read_config(keys: &Node, context: Context<'_>) -> Option<LinkConfig> {
         limit: limit?,
         token_bucket: token_bucket?,
         bottleneck: bottleneck?,
+        cross_traffic: cross_traffic?,
         slots: slots?,
         reorder: reorder?,
         trace: path,

@@ -26,7 +26,7 @@ pub(crate) static TIMELINE: Table = Table::of(&[&[
     optional("coordination", Form::Table(&CHANGES), "Keys that change at every peer, in place of link or peer, and without set"),
 ]]);
 /// Keys under `set`, of a link or of a peer. The key `link` or `peer` beside `set` tells which of the two.
-static SET: Table = Table::over(&joined::<17>(&[LINK.as_slice(), &[&OF_PEER]]));
+static SET: Table = Table::over(&joined::<18>(&[LINK.as_slice(), &[&OF_PEER]]));
 static SET_OF_PEER: Table = Table::over(&[&OF_PEER]);
 const OF_PEER: [Key; 2] =
     [optional("contact", CONTACT, "Contact between the device of the peer and the object"), optional("hand", HAND, "Action of the user of the peer")];

@@ -9,10 +9,10 @@ use cohaptic_scene::{ChangeKind, Scene};
 use cohaptic_units::{Bytes, Instant, Probability, Rate};
 use cohaptic_wan::law::DistTable;
 use cohaptic_wan::{
-    Between, Bottleneck, Bursts, Cells, Chance, Checksum, CoDel, Correlation, Corruption, Delay, DeliveryTrace, Discipline, Displacement,
-    Distribution, FateLog, Flips, FourState, Framing, GilbertElliottInTime, IdleOutages, Jitter, LinkConfig, LinkModel, Loss, MAHIMAHI_BYTES,
-    Modulator, ModulatorState, Outage, Outages, PathTrace, Pattern, Peak, QueueLimit, RandomOutages, Red, Reorder, Service, Slots, Sojourn,
-    TokenBucket,
+    Between, Bottleneck, Bursts, Cells, Chance, Checksum, CoDel, Correlation, Corruption, CrossRecording, CrossTraffic, Delay, DeliveryTrace,
+    Discipline, Displacement, Distribution, FateLog, Flips, FourState, Framing, GilbertElliottInTime, IdleOutages, Jitter, LinkConfig, LinkModel,
+    Loss, MAHIMAHI_BYTES, Modulator, ModulatorState, OnOff, Outage, Outages, PathTrace, Pattern, Peak, Poisson, QueueLimit, RandomOutages, Red,
+    Reorder, Service, Slots, Sojourn, TokenBucket,
 };
 
 const MS: Duration = Duration::from_millis(1);
@@ -196,6 +196,35 @@ fn lines_queues_and_limits_are_read() {
 
     let both = config("mtu = \"1500B\"\nlimit = \"1000 packets\"");
     assert_eq!((both.mtu, both.limit), (Some(Bytes::new(1500)), Some(1000)));
+}
+
+#[test]
+fn every_source_of_cross_traffic_is_read() {
+    let traffic = |text: &str| config(&format!("rate = \"12Mbit\"\ncross-traffic = {text}")).cross_traffic;
+    let rate = |bits| Rate::bits_per_sec(bits).unwrap();
+    let poisson = |bits, size| Some(CrossTraffic::poisson(Poisson { rate: rate(bits), size: Bytes::new(size) }).unwrap());
+    assert_eq!(traffic("{ poisson = { rate = \"6Mbit\" } }"), poisson(6_000_000, 1500));
+    assert_eq!(traffic("{ poisson = { rate = \"6Mbit\", size = \"40B\" } }"), poisson(6_000_000, 40));
+    let on_off = |size, shape| {
+        let on_off = OnOff { sources: 10, peak: rate(2_000_000), size: Bytes::new(size), on: 200 * MS, off: 800 * MS, shape };
+        Some(CrossTraffic::on_off(on_off).unwrap())
+    };
+    let keys = "sources = 10, peak = \"2Mbit\", on = \"200ms\", off = \"800ms\"";
+    assert_eq!(traffic(&format!("{{ on-off = {{ {keys} }} }}")), on_off(1500, 1.5));
+    assert_eq!(traffic(&format!("{{ on-off = {{ {keys}, size = \"500B\", shape = 1.2 }} }}")), on_off(500, 1.2));
+    let recording = CrossRecording::parse(&data("cross.csv")).unwrap();
+    assert_eq!(traffic("{ trace = \"cross.csv\" }"), Some(CrossTraffic::recorded(recording)));
+    assert_eq!(traffic("\"none\""), None);
+    // More than the line carries, before a queue with a limit.
+    let limited = config("rate = \"1Mbit\"\nqueue.limit = \"9 packets\"\ncross-traffic.poisson.rate = \"6Mbit\"");
+    assert_eq!(limited.cross_traffic, poisson(6_000_000, 1500));
+    // A recorded line is a line. Inherited cross-traffic goes with the rate that is taken away.
+    assert!(config("trace = \"line.trace\"\ncross-traffic = { poisson = { rate = \"1kbit\" } }").cross_traffic.is_some());
+    let taken = scene(
+        "[link]\nrate = \"12Mbit\"\ncross-traffic = { poisson = { rate = \"6Mbit\" } }\n[[links]]\nfrom = \"peer1\"\nto = \"peer2\"\nrate = \"unlimited\"",
+        &[],
+    );
+    assert_eq!(taken.links.between(0, 1).as_fixed().unwrap().cross_traffic, None);
 }
 
 #[test]
@@ -384,6 +413,27 @@ fn what_cannot_be_is_refused_with_the_reason() {
         ("rate = \"1Mbit\"\noverhead = \"-3000MB\"", "7:12: link.overhead: \"-3000MB\" is out of range"),
         ("rate = \"1Mbit\"\ncells = { payload = \"0B\" }", "7:21: link.cells.payload: 0B is out of range"),
         ("cells = { payload = \"48B\" }", "6:1: link.cells: cells means nothing on a link without a rate"),
+        ("cross-traffic = { trace = \"cross.csv\" }", "6:1: link.cross-traffic: cross-traffic means nothing on a link without a rate"),
+        ("rate = \"1Mbit\"\ncross-traffic = {}", "7:17: link.cross-traffic: no key is given: expected \"none\""),
+        ("rate = \"1Mbit\"\ncross-traffic = { poisson = { size = \"1B\" } }", "7:29: link.cross-traffic.poisson.rate: missing key"),
+        (
+            "rate = \"1Mbit\"\ncross-traffic = { poisson = { rate = \"1kbit\", size = \"0B\" } }",
+            "7:55: link.cross-traffic.poisson.size: cross packets without bytes",
+        ),
+        (
+            "rate = \"1Mbit\"\ncross-traffic = { poisson = { rate = \"1Mbit\" } }",
+            "7:17: link.cross-traffic: cross-traffic alone needs 100 % of the line, and a queue without a limit",
+        ),
+        ("trace = \"line.trace\"\ncross-traffic = { poisson = { rate = \"1Gbit\" } }", "7:17: link.cross-traffic: cross-traffic alone needs"),
+        (
+            "rate = \"1Mbit\"\ncross-traffic = { on-off = { sources = 1, peak = \"1Mbit\", on = \"1s\", off = \"1s\", shape = 2 } }",
+            "7:92: link.cross-traffic.on-off.shape: a Pareto law of shape 2: expected a shape above 1",
+        ),
+        (
+            "rate = \"1Mbit\"\ncross-traffic = { on-off = { sources = 1, peak = \"1Mbit\", on = \"1ms\", off = \"1s\" } }",
+            "7:64: link.cross-traffic.on-off.on: a packet takes 12ms at the peak rate",
+        ),
+        ("rate = \"1Mbit\"\ncross-traffic = { trace = \"path.csv\" }", "path.csv:1:1: no recording of cross-traffic: expected the columns t,bytes"),
         ("rate = \"1Mbit\"\ntrace = \"line.trace\"", "7:1: link.trace: a line cannot have a rate and a recording"),
         ("token-bucket = { rate = \"1Mbit\" }", "6:16: link.token-bucket.burst: missing key"),
         ("slots = { min = \"2ms\", max = \"1ms\" }", "6:30: link.slots.max: gaps between slots of 2ms to 1ms"),

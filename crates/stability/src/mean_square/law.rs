@@ -252,6 +252,9 @@ fn refuse(config: &LinkConfig) -> Result<(), &'static str> {
     if config.slots.is_some() || config.trace.is_some() {
         return Err("it has slots or a recorded path");
     }
+    if config.cross_traffic.is_some() {
+        return Err("it has cross-traffic");
+    }
     if config.listed != Impairments::default() {
         return Err("it has an impairment without a law here");
     }

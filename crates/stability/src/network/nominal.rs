@@ -153,6 +153,11 @@ fn stripped(config: &LinkConfig, size: Bytes) -> Nominal {
         replaced.chance("random early detection", "random early detection is replaced by the limit of the queue alone".to_owned());
         bottleneck.discipline = Discipline::TailDrop;
     }
+    match config.cross_traffic.take() {
+        Some(traffic) if traffic.is_random() => replaced.chance("cross-traffic", "cross-traffic is left out".to_owned()),
+        Some(_) => replaced.end("recorded cross-traffic, which ends, is left out"),
+        None => {}
+    }
     config.slots = config.slots.map(|slots| regular(slots, &mut replaced));
     if let Some(trace) = config.trace.take() {
         let certain = trace.without_chance();

@@ -1,8 +1,10 @@
 //! Counters of a link.
 
+use core::fmt;
 use core::time::Duration;
 
 use cohaptic_units::Instant;
+use cohaptic_units::print::Counted;
 
 use crate::fates::fate::DropCause;
 
@@ -11,6 +13,7 @@ use crate::fates::fate::DropCause;
 pub struct LinkStats {
     pub(crate) flow: Flow,
     pub(crate) seldom: Seldom,
+    pub(crate) cross: CrossCounts,
 }
 
 /// Counters changed by every packet. Separate from the seldom counters, so the links of a large mesh touch little memory.
@@ -65,12 +68,36 @@ impl Seldom {
     }
 }
 
+/// Counts of cross packets up to the latest packet of the link at the queue.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct CrossCounts {
+    /// Cross packets offered to the queue.
+    pub offered: u64,
+    /// Cross packets dropped by the queue, for any cause.
+    pub dropped: u64,
+}
+
+impl CrossCounts {
+    /// Adds other counts `times` times.
+    pub(crate) const fn add(&mut self, other: Self, times: u64) {
+        self.offered += other.offered * times;
+        self.dropped += other.dropped * times;
+    }
+}
+
+impl fmt::Display for CrossCounts {
+    /// Writes the counts in words: `1500 cross packets, 3 of them dropped`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}, {} of them dropped", Counted(self.offered, "cross packet"), self.dropped)
+    }
+}
+
 impl LinkStats {
     /// Returns counters counted elsewhere: offered packets, delivered packets, the sum of the delays of delivered packets \[ns\], and dropped packets per
     /// cause. Equal causes are added.
     #[must_use]
     pub fn counted(offered: u64, delivered: u64, delay_nanos: u128, dropped: impl IntoIterator<Item = (DropCause, u64)>) -> Self {
-        let mut stats = Self { flow: Flow { offered, delivered, delay_nanos }, seldom: Seldom::default() };
+        let mut stats = Self { flow: Flow { offered, delivered, delay_nanos }, ..Self::default() };
         for (cause, count) in dropped {
             stats.seldom.dropped[cause.index()] += count;
         }
@@ -79,7 +106,8 @@ impl LinkStats {
 
     /// Adds the counters of `links` links with the counters `each`.
     pub fn add(&mut self, each: &Self, links: u64) {
-        let Self { flow, seldom } = self;
+        let Self { flow, seldom, cross } = self;
+        cross.add(each.cross, links);
         flow.offered += each.flow.offered * links;
         flow.delivered += each.flow.delivered * links;
         flow.delay_nanos += each.flow.delay_nanos * u128::from(links);
@@ -133,6 +161,12 @@ impl LinkStats {
     #[must_use]
     pub fn dropped_in_all(&self) -> u64 {
         self.seldom.dropped.iter().sum()
+    }
+
+    /// Returns the counts of the cross-traffic up to the latest packet of the link at the queue. Cross packets are in no other count.
+    #[must_use]
+    pub const fn cross_traffic(&self) -> CrossCounts {
+        self.cross
     }
 
     /// Returns the number of packets inside the link: waiting, in transmission, or propagating.

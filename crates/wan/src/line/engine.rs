@@ -6,6 +6,7 @@ use alloc::vec::Vec;
 use cohaptic_units::Instant;
 
 use crate::fates::fate::DropCause;
+use crate::fates::stats::CrossCounts;
 use crate::line::replay::ReplayStage;
 use crate::line::staged::Staged;
 use crate::netem::kernel_link::KernelStage;
@@ -19,6 +20,8 @@ pub(crate) struct Engine<T> {
     retiring: Vec<Kind<T>>,
     /// Earliest announced instant of a wake of this engine; `None` without an outstanding wake.
     announced: Option<Instant>,
+    /// Counts of the cross-traffic of earlier engines.
+    crossed: CrossCounts,
 }
 
 #[derive(Clone, Debug)]
@@ -46,9 +49,28 @@ impl<T: Clone> Kind<T> {
     }
 }
 
+impl<T> Kind<T> {
+    /// Returns the counts of the cross-traffic.
+    fn crossed(&self) -> CrossCounts {
+        match self {
+            Self::Staged(staged) => staged.crossed(),
+            Self::Replay(_) | Self::Kernel(_) => CrossCounts::default(),
+        }
+    }
+}
+
+impl<T> Engine<T> {
+    /// Returns the counts of the cross-traffic, of this engine and of earlier engines.
+    pub(crate) fn crossed(&self) -> CrossCounts {
+        let mut counts = self.crossed;
+        counts.add(self.kind.crossed(), 1);
+        counts
+    }
+}
+
 impl<T: Clone> Engine<T> {
     pub(crate) const fn new(kind: Kind<T>) -> Self {
-        Self { kind, retiring: Vec::new(), announced: None }
+        Self { kind, retiring: Vec::new(), announced: None, crossed: CrossCounts { offered: 0, dropped: 0 } }
     }
 
     /// Offers a packet with `inside` further packets inside the link.
@@ -112,6 +134,7 @@ impl<T: Clone> Engine<T> {
     /// Replaces the current engine. Packets offered from now on enter the new engine, and packets inside go on in their engine.
     pub(crate) fn replace(&mut self, kind: Kind<T>) {
         let before = core::mem::replace(&mut self.kind, kind);
+        self.crossed.add(before.crossed(), 1);
         // An engine without packets has nothing to finish.
         if before.next_at().is_some() {
             self.retiring.push(before);

@@ -24,7 +24,7 @@ use name::LinkName;
 use pipeline::{Outcome, Pipeline};
 
 use crate::fates::fate::{DropCause, Fate};
-use crate::fates::stats::{Flow, LinkStats, Seldom};
+use crate::fates::stats::{CrossCounts, Flow, LinkStats, Seldom};
 use crate::packet::{Exit, Marks, Outputs, Packet, PacketInfo};
 
 /// A line. `P` is the payload type for filters, and `T` is the packet type of the owner.
@@ -55,7 +55,8 @@ pub(crate) trait Sink<T> {
 impl<P, T> Line<P, T> {
     /// Returns the counters of the line.
     pub(crate) fn stats(&self) -> LinkStats {
-        LinkStats { flow: self.flow, seldom: self.rare.as_ref().map_or_else(Seldom::default, |rare| rare.seldom) }
+        let cross = if let Pipeline::Engine(engine) = &self.pipeline { engine.crossed() } else { CrossCounts::default() };
+        LinkStats { flow: self.flow, seldom: self.rare.as_ref().map_or_else(Seldom::default, |rare| rare.seldom), cross }
     }
 }
 

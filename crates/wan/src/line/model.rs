@@ -163,6 +163,27 @@ impl LinkModel {
         }
     }
 
+    /// Returns whether the link has cross-traffic, now or in a state of its modulator.
+    #[must_use]
+    pub fn has_cross_traffic(&self) -> bool {
+        self.configs().iter().any(|config| config.cross_traffic.is_some() && config.bottleneck.is_some())
+    }
+
+    /// Returns whether the link limits the number of packets inside, now or in a state of its modulator.
+    #[must_use]
+    pub fn has_limit(&self) -> bool {
+        self.configs().iter().any(|config| config.limit.is_some())
+    }
+
+    /// Returns the configuration, or a configuration for each state of the modulator. Empty for a model without stages.
+    fn configs(&self) -> &[LinkConfig] {
+        match self {
+            Self::Fixed(config) => core::slice::from_ref(config),
+            Self::Modulated(modulated) => modulated.configs(),
+            Self::Replay(_) | Self::Kernel(_) => &[],
+        }
+    }
+
     /// Returns whether this link draws random numbers for loss or for jitter at an offer.
     pub(crate) fn is_random(&self) -> bool {
         self.as_fixed().is_some_and(LinkConfig::is_random)

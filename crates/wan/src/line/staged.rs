@@ -17,6 +17,7 @@ use core::time::Duration;
 use cohaptic_units::{Bytes, Instant};
 
 use crate::fates::fate::DropCause;
+use crate::fates::stats::CrossCounts;
 use crate::laws::chance::ChanceStage;
 use crate::line::direct::Direct;
 use crate::packet::{Carried, Exit, Output, Outputs, PacketInfo};
@@ -26,7 +27,7 @@ use crate::stages::corruption::{Checksum, CorruptionStage};
 use crate::stages::list::ImpairmentStages;
 use crate::stages::modulation::ModulationStage;
 use crate::stages::path_trace::PathTrace;
-use crate::stages::queue::{BottleneckStage, TokenBucketStage};
+use crate::stages::queue::{BottleneckStage, CrossStage, TokenBucketStage};
 use crate::stages::reorder::{Placed, ReorderStage};
 use crate::stages::slots::SlotStage;
 
@@ -85,6 +86,8 @@ pub(crate) struct Staged<T> {
     limit: Option<u64>,
     bucket: Option<Box<TokenBucketStage<T>>>,
     bottleneck: Option<BottleneckStage<T>>,
+    /// Cross-traffic of the bottleneck. Stays without a bottleneck and without a configuration.
+    cross: Option<Box<CrossStage>>,
     /// Whether the line has a bottleneck in the physical layout, and no other stage that keeps, copies, marks or damages packets. See
     /// [`Staged::offer_at_once`].
     is_plain: bool,
@@ -168,6 +171,13 @@ impl<T> Ord for Propagating<T> {
     }
 }
 
+impl<T> Staged<T> {
+    /// Returns the counts of the cross-traffic.
+    pub(crate) fn crossed(&self) -> CrossCounts {
+        self.cross.as_ref().map_or_else(CrossCounts::default, |cross| cross.counts())
+    }
+}
+
 impl<T: Clone> Staged<T> {
     /// Makes the stages of this configuration. `direct` holds the stages with immediate decisions, possibly with state from before.
     pub(crate) fn new(now: Instant, direct: Direct, config: LinkConfig, modulation: Option<ModulationStage>) -> Self {
@@ -182,6 +192,7 @@ impl<T: Clone> Staged<T> {
             limit: None,
             bucket: None,
             bottleneck: None,
+            cross: None,
             is_plain: false,
             slots: None,
             reorder: ReorderStage::new(),
@@ -323,6 +334,12 @@ impl<T: Clone> Staged<T> {
                 None
             }
         };
+        // The old cross-traffic meets the old queue up to the change.
+        if let (Some(bottleneck), Some(cross)) = (&mut self.bottleneck, &mut self.cross) {
+            bottleneck.catch_up(now, cross, outputs);
+        }
+        let cross_traffic = config.cross_traffic.filter(|_| config.bottleneck.is_some());
+        self.cross = CrossStage::reconfigured(self.cross.take(), now, cross_traffic, self.direct.draws);
         self.bottleneck = match (self.bottleneck.take(), config.bottleneck) {
             (None, new) => new.map(BottleneckStage::new),
             (Some(mut stage), Some(new)) => {
@@ -357,6 +374,7 @@ impl<T: Clone> Staged<T> {
         // In a plain line only the bottleneck keeps packets, and the direct stages decide at once.
         let decides = |stage: &Stage| matches!(stage, Stage::Outage | Stage::Loss | Stage::Bottleneck | Stage::Propagation);
         self.is_plain = self.bottleneck.is_some()
+            && self.cross.is_none()
             && self.layout() == Layout::Physical
             && self.route.stages[..usize::from(self.route.count)].iter().all(decides)
             && self.trace.is_none()
@@ -392,7 +410,7 @@ impl<T: Clone> Staged<T> {
         for &stage in self.route.keeping().iter().rev() {
             let at = match stage {
                 Stage::Bucket => self.bucket.as_ref().and_then(|bucket| bucket.next_at()),
-                Stage::Bottleneck => self.bottleneck.as_ref().and_then(BottleneckStage::next_at),
+                Stage::Bottleneck => self.bottleneck.as_ref().and_then(|bottleneck| bottleneck.next_at(self.cross.as_deref())),
                 Stage::Slots => self.slots.as_ref().and_then(|slots| slots.next_at()),
                 Stage::Propagation => {
                     let held = self.reorder.next_at();
@@ -417,7 +435,7 @@ impl<T: Clone> Staged<T> {
             Stage::Bucket => released.extend(self.bucket.as_mut().and_then(|bucket| bucket.release(now))),
             Stage::Bottleneck => {
                 if let Some(bottleneck) = &mut self.bottleneck {
-                    bottleneck.release(now, &mut released, outputs);
+                    bottleneck.release(now, self.cross.as_deref_mut(), &mut released, outputs);
                 }
             }
             Stage::Slots => {
@@ -511,8 +529,11 @@ impl<T: Clone> Staged<T> {
                 }
                 Stage::Bottleneck => {
                     if let Some(bottleneck) = &mut self.bottleneck {
+                        if let Some(cross) = &mut self.cross {
+                            bottleneck.catch_up(now, cross, outputs);
+                        }
                         // A bottleneck keeps even a packet that finds the transmitter idle, for its time of transmission.
-                        return bottleneck.offer(now, packet, || draws.first(Purpose::Queue), outputs);
+                        return bottleneck.offer(now, packet, || draws.first(Purpose::Queue), self.cross.as_deref_mut(), outputs);
                     }
                 }
                 Stage::Slots => {

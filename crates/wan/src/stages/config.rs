@@ -19,8 +19,8 @@ use crate::stages::loss::Loss;
 use crate::stages::order::Order;
 use crate::stages::outage::Outages;
 use crate::stages::path_trace::PathTrace;
-use crate::stages::queue::{Bottleneck, Discipline, Load, TokenBucket};
-use crate::stages::queue::{bottleneck, token_bucket};
+use crate::stages::queue::{Bottleneck, CrossTraffic, Discipline, Load, TokenBucket};
+use crate::stages::queue::{bottleneck, cross_traffic, token_bucket};
 use crate::stages::reorder::Reorder;
 use crate::stages::slots::Slots;
 use crate::stages::{corruption, delay, loss, order, outage, path_trace, reorder, slots};
@@ -48,6 +48,8 @@ pub struct LinkConfig {
     pub token_bucket: Option<TokenBucket>,
     /// Rate of serialisation, and the queue before the serialiser. `None` means an unlimited rate, without waiting.
     pub bottleneck: Option<Bottleneck>,
+    /// Packets of other senders in the queue of the bottleneck. Without a bottleneck, cross-traffic has no effect.
+    pub cross_traffic: Option<CrossTraffic>,
     /// Slots for sending. Under `None` the link sends at any time.
     pub slots: Option<Slots>,
     /// Packets put out of order on purpose.
@@ -75,8 +77,8 @@ pub enum Layout {
 }
 
 impl fmt::Debug for LinkConfig {
-    /// Shows the listed impairments only if at least one is configured, because fingerprints of records are computed from this text and must not change with a
-    /// longer list.
+    /// Shows the listed impairments and the cross-traffic only if configured, because fingerprints of records are computed from this text and must not change
+    /// with a longer list.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut shown = f.debug_struct("LinkConfig");
         shown.field("mtu", &self.mtu).field("outages", &self.outages).field("loss", &self.loss);
@@ -86,6 +88,9 @@ impl fmt::Debug for LinkConfig {
         shown.field("delay", &self.delay).field("order", &self.order).field("layout", &self.layout);
         if self.listed != Impairments::default() {
             shown.field("listed", &self.listed);
+        }
+        if let Some(cross_traffic) = &self.cross_traffic {
+            shown.field("cross_traffic", cross_traffic);
         }
         shown.finish()
     }
@@ -109,6 +114,7 @@ impl LinkConfig {
             || self.reorder.is_some()
             || self.trace.is_some()
             || self.listed != Impairments::default()
+            || self.cross_traffic.as_ref().is_some_and(CrossTraffic::is_random)
             // Of the disciplines only RED draws, for its drops and marks.
             || self.bottleneck.as_ref().is_some_and(|bottleneck| matches!(bottleneck.discipline, Discipline::Red(_)))
     }
@@ -144,9 +150,9 @@ impl LinkConfig {
     /// Returns whether a packet of `load` can wait for the serialiser or for tokens.
     #[must_use]
     pub fn makes_wait(&self, load: Load) -> bool {
-        // In the layout of netem the gaps before the bottleneck are the gaps after the delay, so the load says nothing.
-        let waits_for_line =
-            self.bottleneck.as_ref().is_some_and(|bottleneck| self.layout == Layout::Netem || bottleneck.time_without_wait(load).is_none());
+        // In the layout of netem the gaps before the bottleneck are the gaps after the delay, so the load says nothing. Nor does the load count cross packets.
+        let is_unknown = self.layout == Layout::Netem || self.cross_traffic.is_some();
+        let waits_for_line = self.bottleneck.as_ref().is_some_and(|bottleneck| is_unknown || bottleneck.time_without_wait(load).is_none());
         waits_for_line || self.without_queues(load).token_bucket.is_some()
     }
 
@@ -170,7 +176,7 @@ const LIMIT: [Key; 1] = [usual(
 )];
 
 /// Parameters of a link, grouped by stage, in the order of `explain`.
-pub const LINK_PARAMETERS: [&[Key]; 14] = [
+pub const LINK_PARAMETERS: [&[Key]; 15] = [
     &delay::KEYS,
     &order::KEYS,
     &loss::KEYS,
@@ -178,6 +184,7 @@ pub const LINK_PARAMETERS: [&[Key]; 14] = [
     &corruption::KEYS,
     &reorder::KEYS,
     &bottleneck::KEYS,
+    &cross_traffic::KEYS,
     &token_bucket::KEYS,
     &slots::KEYS,
     &MTU,
@@ -199,7 +206,10 @@ impl LinkConfig {
         stages.extend(corruption.as_ref().map(Corruption::words));
         stages.extend(limit.map(|limit| format!("at most {} inside", Counted(limit, "packet"))));
         stages.extend(token_bucket.as_ref().map(TokenBucket::words));
-        stages.extend(self.bottleneck.as_ref().map(Bottleneck::words));
+        stages.extend(self.bottleneck.as_ref().map(|bottleneck| {
+            let shared = self.cross_traffic.as_ref().map_or_else(String::new, |traffic| format!(", shared with cross-traffic ({})", traffic.words()));
+            format!("{}{shared}", bottleneck.words())
+        }));
         stages.extend(self.slots.as_ref().map(Slots::words));
         stages.extend(self.reorder.as_ref().map(Reorder::words));
         stages.extend(self.trace.as_ref().map(|trace| format!("a recorded delay of at least {}, and its loss", Span(trace.least()))));

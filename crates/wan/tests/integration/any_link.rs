@@ -8,10 +8,11 @@ use cohaptic_wan::law::{DistTable, Empirical};
 use cohaptic_wan::netem::Netem;
 use cohaptic_wan::parameters::{Form, Table};
 use cohaptic_wan::{
-    Between, Bottleneck, Cells, Chance, Checksum, CoDel, Correlation, Corruption, Counts, Delay, DeliveryTrace, Discipline, Displacement,
-    Distribution, FateLog, Flips, FourState, Framing, GilbertElliott, GilbertElliottInTime, IdleOutages, Impairments, Jitter, KernelNetem, Layout,
-    Link, LinkConfig, LinkModel, LinkName, Loss, Modulated, Modulator, ModulatorState, Order, Outages, PacketEvent, PacketInfo, PacketRecord,
-    ParameterValue, PathTrace, Pattern, Peak, QueueLimit, RandomOutages, Red, Reorder, Service, Slots, Sojourn, TokenBucket, Values,
+    Between, Bottleneck, Cells, Chance, Checksum, CoDel, Correlation, Corruption, Counts, CrossRecording, CrossTraffic, Delay, DeliveryTrace,
+    Discipline, Displacement, Distribution, FateLog, Flips, FourState, Framing, GilbertElliott, GilbertElliottInTime, IdleOutages, Impairments,
+    Jitter, KernelNetem, Layout, Link, LinkConfig, LinkModel, LinkName, Loss, Modulated, Modulator, ModulatorState, OnOff, Order, Outages,
+    PacketEvent, PacketInfo, PacketRecord, ParameterValue, PathTrace, Pattern, Peak, Poisson, QueueLimit, RandomOutages, Red, Reorder, Service,
+    Slots, Sojourn, TokenBucket, Values,
 };
 use proptest::collection::vec;
 use proptest::option;
@@ -187,6 +188,33 @@ pub(crate) fn any_bottleneck() -> BoxedStrategy<Bottleneck> {
         .boxed()
 }
 
+/// Cross-traffic of some ten thousand packets per second at most, of a load below and above one, and bursts among the first packets.
+pub(crate) fn cross_traffic() -> BoxedStrategy<CrossTraffic> {
+    let poisson = (select(vec![400_000, 8_000_000u64]), select(vec![5, 100u64]));
+    let on_off = (1..4u32, 1..20u64, 1.1..1.9f64);
+    let rows = vec((0..8u64, 1..8u64), 1..20);
+    prop_oneof![
+        poisson.prop_map(|(bits, size)| {
+            let size = Bytes::new(size.max(bits / 80_000));
+            CrossTraffic::poisson(Poisson { rate: rate(bits), size }).unwrap()
+        }),
+        on_off.prop_map(|(sources, size, shape)| {
+            let (peak, size) = (rate(BYTE_A_MICROSECOND), Bytes::new(size));
+            CrossTraffic::on_off(OnOff { sources, peak, size, on: micros(100), off: micros(2_000), shape }).unwrap()
+        }),
+        rows.prop_map(|rows| {
+            let mut at = 0;
+            let row = |(gap, bytes)| {
+                at += gap;
+                format!("{at}e-6,{bytes}\n")
+            };
+            let rows: String = rows.into_iter().map(row).collect();
+            CrossTraffic::recorded(CrossRecording::parse(&format!("t,bytes\n{rows}")).unwrap())
+        }),
+    ]
+    .boxed()
+}
+
 pub(crate) fn slots() -> BoxedStrategy<Slots> {
     (0..4_000u64, 0..4_000u64, option::of(1..4u64), option::of(1..8u64))
         .prop_map(|(min, more, packets, bytes)| {
@@ -329,7 +357,7 @@ pub(crate) fn config_in(layout: Layout) -> BoxedStrategy<LinkConfig> {
     );
     let second = (
         option::weighted(0.25, token_bucket()),
-        option::weighted(0.5, any_bottleneck()),
+        (option::weighted(0.5, any_bottleneck()), option::weighted(0.25, cross_traffic())),
         option::weighted(0.2, slots()),
         option::weighted(0.25, reorder()),
         option::weighted(0.25, path_trace()),
@@ -340,7 +368,7 @@ pub(crate) fn config_in(layout: Layout) -> BoxedStrategy<LinkConfig> {
     (first, second)
         .prop_map(move |(first, second)| {
             let (mtu, outages, loss, marks_instead_of_loss, duplication, corruption, limit) = first;
-            let (token_bucket, bottleneck, slots, reorder, trace, delay, order, listed) = second;
+            let (token_bucket, (bottleneck, cross_traffic), slots, reorder, trace, delay, order, listed) = second;
             LinkConfig {
                 mtu,
                 outages,
@@ -351,6 +379,7 @@ pub(crate) fn config_in(layout: Layout) -> BoxedStrategy<LinkConfig> {
                 limit,
                 token_bucket,
                 bottleneck,
+                cross_traffic,
                 slots,
                 reorder,
                 trace,

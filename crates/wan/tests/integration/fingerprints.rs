@@ -13,10 +13,10 @@ use std::time::Duration;
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::netem::Netem;
 use cohaptic_wan::{
-    Between, Bottleneck, Bursts, Cells, Chance, Checksum, CoDel, Correlation, Corruption, Delay, DeliveryTrace, Discipline, Displacement, FateLog,
-    FateRow, Flips, FourState, Framing, GilbertElliott, GilbertElliottInTime, IdleOutages, Jitter, KernelNetem, Layout, LinkConfig, LinkModel,
-    LinkName, Loss, Modulated, Modulator, Order, Outage, Outages, PacketInfo, PathTrace, Pattern, Peak, QueueLimit, RandomOutages, Red, Reorder,
-    Service, Slots, Sojourn, TokenBucket,
+    Between, Bottleneck, Bursts, Cells, Chance, Checksum, CoDel, Correlation, Corruption, CrossTraffic, Delay, DeliveryTrace, Discipline,
+    Displacement, FateLog, FateRow, Flips, FourState, Framing, GilbertElliott, GilbertElliottInTime, IdleOutages, Jitter, KernelNetem, Layout,
+    LinkConfig, LinkModel, LinkName, Loss, Modulated, Modulator, OnOff, Order, Outage, Outages, PacketInfo, PathTrace, Pattern, Peak, Poisson,
+    QueueLimit, RandomOutages, Red, Reorder, Service, Slots, Sojourn, TokenBucket,
 };
 
 use crate::any_link::{JITTERS, KERNEL_WORDS, all_events, micros};
@@ -132,6 +132,17 @@ fn models() -> Vec<(String, LinkModel)> {
     }
     let service = Service::Recorded(DeliveryTrace::parse("1\n1\n2\n5\n", cohaptic_wan::MAHIMAHI_BYTES).unwrap());
     add("bottleneck, recorded", LinkConfig { bottleneck: Some(Bottleneck { service, ..line.clone() }), ..base() });
+    let poisson = CrossTraffic::poisson(Poisson { rate: rate(4_000_000), size: bytes(1_500) }).unwrap();
+    let ten = Duration::from_millis(10);
+    let on_off = OnOff { sources: 3, peak: rate(4_000_000), size: bytes(500), on: ten, off: ten, shape: 1.4 };
+    for (name, cross_traffic) in [("poisson", poisson), ("on-off", CrossTraffic::on_off(on_off).unwrap())] {
+        for (beside, discipline) in
+            [("tail drop", Discipline::TailDrop), ("head drop", Discipline::HeadDrop), ("red", red(true)), ("codel", codel(false))]
+        {
+            let bottleneck = Some(Bottleneck { discipline, ..line.clone() });
+            add(&format!("cross-traffic, {name}, {beside}"), LinkConfig { bottleneck, cross_traffic: Some(cross_traffic.clone()), ..base() });
+        }
+    }
 
     let mut slots = Slots::new(Duration::from_millis(1), Duration::from_millis(8)).unwrap();
     add("slots", LinkConfig { slots: Some(slots.clone()), ..base() });

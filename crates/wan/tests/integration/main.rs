@@ -10,6 +10,7 @@ mod bounds;
 mod broadcast;
 mod by_stage;
 mod conservation;
+mod cross_traffic;
 mod delay_laws;
 mod determinism;
 mod edges;

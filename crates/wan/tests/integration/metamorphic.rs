@@ -195,6 +195,7 @@ proptest! {
         config.outages = Outages::default();
         config.trace = None;
         config.listed = Impairments::default();
+        config.cross_traffic = None;
         if let Loss::Pattern(_) = config.loss {
             config.loss = Loss::None;
         }

@@ -17,6 +17,7 @@ use crate::line::name::LinkName;
 use crate::line::pipeline::Outcome;
 use crate::line::{Line, Sink};
 use crate::packet::{Marks, Outputs, PacketInfo};
+use crate::stages::config::Layout;
 use queued::{QueuedKind, QueuedLink};
 
 /// Links of any kind, for a driver that knows the instant of its next offer to each link.
@@ -70,11 +71,14 @@ struct Sent<T> {
 const MOST_KINDS: usize = 64;
 
 impl SteppedLinks<()> {
-    /// Returns whether a link of this model can be added. Links with damage of packets, links with a limit of the number of packets inside, replays, and models
-    /// of the kernel's queue cannot.
+    /// Returns whether a link of this model can be added. Links with damage of packets, links with a limit of the number of packets inside, links with
+    /// cross-traffic behind a token bucket or behind the delay, replays, and models of the kernel's queue cannot.
     #[must_use]
     pub fn takes(model: &LinkModel) -> bool {
-        let takes = |config: &crate::LinkConfig| config.corruption.is_none() && config.limit.is_none();
+        // Cross-traffic is counted where a packet of the link meets it. Only if this is the offer of the packet, the driver has reached the counted instant.
+        let counts_at_offers =
+            |config: &crate::LinkConfig| config.cross_traffic.is_none() || (config.token_bucket.is_none() && config.layout == Layout::Physical);
+        let takes = |config: &crate::LinkConfig| config.corruption.is_none() && config.limit.is_none() && counts_at_offers(config);
         match model {
             LinkModel::Fixed(config) => takes(config),
             LinkModel::Modulated(modulated) => modulated.configs().iter().all(takes),

@@ -21,7 +21,7 @@ use crate::line::pipeline::Pipeline;
 use crate::packet::{Marks, Packet, PacketInfo};
 use crate::random::Purpose;
 use crate::stages::config::{Layout, LinkConfig};
-use crate::stages::queue::{Bottleneck, BottleneckStage, Discipline, Fifo, Load, Red, Rules, Service, giga_bits};
+use crate::stages::queue::{Bottleneck, BottleneckStage, Discipline, Fifo, Load, Queued, Red, Rules, Service, giga_bits};
 
 /// Data shared by all queued links of one configuration.
 #[derive(Clone, Debug)]
@@ -240,11 +240,11 @@ impl<T> QueuedLink<T> {
     {
         let Self { direct, flow, latest, line, drops } = self;
         let Drops { counted, ahead } = drops.map_or_else(Drops::default, |drops| *drops);
-        let stats = LinkStats { flow, seldom: counted };
+        let stats = LinkStats { flow, seldom: counted, ..LinkStats::default() };
         let pipeline = match (line, &kind.line) {
             (Some(line), Some(LineKind { bottleneck, .. })) => {
                 // The number and the offer go on with the packet, so the general stages draw the same random numbers.
-                let boxed = |sent: Sent<T>| (sent.at, Packet::new(sent.number, info, Marks::default(), sent));
+                let boxed = |sent: Sent<T>| Queued::Own(sent.at, Packet::new(sent.number, info, Marks::default(), sent));
                 let stage = BottleneckStage::resumed(bottleneck.clone(), line.converted(bottleneck, boxed));
                 Pipeline::resumed(now, direct, kind.config.clone(), stage)
             }
@@ -260,7 +260,7 @@ impl<T> QueuedLink<T> {
 
     /// Returns the counters of the link.
     pub(super) fn stats(&self) -> LinkStats {
-        LinkStats { flow: self.flow, seldom: self.drops.as_ref().map_or_else(Seldom::default, |drops| drops.counted) }
+        LinkStats { flow: self.flow, seldom: self.drops.as_ref().map_or_else(Seldom::default, |drops| drops.counted), ..LinkStats::default() }
     }
 }
 

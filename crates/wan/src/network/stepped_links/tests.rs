@@ -11,7 +11,7 @@ use crate::stages::delay::{Delay, Jitter};
 use crate::stages::loss::Loss;
 use crate::stages::outage::{Outage, Outages};
 use crate::stages::queue::limit::strategies::limits;
-use crate::stages::queue::{Bottleneck, CoDel, Discipline, Framing, QueueLimit, Red};
+use crate::stages::queue::{Bottleneck, CoDel, CrossTraffic, Discipline, Framing, OnOff, Poisson, QueueLimit, Red};
 
 const SIZE: Bytes = Bytes::new(64);
 
@@ -77,6 +77,17 @@ fn with(discipline: Discipline, bits: u64, layout: Layout) -> LinkModel {
     LinkConfig { bottleneck: Some(bottleneck(discipline, Some(limit), bits)), delay, loss, layout, ..LinkConfig::default() }.into()
 }
 
+/// Returns the link with cross-traffic of a fifth of its rate at 100 kbit/s.
+fn crossed(mut model: LinkModel, place: usize) -> LinkModel {
+    let (rate, second) = (|bits| Rate::bits_per_sec(bits).unwrap(), Duration::from_secs(1));
+    let on_off = OnOff { sources: 2, peak: rate(100_000), size: Bytes::new(200), on: second / 20, off: second * 9 / 20, shape: 1.5 };
+    let traffic = [CrossTraffic::poisson(Poisson { rate: rate(20_000), size: Bytes::new(100) }), CrossTraffic::on_off(on_off)];
+    if let LinkModel::Fixed(config) = &mut model {
+        config.cross_traffic = Some(traffic[place].clone().unwrap());
+    }
+    model
+}
+
 const DISCIPLINES: usize = 6;
 
 fn discipline(place: usize) -> Discipline {
@@ -96,15 +107,36 @@ fn they_decide_what_whole_links_decide() {
     }
 }
 
+/// With cross-traffic, and with changes of the cross-traffic while packets are inside.
+#[test]
+fn they_decide_what_whole_links_decide_beside_cross_traffic() {
+    for (place, discipline) in (0..2).flat_map(|place| (0..DISCIPLINES).map(move |number| (place, discipline(number)))) {
+        let plain = with(discipline, 100_000, Layout::Physical);
+        let model = crossed(plain.clone(), place);
+        assert!(SteppedLinks::takes(&model) && QueuedKind::new(&model, SIZE).is_none());
+        compare(&model, &[], (&bursts(), millis(2_900)));
+        for changes in
+            [[(17, &plain), (44, &model)], [(17, &crossed(plain.clone(), 1 - place)), (30, &with(Discipline::HeadDrop, 50_000, Layout::Physical))]]
+        {
+            compare(&model, &changes, (&bursts(), millis(2_900)));
+            compare(&plain, &[(16, &model), changes[1]], (&bursts(), millis(2_900)));
+        }
+    }
+    let netem = crossed(with(Discipline::TailDrop, 100_000, Layout::Netem), 0);
+    assert!(!SteppedLinks::takes(&netem));
+}
+
 /// A driver stops 2 ms after a packet, before the next one. Counters then hold the events up to the stop only: no drop and no mark that the link has decided
 /// for a later instant.
 #[test]
 fn what_is_ahead_of_a_driver_that_stops_is_taken_back() {
     let (name, info, until) = (LinkName::between("a", "b"), PacketInfo { size: SIZE, ecn_capable: true }, millis(2_900));
     let offered = bursts();
-    for (discipline, layout) in (0..DISCIPLINES).map(discipline).flat_map(|discipline| [(discipline, Layout::Physical), (discipline, Layout::Netem)])
-    {
-        let model = with(discipline, 100_000, layout);
+    let models = (0..DISCIPLINES).map(discipline).flat_map(|discipline| {
+        let [physical, netem] = [Layout::Physical, Layout::Netem].map(|layout| with(discipline, 100_000, layout));
+        [crossed(physical.clone(), 0), crossed(physical.clone(), 1), physical, netem]
+    });
+    for model in models {
         for last in 20..50 {
             let mut whole = Link::new(7, &name, model.clone());
             let mut stepped = SteppedLinks::new(until, info);

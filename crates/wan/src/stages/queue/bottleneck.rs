@@ -23,9 +23,9 @@ use super::fifo::{Fifo, Rules};
 use super::framing::{CELLS, SIGNED_SIZE};
 use super::limit::LIMIT;
 use super::red::RED;
-use super::{CoDel, DeliveryTrace, Framing, QueueLimit, Red};
+use super::{CoDel, CrossStage, DeliveryTrace, Framing, QueueLimit, Red};
 use crate::fates::fate::DropCause;
-use crate::packet::{Carried, Exit, Output, Outputs};
+use crate::packet::{Carried, Exit, Output, Outputs, PacketInfo};
 use crate::parameters::{Form, Key, NONE, Table, UNLIMITED, optional, required, usual};
 
 /// Configuration of a serialiser and the queue before it.
@@ -126,10 +126,43 @@ pub(crate) struct BottleneckStage<T> {
     queue: Queue<T>,
     /// Size of the latest packet at an idle transmitter, with its transmission time. Cached, because the time is a division of 128 bits.
     latest_service: Option<(Bytes, Duration)>,
+    /// Departure of the link's first packet inside, or `None` without such a packet. Kept beside cross-traffic only, so that the owner need not wake the stage for
+    /// each cross packet before that packet.
+    first_own: Option<Instant>,
 }
 
-/// Packets of a stage, each with the instant of its offer.
-pub(crate) type Queue<T> = Fifo<(Instant, Carried<T>), Sums>;
+/// Packets of a stage.
+pub(crate) type Queue<T> = Fifo<Queued<T>, Sums>;
+
+/// Packet in the queue or in transmission, with the instant of its offer.
+#[derive(Clone, Debug)]
+pub(crate) enum Queued<T> {
+    /// Packet of the link.
+    Own(Instant, Carried<T>),
+    /// Packet of the cross-traffic, with its size.
+    Cross(Instant, Bytes),
+}
+
+impl<T> Queued<T> {
+    fn info(&self) -> PacketInfo {
+        match self {
+            Self::Own(_, packet) => packet.info,
+            // Cross-traffic does not react, so its packets must not be marked.
+            Self::Cross(_, size) => PacketInfo { size: *size, ecn_capable: false },
+        }
+    }
+
+    const fn is_own(&self) -> bool {
+        matches!(self, Self::Own(..))
+    }
+
+    fn into_own(self) -> Option<Carried<T>> {
+        match self {
+            Self::Own(_, packet) => Some(packet),
+            Self::Cross(..) => None,
+        }
+    }
+}
 
 /// Sums over the waiting packets of a stage.
 #[derive(Clone, Copy, Debug, Default)]
@@ -138,43 +171,50 @@ pub(crate) struct Sums {
     bytes: u128,
     /// Bits to transmit, in 10⁻⁹ bit.
     bits: u128,
+    /// Packets of the link.
+    own: usize,
 }
 
-impl<T> Rules<(Instant, Carried<T>)> for Bottleneck {
+impl<T> Rules<Queued<T>> for Bottleneck {
     type Sums = Sums;
 
     fn bottleneck(&self) -> &Bottleneck {
         self
     }
 
-    fn offered(&self, (offered, _): &(Instant, Carried<T>)) -> Instant {
+    fn offered(&self, packet: &Queued<T>) -> Instant {
+        let (Queued::Own(offered, _) | Queued::Cross(offered, _)) = packet;
         *offered
     }
 
-    fn size(&self, (_, packet): &(Instant, Carried<T>)) -> Bytes {
-        packet.info.size
+    fn size(&self, packet: &Queued<T>) -> Bytes {
+        packet.info().size
     }
 
-    fn bits(&self, (_, packet): &(Instant, Carried<T>)) -> u128 {
-        giga_bits(self.framing.on_the_line(packet.info.size))
+    fn bits(&self, packet: &Queued<T>) -> u128 {
+        giga_bits(self.framing.on_the_line(packet.info().size))
     }
 
-    fn ecn_capable(&self, (_, packet): &(Instant, Carried<T>)) -> bool {
-        packet.info.ecn_capable
+    fn ecn_capable(&self, packet: &Queued<T>) -> bool {
+        packet.info().ecn_capable
     }
 
-    fn mark(&self, (_, packet): &mut (Instant, Carried<T>)) {
-        packet.marks.congestion = true;
+    fn mark(&self, packet: &mut Queued<T>) {
+        if let Queued::Own(_, packet) = packet {
+            packet.marks.congestion = true;
+        }
     }
 
-    fn add(&self, sums: &mut Sums, packet: &(Instant, Carried<T>)) {
+    fn add(&self, sums: &mut Sums, packet: &Queued<T>) {
         sums.bytes += u128::from(self.size(packet).get());
         sums.bits += self.bits(packet);
+        sums.own += usize::from(packet.is_own());
     }
 
-    fn remove(&self, sums: &mut Sums, packet: &(Instant, Carried<T>)) {
+    fn remove(&self, sums: &mut Sums, packet: &Queued<T>) {
         sums.bytes -= u128::from(self.size(packet).get());
         sums.bits -= self.bits(packet);
+        sums.own -= usize::from(packet.is_own());
     }
 
     fn waiting(&self, sums: &Sums, _count: usize) -> (u128, u128) {
@@ -203,7 +243,7 @@ impl<T> BottleneckStage<T> {
 
     /// Returns a bottleneck with packets.
     pub(crate) const fn resumed(config: Bottleneck, queue: Queue<T>) -> Self {
-        Self { config, queue, latest_service: None }
+        Self { config, queue, latest_service: None, first_own: None }
     }
 
     /// Returns the departure of a packet of `size` offered `now` to an idle transmitter. Returns `None` if the transmitter is busy or has a recording, or if
@@ -227,24 +267,91 @@ impl<T> BottleneckStage<T> {
     }
 
     /// Takes a packet. The packet is then sent, waits, or is dropped into `outputs`; older packets may be dropped in its place. `word` gives the packet's
-    /// random word for queues.
-    pub(crate) fn offer(&mut self, now: Instant, packet: Carried<T>, word: impl FnOnce() -> u64, outputs: &mut Outputs<T>) {
-        self.queue.offer(now, &self.config, (now, packet), word, |cause, packet| drop(outputs, now, cause, packet));
+    /// random word for queues. `cross` must have [caught up](Self::catch_up) with `now`.
+    pub(crate) fn offer(
+        &mut self,
+        now: Instant,
+        packet: Carried<T>,
+        word: impl FnOnce() -> u64,
+        mut cross: Option<&mut CrossStage>,
+        outputs: &mut Outputs<T>,
+    ) {
+        self.queue.offer(now, &self.config, Queued::Own(now, packet), word, |cause, packet| drop(&mut cross, outputs, now, cause, packet));
+        if let Some(cross) = cross {
+            cross.meet();
+            // Behind an earlier packet of the link, this packet is not the first.
+            if self.first_own.is_none() {
+                self.foresee();
+            }
+        }
     }
 
-    /// Returns the instant of the next call of [`BottleneckStage::release`], or `None` if the transmitter is idle.
-    pub(crate) fn next_at(&self) -> Option<Instant> {
-        self.queue.on_line().map(|on_line| on_line.next)
+    /// Returns the instant of the next call of [`BottleneckStage::release`], or `None` if the transmitter is idle. Beside cross-traffic, returns `None` too if no
+    /// packet of the link is inside: nobody outside can see what happens then, and [`catch_up`](Self::catch_up) computes it when a packet comes.
+    pub(crate) fn next_at(&self, cross: Option<&CrossStage>) -> Option<Instant> {
+        let on_line = self.queue.on_line()?;
+        let Some(cross) = cross else { return Some(on_line.next) };
+        if !self.has_own() {
+            return None;
+        }
+        match (&self.config.service, &self.config.discipline) {
+            // An admitted packet is never dropped, so its departure is known from its offer.
+            (Service::Rate(_), Discipline::TailDrop | Discipline::Red(_)) => self.first_own,
+            // Packets are dropped, or sent, where a packet leaves the transmitter or where opportunities come.
+            (_, Discipline::TailDrop | Discipline::Red(_) | Discipline::CoDel(_)) => Some(on_line.next),
+            // A cross packet may push out a packet of the link.
+            (_, Discipline::HeadDrop) => Some(cross.next_at().map_or(on_line.next, |arrival| arrival.min(on_line.next))),
+        }
     }
 
     /// Appends the packets leaving the bottleneck `now` to `released`, and dropped packets to `outputs`. `now` is the instant returned by
     /// [`next_at`](Self::next_at).
-    pub(crate) fn release(&mut self, now: Instant, released: &mut VecDeque<Carried<T>>, outputs: &mut Outputs<T>) {
+    pub(crate) fn release(&mut self, now: Instant, cross: Option<&mut CrossStage>, released: &mut VecDeque<Carried<T>>, outputs: &mut Outputs<T>) {
+        match cross {
+            None => self.leave(now, &mut None, released, outputs),
+            Some(cross) => {
+                self.let_happen(now, cross, Some(released), outputs);
+                self.foresee();
+            }
+        }
+    }
+
+    /// Lets the cross-traffic up to `now` happen, before a packet is offered or the configuration changes.
+    pub(crate) fn catch_up(&mut self, now: Instant, cross: &mut CrossStage, outputs: &mut Outputs<T>) {
+        self.let_happen(now, cross, None, outputs);
+    }
+
+    /// Lets departures and arrivals up to `until` happen in the order of their instants. Without `released`, stops before a departure of a packet of the link:
+    /// such a packet leaves at `until` itself, when the owner asks for it.
+    fn let_happen(&mut self, until: Instant, cross: &mut CrossStage, mut released: Option<&mut VecDeque<Carried<T>>>, outputs: &mut Outputs<T>) {
+        loop {
+            let departure = self.queue.on_line().map(|on_line| on_line.next).filter(|at| *at <= until);
+            // At equal instants a departure comes first, and makes room for the packet.
+            if let Some(at) = departure.filter(|at| cross.next_at().is_none_or(|arrival| *at <= arrival)) {
+                let mut nothing = VecDeque::new();
+                let released = match &mut released {
+                    Some(released) => released,
+                    None if self.may_release_own() => return,
+                    None => &mut nothing,
+                };
+                self.leave(at, &mut Some(&mut *cross), released, outputs);
+            } else if let Some((at, size, word)) = cross.take(until) {
+                let cross = &mut Some(&mut *cross);
+                self.queue.offer(at, &self.config, Queued::Cross(at, size), word, |cause, packet| drop(cross, outputs, at, cause, packet));
+            } else {
+                return;
+            }
+        }
+    }
+
+    /// Lets the packets leave that leave `now`, and appends the link's own packets to `released`.
+    #[inline]
+    fn leave(&mut self, now: Instant, cross: &mut Option<&mut CrossStage>, released: &mut VecDeque<Carried<T>>, outputs: &mut Outputs<T>) {
         let Self { config, queue, .. } = self;
         let trace = match &config.service {
             Service::Rate(_) => {
-                let left = queue.leave(now, config, |at, cause, packet| drop(outputs, at, cause, packet));
-                return released.extend(left.map(|(_, (_, packet))| packet));
+                let left = queue.leave(now, config, |at, cause, packet| drop(cross, outputs, at, cause, packet));
+                return released.extend(left.and_then(|(_, packet)| packet.into_own()));
             }
             Service::Recorded(trace) => trace,
         };
@@ -258,8 +365,8 @@ impl<T> BottleneckStage<T> {
                 break;
             }
             budget -= on_line.left;
-            released.extend(queue.on_line_mut().take().map(|on_line| on_line.packet.1));
-            queue.serve_next(now, config, |cause, packet| drop(outputs, now, cause, packet));
+            released.extend(queue.on_line_mut().take().and_then(|on_line| on_line.packet.into_own()));
+            queue.serve_next(now, config, |cause, packet| drop(cross, outputs, now, cause, packet));
             if budget == 0 {
                 break;
             }
@@ -267,22 +374,62 @@ impl<T> BottleneckStage<T> {
         queue.announce(now, config);
     }
 
-    /// Changes rate, framing, limit and discipline; see [`Fifo::reconfigure`].
+    /// Changes rate, framing, limit and discipline; see [`Fifo::reconfigure`]. Cross-traffic must have [caught up](Self::catch_up) with `now`.
     pub(crate) fn reconfigure(&mut self, now: Instant, config: Bottleneck) {
         // The transmission time in the cache belongs to the old rate and framing.
         self.queue.reconfigure(now, &self.config, &config);
         (self.config, self.latest_service) = (config, None);
+        self.foresee();
     }
 
-    /// Returns the packet in transmission and all waiting packets, in order, when a link loses its bottleneck.
+    /// Returns whether a packet of the link waits or is in transmission.
+    fn has_own(&self) -> bool {
+        self.queue.sums().own > 0 || self.queue.on_line().is_some_and(|on_line| on_line.packet.is_own())
+    }
+
+    /// Returns whether the next departure may release a packet of the link.
+    fn may_release_own(&self) -> bool {
+        match &self.config.service {
+            Service::Rate(_) => self.queue.on_line().is_some_and(|on_line| on_line.packet.is_own()),
+            // Packets that wait can leave at one opportunity with the packet in transmission.
+            Service::Recorded(_) => self.has_own(),
+        }
+    }
+
+    /// Computes the departure of the link's first packet inside: the sum of the transmission times, each rounded as at the departures. Over a run, each cross
+    /// packet is passed over once at most, for the packet of the link behind it.
+    fn foresee(&mut self) {
+        self.first_own = None;
+        let Self { config: Bottleneck { service, discipline, .. }, queue, .. } = &*self;
+        let (Service::Rate(rate), Discipline::TailDrop | Discipline::Red(_), Some(on_line)) = (service, discipline, queue.on_line()) else { return };
+        if !self.has_own() {
+            return;
+        }
+        let mut leaves = on_line.next;
+        let mut packet = &on_line.packet;
+        let mut behind = self.queue.waiting();
+        while !packet.is_own() {
+            let Some(next) = behind.next() else { return };
+            leaves = leaves.saturating_add(rate.transmission_time(self.config.bits(next)));
+            packet = next;
+        }
+        self.first_own = Some(leaves);
+    }
+
+    /// Returns the link's packet in transmission and all its waiting packets, in order, when a link loses its bottleneck. Cross packets end here.
     pub(crate) fn dismantle(self) -> impl Iterator<Item = Carried<T>> {
-        self.queue.dismantle().map(|(_, packet)| packet)
+        self.queue.dismantle().filter_map(Queued::into_own)
     }
 }
 
-/// Appends a dropped packet to `outputs`.
-fn drop<T>(outputs: &mut Outputs<T>, now: Instant, cause: DropCause, (_, packet): (Instant, Carried<T>)) {
-    outputs.push(Output { packet, exit: Exit::Dropped(now, cause) });
+/// Appends a dropped packet of the link to `outputs`, and counts a dropped cross packet.
+fn drop<T>(cross: &mut Option<&mut CrossStage>, outputs: &mut Outputs<T>, now: Instant, cause: DropCause, packet: Queued<T>) {
+    match (packet, cross) {
+        (Queued::Own(_, packet), _) => outputs.push(Output { packet, exit: Exit::Dropped(now, cause) }),
+        (Queued::Cross(..), Some(cross)) => cross.count_drop(),
+        // A queue with cross packets has the stage that sent them, even after a change that ends the cross-traffic.
+        (Queued::Cross(..), None) => {}
+    }
 }
 
 /// Parameters of the transmitter and of the queue before the transmitter.
@@ -357,16 +504,16 @@ mod tests {
         let info = Bytes::new(size).into();
         let packet = Packet::new(0, info, Marks::default(), item);
         let mut outputs = Vec::new();
-        stage.offer(micros(now), packet, || 0, &mut outputs);
+        stage.offer(micros(now), packet, || 0, None, &mut outputs);
         outputs.into_iter().map(|output| output.packet.item).collect()
     }
 
     /// Returns the packets that leave up to `until`, each with the microsecond of its departure.
     fn leaves(stage: &mut BottleneckStage<char>, until: u64) -> Vec<(char, u64)> {
         let mut left = Vec::new();
-        while let Some(at) = stage.next_at().filter(|at| *at <= micros(until)) {
+        while let Some(at) = stage.next_at(None).filter(|at| *at <= micros(until)) {
             let mut released = VecDeque::new();
-            stage.release(at, &mut released, &mut Vec::new());
+            stage.release(at, None, &mut released, &mut Vec::new());
             left.extend(released.into_iter().map(|packet| (packet.item, at.as_nanos() / 1_000)));
         }
         left

@@ -125,15 +125,15 @@ mod tests {
         let mut fates = alloc::vec![None; offered.len()];
         let (mut released, mut outputs) = (VecDeque::new(), Vec::new());
         let mut pass = |stage: &mut BottleneckStage<usize>, until: Instant, fates: &mut Vec<Option<Instant>>| {
-            while let Some(at) = stage.next_at().filter(|at| *at <= until) {
-                stage.release(at, &mut released, &mut outputs);
+            while let Some(at) = stage.next_at(None).filter(|at| *at <= until) {
+                stage.release(at, None, &mut released, &mut outputs);
                 released.drain(..).for_each(|packet| fates[packet.item] = Some(at));
             }
         };
         for (place, now) in offered.iter().enumerate() {
             pass(&mut stage, *now, &mut fates);
             let mut outputs = Vec::new();
-            stage.offer(*now, Packet::new(place as u64, PacketInfo::from(size), Marks::default(), place), || 0, &mut outputs);
+            stage.offer(*now, Packet::new(place as u64, PacketInfo::from(size), Marks::default(), place), || 0, None, &mut outputs);
             assert!(outputs.iter().all(|output| matches!(output.exit, Exit::Dropped(..)) && output.packet.item == place));
         }
         pass(&mut stage, Instant::MAX, &mut fates);

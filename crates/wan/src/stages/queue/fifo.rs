@@ -105,6 +105,16 @@ impl<P, S: Default> Fifo<P, S> {
         self.on_line.as_ref()
     }
 
+    /// Returns the sums over the waiting packets.
+    pub(crate) const fn sums(&self) -> &S {
+        &self.sums
+    }
+
+    /// Returns the waiting packets, the oldest first.
+    pub(crate) fn waiting(&self) -> impl Iterator<Item = &P> {
+        self.waiting.iter()
+    }
+
     /// Returns the packet in transmission, for a transmitter with opportunities.
     pub(crate) fn on_line_mut(&mut self) -> &mut Option<OnLine<P>> {
         &mut self.on_line

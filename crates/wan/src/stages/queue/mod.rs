@@ -2,6 +2,7 @@
 
 pub(crate) mod bottleneck;
 mod codel;
+pub(crate) mod cross_traffic;
 mod delivery_trace;
 mod equal_packets;
 mod fifo;
@@ -13,6 +14,7 @@ pub(crate) mod token_bucket;
 
 pub use bottleneck::{Bottleneck, Discipline, Service};
 pub use codel::CoDel;
+pub use cross_traffic::{CrossRecording, CrossRecordingError, CrossTraffic, CrossTrafficError, OnOff, Poisson};
 pub use delivery_trace::{DeliveryTrace, DeliveryTraceError, MAHIMAHI_BYTES};
 pub use framing::{Cells, Framing};
 pub use limit::QueueLimit;
@@ -20,7 +22,8 @@ pub use load::Load;
 pub use red::{Red, RedError};
 pub use token_bucket::{Peak, TokenBucket};
 
-pub(crate) use bottleneck::{BottleneckStage, giga_bits};
+pub(crate) use bottleneck::{BottleneckStage, Queued, giga_bits};
+pub(crate) use cross_traffic::CrossStage;
 pub(crate) use equal_packets::{EqualPackets, nanos};
 pub(crate) use fifo::{Fifo, Rules};
 pub(crate) use token_bucket::TokenBucketStage;

@@ -470,7 +470,10 @@ pub(super) const DOCUMENTS: [Document; 25] = [
     },
     Document {
         command: "link",
-        lines: &["cohaptic link delay 20ms 2ms distribution normal loss 1% 25% duplicate 1% corrupt 1% rate 1mbit --packets 20000 --json"],
+        lines: &[
+            "cohaptic link delay 20ms 2ms distribution normal loss 1% 25% duplicate 1% corrupt 1% rate 1mbit --packets 20000 --json",
+            "cohaptic link rate=12Mbit 'cross-traffic={ poisson = { rate = \"6Mbit\" } }' --packets 1000 --json",
+        ],
         rows: &[
             ("asked.spec", "as written"),
             (
@@ -480,6 +483,10 @@ pub(super) const DOCUMENTS: [Document; 25] = [
             ("achieved.NAME", "what was measured, with standard errors (`_se`) and intervals of 95 %, as defined by the RFCs; copies count"),
             ("compared[].name, compared[].asked, compared[].achieved, compared[].standard_error, compared[].outside", "the rows of the table"),
             ("fates.@Counters but mean_delay_s", "what became of the packets"),
+            (
+                "cross_traffic.offered, cross_traffic.dropped",
+                "packets of the [cross-traffic](emulator-stages.md#cross-traffic) up to the last packet at the queue; absent where there were none",
+            ),
             (
                 "packets_per_s, measured_packets, interrupted, files",
                 "how fast; of how many packets figures are, the first; whether cut short; what was written",
