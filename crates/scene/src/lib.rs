@@ -33,6 +33,7 @@
 mod assembly;
 mod content;
 mod context;
+mod judged;
 mod link_keys;
 mod measures;
 mod model;

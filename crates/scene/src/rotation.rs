@@ -361,7 +361,7 @@ peer = { device = { mass = 0.1 }, coupling = { stiffness = 100 }, grasp = [0.1, 
         refused(&["object.orientation=[1, 0, 0]"], "is not a quaternion");
         refused(&["coordination.rotational-stiffness=[1, 1, 3]"], "a stiffness is above the sum of the two others");
         for (strategy, why) in
-            [("wave", "axis in common"), ("set-position", "energies"), ("passivity-control", "energies"), ("client-server", "clients")]
+            [("wave", "share no axis"), ("set-position", "energies"), ("passivity-control", "energies"), ("client-server", "clients")]
         {
             let name = format!("coordination.strategy={strategy}");
             refused(&[&name], &format!("the strategy {strategy} has no torque for an object with an inertia, because "));

@@ -2,10 +2,8 @@
 
 use core::time::Duration;
 
-use cohaptic_peer::{Contact, Signal};
+use cohaptic_peer::Signal;
 use cohaptic_units::Instant;
-
-use crate::model::{ChangeKind, Scene};
 
 /// A task of a run. A task observes the run and changes no motion, packet or random number.
 #[derive(Clone, PartialEq, Debug)]
@@ -77,31 +75,6 @@ pub struct Hold {
     pub radius: f64,
     /// Longest duration outside at once, after the first entry, without a failure of the task.
     pub grace: Duration,
-}
-
-impl TaskSpec {
-    /// Returns the peers whose copies are judged, by index, in the order of the scene.
-    #[must_use]
-    pub fn judged(&self, scene: &Scene) -> Vec<usize> {
-        match self.who {
-            Judged::All | Judged::Any => (0..scene.peers.len()).filter(|peer| scene.touches(*peer)).collect(),
-            Judged::Peer(peer) => vec![peer],
-        }
-    }
-}
-
-impl Scene {
-    /// Returns whether the device of a peer touches the object at any time of the scene.
-    ///
-    /// # Panics
-    ///
-    /// If there is no such peer.
-    #[must_use]
-    pub fn touches(&self, peer: usize) -> bool {
-        let touches_later =
-            |what: &ChangeKind| matches!(what, ChangeKind::Contact { peer: changed, contact } if *changed == peer && *contact != Contact::None);
-        self.peers[peer].contact != Contact::None || self.timeline.iter().any(|change| touches_later(&change.what))
-    }
 }
 
 impl TaskKind {

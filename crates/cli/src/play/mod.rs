@@ -286,6 +286,7 @@ mod tests {
             ("live/two-and-a-program.toml", "kind=pointer"),
             ("network/push-contact.toml", "timeline"),
             ("network/timeline.toml", "timeline"),
+            ("tasks/reach.toml", "timeline"),
         ];
         let refused = BTreeMap::from(refused);
         let scenes = shipped();

@@ -266,7 +266,7 @@ fn ratio(sum: u128, count: u64) -> Option<f64> {
 
 /// Returns the root of the mean square; `None` if `count` is 0.
 #[expect(clippy::cast_precision_loss, reason = "fewer rows than 2^53")]
-pub(crate) fn mean_square_root(squares: f64, count: u64) -> Option<f64> {
+fn mean_square_root(squares: f64, count: u64) -> Option<f64> {
     (count > 0).then(|| libm::sqrt(squares / count as f64))
 }
 

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use cohaptic_scene::{Measure, TaskOutcome};
 
-use super::{Accumulator, Asked, Rows};
+use super::{Accumulator, Asked, Rows, mean_square_root};
 use crate::task::Judge;
 use crate::{Ending, TickRow};
 
@@ -48,7 +48,7 @@ impl Accumulator for TaskFigures {
         let (result, judge) = self.judge.clone()?.finish(ending, elapsed, &mut |_, _| ());
         match figure {
             Figure::Time => (result.outcome == TaskOutcome::Done).then_some(result.time.as_secs_f64()),
-            Figure::Error => judge.error(peer?),
+            Figure::Error => judge.squared_errors(peer?).and_then(|(squares, count)| mean_square_root(squares, count)),
             Figure::Outside => judge.outside(peer?).map(|outside| outside.as_secs_f64()),
         }
     }

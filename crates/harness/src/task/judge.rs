@@ -6,7 +6,6 @@ use cohaptic_scene::{Hold, Judged, Reach, Scene, TaskKind, TaskOutcome, TaskSpec
 use cohaptic_units::Instant;
 
 use super::TaskResult;
-use crate::measures::mean_square_root;
 use crate::{Ending, TickRow};
 
 /// Judge of a task during a run.
@@ -206,11 +205,10 @@ impl Judge {
         at >= self.spec.start && self.outcome.is_none() && at <= self.deadline
     }
 
-    /// Returns the root mean square of the distance between the target and the copy of a peer, over the judged instants of the task but for the warm-up \[m\].
-    /// `None` for a peer that is not judged, and before the first such instant.
-    pub(crate) fn error(&self, peer: usize) -> Option<f64> {
-        let copy = self.copies.iter().find(|copy| copy.peer == peer)?;
-        mean_square_root(copy.squares, copy.count)
+    /// Returns the sum of the squared distances between the target and the copy of a peer, over the judged instants of the task but for the warm-up \[m²\], and
+    /// the number of these instants. `None` for a peer that is not judged.
+    pub(crate) fn squared_errors(&self, peer: usize) -> Option<(f64, u64)> {
+        self.copies.iter().find(|copy| copy.peer == peer).map(|copy| (copy.squares, copy.count))
     }
 
     /// Returns the time for which the copy of a peer was outside of the held target, after the first entry of all judged copies together. `None` for a task of

@@ -13,7 +13,7 @@
 //!     object = { mass = 0.45 }
 //!     coordination = { strategy = "average-position", stiffness = 1000.0, damping = 5.0, update = "8ms" }
 //!     peer = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
-//!     peers = [{ name = "peer1", hand = { force = 0.5 } }]
+//!     peers = [{ name = "peer1", hand = { force = 2.0 } }]
 //!     link = { delay = "24ms" }
 //!     task = { kind = "reach", targets = [0.05, 0.1], radius = 0.005 }
 //! "#;

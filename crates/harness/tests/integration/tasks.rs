@@ -23,7 +23,7 @@ const SCENE: &str = r#"
     ]
     link = { delay = "24ms", jitter = "3ms", loss = "5%" }
 "#;
-const REACH: &str = r#"task = { kind = "reach", targets = [0.03, 0.09], radius = 0.005, speed = 0.1, dwell = "20ms" }"#;
+const REACH: &str = r#"task = { kind = "reach", targets = [0.1, 0.098], radius = 0.01, speed = 0.1, dwell = "20ms" }"#;
 
 fn scene(text: &str) -> Scene {
     Scene::parse(text, Path::new("test.toml"), &[]).unwrap_or_else(|error| panic!("{error}"))
@@ -129,7 +129,7 @@ fn measures_of_a_task_are_those_of_the_recorded_rows() {
         let cells: Vec<&str> = line.split(',').collect();
         let at: f64 = cells[0].parse().unwrap();
         if cells[1] == "left" && at <= end {
-            let target = if at <= reached { 0.03 } else { 0.09 };
+            let target = if at <= reached { 0.1 } else { 0.098 };
             let error = cells[4].parse::<f64>().unwrap() - target;
             let force: f64 = cells[8].parse().unwrap();
             squares += error * error;

@@ -245,12 +245,13 @@ mod tests {
     }
 
     /// Keys that name a file, words of tc-netem among them, each with the name of the file.
-    const FILES: [(&str, &str, &str); 10] = [
+    const FILES: [(&str, &str, &str); 11] = [
         ("replay", "\"a/fates.csv\"", "desk/a/fates.csv"),
         ("trace", "\"up.trace\"", "desk/up.trace"),
         ("trace", "{ file = \"up.trace\", bytes = \"1500B\" }", "desk/up.trace"),
         ("jitter", "{ sd = \"2ms\", distribution = { table = \"../x.dist\" } }", "desk/../x.dist"),
         ("jitter", "{ sd = \"2ms\", distribution = { empirical = \"/etc/shadow\" } }", "/etc/shadow"),
+        ("cross-traffic", "{ trace = \"cross.csv\" }", "desk/cross.csv"),
         ("slots", "{ delay = \"9ms\", jitter = { sd = \"2ms\", distribution = { empirical = \"slots.csv\" } } }", "desk/slots.csv"),
         ("netem", "\"delay 20ms 5ms distribution /etc/law\"", "/etc/law.dist"),
         ("netem", "\"delay 20ms slot distribution law 2ms 1ms\"", "desk/law.dist"),
@@ -262,7 +263,7 @@ mod tests {
     #[test]
     fn every_file_that_keys_name_is_asked_of_the_reader_and_nothing_of_it_is_quoted() {
         let in_catalogue: usize = LINK_PARAMETERS.into_iter().chain([LINK_KIND_PARAMETERS.as_slice()]).map(files_below).sum();
-        assert_eq!(in_catalogue, 7, "replay, trace, trace.file, and table and empirical of jitter and of slots");
+        assert_eq!(in_catalogue, 8, "replay, trace, trace.file, cross-traffic.trace, and table and empirical of jitter and of slots");
         let state = |next: [f64; 2]| ModulatorState { sojourn: Some(Sojourn::Fixed(Duration::from_secs(1))), next: next.to_vec() };
         let modulator = Modulator::new("cell", vec![state([0.0, 1.0]), state([1.0, 0.0])]).unwrap();
         let names = ["good", "bad"].map(str::to_owned).to_vec();

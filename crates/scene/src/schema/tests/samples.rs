@@ -34,6 +34,10 @@ pub(super) const SCENES: [&str; 4] = [
         { at = "3s", coordination = { smoothed-average-position = { lag = "1ms" }, extrapolated = { horizon = "1ms" }, local-damping = { damping = 1 } } },
         { at = "3s", coordination = { local-lag = { lag = "1ms" }, passivity-control = { reserve = 1 }, set-position = { damping = 1, ceiling = 1 } } },
     ]
+    [task]
+    kind = "track"
+    sines = [{ amplitude = 0.1, frequency = 0.5 }]
+    fail = { force = 8 }
     [measure]
     names = ["energy_j", "peers.a.energy_j", "viscosity_n_s_m"]
     travel = { peer = "b", distance = 0.1, axis = "x" }
@@ -42,6 +46,7 @@ pub(super) const SCENES: [&str; 4] = [
     [expect]
     measures = [{ name = "energy_j", min = 0, max = 1 }]
     discrepancy = { max = 1 }
+    task = { outcome = "done", time = { max = "4s" } }
     position = [{ peer = "a", at = "1s", min = 0 }]
     travel = [{ peer = "a", distance = 0.1, max = "1s" }]
     loss = [{ link = { uplink = "c" }, max = 1 }, { link = { from = "a", to = "b" }, max = 1 }]
@@ -69,6 +74,8 @@ pub(super) const SCENES: [&str; 4] = [
         { from = "peer2", to = "peer7", corrupt = { bit-error-rate = 1e-6 } },
         { from = "peer2", to = "peer8", delay = "20ms", slots = { delay = "10ms", jitter = "1ms" } },
         { from = "peer3", to = "peer2", reorder = { probability = 0.1 } },
+        { from = "peer3", to = "peer4", cross-traffic = { poisson = { rate = "100kbit", size = "1500B" } } },
+        { from = "peer3", to = "peer5", cross-traffic = { on-off = { sources = 3, peak = "200kbit", size = "1500B", on = "1s", off = "2s", shape = 1.5 } } },
         { from = "peer3", to = "peer1", netem = "delay 1ms", netem-profile = "exact" },
     ]
     "#,
