@@ -82,7 +82,7 @@ pub use network::direct_links::{Arrivals, DirectLinks};
 pub use network::id::{LinkId, NodeId, Path};
 pub use network::stepped_links::SteppedLinks;
 pub use network::{AccessLine, MOST_NODES, Network, NetworkConfig, NetworkError};
-pub use packet::PacketInfo;
+pub use packet::{PacketInfo, flow_number};
 pub use ring::Ring;
 pub use stages::config::{LINK_PARAMETERS, Layout, LinkConfig};
 pub use stages::corruption::{Checksum, Corruption, Flips};
@@ -96,7 +96,7 @@ pub use stages::outage::{IdleOutages, Outage, Outages, OutagesError, RandomOutag
 pub use stages::path_trace::{Between, PathTrace, PathTraceError};
 pub use stages::queue::{
     Bottleneck, Cells, CoDel, CrossRecording, CrossRecordingError, CrossTraffic, CrossTrafficError, DeliveryTrace, DeliveryTraceError, Discipline,
-    Framing, Load, MAHIMAHI_BYTES, OnOff, Peak, Poisson, QueueLimit, Red, RedError, Service, TokenBucket,
+    FqCoDel, Framing, Load, MAHIMAHI_BYTES, OnOff, Peak, Pie, Poisson, QueueLimit, Red, RedError, Service, TokenBucket,
 };
 pub use stages::reorder::{Displacement, Reorder};
 pub use stages::slots::{SlotGap, Slots, SlotsError};

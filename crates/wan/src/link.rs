@@ -34,6 +34,8 @@ pub struct Link<P> {
     now: Instant,
     /// Stages and counters of the link.
     line: Line<P, InLink<P>>,
+    /// Number of the flow of a packet by its payload. Under `None` all packets are one flow.
+    flows: Option<fn(&P) -> u32>,
     traffic: Traffic<P>,
     /// Buffer for the outputs of stages, empty between calls. A field, for the reuse of its memory.
     outputs: Outputs<InLink<P>>,
@@ -57,6 +59,7 @@ impl<P: Clone> Link<P> {
             name: name.clone(),
             now: Instant::ZERO,
             line: Line::new(seed, name, model.into(), false),
+            flows: None,
             traffic: Traffic { pending: EventQueue::new(), happened: VecDeque::new() },
             outputs: Vec::new(),
         }
@@ -66,6 +69,14 @@ impl<P: Clone> Link<P> {
     #[must_use]
     pub fn with_filter(mut self, drops: impl Fn(&Offered<'_, P>) -> bool + Send + Sync + 'static) -> Self {
         self.line.set_filter(Filter::new(drops));
+        self
+    }
+
+    /// Sets the function from a payload to the number of the packet's flow, for queues with [`FqCoDel`](crate::FqCoDel). Packets with different numbers are
+    /// packets of different flows. Without this function all packets are one flow.
+    #[must_use]
+    pub fn with_flows(mut self, flow: fn(&P) -> u32) -> Self {
+        self.flows = Some(flow);
         self
     }
 
@@ -93,7 +104,10 @@ impl<P: Clone> Link<P> {
         match self.line.offer(now, None) {
             Outcome::Arrives(at) => self.traffic.pending.push(Pending { at, packet, copy: 0, marks: None }),
             Outcome::Dropped(cause) => self.drop(now, cause, packet),
-            Outcome::Enters => self.line.enter(now, info, Marks::default(), packet, &mut self.outputs, &mut self.traffic),
+            Outcome::Enters => {
+                let flow = self.flows.map_or(0, |flow| flow(&packet.payload));
+                self.line.enter(now, (info, flow), Marks::default(), packet, &mut self.outputs, &mut self.traffic);
+            }
         }
         Ok(())
     }

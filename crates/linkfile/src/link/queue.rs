@@ -1,7 +1,9 @@
 //! Readers of `queue` and of limits: the room for waiting packets, and the discipline that drops packets.
 
+use core::num::NonZeroU32;
+
 use cohaptic_units::Bytes;
-use cohaptic_wan::{CoDel, Discipline, QueueLimit, Red};
+use cohaptic_wan::{CoDel, Discipline, FqCoDel, Pie, QueueLimit, Red};
 
 use super::{UNLIMITED, unless};
 use crate::document::{Node, quote};
@@ -17,7 +19,7 @@ pub(super) struct Queue {
     pub(super) discipline: Discipline,
 }
 
-const DISCIPLINES: &str = "one of tail-drop, head-drop, codel, red, { codel = … } or { red = … }";
+const DISCIPLINES: &str = "one of tail-drop, head-drop, codel, fq-codel, pie, red, { codel = … }, { fq-codel = … }, { pie = … } or { red = … }";
 const LIMIT: &str = "a limit such as \"100 packets\", \"64kB\" or \"50ms\"";
 
 /// Reads a queue: limit and discipline.
@@ -62,6 +64,8 @@ fn read_discipline(node: &Node, context: Context<'_>, limit: Option<QueueLimit>)
             "tail-drop" => Some(Discipline::TailDrop),
             "head-drop" => Some(Discipline::HeadDrop),
             "codel" => read_codel(&nothing(node), context).map(Discipline::CoDel),
+            "fq-codel" => read_fq_codel(&nothing(node), context).map(Discipline::FqCoDel),
+            "pie" => read_pie(&nothing(node), context).map(Discipline::Pie),
             "red" => read_plain_red(node, context, limit),
             other => {
                 context.fault_at(node, format!("unknown name {}: expected {DISCIPLINES}", quote(other)));
@@ -70,13 +74,14 @@ fn read_discipline(node: &Node, context: Context<'_>, limit: Option<QueueLimit>)
         };
     }
     let mut table = TableReader::new(node, context, LINK_TABLE.table("queue.discipline"), DISCIPLINES)?;
-    let entries = [table.entry("codel"), table.entry("red")];
+    let entries = ["codel", "fq-codel", "pie", "red"].map(|name| table.entry(name));
     table.finish();
     let chosen = only_one(node, context, &entries, DISCIPLINES)?;
-    if chosen.name == "codel" {
-        read_codel(&chosen.node, context).map(Discipline::CoDel)
-    } else {
-        read_red(&chosen.node, context, None).map(Discipline::Red)
+    match chosen.name.as_str() {
+        "codel" => read_codel(&chosen.node, context).map(Discipline::CoDel),
+        "fq-codel" => read_fq_codel(&chosen.node, context).map(Discipline::FqCoDel),
+        "pie" => read_pie(&chosen.node, context).map(Discipline::Pie),
+        _ => read_red(&chosen.node, context, None).map(Discipline::Red),
     }
 }
 
@@ -88,6 +93,36 @@ fn read_codel(node: &Node, context: Context<'_>) -> Option<CoDel> {
     let (mtu, ecn) = (table.value("mtu"), table.value("ecn"));
     table.finish();
     Some(CoDel { target: target?, interval: interval?, mtu: mtu?, ecn: ecn? })
+}
+
+/// Reads the parameters of FQ-CoDel.
+fn read_fq_codel(node: &Node, context: Context<'_>) -> Option<FqCoDel> {
+    const EXPECTED: &str = "a table such as { target = \"5ms\", quantum = \"300B\" }";
+    let mut table = TableReader::new(node, context, LINK_TABLE.table("queue.discipline.fq-codel"), EXPECTED)?;
+    let (target, interval) = (table.value("target"), table.value("interval"));
+    let (mtu, ecn) = (table.value("mtu"), table.value("ecn"));
+    let quantum = table.read("quantum", |node, context| {
+        let size = values::size(node, context)?;
+        let found = u32::try_from(size.get()).ok().and_then(NonZeroU32::new);
+        if found.is_none() {
+            context.fault_at(node, format!("a queue cannot send {size} in its turn: expected a size from 1B to {}B", u32::MAX));
+        }
+        found
+    });
+    let flows: Option<u64> = table.value("flows");
+    table.finish();
+    let flows = u32::try_from(flows?).ok().and_then(NonZeroU32::new).expect("the declaration of the key gives the range");
+    Some(FqCoDel { codel: CoDel { target: target?, interval: interval?, mtu: mtu?, ecn: ecn? }, quantum: quantum?, flows })
+}
+
+/// Reads the parameters of PIE.
+fn read_pie(node: &Node, context: Context<'_>) -> Option<Pie> {
+    const EXPECTED: &str = "a table such as { target = \"15ms\", burst = \"150ms\" }";
+    let mut table = TableReader::new(node, context, LINK_TABLE.table("queue.discipline.pie"), EXPECTED)?;
+    let (target, burst) = (table.value("target"), table.value("burst"));
+    let (mtu, ecn) = (table.value("mtu"), table.value("ecn"));
+    table.finish();
+    Some(Pie { target: target?, burst: burst?, mtu: mtu?, ecn: ecn? })
 }
 
 /// Reads RED without parameters, with the advice of Floyd: the upper threshold is three times the lower threshold, and a tenth of the packets is dropped at the

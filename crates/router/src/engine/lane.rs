@@ -29,7 +29,12 @@ impl Lane {
     pub(super) fn new(seed: u64, link: &NamedLink, from: Side) -> Self {
         let end = |side: Side| format!("{}.{}", link.name, side.name());
         let name = LinkName::between(&end(from), &end(from.opposite()));
-        Self { link: Link::new(seed, &name, link.model.clone()), overload: 0, delivered_bytes: 0, recent: Lateness::new() }
+        Self {
+            link: Link::new(seed, &name, link.model.clone()).with_flows(|packet| packet.flow()),
+            overload: 0,
+            delivered_bytes: 0,
+            recent: Lateness::new(),
+        }
     }
 
     /// Returns the instant of the link's next event.

@@ -3,6 +3,7 @@
 use core::net::{IpAddr, Ipv4Addr, Ipv6Addr};
 
 use cohaptic_linkfile::router::Protocol;
+use cohaptic_wan::flow_number;
 
 use super::checksum;
 
@@ -80,6 +81,22 @@ impl Headers {
             Some(6) => read_v6(bytes),
             Some(_) => Err(Malformed::Version),
         }
+    }
+
+    /// Returns the number of the flow, from both addresses and, of a whole packet, from protocol and ports. All fragments of a packet are one flow.
+    pub(super) fn flow(&self) -> u32 {
+        let halves = |address: IpAddr| match address {
+            IpAddr::V4(v4) => [0, v4.to_bits().into()],
+            IpAddr::V6(v6) => {
+                let [a, b, c, d, e, f, g, h] = v6.segments().map(u64::from);
+                [a << 48 | b << 32 | c << 16 | d, e << 48 | f << 32 | g << 16 | h]
+            }
+        };
+        let ([s1, s0], [d1, d0]) = (halves(self.source), halves(self.destination));
+        let [source, destination] = self.ports.unwrap_or_default().map(u64::from);
+        // Later fragments have no ports, so the first fragment must not count its ports.
+        let ends = if self.is_whole { u64::from(self.protocol.0) << 32 | source << 16 | destination } else { u64::MAX };
+        flow_number(&[s1, s0, d1, d0, ends])
     }
 
     /// Sets both congestion bits in `bytes`, from which the headers were read. Corrects the checksum of an IPv4 header.

@@ -97,6 +97,12 @@ impl Packet {
         }
     }
 
+    /// Returns the number of the packet's flow, for queues with a queue per flow. Packets that are no packets of IP are one flow.
+    #[must_use]
+    pub fn flow(&self) -> u32 {
+        if let Content::Ip { headers, .. } = &self.content { headers.flow() } else { 0 }
+    }
+
     /// Marks the packet with congestion (RFC 3168), unless it is no packet of IP.
     pub fn mark_congestion(&mut self) {
         if let Content::Ip { at, headers } = &mut self.content {
@@ -193,6 +199,41 @@ mod tests {
             _ => builder.double_vlan(vlan, vlan).ipv4([10, 0, 0, 1], [10, 0, 0, 2], 64).udp(1, 2).write(&mut frame, &[]).unwrap(),
         }
         frame
+    }
+
+    /// Each part of the address makes another flow, in both directions and versions; fragments of one packet are one flow, whatever their ports.
+    #[test]
+    fn flows_differ_by_each_part_of_their_address() {
+        let of = |builder: etherparse::PacketBuilderStep<etherparse::UdpHeader>| {
+            let mut bytes = Vec::new();
+            builder.write(&mut bytes, b"data").unwrap();
+            bytes
+        };
+        let flow = |bytes: Vec<u8>| Packet::new(bytes, Framing::Ip).flow();
+        let v4 =
+            |source, destination, ports: (u16, u16)| of(PacketBuilder::ipv4([10, 0, 0, source], [10, 0, 0, destination], 64).udp(ports.0, ports.1));
+        let v6 = |source, destination, ports: (u16, u16)| of(PacketBuilder::ipv6([source; 16], [destination; 16], 64).udp(ports.0, ports.1));
+        let mut tcp = Vec::new();
+        PacketBuilder::ipv4([10, 0, 0, 1], [10, 0, 0, 2], 64).tcp(1, 2, 0, 0).write(&mut tcp, b"data").unwrap();
+        let all = [
+            flow(v4(1, 2, (1, 2))),
+            flow(v4(2, 1, (2, 1))),
+            flow(v4(1, 3, (1, 2))),
+            flow(v4(1, 2, (1, 3))),
+            flow(v4(1, 2, (3, 2))),
+            flow(v6(1, 2, (1, 2))),
+            flow(v6(2, 1, (2, 1))),
+            flow(tcp),
+            flow(vec![0; 30]),
+        ];
+        assert!(all.iter().enumerate().all(|(place, flow)| all[..place].iter().all(|other| other != flow)), "{all:?}");
+        let fragment = |ports, more: u8, offset: u8| {
+            let mut bytes = v4(1, 2, ports);
+            (bytes[6], bytes[7]) = (more << 5, offset);
+            flow(bytes)
+        };
+        assert_eq!(fragment((1, 2), 1, 0), fragment((77, 88), 0, 9));
+        assert_ne!(fragment((1, 2), 1, 0), all[0]);
     }
 
     #[test]

@@ -10,9 +10,9 @@ use cohaptic_units::{Bytes, Instant, Probability, Rate};
 use cohaptic_wan::law::DistTable;
 use cohaptic_wan::{
     Between, Bottleneck, Bursts, Cells, Chance, Checksum, CoDel, Correlation, Corruption, CrossRecording, CrossTraffic, Delay, DeliveryTrace,
-    Discipline, Displacement, Distribution, FateLog, Flips, FourState, Framing, GilbertElliottInTime, IdleOutages, Jitter, LinkConfig, LinkModel,
-    Loss, MAHIMAHI_BYTES, Modulator, ModulatorState, OnOff, Outage, Outages, PathTrace, Pattern, Peak, Poisson, QueueLimit, RandomOutages, Red,
-    Reorder, Service, Slots, Sojourn, TokenBucket,
+    Discipline, Displacement, Distribution, FateLog, Flips, FourState, FqCoDel, Framing, GilbertElliottInTime, IdleOutages, Jitter, LinkConfig,
+    LinkModel, Loss, MAHIMAHI_BYTES, Modulator, ModulatorState, OnOff, Outage, Outages, PathTrace, Pattern, Peak, Pie, Poisson, QueueLimit,
+    RandomOutages, Red, Reorder, Service, Slots, Sojourn, TokenBucket,
 };
 
 const MS: Duration = Duration::from_millis(1);
@@ -162,6 +162,24 @@ fn lines_queues_and_limits_are_read() {
         queue("{ limit = \"9 packets\", discipline.codel = { target = \"2ms\", interval = \"30ms\", mtu = \"100B\", ecn = true } }"),
         line(Some(QueueLimit::Packets(9)), Discipline::CoDel(codel))
     );
+    let packets = Some(QueueLimit::Packets(10_240));
+    assert_eq!(queue("{ limit = \"10240 packets\", discipline = \"fq-codel\" }"), line(packets, Discipline::FqCoDel(FqCoDel::default())));
+    let table = "target = \"2ms\", interval = \"30ms\", mtu = \"100B\", ecn = true, quantum = \"300B\", flows = 16";
+    let fq_codel = FqCoDel { codel, quantum: 300.try_into().unwrap(), flows: 16.try_into().unwrap() };
+    assert_eq!(queue(&format!("{{ limit = \"10240 packets\", discipline.fq-codel = {{ {table} }} }}")), line(packets, Discipline::FqCoDel(fq_codel)));
+    assert_eq!(queue("{ limit = \"10240 packets\", discipline = \"pie\" }"), line(packets, Discipline::Pie(Pie::default())));
+    let pie = Pie { target: 2 * MS, burst: 30 * MS, mtu: Bytes::new(100), ecn: true };
+    assert_eq!(
+        queue("{ limit = \"10240 packets\", discipline.pie = { target = \"2ms\", burst = \"30ms\", mtu = \"100B\", ecn = true } }"),
+        line(packets, Discipline::Pie(pie))
+    );
+    for (key, said) in [
+        ("quantum = \"0B\"", "quantum: a queue cannot send 0B in its turn: expected a size from 1B to 4294967295B"),
+        ("flows = 0", "flows: 0 is out of range: expected an integer from 1 to 65536"),
+    ] {
+        let error = refused(&format!("link = {{ rate = \"1Mbit\", queue = {{ limit = \"9 packets\", discipline.fq-codel = {{ {key} }} }} }}"), &[]);
+        assert!(error.contains(said), "{error}");
+    }
     let red = |min, max, most, weight, packet, ecn| {
         Discipline::Red(Red::new(Bytes::new(min), Bytes::new(max), p(most), weight, Bytes::new(packet), ecn).unwrap())
     };

@@ -147,11 +147,16 @@ fn stripped(config: &LinkConfig, size: Bytes) -> Nominal {
     if config.reorder.take().is_some() {
         replaced.chance("reordering", "reordering on purpose is left out".to_owned());
     }
-    if let Some(bottleneck) = &mut config.bottleneck
-        && matches!(bottleneck.discipline, Discipline::Red(_))
-    {
-        replaced.chance("random early detection", "random early detection is replaced by the limit of the queue alone".to_owned());
-        bottleneck.discipline = Discipline::TailDrop;
+    if let Some(bottleneck) = &mut config.bottleneck {
+        let what = match bottleneck.discipline {
+            Discipline::Red(_) => Some("random early detection"),
+            Discipline::Pie(_) => Some("PIE"),
+            Discipline::TailDrop | Discipline::HeadDrop | Discipline::CoDel(_) | Discipline::FqCoDel(_) => None,
+        };
+        if let Some(what) = what {
+            replaced.chance(what, format!("{what} is replaced by the limit of the queue alone"));
+            bottleneck.discipline = Discipline::TailDrop;
+        }
     }
     match config.cross_traffic.take() {
         Some(traffic) if traffic.is_random() => replaced.chance("cross-traffic", "cross-traffic is left out".to_owned()),

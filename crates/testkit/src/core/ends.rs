@@ -2,8 +2,11 @@
 
 use std::net::{IpAddr, SocketAddr};
 
+use cohaptic_wan::{Path, flow_number};
+
 use super::bound::Port;
 use crate::address::Addresses;
+use crate::wire::HasFlow;
 
 /// Returns the address of IPv4 as a socket of IPv6 shows it; an address of IPv6 as it is.
 pub(crate) fn mapped(address: SocketAddr) -> SocketAddr {
@@ -98,6 +101,15 @@ impl Ends {
     pub(super) const fn back(self, kind: Kind) -> Self {
         let Self { from, to, from_port, to_port, is_six, .. } = self;
         Self::of([to, from], [to_port, from_port], is_six, kind)
+    }
+}
+
+impl HasFlow for Ends {
+    /// Protocol, addresses and ports: what a router knows of a packet.
+    fn flow(&self, _path: Path) -> u32 {
+        let addresses = u64::from(self.from) << 32 | u64::from(self.to);
+        let ports = u64::from(self.from_port) << 16 | u64::from(self.to_port);
+        flow_number(&[addresses, (self.kind as u64) << 33 | u64::from(self.is_six) << 32 | ports])
     }
 }
 

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use cohaptic_units::Instant;
 use cohaptic_units::print::Seconds;
-use cohaptic_wan::{LinkStats, NodeId};
+use cohaptic_wan::{LinkStats, NodeId, Path, flow_number};
 
 use super::deadlines::Deadlines;
 use super::{Node, Packet};
@@ -22,7 +22,7 @@ use crate::record::Record;
 use crate::seed::Seed;
 use crate::setup::Setup;
 use crate::watch::{Kind, Watched};
-use crate::wire::Wire;
+use crate::wire::{HasFlow, Wire};
 
 /// Running nodes.
 ///
@@ -65,6 +65,13 @@ pub(super) struct Ports {
     pub(super) to: u16,
     /// `true` if the packet is of IPv6.
     pub(super) is_six: bool,
+}
+
+impl HasFlow for Ports {
+    fn flow(&self, Path { from, to }: Path) -> u32 {
+        let ends = [from.0, to.0, self.from, self.to].into_iter().fold(0, |ends, part| ends << 16 | u64::from(part));
+        flow_number(&[ends, self.is_six.into()])
+    }
 }
 
 /// Counts of the packets and timers of a node.

@@ -19,7 +19,7 @@ use exits::{Out, counted};
 pub(crate) use held::{BYTE_LIMIT, Held, Where};
 pub(crate) use hitting::HitCount;
 use hitting::Hitting;
-pub(crate) use parcel::{Arrival, Octets, Parcel, Spare};
+pub(crate) use parcel::{Arrival, HasFlow, Octets, Parcel, Spare};
 pub(crate) use recording::{Recorded, Recording, Seen};
 
 use crate::access::AccessStats;
@@ -60,7 +60,7 @@ pub(crate) struct Wire<A> {
     said: Arc<Said>,
 }
 
-impl<A: Clone + Send + Sync + 'static> Wire<A> {
+impl<A: HasFlow + Clone + Send + Sync + 'static> Wire<A> {
     pub(crate) fn new(
         names: &Arc<Names>,
         seed: u64,
@@ -69,7 +69,7 @@ impl<A: Clone + Send + Sync + 'static> Wire<A> {
         link: impl Fn(NodeId, NodeId) -> LinkModel + Send + Sync + 'static,
     ) -> Self {
         let config = NetworkConfig { seed, nodes: names.to_vec(), general: false };
-        let mut network = Network::on_demand(config, link);
+        let mut network: Network<Box<Parcel<A>>> = Network::on_demand(config, link).with_flows(|path, parcel| parcel.addresses.flow(path));
         for (host, lines) in &settings.access {
             let lines = [(AccessLine::Uplink(*host), &lines.uplink), (AccessLine::Downlink(*host), &lines.downlink)];
             for (line, model) in lines.into_iter().filter_map(|(line, model)| Some((line, model.clone()?))) {

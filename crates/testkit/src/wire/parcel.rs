@@ -26,6 +26,12 @@ pub(crate) struct Parcel<A> {
     pub(crate) arrival: Arrival,
 }
 
+/// Addresses of a packet that tell its flow.
+pub(crate) trait HasFlow {
+    /// Returns the number of the packet's flow on a path between two hosts.
+    fn flow(&self, path: Path) -> u32;
+}
+
 /// Report of a link about a packet that it has delivered.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Arrival {

@@ -21,6 +21,8 @@ pub enum DropCause {
     Red,
     /// Controlled delay dropped the packet, because waits had exceeded the target for an interval.
     CoDel,
+    /// The controller of PIE dropped the packet, because the delay of the queue exceeded the target.
+    Pie,
     /// Bits of the packet were flipped, and the receiver's checksum detected the damage.
     Checksum,
     /// The replayed log has ended.
@@ -29,8 +31,19 @@ pub enum DropCause {
 
 impl DropCause {
     /// All causes in the order of the stages, indexed by the cause's number.
-    pub const ALL: [Self; 10] =
-        [Self::Filter, Self::Mtu, Self::Outage, Self::Loss, Self::Limit, Self::QueueFull, Self::Red, Self::CoDel, Self::Checksum, Self::EndOfLog];
+    pub const ALL: [Self; 11] = [
+        Self::Filter,
+        Self::Mtu,
+        Self::Outage,
+        Self::Loss,
+        Self::Limit,
+        Self::QueueFull,
+        Self::Red,
+        Self::CoDel,
+        Self::Pie,
+        Self::Checksum,
+        Self::EndOfLog,
+    ];
 
     /// Returns the name in records and JSON, such as `queue-full`.
     #[must_use]
@@ -44,6 +57,7 @@ impl DropCause {
             Self::QueueFull => "queue-full",
             Self::Red => "red",
             Self::CoDel => "codel",
+            Self::Pie => "pie",
             Self::Checksum => "checksum",
             Self::EndOfLog => "end-of-log",
         }

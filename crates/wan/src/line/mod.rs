@@ -123,13 +123,21 @@ impl<P, T: Clone> Line<P, T> {
         self.rare().seldom.take_back(dropped);
     }
 
-    /// Hands the packet of the latest offer to the engine, with the marks of earlier lines on the packet.
-    pub(crate) fn enter(&mut self, now: Instant, info: PacketInfo, marks: Marks, item: T, outputs: &mut Outputs<T>, sink: &mut impl Sink<T>) {
+    /// Hands the packet of the latest offer to the engine, with the number of its flow and with the marks of earlier lines on the packet.
+    pub(crate) fn enter(
+        &mut self,
+        now: Instant,
+        (info, flow): (PacketInfo, u32),
+        marks: Marks,
+        item: T,
+        outputs: &mut Outputs<T>,
+        sink: &mut impl Sink<T>,
+    ) {
         // `offer` has counted the packet itself already.
         let inside = self.stats().in_flight() - 1;
         let number = self.flow.offered - 1;
         if let Some(engine) = self.pipeline.engine() {
-            engine.offer(now, Packet::new(number, info, marks, item), inside, outputs);
+            engine.offer(now, Packet::new(number, info, marks, item).of_flow(flow), inside, outputs);
         }
         // The packet itself, or an earlier packet pushed out by it, may leave at once.
         self.come_out(outputs, sink);

@@ -86,6 +86,8 @@ pub struct Network<P> {
     has_filters: bool,
     /// `true` if a packet to all passes the uplink of its node once, instead of once per receiver.
     has_relay: bool,
+    /// Number of the flow of a packet by its path and its payload. Under `None` each pair of sender and receiver is a flow.
+    flows: Option<fn(Path, &P) -> u32>,
 }
 
 impl<P: Clone> Network<P> {
@@ -162,6 +164,7 @@ impl<P: Clone> Network<P> {
             is_random: false,
             has_filters: false,
             has_relay: false,
+            flows: None,
             config,
         }
     }
@@ -219,6 +222,14 @@ impl<P: Clone> Network<P> {
         self.lines.links[place].set_filter(Filter::new(drops));
         self.has_filters = true;
         Ok(self)
+    }
+
+    /// Sets the function from a path and a payload to the number of the packet's flow, for queues with [`FqCoDel`](crate::FqCoDel). Packets with different numbers are
+    /// packets of different flows. Without this function each pair of sender and receiver is a flow.
+    #[must_use]
+    pub fn with_flows(mut self, flow: fn(Path, &P) -> u32) -> Self {
+        self.flows = Some(flow);
+        self
     }
 
     /// Makes [`Network::poll_awaited`] announce events for these receivers. Call this function before the first packet is sent. Missing nodes are ignored.

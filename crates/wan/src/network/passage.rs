@@ -155,7 +155,12 @@ impl<P: Clone> Network<P> {
             damage: self.traffic.take_damage(&packet),
             discarded_on_arrival: packet.size.has(SizeAndMarks::DISCARDED_ON_ARRIVAL),
         };
-        self.with_engine(line, |line, outputs, exits| line.enter(now, packet.size.info(), marks, packet, outputs, exits));
+        let flow = match self.flows {
+            Some(flow) => flow(packet.path, &packet.payload),
+            // On every line either the sender or the receiver is the same for all packets, so the sum differs for different pairs.
+            None => u32::from(packet.path.from.0) + u32::from(packet.path.to.0),
+        };
+        self.with_engine(line, |line, outputs, exits| line.enter(now, (packet.size.info(), flow), marks, packet, outputs, exits));
     }
 
     /// Lets `act` act on the engine of a line, and schedules the announced wake of the engine.

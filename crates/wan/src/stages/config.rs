@@ -115,8 +115,8 @@ impl LinkConfig {
             || self.trace.is_some()
             || self.listed != Impairments::default()
             || self.cross_traffic.as_ref().is_some_and(CrossTraffic::is_random)
-            // Of the disciplines only RED draws, for its drops and marks.
-            || self.bottleneck.as_ref().is_some_and(|bottleneck| matches!(bottleneck.discipline, Discipline::Red(_)))
+            // Of the disciplines only RED and PIE draw, for their drops and marks.
+            || self.bottleneck.as_ref().is_some_and(|bottleneck| matches!(bottleneck.discipline, Discipline::Red(_) | Discipline::Pie(_)))
     }
 
     /// Returns whether the link only delays packets, every packet by the same span.

@@ -9,10 +9,10 @@ use cohaptic_wan::netem::Netem;
 use cohaptic_wan::parameters::{Form, Table};
 use cohaptic_wan::{
     Between, Bottleneck, Cells, Chance, Checksum, CoDel, Correlation, Corruption, Counts, CrossRecording, CrossTraffic, Delay, DeliveryTrace,
-    Discipline, Displacement, Distribution, FateLog, Flips, FourState, Framing, GilbertElliott, GilbertElliottInTime, IdleOutages, Impairments,
-    Jitter, KernelNetem, Layout, Link, LinkConfig, LinkModel, LinkName, Loss, Modulated, Modulator, ModulatorState, OnOff, Order, Outages,
-    PacketEvent, PacketInfo, PacketRecord, ParameterValue, PathTrace, Pattern, Peak, Poisson, QueueLimit, RandomOutages, Red, Reorder, Service,
-    Slots, Sojourn, TokenBucket, Values,
+    Discipline, Displacement, Distribution, FateLog, Flips, FourState, FqCoDel, Framing, GilbertElliott, GilbertElliottInTime, IdleOutages,
+    Impairments, Jitter, KernelNetem, Layout, Link, LinkConfig, LinkModel, LinkName, Loss, Modulated, Modulator, ModulatorState, OnOff, Order,
+    Outages, PacketEvent, PacketInfo, PacketRecord, ParameterValue, PathTrace, Pattern, Peak, Poisson, QueueLimit, RandomOutages, Red, Reorder,
+    Service, Slots, Sojourn, TokenBucket, Values,
 };
 use proptest::collection::vec;
 use proptest::option;
@@ -179,7 +179,19 @@ pub(crate) fn codel() -> BoxedStrategy<CoDel> {
 }
 
 pub(crate) fn discipline() -> BoxedStrategy<Discipline> {
-    prop_oneof![Just(Discipline::TailDrop), Just(Discipline::HeadDrop), red().prop_map(Discipline::Red), codel().prop_map(Discipline::CoDel),].boxed()
+    prop_oneof![
+        Just(Discipline::TailDrop),
+        Just(Discipline::HeadDrop),
+        red().prop_map(Discipline::Red),
+        codel().prop_map(Discipline::CoDel),
+        fq_codel().prop_map(Discipline::FqCoDel),
+    ]
+    .boxed()
+}
+
+pub(crate) fn fq_codel() -> BoxedStrategy<FqCoDel> {
+    let number = |numbers: std::ops::Range<u32>| numbers.prop_map(|number| number.try_into().unwrap());
+    (codel(), number(1..8), number(1..6)).prop_map(|(codel, quantum, flows)| FqCoDel { codel, quantum, flows }).boxed()
 }
 
 pub(crate) fn any_bottleneck() -> BoxedStrategy<Bottleneck> {

@@ -5,8 +5,8 @@ use std::time::Duration;
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::random::{Purpose, Stream};
 use cohaptic_wan::{
-    Bottleneck, CoDel, CrossCounts, CrossRecording, CrossTraffic, Delay, Discipline, Distribution, DropCause, Fate, Jitter, Link, LinkConfig,
-    LinkName, Loss, PacketInfo, Poisson, QueueLimit,
+    Bottleneck, CoDel, CrossCounts, CrossRecording, CrossTraffic, Delay, Discipline, Distribution, DropCause, Fate, FqCoDel, Jitter, Link,
+    LinkConfig, LinkName, Loss, PacketInfo, Pie, Poisson, QueueLimit,
 };
 use rand_distr::{Distribution as _, Exp1};
 
@@ -143,6 +143,65 @@ fn cross_packets_keep_the_limit_and_the_discipline() {
     let (seen, counts) = ends(line(None, codel), &many, &offered);
     assert!(counts.offered == 40 && counts.dropped > 3, "{counts:?}");
     assert!(seen.iter().any(|(_, delivered)| !delivered) && seen[28] == (2_010, true), "{seen:?}");
+}
+
+/// Cross packets are one flow, whatever the number of queues: behind those of 100 µs at 0, 10 and 20 µs, a packet of the link waits for the packet on the line
+/// and for the rest of the quantum alone. A cross packet that finds no room pushes out the packet of the link if that is the longer queue.
+#[test]
+fn cross_packets_have_a_queue_of_their_own() {
+    for flows in [1, 2, 1024] {
+        let fq_codel = |quantum: u32| {
+            Discipline::FqCoDel(FqCoDel { quantum: quantum.try_into().unwrap(), flows: flows.try_into().unwrap(), ..FqCoDel::default() })
+        };
+        let rows = "0,100\n0.000010,100\n0.000020,100\n";
+        let counts = |offered, dropped| CrossCounts { offered, dropped };
+        assert_eq!(ends(line(None, fq_codel(100)), rows, &[15]), (vec![(110, true)], counts(2, 0)));
+        assert_eq!(ends(line(None, fq_codel(200)), rows, &[15]), (vec![(210, true)], counts(2, 0)));
+        let one = Some(QueueLimit::Packets(1));
+        assert_eq!(ends(line(one, fq_codel(100)), rows, &[15]), (vec![(110, true)], counts(2, 1)));
+        assert_eq!(ends(line(one, fq_codel(100)), "0,100\n0.000020,5\n", &[15]), (vec![(20, false)], counts(1, 0)));
+    }
+}
+
+/// A driver that comes when a link asks for a wake and one that comes long after see the same, and a link asks for a wake at the instant of each of its events:
+/// queues with a flow of their own for cross packets drop packets at any instant, and PIE counts every packet that is sent.
+#[test]
+fn drivers_of_every_habit_see_the_same() {
+    let millis = Duration::from_millis;
+    let codel = CoDel { target: millis(5), interval: millis(30), mtu: Bytes::new(20), ecn: false };
+    let fq_codel = Discipline::FqCoDel(FqCoDel { codel, quantum: 30.try_into().unwrap(), ..FqCoDel::default() });
+    let pie = Discipline::Pie(Pie { target: millis(5), burst: Duration::ZERO, mtu: Bytes::new(20), ecn: false });
+    for (discipline, limit, cause) in [(fq_codel, 3, DropCause::CoDel), (pie, 8, DropCause::Pie)] {
+        // A byte takes 100 µs. Packets of the link alone need the whole line, and cross packets a quarter of it.
+        let traffic = CrossTraffic::poisson(Poisson { rate: rate(20_000), size: Bytes::new(40) }).unwrap();
+        let bottleneck = Some(Bottleneck { limit: Some(QueueLimit::Packets(limit)), discipline, ..Bottleneck::at_rate(rate(80_000)) });
+        let config = LinkConfig { bottleneck, cross_traffic: Some(traffic), ..LinkConfig::default() };
+        let events = |is_punctual: bool| {
+            let mut link = Link::new(3, &LinkName::between("a", "b"), config.clone());
+            let mut events = Vec::new();
+            for number in 0..20_000_u64 {
+                let now = Instant::from_nanos(number * 6_000_000);
+                while let Some(at) = link.poll_timeout().filter(|at| is_punctual && *at < now) {
+                    link.handle_timeout(at).unwrap();
+                    events.extend(std::iter::from_fn(|| link.poll_event()).map(|event| (at, event.record)));
+                }
+                link.handle_packet(now, Bytes::new(60 + number % 3), ()).unwrap();
+                if is_punctual {
+                    events.extend(std::iter::from_fn(|| link.poll_event()).map(|event| (now, event.record)));
+                }
+            }
+            assert!(events.iter().all(|(polled, event)| *polled == event.at));
+            link.handle_timeout(Instant::MAX).unwrap();
+            let rest = std::iter::from_fn(|| link.poll_event()).map(|event| event.record);
+            events.into_iter().map(|(_, event)| event).chain(rest).collect::<Vec<_>>()
+        };
+        let punctual = events(true);
+        for dropped in [DropCause::QueueFull, cause] {
+            let count = punctual.iter().filter(|event| event.fate == Fate::Dropped(dropped)).count();
+            assert!(count > 5, "{discipline:?}: {count} drops for {dropped:?}");
+        }
+        assert_eq!(punctual, events(false));
+    }
 }
 
 /// Loss and jitter of a packet are those of the link without cross-traffic: the same packets are lost, and a packet that arrives takes the same delay after its

@@ -14,9 +14,9 @@ use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::netem::Netem;
 use cohaptic_wan::{
     Between, Bottleneck, Bursts, Cells, Chance, Checksum, CoDel, Correlation, Corruption, CrossTraffic, Delay, DeliveryTrace, Discipline,
-    Displacement, FateLog, FateRow, Flips, FourState, Framing, GilbertElliott, GilbertElliottInTime, IdleOutages, Jitter, KernelNetem, Layout,
-    LinkConfig, LinkModel, LinkName, Loss, Modulated, Modulator, OnOff, Order, Outage, Outages, PacketInfo, PathTrace, Pattern, Peak, Poisson,
-    QueueLimit, RandomOutages, Red, Reorder, Service, Slots, Sojourn, TokenBucket,
+    Displacement, FateLog, FateRow, Flips, FourState, FqCoDel, Framing, GilbertElliott, GilbertElliottInTime, IdleOutages, Jitter, KernelNetem,
+    Layout, LinkConfig, LinkModel, LinkName, Loss, Modulated, Modulator, OnOff, Order, Outage, Outages, PacketInfo, PathTrace, Pattern, Peak, Pie,
+    Poisson, QueueLimit, RandomOutages, Red, Reorder, Service, Slots, Sojourn, TokenBucket,
 };
 
 use crate::any_link::{JITTERS, KERNEL_WORDS, all_events, micros};
@@ -122,9 +122,17 @@ fn models() -> Vec<(String, LinkModel)> {
     {
         add(&format!("bottleneck, limit in {name}"), LinkConfig { bottleneck: Some(Bottleneck { limit: Some(limit), ..line.clone() }), ..base() });
     }
-    for (name, discipline) in
-        [("head drop", Discipline::HeadDrop), ("red", red(false)), ("red, ecn", red(true)), ("codel", codel(false)), ("codel, ecn", codel(true))]
-    {
+    let fq_codel = Discipline::FqCoDel(FqCoDel { quantum: 700.try_into().unwrap(), ..FqCoDel::default() });
+    let pie = Discipline::Pie(Pie { target: Duration::from_millis(2), burst: Duration::ZERO, mtu: bytes(500), ecn: true });
+    for (name, discipline) in [
+        ("head drop", Discipline::HeadDrop),
+        ("red", red(false)),
+        ("red, ecn", red(true)),
+        ("codel", codel(false)),
+        ("codel, ecn", codel(true)),
+        ("fq-codel", fq_codel),
+        ("pie, ecn", pie),
+    ] {
         add(&format!("bottleneck, {name}"), LinkConfig { bottleneck: Some(Bottleneck { discipline, ..line.clone() }), ..base() });
     }
     for (name, framing) in [("cells", cells), ("negative overhead", Framing { overhead: -100, cells: None })] {

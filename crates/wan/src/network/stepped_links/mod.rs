@@ -167,9 +167,10 @@ impl<T: Clone> SteppedLinks<T> {
             Some(Err(cause)) => line.drop(cause),
             None => {
                 // An offer happens at the present instant of the driver, so nothing is noted ahead.
+                // All packets of a link are one flow.
                 line.enter(
                     now,
-                    *info,
+                    (*info, 0),
                     Marks::default(),
                     Sent { at: now, number, item },
                     outputs,

@@ -21,7 +21,7 @@ use crate::line::pipeline::Pipeline;
 use crate::packet::{Marks, Packet, PacketInfo};
 use crate::random::Purpose;
 use crate::stages::config::{Layout, LinkConfig};
-use crate::stages::queue::{Bottleneck, BottleneckStage, Discipline, Fifo, Load, Queued, Red, Rules, Service, giga_bits};
+use crate::stages::queue::{Bottleneck, BottleneckStage, Discipline, Fifo, FqCoDel, Load, Queued, Red, Rules, Service, giga_bits};
 
 /// Data shared by all queued links of one configuration.
 #[derive(Clone, Debug)]
@@ -66,10 +66,11 @@ impl LineKind {
         let Service::Rate(rate) = bottleneck.service else { return None };
         let mean_packet = match bottleneck.discipline {
             Discipline::TailDrop | Discipline::HeadDrop => 0.0,
-            Discipline::CoDel(codel) if !codel.ecn => 0.0,
+            Discipline::CoDel(codel) | Discipline::FqCoDel(FqCoDel { codel, .. }) if !codel.ecn => 0.0,
+            Discipline::Pie(pie) if !pie.ecn => 0.0,
             Discipline::Red(red) if !red.ecn() => bottleneck.time_of_mean_packet(&red),
             // Marks would have to be carried with each waiting packet, but `Sent` has no field for marks.
-            Discipline::CoDel(_) | Discipline::Red(_) => return None,
+            Discipline::CoDel(_) | Discipline::FqCoDel(_) | Discipline::Pie(_) | Discipline::Red(_) => return None,
         };
         // Framing is the same for all packets, because all packets have one size.
         let bits = giga_bits(bottleneck.framing.on_the_line(size));
@@ -100,6 +101,11 @@ impl<T> Rules<Sent<T>> for LineKind {
 
     fn bits(&self, _packet: &Sent<T>) -> u128 {
         self.bits
+    }
+
+    fn flow(&self, _packet: &Sent<T>) -> Option<u32> {
+        // All packets of a link are one flow.
+        Some(0)
     }
 
     fn ecn_capable(&self, _packet: &Sent<T>) -> bool {

@@ -11,7 +11,7 @@ use crate::stages::delay::{Delay, Jitter};
 use crate::stages::loss::Loss;
 use crate::stages::outage::{Outage, Outages};
 use crate::stages::queue::limit::strategies::limits;
-use crate::stages::queue::{Bottleneck, CoDel, CrossTraffic, Discipline, Framing, OnOff, Poisson, QueueLimit, Red};
+use crate::stages::queue::{Bottleneck, CoDel, CrossTraffic, Discipline, FqCoDel, Framing, OnOff, Pie, Poisson, QueueLimit, Red};
 
 const SIZE: Bytes = Bytes::new(64);
 
@@ -88,10 +88,30 @@ fn crossed(mut model: LinkModel, place: usize) -> LinkModel {
     model
 }
 
-const DISCIPLINES: usize = 6;
+fn fq_codel(ecn: bool) -> Discipline {
+    let Discipline::CoDel(codel) = codel(30, 64, ecn) else { unreachable!("a CoDel was made") };
+    Discipline::FqCoDel(FqCoDel { codel, ..FqCoDel::default() })
+}
+
+fn pie(ecn: bool) -> Discipline {
+    Discipline::Pie(Pie { target: Duration::from_millis(1), burst: Duration::ZERO, mtu: SIZE, ecn })
+}
+
+const DISCIPLINES: usize = 10;
 
 fn discipline(place: usize) -> Discipline {
-    [Discipline::TailDrop, Discipline::HeadDrop, codel(30, 64, false), codel(30, 64, true), red(false), red(true)][place]
+    [
+        Discipline::TailDrop,
+        Discipline::HeadDrop,
+        codel(30, 64, false),
+        codel(30, 64, true),
+        red(false),
+        red(true),
+        fq_codel(false),
+        fq_codel(true),
+        pie(false),
+        pie(true),
+    ][place]
 }
 
 #[test]
@@ -100,7 +120,7 @@ fn they_decide_what_whole_links_decide() {
     for (discipline, bits, layout) in (0..DISCIPLINES).map(discipline).flat_map(|discipline| {
         [(discipline, 100_000, Layout::Physical), (discipline, 64_000, Layout::Physical), (discipline, 100_000, Layout::Netem)]
     }) {
-        let marks = matches!(discipline, Discipline::CoDel(codel) if codel.ecn) || discipline == red(true);
+        let marks = [codel(30, 64, true), red(true), fq_codel(true), pie(true)].contains(&discipline);
         let queued = QueuedKind::new(&with(discipline, bits, layout), SIZE);
         assert_eq!(queued.is_some(), layout == Layout::Physical && !marks, "{discipline:?}");
         compare(&with(discipline, bits, layout), &[], (&bursts(), millis(2_900)));
@@ -198,7 +218,7 @@ fn what_is_inside_stays_when_links_change() {
 fn queues_between_memories_decide_what_whole_links_decide() {
     for words in ["delay 24ms 4ms 50% loss gemodel 5% 20%", "delay 24ms", "loss 30%"] {
         let config = Netem::parse(words).unwrap().to_link_config(&mut |_| None).unwrap();
-        for discipline in [Discipline::HeadDrop, codel(30, 0, false), red(false)] {
+        for discipline in [Discipline::HeadDrop, codel(30, 0, false), red(false), fq_codel(false), pie(false)] {
             let model = LinkConfig { bottleneck: Some(bottleneck(discipline, None, 100_000)), layout: Layout::Physical, ..config.clone() }.into();
             assert!(QueuedKind::new(&model, SIZE).is_some());
             compare(&model, &[], (&bursts(), millis(2_900)));
@@ -213,7 +233,7 @@ proptest! {
         limit in limits(90_000_000),
         bits in prop_oneof![Just(64_000_u64), 40_000_u64..200_000],
         discipline in prop_oneof![
-            Just(Discipline::HeadDrop), Just(red(false)), (1_u64..300, 0_u64..300).prop_map(|(interval, mtu)| codel(interval, mtu, false))
+            Just(Discipline::HeadDrop), Just(red(false)), Just(fq_codel(false)), Just(pie(false)), (1_u64..300, 0_u64..300).prop_map(|(interval, mtu)| codel(interval, mtu, false))
         ],
         gaps in prop::collection::vec(prop_oneof![Just(0_u64), 0..6_000_000_u64, 4_000_000..9_000_000_u64, Just(8_000_000), Just(90_000_000)], 1..200),
         until in 0_u64..1_500_000_000,

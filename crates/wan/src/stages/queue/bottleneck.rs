@@ -1,4 +1,4 @@
-//! Bottleneck: a first-in-first-out queue before a serialiser.
+//! Bottleneck: a queue before a serialiser, first in first out unless the discipline has a queue per flow.
 //!
 //! ```text
 //! offered ──► [ waiting … ] ──► transmitter, 8·(size with framing)/R per packet ──► propagation
@@ -20,10 +20,12 @@ use cohaptic_units::{Bytes, Instant, Rate};
 
 use super::codel::CODEL;
 use super::fifo::{Fifo, Rules};
+use super::fq_codel::FQ_CODEL;
 use super::framing::{CELLS, SIGNED_SIZE};
 use super::limit::LIMIT;
+use super::pie::PIE;
 use super::red::RED;
-use super::{CoDel, CrossStage, DeliveryTrace, Framing, QueueLimit, Red};
+use super::{CoDel, CrossStage, DeliveryTrace, FqCoDel, Framing, Pie, QueueLimit, Red};
 use crate::fates::fate::DropCause;
 use crate::packet::{Carried, Exit, Output, Outputs, PacketInfo};
 use crate::parameters::{Form, Key, NONE, Table, UNLIMITED, optional, required, usual};
@@ -62,6 +64,10 @@ pub enum Discipline {
     Red(Red),
     /// Drops some of the oldest packets after waits have exceeded a target for an interval.
     CoDel(CoDel),
+    /// Has a queue per flow, served in turn, with CoDel for each. A full queue drops the oldest packets of the longest queue.
+    FqCoDel(FqCoDel),
+    /// Drops some of the newest packets, with a probability that follows the delay of the queue.
+    Pie(Pie),
 }
 
 impl Bottleneck {
@@ -195,6 +201,13 @@ impl<T> Rules<Queued<T>> for Bottleneck {
         giga_bits(self.framing.on_the_line(packet.info().size))
     }
 
+    fn flow(&self, packet: &Queued<T>) -> Option<u32> {
+        match packet {
+            Queued::Own(_, packet) => Some(packet.flow),
+            Queued::Cross(..) => None,
+        }
+    }
+
     fn ecn_capable(&self, packet: &Queued<T>) -> bool {
         packet.info().ecn_capable
     }
@@ -247,12 +260,12 @@ impl<T> BottleneckStage<T> {
     }
 
     /// Returns the departure of a packet of `size` offered `now` to an idle transmitter. Returns `None` if the transmitter is busy or has a recording, or if
-    /// the discipline is RED, with random numbers even for an idle transmitter. No further discipline affects a packet at an idle transmitter.
+    /// the discipline takes note of a packet at an idle transmitter: RED's average, PIE's delay and the turns of FQ-CoDel.
     #[inline]
     pub(crate) fn departure_if_idle(&mut self, now: Instant, size: Bytes) -> Option<Instant> {
         let Service::Rate(rate) = &self.config.service else { return None };
         // A waiting packet implies a packet in transmission, so the queue is empty here.
-        if self.queue.on_line().is_some() || matches!(self.config.discipline, Discipline::Red(_)) {
+        if self.queue.on_line().is_some() || matches!(self.config.discipline, Discipline::Red(_) | Discipline::Pie(_) | Discipline::FqCoDel(_)) {
             return None;
         }
         let service = match self.latest_service {
@@ -272,7 +285,7 @@ impl<T> BottleneckStage<T> {
         &mut self,
         now: Instant,
         packet: Carried<T>,
-        word: impl FnOnce() -> u64,
+        word: impl Fn() -> u64,
         mut cross: Option<&mut CrossStage>,
         outputs: &mut Outputs<T>,
     ) {
@@ -296,11 +309,11 @@ impl<T> BottleneckStage<T> {
         }
         match (&self.config.service, &self.config.discipline) {
             // An admitted packet is never dropped, so its departure is known from its offer.
-            (Service::Rate(_), Discipline::TailDrop | Discipline::Red(_)) => self.first_own,
+            (Service::Rate(_), Discipline::TailDrop | Discipline::Red(_) | Discipline::Pie(_)) => self.first_own,
             // Packets are dropped, or sent, where a packet leaves the transmitter or where opportunities come.
-            (_, Discipline::TailDrop | Discipline::Red(_) | Discipline::CoDel(_)) => Some(on_line.next),
+            (_, Discipline::TailDrop | Discipline::Red(_) | Discipline::Pie(_) | Discipline::CoDel(_)) => Some(on_line.next),
             // A cross packet may push out a packet of the link.
-            (_, Discipline::HeadDrop) => Some(cross.next_at().map_or(on_line.next, |arrival| arrival.min(on_line.next))),
+            (_, Discipline::HeadDrop | Discipline::FqCoDel(_)) => Some(cross.next_at().map_or(on_line.next, |arrival| arrival.min(on_line.next))),
         }
     }
 
@@ -401,7 +414,11 @@ impl<T> BottleneckStage<T> {
     fn foresee(&mut self) {
         self.first_own = None;
         let Self { config: Bottleneck { service, discipline, .. }, queue, .. } = &*self;
-        let (Service::Rate(rate), Discipline::TailDrop | Discipline::Red(_), Some(on_line)) = (service, discipline, queue.on_line()) else { return };
+        let (Service::Rate(rate), Discipline::TailDrop | Discipline::Red(_) | Discipline::Pie(_), Some(on_line)) =
+            (service, discipline, queue.on_line())
+        else {
+            return;
+        };
         if !self.has_own() {
             return;
         }
@@ -457,14 +474,18 @@ static QUEUE: Table = Table::of(&[&[
         "Choice of the packets that are dropped",
     ),
 ]]);
-const DISCIPLINES: [(&str, &str); 4] = [
+const DISCIPLINES: [(&str, &str); 6] = [
     ("tail-drop", "the newest when the queue is full"),
     ("head-drop", "the oldest when the queue is full"),
     ("codel", "the oldest when they wait too long for too long"),
+    ("fq-codel", "a queue per flow, served in turn, with codel for each; the oldest of the longest when full"),
+    ("pie", "some of the newest, the more the longer the delay of the queue is above a target"),
     ("red", "some of the newest, the more the longer the queue is on average; needs a limit in bytes"),
 ];
 static DISCIPLINE: Table = Table::of(&[&[
     optional("codel", Form::Table(&CODEL), "Drops of the oldest packets when they wait longer than the target for an interval"),
+    optional("fq-codel", Form::Table(&FQ_CODEL), "A queue per flow, served in turn, with codel for each"),
+    optional("pie", Form::Table(&PIE), "Drops of some of the newest packets, with a probability that keeps the delay of the queue near a target"),
     optional("red", Form::Table(&RED), "Drops of some of the newest packets while the average queue is above min, and of all above max"),
 ]]);
 
@@ -476,6 +497,8 @@ impl Bottleneck {
             Discipline::HeadDrop => ", head-drop".into(),
             Discipline::Red(_) => ", RED".into(),
             Discipline::CoDel(codel) => format!(", CoDel {} in {}", Span(codel.target), Span(codel.interval)),
+            Discipline::FqCoDel(FqCoDel { codel, .. }) => format!(", FQ-CoDel {} in {}", Span(codel.target), Span(codel.interval)),
+            Discipline::Pie(pie) => format!(", PIE {}", Span(pie.target)),
         };
         let service = match &self.service {
             Service::Rate(rate) => rate.to_string(),

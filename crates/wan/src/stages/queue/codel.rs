@@ -106,7 +106,8 @@ impl CoDelState {
         // A queue that grew again soon after its control continues with the successful rate of drops. `count` is never below `last_count`: `count` grows while
         // dropping, and both are set together.
         let since = self.count - self.last_count;
-        let recently = now.saturating_duration_since(self.drop_next) < codel.interval.saturating_mul(16);
+        // Drops by another cause count before the first state of dropping too. `last_count` is zero until then, and `drop_next` is no instant of a drop.
+        let recently = self.last_count > 0 && now.saturating_duration_since(self.drop_next) < codel.interval.saturating_mul(16);
         self.count = if since > 1 && recently { since } else { 1 };
         self.drop_next = control_law(now, codel.interval, self.count);
         self.last_count = self.count;
@@ -115,6 +116,16 @@ impl CoDelState {
         }
         self.dropped = Dropped::Entering;
         Verdict::Drop
+    }
+
+    /// Notes that the queue has no packet for the transmitter: the pseudocode then has nothing to drop, and ends the state of dropping.
+    pub(crate) fn finds_nothing(&mut self) {
+        (self.first_above, self.dropping, self.dropped) = (None, false, Dropped::Not);
+    }
+
+    /// Counts a packet dropped by another cause as a drop of the control law, so that the next drops follow sooner.
+    pub(crate) fn counts_drop(&mut self) {
+        self.count += 1;
     }
 
     /// Returns whether waits have exceeded the target for an interval, and tracks the begin of the excess.

@@ -1,9 +1,11 @@
-//! First-in-first-out queue before a transmitter: choice of the packets to wait, to transmit, to mark and to drop.
+//! Queue before a transmitter: choice of the packets to wait, to transmit, to mark and to drop. First in, first out, except with FQ-CoDel, which has a queue per
+//! flow.
 //!
 //! The queue serves packets of any type over any transmitter; [`Rules`] has the differences. A stage of a link keeps packets of any size, each boxed, over
 //! transmitters of constant rate or of recorded opportunities ([`BottleneckStage`](super::BottleneckStage)). A link of a large mesh keeps packets of one size
 //! over a transmitter of constant rate, with size and transmission time known beforehand and stored once for all links of a kind.
 
+use alloc::boxed::Box;
 use alloc::collections::VecDeque;
 use core::time::Duration;
 
@@ -11,7 +13,9 @@ use cohaptic_units::{Bytes, Instant};
 
 use super::bottleneck::{Bottleneck, Discipline, idle_packets};
 use super::codel::{self, CoDelState};
+use super::fq_codel::FlowQueues;
 use super::limit::{QueueLimit, Waiting};
+use super::pie::{self, PieState};
 use super::red::{self, Red, RedState};
 use crate::fates::fate::DropCause;
 
@@ -30,6 +34,9 @@ pub(crate) trait Rules<P> {
 
     /// Returns the bits to transmit for a packet, in 10⁻⁹ bit.
     fn bits(&self, packet: &P) -> u128;
+
+    /// Returns the number of a packet's flow, or `None` for a packet of the cross-traffic: all these packets are one flow, which is no flow of the link.
+    fn flow(&self, packet: &P) -> Option<u32>;
 
     /// Returns whether a packet is marked in place of a drop.
     fn ecn_capable(&self, packet: &P) -> bool;
@@ -54,13 +61,13 @@ pub(crate) trait Rules<P> {
 /// Waiting packets, the packet in transmission, and the memory of the discipline.
 #[derive(Clone, Debug)]
 pub(crate) struct Fifo<P, S> {
-    /// Waiting packets, the oldest first.
+    /// Waiting packets, the oldest first. Empty with FQ-CoDel, whose queues are in `discipline`.
     waiting: VecDeque<P>,
     sums: S,
     on_line: Option<OnLine<P>>,
     /// Instant since which the transmitter is idle, or up to which idle time has been counted. Meaningful only with RED, while no packet is in transmission.
     idle_since: Instant,
-    discipline: DisciplineState,
+    discipline: DisciplineState<P>,
 }
 
 /// Packet in transmission.
@@ -77,20 +84,34 @@ pub(crate) struct OnLine<P> {
     pub(crate) opportunities: u64,
 }
 
-/// State of a discipline between packets.
+/// State of a discipline between packets. The larger states are boxed, because a large mesh has many queues and most of them have none of these disciplines.
 #[derive(Clone, Debug)]
-enum DisciplineState {
+enum DisciplineState<P> {
     Nothing,
     CoDel(CoDelState),
+    FqCoDel(Box<FlowQueues<P>>),
+    Pie(Box<PieState>),
     Red(RedState),
 }
 
-impl DisciplineState {
+impl<P> DisciplineState<P> {
     fn new(discipline: &Discipline) -> Self {
         match discipline {
             Discipline::TailDrop | Discipline::HeadDrop => Self::Nothing,
             Discipline::CoDel(_) => Self::CoDel(CoDelState::default()),
+            Discipline::FqCoDel(_) => Self::FqCoDel(Box::new(FlowQueues::new())),
+            Discipline::Pie(pie) => Self::Pie(Box::new(PieState::new(pie))),
             Discipline::Red(_) => Self::Red(RedState::default()),
+        }
+    }
+
+    fn converted<Q>(self, convert: impl FnMut(P) -> Q) -> DisciplineState<Q> {
+        match self {
+            Self::Nothing => DisciplineState::Nothing,
+            Self::CoDel(state) => DisciplineState::CoDel(state),
+            Self::FqCoDel(flows) => DisciplineState::FqCoDel(Box::new(flows.converted(convert))),
+            Self::Pie(state) => DisciplineState::Pie(state),
+            Self::Red(state) => DisciplineState::Red(state),
         }
     }
 }
@@ -121,14 +142,14 @@ impl<P, S: Default> Fifo<P, S> {
     }
 
     /// Takes a packet. The packet is then sent, waits, or is dropped; older packets may be dropped in its place. `word` gives the packet's random word for
-    /// queues, and is called by RED only. `dropped` takes each dropped packet.
+    /// queues, and is called by RED and PIE only. `dropped` takes each dropped packet.
     #[inline(always)]
     pub(crate) fn offer<R: Rules<P, Sums = S>>(
         &mut self,
         now: Instant,
         rules: &R,
         mut packet: P,
-        word: impl FnOnce() -> u64,
+        word: impl Fn() -> u64,
         mut dropped: impl FnMut(DropCause, P),
     ) {
         // RED sees every offer, even at an idle transmitter, because its average moves with every packet.
@@ -139,6 +160,10 @@ impl<P, S: Default> Fifo<P, S> {
                 red::Verdict::Drop => return dropped(DropCause::Red, packet),
             }
         }
+        // With a queue per flow, the packet to send next is chosen in turn, even if only one packet waits: its queue then has had a part of its turn.
+        if matches!(rules.bottleneck().discipline, Discipline::FqCoDel(_)) {
+            return self.offer_to_flow(now, rules, packet, dropped);
+        }
         // An idle transmitter implies an empty queue, so no limit applies.
         if self.on_line.is_none() {
             return self.serve(now, rules, packet, dropped);
@@ -148,7 +173,20 @@ impl<P, S: Default> Fifo<P, S> {
             let head = if rules.bottleneck().discipline == Discipline::HeadDrop { self.take_head(rules) } else { None };
             match head {
                 Some(head) => dropped(DropCause::QueueFull, head),
-                None => return dropped(DropCause::QueueFull, packet),
+                None => {
+                    if let DisciplineState::Pie(state) = &mut self.discipline {
+                        state.overflows();
+                    }
+                    return dropped(DropCause::QueueFull, packet);
+                }
+            }
+        }
+        // PIE sees only packets that find room. At an idle transmitter no packet waits, and PIE drops none.
+        if matches!(rules.bottleneck().discipline, Discipline::Pie(_)) {
+            match self.pie_verdict(now, rules, &packet, word) {
+                pie::Verdict::Pass => {}
+                pie::Verdict::Mark => rules.mark(&mut packet),
+                pie::Verdict::Drop => return dropped(DropCause::Pie, packet),
             }
         }
         rules.add(&mut self.sums, &packet);
@@ -173,9 +211,45 @@ impl<P, S: Default> Fifo<P, S> {
     /// Begins to send the oldest waiting packet, or notes that the transmitter is idle if no packet waits.
     #[inline(always)]
     pub(crate) fn serve_next<R: Rules<P, Sums = S>>(&mut self, now: Instant, rules: &R, dropped: impl FnMut(DropCause, P)) {
+        if matches!(self.discipline, DisciplineState::FqCoDel(_)) {
+            return self.serve_next_flow(now, rules, dropped);
+        }
         match self.take_head(rules) {
             Some(packet) => self.serve(now, rules, packet, dropped),
             None => self.idle_since = now,
+        }
+    }
+
+    /// Begins to send the next packet of the queues of flows.
+    #[inline(never)]
+    fn serve_next_flow<R: Rules<P, Sums = S>>(&mut self, now: Instant, rules: &R, dropped: impl FnMut(DropCause, P)) {
+        let Self { sums, discipline, .. } = self;
+        if let (DisciplineState::FqCoDel(flows), Discipline::FqCoDel(fq_codel)) = (discipline, &rules.bottleneck().discipline)
+            && let Some(packet) = flows.take(now, rules, fq_codel, sums, dropped)
+        {
+            self.send(now, rules, packet);
+        }
+    }
+
+    /// Takes a packet into the queue of its flow, and drops packets of the longest queue until the limit holds.
+    #[inline(never)]
+    fn offer_to_flow<R: Rules<P, Sums = S>>(&mut self, now: Instant, rules: &R, packet: P, mut dropped: impl FnMut(DropCause, P)) {
+        let (DisciplineState::FqCoDel(flows), Discipline::FqCoDel(fq_codel)) = (&mut self.discipline, &rules.bottleneck().discipline) else { return };
+        let bits = rules.bits(&packet);
+        rules.add(&mut self.sums, &packet);
+        let newest = flows.push(rules, fq_codel, packet);
+        if self.on_line.is_none() {
+            return self.serve_next_flow(now, rules, dropped);
+        }
+        // The newest packet counts from the beginning, so the longest queue may be its own. Without the newest packet the others are within the limit, or as
+        // far beyond a limit that was made smaller as before.
+        while !self.holds(now, rules, bits) {
+            let Self { sums, discipline, .. } = self;
+            let DisciplineState::FqCoDel(flows) = discipline else { return };
+            let last = flows.drop_from_longest(rules, sums, &mut dropped);
+            if last.is_none_or(|last| last == newest) {
+                return;
+            }
         }
     }
 
@@ -201,6 +275,15 @@ impl<P, S: Default> Fifo<P, S> {
                 }
             }
         }
+        if let (DisciplineState::Pie(state), Discipline::Pie(pie)) = (&mut self.discipline, &rules.bottleneck().discipline) {
+            state.sends(pie, now, now.saturating_duration_since(rules.offered(&packet)), self.waiting.is_empty());
+        }
+        self.send(now, rules, packet);
+    }
+
+    /// Puts a packet on the line.
+    #[inline(always)]
+    fn send<R: Rules<P, Sums = S>>(&mut self, now: Instant, rules: &R, packet: P) {
         let left = rules.bits(&packet);
         let (next, opportunities) = rules.next(now, left);
         self.on_line = Some(OnLine { packet, since: now, left, next, opportunities });
@@ -223,18 +306,37 @@ impl<P, S: Default> Fifo<P, S> {
         }
         // A new kind of discipline begins without memory. New parameters of the same kind keep the memory.
         let (old, new) = (&before.bottleneck().discipline, &rules.bottleneck().discipline);
-        if core::mem::discriminant(old) != core::mem::discriminant(new) {
-            self.discipline = DisciplineState::new(new);
+        let is_same = match (old, new) {
+            // Another number of queues spreads the flows anew.
+            (Discipline::FqCoDel(old), Discipline::FqCoDel(new)) => old.flows == new.flows,
+            (old, new) => core::mem::discriminant(old) == core::mem::discriminant(new),
+        };
+        if let (DisciplineState::Pie(state), Discipline::Pie(pie)) = (&mut self.discipline, old) {
+            // The old parameters apply up to `now`.
+            state.pass(pie, now);
+        }
+        if !is_same && let DisciplineState::FqCoDel(flows) = core::mem::replace(&mut self.discipline, DisciplineState::new(new)) {
+            self.waiting.extend(flows.into_packets());
         }
         // The sums are made anew, because the new framing changes the bits of every waiting packet.
         self.sums = S::default();
-        self.waiting.iter().for_each(|packet| rules.add(&mut self.sums, packet));
+        let Self { waiting, sums, discipline, .. } = self;
+        match (discipline, new) {
+            (DisciplineState::FqCoDel(flows), Discipline::FqCoDel(fq_codel)) => {
+                for packet in waiting.drain(..) {
+                    flows.push(rules, fq_codel, packet);
+                }
+                flows.packets().for_each(|packet| rules.add(sums, packet));
+            }
+            _ => waiting.iter().for_each(|packet| rules.add(sums, packet)),
+        }
         self.announce(now, rules);
     }
 
     /// Returns the packet in transmission and all waiting packets, in order, when a link loses its bottleneck.
     pub(crate) fn dismantle(self) -> impl Iterator<Item = P> {
-        self.on_line.into_iter().map(|on_line| on_line.packet).chain(self.waiting)
+        let of_flows = if let DisciplineState::FqCoDel(flows) = self.discipline { Some(flows.into_packets()) } else { None };
+        self.on_line.into_iter().map(|on_line| on_line.packet).chain(self.waiting).chain(of_flows.into_iter().flatten())
     }
 
     /// Returns the queue with each packet converted to another type, under other rules.
@@ -242,24 +344,57 @@ impl<P, S: Default> Fifo<P, S> {
         let Self { waiting, on_line, idle_since, discipline, .. } = self;
         let on_line =
             on_line.map(|OnLine { packet, since, left, next, opportunities }| OnLine { packet: convert(packet), since, left, next, opportunities });
-        let waiting: VecDeque<Q> = waiting.into_iter().map(convert).collect();
+        let waiting: VecDeque<Q> = waiting.into_iter().map(&mut convert).collect();
+        let discipline = discipline.converted(convert);
         // The new rules may need no sums, or different sums.
         let mut sums = R::Sums::default();
         waiting.iter().for_each(|packet| rules.add(&mut sums, packet));
+        if let DisciplineState::FqCoDel(flows) = &discipline {
+            flows.packets().for_each(|packet| rules.add(&mut sums, packet));
+        }
         Fifo { waiting, sums, on_line, idle_since, discipline }
+    }
+
+    /// Returns the number of waiting packets.
+    fn len(&self) -> usize {
+        match &self.discipline {
+            DisciplineState::FqCoDel(flows) => flows.len(),
+            DisciplineState::Nothing | DisciplineState::CoDel(_) | DisciplineState::Pie(_) | DisciplineState::Red(_) => self.waiting.len(),
+        }
+    }
+
+    /// Returns whether the queue is within its limit, the newest packet with `newest` bits (10⁻⁹ bit) included.
+    fn holds<R: Rules<P, Sums = S>>(&self, now: Instant, rules: &R, newest: u128) -> bool {
+        let Some(limit) = rules.bottleneck().limit else { return true };
+        let (bytes, bits) = rules.waiting(&self.sums, self.len());
+        let time = self.time_to_send(now, rules, limit, bits - newest);
+        limit.holds(Waiting { packets: self.len() as u64, bytes, time })
     }
 
     /// Returns whether the limit admits another packet.
     fn admits<R: Rules<P, Sums = S>>(&self, now: Instant, rules: &R, packet: &P) -> bool {
-        let bottleneck = rules.bottleneck();
-        let Some(limit) = bottleneck.limit else { return true };
+        let Some(limit) = rules.bottleneck().limit else { return true };
         let (bytes, bits) = rules.waiting(&self.sums, self.waiting.len());
-        let time = match (limit, &self.on_line) {
-            // The waiting time is the time of the rest of the packet in transmission and of all waiting packets.
-            (QueueLimit::Time(_), Some(on_line)) => bottleneck.time_to_send((on_line.since, on_line.left), bits, now),
-            _ => Duration::ZERO,
-        };
+        let time = self.time_to_send(now, rules, limit, bits);
         limit.admits(Waiting { packets: self.waiting.len() as u64, bytes, time }, rules.size(packet))
+    }
+
+    /// Returns the time of the rest of the packet in transmission and of `bits` (10⁻⁹ bit) after it, or zero if the limit is no time.
+    fn time_to_send<R: Rules<P, Sums = S>>(&self, now: Instant, rules: &R, limit: QueueLimit, bits: u128) -> Duration {
+        match (limit, &self.on_line) {
+            (QueueLimit::Time(_), Some(on_line)) => rules.bottleneck().time_to_send((on_line.since, on_line.left), bits, now),
+            _ => Duration::ZERO,
+        }
+    }
+
+    /// Returns PIE's verdict about a packet offered while the transmitter is busy.
+    #[inline(never)]
+    fn pie_verdict<R: Rules<P, Sums = S>>(&mut self, now: Instant, rules: &R, packet: &P, word: impl Fn() -> u64) -> pie::Verdict {
+        let (bytes, _) = rules.waiting(&self.sums, self.waiting.len());
+        let (DisciplineState::Pie(state), Discipline::Pie(pie)) = (&mut self.discipline, &rules.bottleneck().discipline) else {
+            return pie::Verdict::Pass;
+        };
+        state.verdict(pie, now, bytes, rules.ecn_capable(packet), word)
     }
 
     /// Returns RED's verdict about an offered packet.

@@ -32,10 +32,15 @@ pub(crate) struct Waiting {
 impl QueueLimit {
     /// Returns whether another packet of `size` may wait too.
     pub(crate) fn admits(self, waiting: Waiting, size: Bytes) -> bool {
+        // The new packet counts too, but not the packet in transmission.
+        self.holds(Waiting { packets: waiting.packets.saturating_add(1), bytes: waiting.bytes + u128::from(size.get()), time: waiting.time })
+    }
+
+    /// Returns whether the queue is within the limit. `time` of `waiting` is the wait of the newest packet.
+    pub(crate) fn holds(self, waiting: Waiting) -> bool {
         match self {
-            Self::Packets(limit) => waiting.packets < limit,
-            // The new packet counts too, but not the packet in transmission.
-            Self::Bytes(limit) => waiting.bytes + u128::from(size.get()) <= u128::from(limit.get()),
+            Self::Packets(limit) => waiting.packets <= limit,
+            Self::Bytes(limit) => waiting.bytes <= u128::from(limit.get()),
             Self::Time(limit) => waiting.time <= limit,
         }
     }

@@ -54,7 +54,7 @@ mod tests {
     use cohaptic_units::{Probability, Rate};
 
     use super::*;
-    use crate::stages::queue::{CoDel, Framing, Peak, QueueLimit, Red};
+    use crate::stages::queue::{CoDel, FqCoDel, Framing, Peak, Pie, QueueLimit, Red};
 
     /// Returns a load of 64 bytes, which take 512 µs at 1 Mbit/s.
     fn load(micros: u64) -> Load {
@@ -69,7 +69,14 @@ mod tests {
             ..Bottleneck::at_rate(Rate::bits_per_sec(1_000_000).unwrap())
         };
         let red = |min| Discipline::Red(Red::new(Bytes::new(min), Bytes::new(1000), Probability::ONE, 0.1, Bytes::new(64), false).unwrap());
-        for discipline in [Discipline::TailDrop, Discipline::HeadDrop, Discipline::CoDel(CoDel::default()), red(1)] {
+        for discipline in [
+            Discipline::TailDrop,
+            Discipline::HeadDrop,
+            Discipline::CoDel(CoDel::default()),
+            Discipline::FqCoDel(FqCoDel::default()),
+            Discipline::Pie(Pie::default()),
+            red(1),
+        ] {
             assert_eq!(line(discipline).time_without_wait(load(512)), Some(Duration::from_micros(512)), "{discipline:?}");
             assert_eq!(line(discipline).time_without_wait(load(511)), None, "{discipline:?}");
         }

@@ -6,9 +6,11 @@ pub(crate) mod cross_traffic;
 mod delivery_trace;
 mod equal_packets;
 mod fifo;
+mod fq_codel;
 mod framing;
 pub(crate) mod limit;
 mod load;
+mod pie;
 mod red;
 pub(crate) mod token_bucket;
 
@@ -16,9 +18,11 @@ pub use bottleneck::{Bottleneck, Discipline, Service};
 pub use codel::CoDel;
 pub use cross_traffic::{CrossRecording, CrossRecordingError, CrossTraffic, CrossTrafficError, OnOff, Poisson};
 pub use delivery_trace::{DeliveryTrace, DeliveryTraceError, MAHIMAHI_BYTES};
+pub use fq_codel::FqCoDel;
 pub use framing::{Cells, Framing};
 pub use limit::QueueLimit;
 pub use load::Load;
+pub use pie::Pie;
 pub use red::{Red, RedError};
 pub use token_bucket::{Peak, TokenBucket};
 

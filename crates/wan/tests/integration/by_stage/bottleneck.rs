@@ -1,13 +1,16 @@
 //! The bottleneck: a line that takes bit after bit, or on a recorded line byte after byte, and a queue whose rules are those of the papers: RED by the
-//! text of Floyd & Jacobson (1993), CoDel by the pseudocode of RFC 8289.
+//! text of Floyd & Jacobson (1993), CoDel by the pseudocode of RFC 8289, FQ-CoDel by the text of RFC 8290. PIE does nothing in the microseconds of these
+//! scripts; [`queue_laws`](crate::queue_laws) has its model.
+
+use std::collections::BTreeMap;
 
 use cohaptic_units::Bytes;
 use cohaptic_wan::random::Purpose;
-use cohaptic_wan::{Bottleneck, CoDel, DeliveryTrace, Discipline, DropCause, Framing, LinkConfig, QueueLimit, Red, Service};
+use cohaptic_wan::{Bottleneck, CoDel, DeliveryTrace, Discipline, DropCause, FqCoDel, Framing, LinkConfig, Pie, QueueLimit, Red, Service};
 use proptest::prelude::*;
 
-use super::{Act, Packet, Said, Script, delivered, draws, dropped, said, script, sorted};
-use crate::any_link::{codel, framing, limit};
+use super::{Act, Packet, Said, Script, delivered, draws, dropped, flow, said, script, sorted};
+use crate::any_link::{codel, fq_codel, framing, limit};
 use crate::random_links::{BYTE_A_MICROSECOND, cases, rate};
 
 /// 10⁻⁹ bit.
@@ -84,7 +87,16 @@ struct Line {
     avg: f64,
     unhit: f64,
     idle_since: u64,
-    // CoDel, in the names of RFC 8289.
+    /// CoDel of each queue. CoDel without flows has one queue, number 0.
+    controls: BTreeMap<u32, Control>,
+    /// FQ-CoDel: the two lists of queues with their rest of the turn \[bytes\].
+    new: Vec<(u32, i64)>,
+    old: Vec<(u32, i64)>,
+}
+
+/// CoDel, in the names of RFC 8289.
+#[derive(Clone, Copy, Default)]
+struct Control {
     first_above_time: Option<u64>,
     drop_next: u64,
     count: u64,
@@ -115,12 +127,19 @@ impl Line {
             avg: 0.0,
             unhit: 0.0,
             idle_since: 0,
-            first_above_time: None,
-            drop_next: 0,
-            count: 0,
-            lastcount: 0,
-            dropping: false,
+            controls: BTreeMap::new(),
+            new: Vec::new(),
+            old: Vec::new(),
         }
+    }
+
+    /// Number of the queue of a packet.
+    fn number(&self, packet: Packet) -> u32 {
+        if let Discipline::FqCoDel(fq_codel) = self.config.bottleneck.discipline { flow(packet.number) % fq_codel.flows.get() } else { 0 }
+    }
+
+    fn control(&mut self, number: u32) -> &mut Control {
+        self.controls.entry(number).or_default()
     }
 
     fn bytes(&self) -> u64 {
@@ -179,7 +198,11 @@ impl Line {
     }
 
     fn send_next(&mut self, now: u64) {
-        let next = if let Discipline::CoDel(codel) = self.config.bottleneck.discipline { self.deque(&codel, now) } else { self.pop() };
+        let next = match self.config.bottleneck.discipline {
+            Discipline::CoDel(codel) => self.deque(&codel, 0, now),
+            Discipline::FqCoDel(fq_codel) => self.deque_in_turn(&fq_codel, now),
+            _ => self.pop(0),
+        };
         match next {
             None => self.idle_since = now,
             Some(queued) => {
@@ -189,23 +212,101 @@ impl Line {
         }
     }
 
-    fn pop(&mut self) -> Option<Queued> {
-        (!self.queue.is_empty()).then(|| self.queue.remove(0))
+    /// The oldest packet of a queue.
+    fn pop(&mut self, number: u32) -> Option<Queued> {
+        let place = self.queue.iter().position(|queued| self.number(queued.packet) == number)?;
+        Some(self.queue.remove(place))
+    }
+
+    /// RFC 8290, section 4.2.
+    fn deque_in_turn(&mut self, fq_codel: &FqCoDel, now: u64) -> Option<Queued> {
+        loop {
+            let is_new = !self.new.is_empty();
+            let list = if is_new { &mut self.new } else { &mut self.old };
+            let (number, credit) = *list.first()?;
+            if credit <= 0 {
+                list.remove(0);
+                self.old.push((number, credit + i64::from(fq_codel.quantum.get())));
+                continue;
+            }
+            let packet = self.deque(&fq_codel.codel, number, now);
+            let list = if is_new { &mut self.new } else { &mut self.old };
+            match packet {
+                Some(queued) => {
+                    list[0].1 -= i64::try_from(queued.packet.size).unwrap();
+                    return Some(queued);
+                }
+                None => {
+                    list.remove(0);
+                    if is_new && !self.old.is_empty() {
+                        self.old.push((number, credit));
+                    }
+                }
+            }
+        }
+    }
+
+    /// Puts the queue of a packet into the list of new ones, unless it is in a list.
+    fn lists(&mut self, fq_codel: &FqCoDel, packet: Packet) {
+        let number = self.number(packet);
+        if self.new.iter().chain(&self.old).all(|(listed, _)| *listed != number) {
+            self.new.push((number, fq_codel.quantum.get().into()));
+        }
+    }
+
+    /// RFC 8290, section 4.1, and Linux: drops half of the bytes of the longest queue from its head. Scripts are too short for the 64 packets.
+    fn drop_from_longest(&mut self, now: u64) {
+        let mut bytes: BTreeMap<u32, u64> = BTreeMap::new();
+        for queued in &self.queue {
+            *bytes.entry(self.number(queued.packet)).or_default() += queued.packet.size;
+        }
+        let most = *bytes.values().max().unwrap();
+        let number = *bytes.iter().find(|(_, bytes)| **bytes == most).unwrap().0;
+        let mut gone = 0;
+        while let Some(queued) = self.pop(number) {
+            self.control(number).count += 1;
+            self.said.push(dropped(queued.packet, now, DropCause::QueueFull, queued.marked));
+            gone += queued.packet.size;
+            if gone >= most / 2 {
+                return;
+            }
+        }
+    }
+
+    fn offer_to_flow(&mut self, fq_codel: &FqCoDel, now: u64, packet: Packet) {
+        self.lists(fq_codel, packet);
+        self.queue.push(Queued { packet, came: now, marked: false });
+        if self.sending.is_none() {
+            return self.send_next(now);
+        }
+        loop {
+            let Some(place) = self.queue.iter().position(|queued| queued.packet.number == packet.number) else { return };
+            // As full as it is for the newest packet, which is not one of those before it.
+            let newest = self.queue.remove(place);
+            let is_full = self.is_full(now, packet.size);
+            self.queue.insert(place, newest);
+            if !is_full {
+                return;
+            }
+            self.drop_from_longest(now);
+        }
     }
 
     /// RFC 8289, section 5.5: the packet, and whether it may be dropped.
-    fn dodequeue(&mut self, codel: &CoDel, now: u64) -> Option<(Queued, bool)> {
-        let Some(p) = self.pop() else {
-            self.first_above_time = None;
+    fn dodequeue(&mut self, codel: &CoDel, number: u32, now: u64) -> Option<(Queued, bool)> {
+        let Some(p) = self.pop(number) else {
+            self.control(number).first_above_time = None;
             return None;
         };
+        let bytes = self.bytes();
+        let control = self.control(number);
         let mut ok_to_drop = false;
         let sojourn_time = now - p.came;
-        if u128::from(sojourn_time) < codel.target.as_nanos() || self.bytes() <= codel.mtu.get() {
-            self.first_above_time = None;
+        if u128::from(sojourn_time) < codel.target.as_nanos() || bytes <= codel.mtu.get() {
+            control.first_above_time = None;
         } else {
-            match self.first_above_time {
-                None => self.first_above_time = Some(now + u64::try_from(codel.interval.as_nanos()).unwrap()),
+            match control.first_above_time {
+                None => control.first_above_time = Some(now + u64::try_from(codel.interval.as_nanos()).unwrap()),
                 Some(first_above_time) => ok_to_drop = now >= first_above_time,
             }
         }
@@ -218,27 +319,29 @@ impl Line {
     }
 
     /// Pseudo-code of RFC 8289, section 5.6. An ECN-capable packet that would be dropped is marked and sent, as in Linux.
-    fn deque(&mut self, codel: &CoDel, now: u64) -> Option<Queued> {
-        let mut r = self.dodequeue(codel, now);
+    fn deque(&mut self, codel: &CoDel, number: u32, now: u64) -> Option<Queued> {
+        let mut r = self.dodequeue(codel, number, now);
         let marks = |p: &Queued| codel.ecn && p.packet.ecn_capable;
-        if self.dropping {
+        if self.control(number).dropping {
             if !r.is_some_and(|(_, ok_to_drop)| ok_to_drop) {
-                self.dropping = false;
+                self.control(number).dropping = false;
             }
-            while now >= self.drop_next && self.dropping {
+            while now >= self.control(number).drop_next && self.control(number).dropping {
                 let (mut p, _) = r.unwrap();
-                self.count += 1;
+                self.control(number).count += 1;
                 if marks(&p) {
                     p.marked = true;
-                    self.drop_next = Self::control_law(codel, self.drop_next, self.count);
+                    let control = self.control(number);
+                    control.drop_next = Self::control_law(codel, control.drop_next, control.count);
                     return Some(p);
                 }
                 self.said.push(dropped(p.packet, now, DropCause::CoDel, p.marked));
-                r = self.dodequeue(codel, now);
+                r = self.dodequeue(codel, number, now);
                 if r.is_some_and(|(_, ok_to_drop)| ok_to_drop) {
-                    self.drop_next = Self::control_law(codel, self.drop_next, self.count);
+                    let control = self.control(number);
+                    control.drop_next = Self::control_law(codel, control.drop_next, control.count);
                 } else {
-                    self.dropping = false;
+                    self.control(number).dropping = false;
                 }
             }
         } else if let Some((mut p, true)) = r {
@@ -247,14 +350,17 @@ impl Line {
                 r = Some((p, true));
             } else {
                 self.said.push(dropped(p.packet, now, DropCause::CoDel, p.marked));
-                r = self.dodequeue(codel, now);
+                r = self.dodequeue(codel, number, now);
             }
-            self.dropping = true;
-            let delta = self.count - self.lastcount;
-            let recently = i128::from(now) - i128::from(self.drop_next) < 16 * i128::try_from(codel.interval.as_nanos()).unwrap();
-            self.count = if delta > 1 && recently { delta } else { 1 };
-            self.drop_next = Self::control_law(codel, now, self.count);
-            self.lastcount = self.count;
+            self.control(number).dropping = true;
+            let control = self.control(number);
+            let delta = control.count - control.lastcount;
+            // Before the first drop there is no control that it could go on with.
+            let recently =
+                control.lastcount > 0 && i128::from(now) - i128::from(control.drop_next) < 16 * i128::try_from(codel.interval.as_nanos()).unwrap();
+            control.count = if delta > 1 && recently { delta } else { 1 };
+            control.drop_next = Self::control_law(codel, now, control.count);
+            control.lastcount = control.count;
         }
         r.map(|(p, _)| p)
     }
@@ -335,6 +441,9 @@ impl Line {
     }
 
     fn offer(&mut self, now: u64, packet: Packet, words: Option<&Words>) {
+        if let Discipline::FqCoDel(fq_codel) = self.config.bottleneck.discipline {
+            return self.offer_to_flow(&fq_codel, now, packet);
+        }
         let mut queued = Queued { packet, came: now, marked: false };
         if let Some(words) = words {
             match self.red(words, now, packet) {
@@ -366,12 +475,22 @@ impl Line {
             }
             sending.since = now;
         }
-        let kind = |config: &Config| std::mem::discriminant(&config.bottleneck.discipline);
-        if kind(&self.config) != kind(&config) {
-            (self.avg, self.unhit) = (0.0, 0.0);
-            (self.first_above_time, self.drop_next, self.count, self.lastcount, self.dropping) = (None, 0, 0, 0, false);
-        }
+        // Another number of queues is another discipline.
+        let kind = |config: &Config| {
+            let flows = if let Discipline::FqCoDel(fq_codel) = config.bottleneck.discipline { fq_codel.flows.get() } else { 0 };
+            (std::mem::discriminant(&config.bottleneck.discipline), flows)
+        };
+        let is_same = kind(&self.config) == kind(&config);
         self.config = config;
+        if !is_same {
+            (self.avg, self.unhit) = (0.0, 0.0);
+            self.controls.clear();
+            self.new.clear();
+            self.old.clear();
+            if let Discipline::FqCoDel(fq_codel) = self.config.bottleneck.discipline {
+                self.queue.clone().into_iter().for_each(|queued| self.lists(&fq_codel, queued.packet));
+            }
+        }
     }
 }
 
@@ -438,7 +557,7 @@ fn with_red() -> BoxedStrategy<WithWords> {
 }
 
 fn queues() -> BoxedStrategy<Discipline> {
-    prop_oneof![Just(Discipline::TailDrop), Just(Discipline::HeadDrop)].boxed()
+    prop_oneof![2 => Just(Discipline::TailDrop), 2 => Just(Discipline::HeadDrop), 1 => Just(Discipline::Pie(Pie::default()))].boxed()
 }
 
 proptest! {
@@ -462,6 +581,13 @@ proptest! {
     }
 
     #[test]
+    fn fq_codel_by_the_text_of_the_rfc(
+        script in script(plain(config(prop_oneof![5 => rates(), 1 => recorded()].boxed(), fq_codel().prop_map(Discipline::FqCoDel).boxed()))),
+    ) {
+        prop_assert_eq!(said(&script, link), model(&script));
+    }
+
+    #[test]
     fn red_by_the_text_of_the_paper(script in script(with_red())) {
         prop_assert_eq!(said(&script, link), model(&script));
     }
@@ -470,6 +596,7 @@ proptest! {
     fn disciplines_that_take_turns(script in script(prop_oneof![
         plain(config(rates(), queues())),
         plain(config(rates(), codel().prop_map(Discipline::CoDel).boxed())),
+        plain(config(rates(), fq_codel().prop_map(Discipline::FqCoDel).boxed())),
         with_red(),
     ].boxed())) {
         prop_assert_eq!(said(&script, link), model(&script));

@@ -74,7 +74,7 @@ fn script<C: Clone + std::fmt::Debug + 'static>(config: BoxedStrategy<C>) -> Box
 /// Returns the events of a link under a script. `link` puts the configuration of the stage into the configuration of a link.
 fn events<C: Clone>(script: &Script<C>, link: impl Fn(C) -> LinkConfig) -> Vec<PacketEvent<u64>> {
     let Some((_, Act::Change(first))) = script.first() else { unreachable!("a script begins with a configuration") };
-    let mut subject = any_link(link(first.clone()));
+    let mut subject = any_link(link(first.clone())).with_flows(|number| flow(*number));
     for (now, act) in &script[1..] {
         match act {
             Act::Offer(packet) => {
@@ -106,6 +106,11 @@ fn delivered(packet: Packet, nanos: u64, marked: bool) -> Said {
 
 fn dropped(packet: Packet, nanos: u64, cause: DropCause, marked: bool) -> Said {
     (packet.number, 0, at(nanos), Fate::Dropped(cause), marked)
+}
+
+/// Returns the flow of a packet: ten flows, in no order.
+fn flow(number: u64) -> u32 {
+    u32::try_from(number * number % 17 % 10).unwrap()
 }
 
 fn draws(number: u64, copy: u8) -> PacketDraws {

@@ -99,7 +99,7 @@ impl CrossStage {
 
     /// Returns the next packet if it comes by `until`, with its random word for queues, and counts the packet as offered.
     #[inline]
-    pub(crate) fn take(&mut self, until: Instant) -> Option<(Instant, Bytes, impl FnOnce() -> u64 + use<>)> {
+    pub(crate) fn take(&mut self, until: Instant) -> Option<(Instant, Bytes, impl Fn() -> u64 + use<>)> {
         let (at, size) = self.next.filter(|(at, _)| *at <= until)?;
         self.advance();
         let (draws, number) = (self.draws, self.counts.offered);
