@@ -228,6 +228,7 @@ mod tests {
 
     /// Against the sum that defines the transform.
     #[test]
+    #[expect(clippy::cast_precision_loss, reason = "a few points")]
     fn amplitudes_are_those_of_the_definition() {
         let values = [0.3, 1.0, -0.25, 0.5, 0.125];
         for (place, amplitude) in amplitudes(&values, 16).into_iter().enumerate() {

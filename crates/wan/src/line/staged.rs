@@ -174,7 +174,7 @@ impl<T> Ord for Propagating<T> {
 impl<T> Staged<T> {
     /// Returns the counts of the cross-traffic.
     pub(crate) fn crossed(&self) -> CrossCounts {
-        self.cross.as_ref().map_or_else(CrossCounts::default, |cross| cross.counts())
+        self.cross.as_ref().map_or_else(CrossCounts::default, |cross| cross.reported())
     }
 }
 

@@ -1,4 +1,5 @@
 //! Cross-traffic at the bottleneck: waits against the queue M/D/1, the packets' own draws, counters, and drivers of every habit.
+#![expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "instants, rates and counts of tests are small and positive")]
 
 use std::time::Duration;
 
@@ -31,8 +32,11 @@ fn waits_at_most(rho: f64, x: f64) -> f64 {
     (1.0 - rho) * sum
 }
 
+/// Load, mean wait, and quantiles of the wait, each with its level; waits in times of a packet.
+type Waits = (f64, f64, [(f64, f64); 3]);
+
 /// Load, mean wait and quantiles of the wait, in transmission times.
-const M_D_1: [(f64, f64, [(f64, f64); 3]); 2] =
+const M_D_1: [Waits; 2] =
     [(0.5, 0.5, [(0.95, 2.0506), (0.99, 3.3363), (0.999, 5.1684)]), (0.8, 2.0, [(0.95, 6.6203), (0.99, 10.3559), (0.999, 15.7003)])];
 
 /// The quantiles have the given four decimals. The mean is ρ/(2(1 − ρ)), also as the integral of the tail.

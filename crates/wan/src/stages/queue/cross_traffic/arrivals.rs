@@ -118,7 +118,7 @@ impl CrossStage {
     }
 
     /// Returns the counts at the latest packet of the link. The counts do not depend on how often the stage is asked to catch up between two packets.
-    pub(crate) const fn counts(&self) -> CrossCounts {
+    pub(crate) const fn reported(&self) -> CrossCounts {
         self.met
     }
 
