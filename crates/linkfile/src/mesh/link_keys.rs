@@ -269,7 +269,10 @@ mod tests {
         let names = ["good", "bad"].map(str::to_owned).to_vec();
         let modulators = Arc::new(Modulators::from([("cell".to_owned(), (modulator, names))]));
         for (key, value, file) in FILES {
-            let keys = LinkKeys { keys: vec![(key.to_owned(), value.to_owned())], modulators: Arc::clone(&modulators) };
+            // Cross-traffic without a rate is refused before its file is.
+            let rate = (key == "cross-traffic").then_some(("rate", "\"1Mbit\""));
+            let keys = std::iter::once((key, value)).chain(rate).map(|(key, value)| (key.to_owned(), value.to_owned()));
+            let keys = LinkKeys { keys: keys.collect(), modulators: Arc::clone(&modulators) };
             let asked = RefCell::new(Vec::new());
             let secret = |path: &Path| {
                 asked.borrow_mut().push(path.to_path_buf());
