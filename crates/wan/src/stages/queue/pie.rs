@@ -36,6 +36,9 @@ const UPDATE_NANOS: u64 = 15_000_000;
 const PROPORTIONAL: f64 = 0.125;
 /// Gain of the growth since the update before \[1/s\] (RFC 8033, beta).
 const DIFFERENTIAL: f64 = 1.25;
+/// Most updates between two changes of the queue: 25 minutes. Of a queue that changes nothing for longer, the updates before are left out.
+const MOST_UPDATES: u64 = 100_000;
+
 /// Divisor of a step for probabilities below a bound (RFC 8033, section 4.2): the smaller the probability, the smaller the steps.
 const DIVISORS: [(f64, f64); 6] = [(1e-6, 2048.0), (1e-5, 512.0), (1e-4, 128.0), (1e-3, 32.0), (1e-2, 8.0), (1e-1, 2.0)];
 
@@ -72,6 +75,8 @@ impl PieState {
     /// Performs the updates due by `now`. Called before each change of the queue, so the delay was the same at all these updates.
     pub(crate) fn pass(&mut self, pie: &Pie, now: Instant) {
         let due = now.as_nanos() / UPDATE_NANOS;
+        // A queue that stands still for longer has the last updates only, so that centuries of silence take no centuries of updates.
+        self.updates = self.updates.max(due.saturating_sub(MOST_UPDATES));
         while self.updates < due {
             self.updates += 1;
             let before = *self;
