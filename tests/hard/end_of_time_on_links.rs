@@ -6,9 +6,9 @@ use std::time::Duration;
 use cohaptic_tests::same_cases;
 use cohaptic_units::{Bytes, Instant, Probability, Rate};
 use cohaptic_wan::{
-    Bottleneck, Chance, CoDel, Correlation, Delay, DeliveryTrace, Discipline, Displacement, Distribution, Fate, Framing, IdleOutages, Jitter,
-    KernelNetem, Layout, Link, LinkConfig, LinkModel, LinkName, Network, NetworkConfig, NodeId, Order, Outage, Outages, PacketInfo, Peak, QueueLimit,
-    RandomOutages, Red, Reorder, Service, Slots, Sojourn, TokenBucket, netem,
+    Bottleneck, Chance, CoDel, Correlation, Delay, DeliveryTrace, Discipline, Displacement, Distribution, Fate, FqCoDel, Framing, IdleOutages,
+    Jitter, KernelNetem, Layout, Link, LinkConfig, LinkModel, LinkName, Network, NetworkConfig, NodeId, Order, Outage, Outages, PacketInfo, Peak,
+    Pie, QueueLimit, RandomOutages, Red, Reorder, Service, Slots, Sojourn, TokenBucket, netem,
 };
 use proptest::collection::vec;
 use proptest::option;
@@ -63,7 +63,11 @@ fn framing() -> impl Strategy<Value = Framing> + Clone {
 fn bottleneck() -> impl Strategy<Value = Bottleneck> + Clone {
     let red = Red::new(Bytes::new(1), Bytes::new(u64::MAX), Probability::new(0.5).unwrap(), 0.002, Bytes::new(1500), false).unwrap();
     let codel = (span(), span()).prop_map(|(target, interval)| Discipline::CoDel(CoDel { target, interval, mtu: Bytes::ZERO, ecn: false }));
-    let discipline = prop_oneof![Just(Discipline::TailDrop), Just(Discipline::HeadDrop), Just(Discipline::Red(red)), codel];
+    let fq_codel = (span(), span()).prop_map(|(target, interval)| {
+        Discipline::FqCoDel(FqCoDel { codel: CoDel { target, interval, mtu: Bytes::ZERO, ecn: false }, ..FqCoDel::default() })
+    });
+    let pie = (span(), span()).prop_map(|(target, burst)| Discipline::Pie(Pie { target, burst, mtu: Bytes::ZERO, ecn: false }));
+    let discipline = prop_oneof![Just(Discipline::TailDrop), Just(Discipline::HeadDrop), Just(Discipline::Red(red)), codel, fq_codel, pie];
     let recorded =
         select(vec!["1", "9000000000000", "0\n1\n1\n"]).prop_map(|text| Service::Recorded(DeliveryTrace::parse(text, Bytes::new(1500)).unwrap()));
     let service = prop_oneof![3 => rate().prop_map(Service::Rate), 1 => recorded];
