@@ -40,7 +40,7 @@ pub trait Transport {
 /// Requests to the chip, with their numbers on the wire.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Request {
-    /// Purges a buffer: see [`PURGE_RX`](crate::ftdi::PURGE_RX) and [`PURGE_TX`](crate::ftdi::PURGE_TX).
+    /// Purges a buffer: `PURGE_RX` for what the device has sent, `PURGE_TX` for what it is sent.
     Reset = 0,
     /// Sets the lines RTS and DTR.
     ModemControl = 1,

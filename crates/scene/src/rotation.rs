@@ -148,7 +148,7 @@ impl Scene {
         Some(Gains { stiffness: of(given.stiffness, gains.stiffness), damping })
     }
 
-    /// Iterates over [`Scene::rotation_gains`] at the beginning and after each change of KT and BT or of KR and BR in the timeline. Empty if the object does
+    /// Iterates over the rotational gains at the beginning and after each change of KT and BT or of KR and BR in the timeline. Empty if the object does
     /// not turn.
     ///
     /// Default gains follow KT and BT. A gain in the timeline is a given gain from then on. Each component of KR is at most the sum of the two others, whether
