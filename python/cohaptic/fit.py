@@ -40,7 +40,7 @@ def fit(
     drift of one clock against the other, where it is significant.
 
     ``direction`` is the way of the packets in a file that has both ways, and ``split`` the share of a round trip that is the delay of one way, such as 0.5.
-    ``walk`` lets a measured rate change as a walk through five states, and ``instant_bytes`` leave at each instant of a line (1504 of mahimahi, otherwise 1400).
+    ``walk`` lets a measured rate change as a walk through five states, and ``instant_bytes`` leave at each instant of a line (mahimahi: 1504, else 1400).
     ``tick`` [s] is the tick of the clock that showed the delays, to which it rounds or, with ``cut``, cuts. ``hold_out`` is the
     share of the time at the end whose packets are not fitted and judge the link, such as 0.5.
 
