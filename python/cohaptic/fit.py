@@ -61,7 +61,9 @@ def fit(
         measured = _native.Delays.of(at, delays)
     else:
         if receiver is not None and is_of_other_programs:
-            raise TypeError("direction, split, instant_bytes and walk are for files of other programs: expected one file")
+            raise TypeError(
+                "direction, split, instant_bytes and walk are for files of other programs: expected one file"
+            )
         measured = _native.Delays.read(
             os.fspath(source),
             None if receiver is None else os.fspath(receiver),
