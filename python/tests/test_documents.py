@@ -78,7 +78,7 @@ def test_a_comparison_is_that_of_the_program_whoever_makes_its_runs(two: str, an
 def test_what_cannot_be_compared_is_refused() -> None:
     scene = Scene(TWO)
     for strategies, vary, part in [
-        ("average-position", [], "cannot be compared with another"),
+        ("average-position", [], "names fewer than two strategies"),
         (["average-position", "extrapolatd"], [], "unknown strategy"),
         (STRATEGIES, ["coordination.strategy=wave"], "expected another key"),
     ]:
