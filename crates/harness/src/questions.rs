@@ -4,7 +4,7 @@
 pub(crate) const MOST_INSTANTS_BETWEEN_QUESTIONS: u32 = 1024;
 
 /// Greatest number of ticks of peers, or packets, between two calls of [`Observer::keep_going`](crate::Observer::keep_going), unless a single instant has more.
-/// This amount of work takes a part of a second.
+/// Work of this amount takes a part of a second.
 pub(crate) const MOST_WORK_BETWEEN_QUESTIONS: usize = 1 << 22;
 
 /// Returns the number of instants, or of ticks in arrays, between two calls of [`Observer::keep_going`](crate::Observer::keep_going): a power of two. `work` is

@@ -49,7 +49,7 @@ pub struct Scene {
     pub links: LinkTable,
     /// Changes during the run, in order of time; changes at the same instant are in the order of the file.
     pub timeline: Vec<Change>,
-    /// What the users are asked to do; `None` if the scene has no table `[task]`.
+    /// Task of the users; `None` if the scene has no table `[task]`.
     pub task: Option<Box<TaskSpec>>,
     /// Measures of a run; `None` if the scene has no table `[measure]`.
     pub measure: Option<MeasureSpec>,

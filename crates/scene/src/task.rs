@@ -8,7 +8,7 @@ use cohaptic_units::Instant;
 /// A task of a run. A task observes the run and changes no motion, packet or random number.
 #[derive(Clone, PartialEq, Debug)]
 pub struct TaskSpec {
-    /// What is asked for.
+    /// Kind of the task, with the keys of this kind.
     pub kind: TaskKind,
     /// First instant that is judged.
     pub start: Instant,
@@ -23,15 +23,15 @@ pub struct TaskSpec {
 /// Peers whose copies a task judges.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Judged {
-    /// All peers whose devices touch the object at any time of the scene, together.
+    /// The peers whose devices touch the object at any time of the scene, judged together.
     All,
-    /// The same peers, each alone: the first peer whose copy does all that is asked for ends the task.
+    /// The same peers, each judged alone: the first peer whose copy does all that is asked for ends the task.
     Any,
-    /// One peer, by the index in [`Scene::peers`](crate::Scene::peers).
+    /// A single peer, by the index in [`Scene::peers`](crate::Scene::peers).
     Peer(usize),
 }
 
-/// What a task asks for.
+/// Kind of a task.
 #[derive(Clone, PartialEq, Debug)]
 pub enum TaskKind {
     /// The object is moved to one target after the other.
@@ -104,7 +104,7 @@ impl Track {
 /// Result of a task.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum TaskOutcome {
-    /// All that was asked for was done.
+    /// The users did all that the task asks for.
     Done,
     /// The time was over first.
     TimedOut,

@@ -105,7 +105,7 @@ fn median_s(config: &LinkConfig, length: Duration) -> Option<f64> {
     times[times.len() / 2].map(|time| time.as_secs_f64())
 }
 
-/// One way of a connection.
+/// Direction of a connection.
 struct Way {
     link: Link<Segment<'static>>,
     /// Instant of the link at which the connection begins.

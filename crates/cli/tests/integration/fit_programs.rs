@@ -185,7 +185,7 @@ fn a_recorded_line_gives_its_walk() {
     let document = desk.json("fit lte.line --bytes 1504B --walk --require-law --out walk.toml --json");
     let walk = &document["recorded"]["walk"];
     assert_eq!(walk["refused"], json!([]), "{document:#}");
-    // Some 400 s know a sojourn of 2.758 s to about a third: a state is visited 30 times, and the rate is correlated over several visits.
+    // A measurement of 400 s gives a sojourn of 2.758 s to about a third: a state is visited 30 times, and the rate is correlated over several visits.
     assert!((1.8..4.2).contains(&number(&walk["sojourn_s"])), "{document:#}");
     assert!(desk.read("walk.toml").contains("name = \"rate-walk\"") && !desk.path("walk.line").exists());
     desk.write("scene.toml", format!("{SCENE}{}", desk.read("walk.toml")));

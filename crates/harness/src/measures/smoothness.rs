@@ -155,7 +155,7 @@ fn amplitudes(values: &[f64], points: usize) -> Vec<f64> {
     }
     let mut half = 1;
     while half < points {
-        // One table a stage: a product of rotations would add up rounding errors.
+        // Rotations come from a table per stage, because a product of rotations would add up rounding errors.
         let turns: Vec<(f64, f64)> = (0..half)
             .map(|place| {
                 let (sine, cosine) = libm::sincos(-core::f64::consts::PI * place as f64 / half as f64);

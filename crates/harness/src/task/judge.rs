@@ -144,7 +144,7 @@ pub(crate) enum TaskRow {
 /// Function that takes the rows of a task, each with its instant, in order of time.
 pub(crate) type OnRow<'a> = &'a mut dyn FnMut(Instant, TaskRow);
 
-/// What a judgement saw, for records: the group with the most reached targets, and among equals the first.
+/// State of a group at a judgement, for records: of the group with the most reached targets, and among equals of the first.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Seen {
     /// Number of the target, from 0.

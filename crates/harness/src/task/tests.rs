@@ -57,7 +57,7 @@ fn millis(count: u64) -> Instant {
     Instant::from_nanos(count * 1_000_000)
 }
 
-/// Both copies at the same place, at rest and without force.
+/// Returns rows with both copies at the same place, at rest and without force.
 fn together(positions: &[f64]) -> Vec<[Row; 2]> {
     positions.iter().map(|&position| [(position, 0.0, 0.0); 2]).collect()
 }

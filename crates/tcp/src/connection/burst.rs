@@ -77,8 +77,8 @@ impl Connection {
         // A last segment below the full size belongs to the burst if neither the window nor Nagle's algorithm holds it back.
         let takes_rest = unsent <= open && (self.config.nodelay || self.send.is_shut || self.send.small_end <= self.send.una);
         let segments = if takes_rest { unsent.div_ceil(mss) } else { unsent.min(open) / mss };
-        // What leaves while the program writes is one buffer, of at most half of the peer's largest window (`tcp_bound_to_half_wnd`). Later a buffer takes
-        // octets of the next one (`tcp_grow_skb`).
+        // The octets that leave while the program writes are one buffer, of at most half of the peer's largest window (`tcp_bound_to_half_wnd`). Later a
+        // buffer takes octets of the next one (`tcp_grow_skb`).
         let most = if self.send.pushes.is_writing { self.half_window() / mss } else { u64::MAX };
         u32::try_from(segments.min(most)).unwrap_or(u32::MAX).min(quota).max(1)
     }

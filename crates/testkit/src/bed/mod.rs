@@ -143,7 +143,7 @@ impl Testbed {
     /// host last passes the *downlink*, towards the user. In between is the link from host to host, ideal unless the test says otherwise. Packets to all other
     /// hosts share the uplink and wait for each other there.
     ///
-    /// What changes a link of the library by itself, such as its rate, changes uplink and downlink of one host together, and those of two hosts apart.
+    /// A modulator of the link, of its rate for example, changes uplink and downlink of one host together, and those of two hosts apart.
     /// [`Bed::access_stats`] returns what the lines did, and the trace tells on which part of its path a packet was lost. A packet that a
     /// [hit](crate::hit) drops has passed the uplink, and goes no further.
     ///

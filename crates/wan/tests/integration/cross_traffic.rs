@@ -132,7 +132,7 @@ fn a_packet_waits_for_what_came_before_it() {
     assert_eq!(seen, [(100, false), (130, true)]);
 }
 
-/// One place in the queue. Cross packets of 100 µs at 0 and 10 µs: the second waits, and the packet at 15 µs finds no room. With drops at the head the cross
+/// The queue has one place. Cross packets of 100 µs at 0 and 10 µs: the second waits, and the packet at 15 µs finds no room. With drops at the head the cross
 /// packet gives way, and a cross packet at 20 µs then takes the place of the packet, at its own instant.
 #[test]
 fn cross_packets_keep_the_limit_and_the_discipline() {

@@ -165,7 +165,7 @@ fn a_lone_packet_beside_backlogged_flows_waits_for_the_packet_on_the_line_only()
     assert!(waits(Discipline::TailDrop)[3..].iter().all(|wait| *wait > 90 * MILLI));
 }
 
-/// One flow of 300 bytes a packet and one of 1500 share the line by bytes, not by packets, also if the small ones come five times as often.
+/// A flow of 300-byte packets and a flow of 1500-byte packets share the line by bytes, not by packets, also if the small packets come five times as often.
 #[test]
 fn flows_share_the_line_by_bytes() {
     let small = (0..5_000_u64).map(|number| (number * MILLI / 5, 1, 300));
@@ -392,7 +392,7 @@ mod pie {
         let dropped = late.iter().filter(|(_, fate)| **fate == Err(DropCause::Pie)).count() as f64 / late.len() as f64;
         let delays: Vec<f64> = late.iter().filter_map(|(place, fate)| fate.ok().map(|(at, _)| (at - offered[*place].0) as f64 / 1e6)).collect();
         let mean = delays.iter().sum::<f64>() / delays.len() as f64;
-        // What cannot be carried is dropped, and a packet takes a millisecond on the line after its wait.
+        // Traffic beyond the rate is dropped, and a packet takes a millisecond on the line after its wait.
         assert!((dropped - 0.2).abs() < 0.001, "{dropped}");
         assert!((mean - 16.0).abs() < 1.0, "{mean}");
     }

@@ -9,7 +9,7 @@ use redis::{AsyncCommands, AsyncConnectionConfig, Client, RedisResult};
 ///
 /// # Errors
 ///
-/// Those of Redis, other than that no answer comes in time.
+/// The errors of Redis, other than that no answer comes in time.
 pub async fn order(redis: &Client, order: &str) -> RedisResult<()> {
     let config = AsyncConnectionConfig::new().set_response_timeout(Some(Duration::from_millis(500)));
     loop {
@@ -28,7 +28,7 @@ pub async fn order(redis: &Client, order: &str) -> RedisResult<()> {
 ///
 /// # Errors
 ///
-/// Those of Redis, and if an order is not text.
+/// The errors of Redis, and an error if an order is not text.
 pub async fn kitchen(redis: &Client, mut cook: impl FnMut(String)) -> RedisResult<()> {
     let mut subscription = redis.get_async_pubsub().await?;
     subscription.subscribe("orders").await?;

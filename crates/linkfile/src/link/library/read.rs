@@ -176,7 +176,7 @@ mod tests {
                 let has_place = ["doi:", "arXiv:", "https://"].iter().any(|place| source.cite.contains(place));
                 match source.read.as_str() {
                     "source" => assert!(has_place, "{} {name}: {}", profile.title(), source.cite),
-                    // Who copied the figures is not always known. The reader is told that nobody has looked into the source itself.
+                    // The person who copied the figures is not always known. The page says that nobody has looked into the source itself.
                     "transcription" | "computed" => {}
                     "recalled" => assert!(!has_place && source.cite.contains("not found again"), "{} {name}: {}", profile.title(), source.cite),
                     other => panic!("{} {name}: {other}", profile.title()),

@@ -73,7 +73,7 @@ pub(super) struct Tcp {
     calls: u64,
 }
 
-/// One side of a connection, and the tasks that wait to read from it or to write to it.
+/// Side of a connection, and the tasks that wait to read from it or to write to it.
 #[derive(Debug)]
 struct End {
     host: NodeId,

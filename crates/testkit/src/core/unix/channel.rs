@@ -1,4 +1,4 @@
-//! One direction of a Unix stream, or a pipe: the bytes that were written and not read yet, and the tasks that wait at both ends.
+//! Direction of a Unix stream, or a pipe: the bytes that were written and not read yet, and the tasks that wait at both ends.
 //!
 //! The limits are those of Linux 6.18, measured by writing pieces of one size until the system refuses. A stream counts the memory of each piece
 //! (`unix_stream_sendmsg`, `SKB_TRUESIZE`), so that many small writes fill it with fewer bytes than few large ones. A pipe counts pages (`pipe_write`).
@@ -172,7 +172,7 @@ impl Channel {
     }
 
     fn put_pages(&mut self, bytes: &[u8]) -> usize {
-        // What exceeds whole pages joins the last page, if all of it fits there.
+        // The bytes beyond whole pages join the last page, if all of these bytes fit there.
         let rest = bytes.len() % PAGE;
         let mut count = 0;
         if rest > 0

@@ -54,7 +54,7 @@ impl GammaMap {
             let series = taylor(shape, centre(number));
             *cell = series.x.map_or(Cell::NONE, |terms| Cell::new(&terms));
             *logarithm = series.logarithm.map_or(Cell::NONE, |terms| Cell::new(&terms));
-            // Where even x at the right edge of the cell is as good as 0, its logarithm may be beyond the range of numbers.
+            // In a cell whose right edge has an x near 0, the logarithm of x may be beyond the range of numbers.
             let edge = centre(number) + 0.5 / DENSITY;
             if series.logarithm.is_none() && gamma_inverse::inverse(shape, Tail::of_normal(edge), edge) < NOTHING {
                 *logarithm = Cell::new(&core::array::from_fn(|n| if n == 0 { -1000.0 } else { 0.0 }));

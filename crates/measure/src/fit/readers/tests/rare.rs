@@ -67,7 +67,7 @@ fn ping_is_read_as_other_programs_print_it() {
     let twice = "PING h\n64 bytes from h: icmp_seq=1 time=5 ms\n64 bytes from h: icmp_seq=1 time=6 ms\n";
     let found = delays(twice, None);
     assert_eq!((packets(&found).len(), found.left_out.copies), (1, 1));
-    // One packet has no gap.
+    // A single packet has no gap.
     let one =
         "PING h\n64 bytes from h: icmp_seq=1 time=5 ms\n--- h ping statistics ---\n1 packets transmitted, 1 received, 0% packet loss, time 0ms\n";
     assert_eq!(packets(&delays(one, None)), [(0.0, Some(5.0))]);
@@ -80,7 +80,7 @@ fn ping_on_a_busy_computer_keeps_the_order_of_sending() {
                 [1.025] 64 bytes from h: icmp_seq=3 time=5.0 ms\n";
     let sent: Vec<f64> = delays(late, None).measurements.packets().iter().map(|packet| packet.sent_s).collect();
     assert!(sent.windows(2).all(|pair| pair[0] <= pair[1]), "{sent:?}");
-    // One line without a time: then no packet has one, and they are a second apart.
+    // A single line without a time takes the times from all packets, and packets are then a second apart.
     let torn = late.replace("[1.045] ", "");
     let found = delays(&torn, None);
     assert_eq!(packets(&found).iter().map(|packet| packet.0).collect::<Vec<_>>(), [0.0, 1_000.0, 2_000.0]);
@@ -128,7 +128,7 @@ fn netem_trace_has_defaults_and_limits() {
     assert_eq!(fixed("StaticLossConfig", json!({ "loss": [0.3, 0.3] })), "[link]\nloss = 0.3\n");
     assert_eq!(fixed("StaticLossConfig", json!({ "loss": [] })), "[link]\nloss = 0.0\n");
     assert_eq!(fixed("StaticBwConfig", json!({ "bw": "1Gbps 250kbps 5bps" })), "[link]\nrate = \"1000250005bit\"\n");
-    // What lasts no time is passed over, also in a trace, and a pattern without a count repeats for ever.
+    // An entry that lasts no time is passed over, also in a trace, and a pattern without a count repeats for ever.
     let with_nothing = json!({ "RepeatedBwPatternConfig": { "pattern": [rate_for(5, 0), rate_for(6, 1)] } }).to_string();
     assert_eq!((recording(&with_nothing).to_scene_toml(""), &recording(&with_nothing).notes[..]), ("[link]\nrate = \"6bit\"\n".to_owned(), &[][..]));
     assert_eq!(scene(json!({ "TraceBwConfig": [[0.0, [2.0]], [5.0, [3.0]]] })), "[link]\nrate = \"3000000bit\"\n");

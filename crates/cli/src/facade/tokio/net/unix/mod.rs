@@ -80,7 +80,7 @@ use try_from_std;
 ///
 /// # Errors
 ///
-/// Those of the standard library: the path is too long, or a zero is within it.
+/// The errors of the standard library: the path is too long, or a zero is within it.
 fn name_of(path: &Path) -> io::Result<UnixName> {
     #[cfg(any(target_os = "linux", target_os = "android"))]
     {
