@@ -50,7 +50,8 @@ const MOST_BYTES: u64 = 1 << 24;
 /// The queues of all flows.
 #[derive(Clone, Debug)]
 pub(crate) struct FlowQueues<P> {
-    /// Queues that ever had a packet, by number; the queue of the cross-traffic has none, and is counted in addition to the `flows` queues. An empty queue stays, because CoDel remembers its latest drops.
+    /// Queues that ever had a packet, by number. The queue of the cross-traffic has no number, and does not count among the `flows` queues. An empty queue
+    /// stays, because CoDel remembers the latest drops of the queue.
     queues: BTreeMap<Option<u32>, FlowQueue<P>>,
     /// Numbers of new queues, in their order of service.
     new: VecDeque<Option<u32>>,
@@ -153,8 +154,9 @@ impl<P> FlowQueues<P> {
         }
     }
 
-    /// Drops half of the bytes of the longest queue, from its head, at least one packet and at most [`MOST_DROPPED`]. Of equally long queues the one with the
-    /// smallest number counts as the longest, before these the queue of the cross-traffic. Returns the place of the last dropped packet in the order of offers, or `None` if no packet waits.
+    /// Drops half of the bytes of the longest queue, from its head, at least one packet and at most [`MOST_DROPPED`]. Of equally long queues the queue of the
+    /// cross-traffic counts as the longest, or else the queue with the smallest number. Returns the place of the last dropped packet in the order of offers,
+    /// or `None` if no packet waits.
     pub(crate) fn drop_from_longest<R: Rules<P>>(&mut self, rules: &R, sums: &mut R::Sums, mut dropped: impl FnMut(DropCause, P)) -> Option<u64> {
         let filled = self.queues.values_mut().filter(|queue| !queue.waiting.is_empty());
         let queue = filled.reduce(|longest, queue| if queue.bytes > longest.bytes { queue } else { longest })?;
