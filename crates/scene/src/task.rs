@@ -110,7 +110,7 @@ pub enum TaskOutcome {
     TimedOut,
     /// A judged peer failed.
     Failed,
-    /// A number of the run was not finite before the task had another outcome.
+    /// The run diverged, and the task had no other outcome before the end of the run.
     Diverged,
     /// The run ended before the timeout of the task.
     Unfinished,

@@ -5,8 +5,8 @@ use std::time::Duration;
 use cohaptic_scene::{Measure, TaskOutcome};
 
 use super::{Accumulator, Asked, Rows, mean_square_root};
+use crate::TickRow;
 use crate::task::Judge;
-use crate::{Ending, TickRow};
 
 /// Judge of the task of a scene, for the measures that the judge itself keeps.
 #[derive(Clone, Debug)]
@@ -42,10 +42,9 @@ impl Accumulator for TaskFigures {
     }
 
     fn value(&self, figure: Figure, peer: Option<usize>, elapsed: Duration) -> Option<f64> {
-        // A run that has not come to the end of the scene counts as interrupted: its task is undecided unless it was decided before.
-        let end = cohaptic_units::Instant::ZERO.saturating_add(elapsed);
-        let ending = if elapsed >= self.duration { Ending::Complete } else { Ending::Interrupted(end) };
-        let (result, judge) = self.judge.clone()?.finish(ending, elapsed, &mut |_, _| ());
+        // A task is undecided in a run that has not come to the end of the scene, unless it was decided before.
+        let otherwise = (elapsed < self.duration).then_some(TaskOutcome::Unfinished);
+        let (result, judge) = self.judge.clone()?.finish(otherwise, elapsed, &mut |_, _| ());
         match figure {
             Figure::Time => (result.outcome == TaskOutcome::Done).then_some(result.time.as_secs_f64()),
             Figure::Error => judge.squared_errors(peer?).and_then(|(squares, count)| mean_square_root(squares, count)),

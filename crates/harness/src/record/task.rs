@@ -6,7 +6,7 @@ use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
 use super::file::{RecordError, RecordFile, push_f64, push_seconds, push_whole};
-use crate::task::{Event, Judge, Seen, TaskRow};
+use crate::task::{Event, Judge, Seen, TaskRow, without_outcome};
 use crate::{Summary, TickRow};
 
 /// Writes the columns `t,goal,gx,error_m,inside` of `task.csv`, with `gy` and `gz` after `gx` for further axes, and `t,peer,event,goal` of `task-events.csv`.
@@ -56,7 +56,7 @@ impl TaskRecord {
     pub(crate) fn finish(self, summary: &Summary) -> Result<[PathBuf; 2], RecordError> {
         let Self { judge, mut files } = self;
         let mut written = Ok(());
-        judge.finish(summary.ending, summary.duration, &mut |at, row| files.take(at, row, &mut written));
+        judge.finish(without_outcome(summary), summary.duration, &mut |at, row| files.take(at, row, &mut written));
         written?;
         Ok([files.rows.finish()?, files.events.finish()?])
     }

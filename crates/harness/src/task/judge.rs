@@ -6,7 +6,7 @@ use cohaptic_scene::{Hold, Judged, Reach, Scene, TaskKind, TaskOutcome, TaskSpec
 use cohaptic_units::Instant;
 
 use super::TaskResult;
-use crate::{Ending, TickRow};
+use crate::TickRow;
 
 /// Judge of a task during a run.
 #[derive(Clone, Debug)]
@@ -242,20 +242,18 @@ impl Judge {
         }
     }
 
-    /// Returns the result at the ending of a run of the simulated duration `duration`, after judging the last instant, and the judge with that
-    /// instant in its sums.
-    pub(crate) fn finish(mut self, ending: Ending, duration: Duration, on_row: OnRow<'_>) -> (TaskResult, Self) {
-        // The last instant of a diverged run has numbers that are not finite, or leads to such numbers.
+    /// Returns the result at the end of a run of the simulated duration `duration`, after judging the last instant, and the judge with that instant in its
+    /// sums. `otherwise`: outcome of a task without an outcome until then; `None` if the run came to the end of the scene, so that the deadline decides.
+    pub(crate) fn finish(mut self, otherwise: Option<TaskOutcome>, duration: Duration, on_row: OnRow<'_>) -> (TaskResult, Self) {
         if let Some(at) = self.now {
             self.on_instant(at, on_row);
         }
         let end = Instant::ZERO.saturating_add(duration);
         if self.outcome.is_none() {
             // No tick lies at the end of the scene, so a deadline at the end is decided here.
-            if ending == Ending::Complete && self.is_in_scene {
-                self.time_is_over(on_row);
-            } else {
-                self.end(TaskOutcome::from(ending), end, None, None, on_row);
+            match otherwise {
+                None if self.is_in_scene => self.time_is_over(on_row),
+                otherwise => self.end(otherwise.unwrap_or(TaskOutcome::Unfinished), end, None, None, on_row),
             }
         }
         let (outcome, at, failure) = self.outcome.unwrap_or((TaskOutcome::Unfinished, end, None));

@@ -13,16 +13,16 @@
 //!     object = { mass = 0.45 }
 //!     coordination = { strategy = "average-position", stiffness = 1000.0, damping = 5.0, update = "8ms" }
 //!     peer = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
-//!     peers = [{ name = "peer1", hand = { force = 2.0 } }]
+//!     peers = [{ name = "peer1", hand = { arm = { mass = 0.5, damping = 20.0, stiffness = 300.0 }, follows = { position = 0.1 } } }]
 //!     link = { delay = "24ms" }
-//!     task = { kind = "reach", targets = [0.05, 0.1], radius = 0.005 }
+//!     task = { kind = "reach", targets = [0.1], radius = 0.005 }
 //! "#;
 //! let scene = Scene::parse(text, "two.toml".as_ref(), &[])?;
 //! let mut watch = TaskWatch::of(&scene).expect("the scene has a task");
 //! let summary = Simulation::new(&scene, Model::Least).run(&mut watch)?;
 //! let result = watch.result(&summary);
 //! assert_eq!(result.outcome, TaskOutcome::Done);
-//! assert_eq!(result.reached.len(), 2);
+//! assert_eq!(result.reached.len(), 1);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -71,7 +71,7 @@ pub fn task_words(result: &TaskResult, scene: &Scene) -> String {
         TaskOutcome::Done => format!("done after {after}"),
         TaskOutcome::TimedOut => format!("timed out after {after}"),
         TaskOutcome::Failed => format!("failed after {after}{}", reason.unwrap_or_default()),
-        TaskOutcome::Diverged => format!("the run diverged {after} after the start of the task"),
+        TaskOutcome::Diverged => "the run diverged".to_owned(),
         TaskOutcome::Unfinished => format!("unfinished: the run ended {after} after the start of the task"),
     }
 }
@@ -92,7 +92,7 @@ impl TaskWatch {
     /// Returns the result after the run with this summary.
     #[must_use]
     pub fn result(&self, summary: &Summary) -> TaskResult {
-        self.judge.clone().finish(summary.ending, summary.duration, &mut |_, _| ()).0
+        self.judge.clone().finish(without_outcome(summary), summary.duration, &mut |_, _| ()).0
     }
 }
 
@@ -109,12 +109,11 @@ impl Observer for TaskWatch {
     }
 }
 
-impl From<Ending> for TaskOutcome {
-    /// Returns the outcome of a task without an outcome of its own at the ending of a run.
-    fn from(ending: Ending) -> Self {
-        match ending {
-            Ending::Diverged(_) => Self::Diverged,
-            Ending::Complete | Ending::Interrupted(_) => Self::Unfinished,
-        }
+/// Returns the outcome of a task that had no outcome before the end of a run; `None` if the deadline of the task decides. A run has diverged as
+/// [`Summary::has_diverged`] says.
+pub(crate) fn without_outcome(summary: &Summary) -> Option<TaskOutcome> {
+    match summary.ending {
+        Ending::Complete | Ending::Diverged(_) => summary.has_diverged().then_some(TaskOutcome::Diverged),
+        Ending::Interrupted(_) => Some(TaskOutcome::Unfinished),
     }
 }

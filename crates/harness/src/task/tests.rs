@@ -4,8 +4,8 @@ use cohaptic_scene::{Scene, TaskOutcome};
 use cohaptic_units::Instant;
 
 use super::{Event, Failure, FailureReason, Judge, TaskResult, TaskRow};
+use crate::TickRow;
 use crate::rows::StateRow;
-use crate::{Ending, TickRow};
 
 /// State of one copy at a tick: position, velocity and coupling force.
 type Row = (f64, f64, f64);
@@ -13,10 +13,10 @@ type Row = (f64, f64, f64);
 /// Result and events of a task with the keys `task` in a scene of 10 ms with two peers, `left` and `right`, which both touch. `rows` has the states of both
 /// copies at each millisecond.
 fn judged(task: &str, rows: &[[Row; 2]]) -> (TaskResult, Vec<(u64, Event)>) {
-    judged_until(task, rows, Ending::Complete, 10)
+    judged_until(task, rows, None, 10)
 }
 
-fn judged_until(task: &str, rows: &[[Row; 2]], ending: Ending, duration: u64) -> (TaskResult, Vec<(u64, Event)>) {
+fn judged_until(task: &str, rows: &[[Row; 2]], otherwise: Option<TaskOutcome>, duration: u64) -> (TaskResult, Vec<(u64, Event)>) {
     let text = format!(
         "scene = {{ duration = \"10ms\" }}
          object = {{ mass = 0.45 }}
@@ -49,7 +49,7 @@ fn judged_until(task: &str, rows: &[[Row; 2]], ending: Ending, duration: u64) ->
             judge.on_tick(&row, &mut note);
         }
     }
-    let (result, _) = judge.finish(ending, millis(duration) - Instant::ZERO, &mut note);
+    let (result, _) = judge.finish(otherwise, millis(duration) - Instant::ZERO, &mut note);
     (result, events)
 }
 
@@ -145,12 +145,10 @@ fn the_time_ends_at_the_timeout_and_the_instant_of_the_timeout_still_counts() {
 fn a_run_that_ends_early_leaves_the_task_unfinished_or_diverged() {
     let task = r#"kind = "hold", target = 0.0, radius = 0.01"#;
     let rows = together(&[0.0, 0.0, 0.0]);
-    for (ending, expected) in [
-        (Ending::Interrupted(millis(2)), TaskOutcome::Unfinished),
-        (Ending::Diverged(millis(2)), TaskOutcome::Diverged),
-        (Ending::Complete, TaskOutcome::Done),
-    ] {
-        let (result, events) = judged_until(task, &rows, ending, 2);
+    for (otherwise, expected) in
+        [(Some(TaskOutcome::Unfinished), TaskOutcome::Unfinished), (Some(TaskOutcome::Diverged), TaskOutcome::Diverged), (None, TaskOutcome::Done)]
+    {
+        let (result, events) = judged_until(task, &rows, otherwise, 2);
         assert_eq!(result.outcome, expected);
         assert!(matches!(events.last(), Some((_, Event::Ended { outcome, .. })) if *outcome == expected), "{events:?}");
     }

@@ -140,3 +140,17 @@ fn measures_of_a_task_are_those_of_the_recorded_rows() {
     assert!((value(1) - (squares / count).sqrt()).abs() < 1e-12, "{} {}", value(1), (squares / count).sqrt());
     assert!((value(2) / effort - 1.0).abs() < 1e-12);
 }
+
+/// A run in which copies are a metre apart has diverged, also if its numbers are finite, and so has its task.
+#[test]
+fn the_task_of_a_run_that_diverges_is_not_merely_late() {
+    let outcome = |stiffness: &str| {
+        let text = format!("{SCENE}\n{REACH}").replace("stiffness = 1000.0", &format!("stiffness = {stiffness}"));
+        let scene = scene(&text);
+        let mut watch = TaskWatch::of(&scene).unwrap();
+        let Ok(summary) = Simulation::new(&scene, Model::Least).run(&mut watch);
+        (summary.has_diverged(), watch.result(&summary).outcome)
+    };
+    assert_eq!(outcome("1000.0"), (false, TaskOutcome::Done));
+    assert_eq!(outcome("8000.0"), (true, TaskOutcome::Diverged));
+}
