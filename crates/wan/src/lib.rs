@@ -70,7 +70,7 @@ pub use fates::record::{PacketEvent, PacketRecord, PathPart};
 pub use fates::stats::{CrossCounts, LinkStats};
 pub use laws::chance::{Chance, ChanceError};
 pub use laws::delay as law;
-pub use laws::delay::Distribution;
+pub use laws::delay::distribution::Distribution;
 pub use laws::normal::standard_normal;
 pub use laws::sojourn::Sojourn;
 pub use line::filter::Offered;

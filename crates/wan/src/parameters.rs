@@ -12,9 +12,9 @@ use alloc::vec::Vec;
 #[derive(Debug)]
 pub struct Table {
     /// Groups of keys, in the order of the reference. Several tables can share a group.
-    pub groups: &'static [&'static [Key]],
+    pub(crate) groups: &'static [&'static [Key]],
     /// Function with further keys, made by a registry while the program runs. These keys come after the keys of the groups.
-    pub made: Option<fn() -> &'static [Key]>,
+    pub(crate) made: Option<fn() -> &'static [Key]>,
     /// Form of the value under any further name, or `None` if further names are unknown keys.
     pub others: Option<&'static Form>,
     /// `true` if the table is laid over another table. A missing key then has the value of the table below, and the default only if the table below lacks the

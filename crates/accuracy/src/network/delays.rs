@@ -3,7 +3,8 @@
 use std::hint::black_box;
 use std::time::Duration;
 
-use cohaptic_wan::law::{DistTable, Distribution, Law};
+use cohaptic_wan::Distribution;
+use cohaptic_wan::law::{DistTable, Law};
 use cohaptic_wan::netem::kernel::{Prng, Table};
 use cohaptic_wan::random::unit;
 

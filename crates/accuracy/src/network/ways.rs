@@ -6,7 +6,8 @@
     reason = "written for speed; every number here is small"
 )]
 
-use cohaptic_wan::law::{Distribution, Law};
+use cohaptic_wan::Distribution;
+use cohaptic_wan::law::Law;
 
 /// Returns the compared laws with a delay of 24 ± 2 ms. Laws on a half-line begin at 20 ms.
 ///

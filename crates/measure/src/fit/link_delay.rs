@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use cohaptic_wan::law::{Distribution, Empirical, Law};
+use cohaptic_wan::Distribution;
+use cohaptic_wan::law::{Empirical, Law};
 
 use super::distribution::Candidate;
 use super::link::FittedLaw;

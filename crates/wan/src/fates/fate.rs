@@ -65,7 +65,7 @@ impl DropCause {
 
     /// Returns the cause with the given name, or `None` if no cause has the name.
     #[must_use]
-    pub fn from_name(name: &str) -> Option<Self> {
+    pub(crate) fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|cause| cause.name() == name)
     }
 

@@ -67,7 +67,7 @@ impl KernelNetem {
 
     fn build<T>(&self, seed: u64) -> Result<Qdisc<T>, QdiscError> {
         let table = |wanted: &TableName| self.tables.iter().find(|(name, _)| name == wanted).map(|(_, table)| table.clone());
-        Qdisc::with_tables(&self.words, seed, table)
+        Qdisc::new(&self.words, seed, table)
     }
 }
 
@@ -122,7 +122,8 @@ impl LinkModel {
         self.as_fixed().is_some_and(LinkConfig::is_constant_delay)
     }
 
-    /// Returns the link's delay of every packet of this load, or `None` if the link does more: see [`LinkConfig::constant_delay_of`].
+    /// Returns the link's delay of every packet of this load, or `None` if the link does more. The delay is the transmission time, if no packet waits
+    /// for a transmission, plus the propagation delay.
     #[must_use]
     pub fn constant_delay_of(&self, load: Load) -> Option<Duration> {
         self.as_fixed()?.constant_delay_of(load)

@@ -159,7 +159,7 @@ impl LinkConfig {
     /// Returns the link's delay of every packet of `load`, or `None` if the link does more. The span is the transmission time, if no packet waits for a
     /// transmission, plus the propagation delay.
     #[must_use]
-    pub fn constant_delay_of(&self, load: Load) -> Option<Duration> {
+    pub(crate) fn constant_delay_of(&self, load: Load) -> Option<Duration> {
         let line = self.bottleneck.as_ref().map_or(Some(Duration::ZERO), |bottleneck| bottleneck.time_without_wait(load))?;
         self.without_queues(load).is_constant_delay().then(|| line.saturating_add(self.delay.mean()))
     }

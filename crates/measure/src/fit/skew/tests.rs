@@ -1,6 +1,7 @@
 use std::sync::Arc;
 
-use cohaptic_wan::law::{DistTable, Distribution, Empirical, Law};
+use cohaptic_wan::Distribution;
+use cohaptic_wan::law::{DistTable, Empirical, Law};
 use rand_distr::{Distribution as _, Exp1, StandardNormal};
 
 use super::*;

@@ -1,6 +1,7 @@
 //! Calibration of the statements of `cohaptic fit`.
 
-use cohaptic_wan::law::{Distribution, Law};
+use cohaptic_wan::Distribution;
+use cohaptic_wan::law::Law;
 use rand_distr::{Distribution as _, Exp1, StandardNormal};
 
 use super::{OF_BATCHES, OF_LIKELIHOOD, Tally};

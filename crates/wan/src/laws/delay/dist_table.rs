@@ -38,7 +38,7 @@ pub enum DistTableError {
         /// Word, or its first 24 characters.
         word: Box<str>,
     },
-    /// The file has more than [`DistTable::MOST`] entries.
+    /// The file has more than 16384 entries.
     TooMany {
         /// Line of the first surplus entry.
         line: usize,
@@ -70,7 +70,7 @@ impl core::error::Error for DistTableError {}
 
 impl DistTable {
     /// Largest number of entries for `tc`.
-    pub const MOST: usize = 16_384;
+    pub(crate) const MOST: usize = 16_384;
     /// Entry of one standard deviation.
     pub(crate) const ONE_DEVIATION: f64 = 8192.0;
 

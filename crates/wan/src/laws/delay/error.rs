@@ -51,7 +51,7 @@ pub enum LawError {
         above_floor: f64,
         /// Standard deviation asked for.
         sd: f64,
-        /// Largest standard deviation: [`MAX_VARIATION`](super::MAX_VARIATION) times the mean above the floor.
+        /// Largest standard deviation: 100 times the mean above the floor.
         largest_sd: f64,
     },
     /// The correlation is not a number from −1 to 1.

@@ -32,7 +32,8 @@
 //! numbers beyond ±37.5, a probability of 5·10⁻³⁰⁸, count as ±37.5, so every delay is finite.
 //!
 //! ```
-//! use cohaptic_wan::law::{Distribution, Law};
+//! use cohaptic_wan::Distribution;
+//! use cohaptic_wan::law::Law;
 //!
 //! // Milliseconds: at least 20, on average 24 ± 2.
 //! let law = Law::new(&Distribution::Gamma, 24.0, 2.0, Some(20.0))?;
@@ -44,6 +45,7 @@
 mod correlation;
 mod cut;
 mod dist_table;
+pub(crate) mod distribution;
 mod empirical;
 mod error;
 mod fit;
@@ -56,24 +58,6 @@ mod standard;
 mod tail;
 mod whole;
 
-impl Distribution {
-    /// Returns the name of the law.
-    pub(crate) fn words(&self) -> &'static str {
-        match self {
-            Self::Normal => "normal",
-            Self::Uniform => "uniform",
-            Self::Pareto => "Pareto",
-            Self::ParetoNormal => "Pareto-normal",
-            Self::LogNormal => "lognormal",
-            Self::Gamma => "gamma",
-            Self::Weibull => "Weibull",
-            Self::Laplace => "Laplace",
-            Self::Empirical(_) => "measured",
-            Self::Table(_) => "tabulated",
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests;
 
@@ -81,6 +65,7 @@ use alloc::sync::Arc;
 
 pub(crate) use dist_table::entries as dist_file_entries;
 pub use dist_table::{DistTable, DistTableError};
+pub(crate) use distribution::Distribution;
 pub use empirical::{Empirical, EmpiricalError};
 pub use error::LawError;
 use fit::{Asked, Fit, fit};
@@ -89,34 +74,8 @@ use gamma_map::GammaMap;
 use standard::Standard;
 use tail::Tail;
 
-/// Form of a law. The table of the [module](self) defines each form and its delays at the floor.
-#[derive(Clone, PartialEq, Debug, Default)]
-pub enum Distribution {
-    /// Normal, cut at the floor.
-    #[default]
-    Normal,
-    /// Uniform over µ ± √3·σ.
-    Uniform,
-    /// Pareto of tail index 3, as in netem's table, but exact: its standard deviation is the given one, and its tail has no end.
-    Pareto,
-    /// Mixture of ¼ normal and ¾ Pareto of netem, exact, cut at the floor.
-    ParetoNormal,
-    /// Lognormal from the floor.
-    LogNormal,
-    /// Gamma from the floor.
-    Gamma,
-    /// Weibull from the floor.
-    Weibull,
-    /// Laplace, cut at the floor.
-    Laplace,
-    /// Given values, shifted and stretched to the given mean and deviation.
-    Empirical(Arc<Empirical>),
-    /// Entries of a `.dist` file as netem uses them: σ·entry/8192 around the mean, cut at the floor. Mean and deviation of the delays depend on the table.
-    Table(Arc<DistTable>),
-}
-
 /// Largest standard deviation of a lognormal, gamma or Weibull law, in units of its mean above the floor.
-pub const MAX_VARIATION: f64 = 100.0;
+const MAX_VARIATION: f64 = 100.0;
 
 /// Largest size of standard normal numbers; Φ(−37.5) = 4.6·10⁻³⁰⁸ is still a normal `f64`.
 const LARGEST_NORMAL: f64 = 37.5;

@@ -1,8 +1,8 @@
 //! The behaviour of Linux 6.6 with a netem (`net/sched/sch_netem.c`), draw for draw.
 //!
-//! A [`Qdisc`] is the queueing discipline on a device of infinite speed, without a child and at the root. Offer packets with [`Qdisc::enqueue`], and take
-//! leaving packets with [`Qdisc::dequeue`]. With the same `seed` the decisions are the decisions of the kernel, except for values from the kernel's unseeded
-//! generator (below). The code was written anew from formulas and facts, and contains no code of the kernel.
+//! A link of this model ([`KernelNetem`](crate::KernelNetem)) is the queueing discipline on a device of infinite speed, without a child and at the root. With
+//! the same `seed` the decisions are the decisions of the kernel, except for values from the kernel's unseeded generator (below). The code was written anew
+//! from formulas and facts, and contains no code of the kernel.
 //!
 //! # The way of a packet
 //!
@@ -18,9 +18,9 @@
 //!
 //! # Random numbers
 //!
-//! [`Prng`] is the kernel's generator, seeded by `seed` of the words or of [`Qdisc::new`]. The kernel takes three values from its unseeded generator: the
-//! place of a flipped bit, the gap between slots without a distribution, and the first value of every correlated sequence. Here these values come from a
-//! SplitMix64 (Steele, Lea & Flood 2014), seeded by the seed of [`Qdisc::new`] alone.
+//! [`Prng`] is the kernel's generator, seeded by `seed` of the words or else by the seed of the link. The kernel takes three values from its unseeded
+//! generator: the place of a flipped bit, the gap between slots without a distribution, and the first value of every correlated sequence. Here these values
+//! come from a SplitMix64 (Steele, Lea & Flood 2014), seeded by the seed of the link alone.
 //!
 //! # Rounding by `tc`
 //!
@@ -44,8 +44,9 @@ mod time_fifo;
 
 pub use parameters::QdiscError;
 pub use prng::Prng;
-pub use qdisc::{Dequeued, DropReason, FlippedBit, Output, Qdisc};
 pub use table::Table;
+
+pub(crate) use qdisc::{DropReason, Output, Qdisc};
 
 #[cfg(test)]
 mod tests;

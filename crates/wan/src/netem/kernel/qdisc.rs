@@ -19,7 +19,7 @@ use crate::netem::{Distribution, Netem, SlotGap, TableName};
 /// decisions, call [`dequeue`](Self::dequeue) until `None` is returned, after every [`enqueue`](Self::enqueue) and at [`next_at`](Self::next_at), and at no
 /// other time. Time must not go back.
 #[derive(Clone, Debug)]
-pub struct Qdisc<T> {
+pub(crate) struct Qdisc<T> {
     parameters: Parameters,
     table: Option<Table>,
     loss: LossModel,
@@ -33,23 +33,30 @@ pub struct Qdisc<T> {
     /// Number of packets delayed since the last reordering.
     counter: u32,
     /// Packets without delay, and the times of their arrival \[ns\]. The newest packet leaves first.
-    reordered: Vec<(i64, Packet<T>)>,
+    pub(super) reordered: Vec<(i64, Packet<T>)>,
     line: TimeFifo<Packet<T>>,
 }
 
-#[derive(Clone, Debug)]
-struct Packet<T> {
-    item: T,
+/// A packet in the qdisc, or on its way out.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct Packet<T> {
+    /// The packet, as offered.
+    pub(crate) item: T,
+    /// Length of the packet as offered \[bytes\].
     size: u32,
-    copy: u8,
+    /// 0 for the packet, 1 for its copy.
+    pub(crate) copy: u8,
+    /// Whether the packet can carry a congestion mark.
     ect: bool,
-    marked: bool,
-    corrupted: Option<FlippedBit>,
+    /// `true` if the packet was marked instead of lost. The kernel counts the mark as a drop.
+    pub(crate) marked: bool,
+    /// The flipped bit, or `None`. The kernel completes checksums before the flip of the bit, so a host with verification of checksums drops the packet.
+    pub(crate) corrupted: Option<FlippedBit>,
 }
 
 /// An event of a packet in the call of its offer.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub enum Output<T> {
+pub(crate) enum Output<T> {
     /// A copy of the packet was made. Packet and copy go on separately, and the events of the copy come first.
     Duplicated,
     /// The packet or its copy was dropped.
@@ -65,56 +72,30 @@ pub enum Output<T> {
 
 /// The reason of a drop.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum DropReason {
+pub(crate) enum DropReason {
     /// The loss model lost the packet.
     Loss,
     /// The qdisc held `limit` packets already.
     Limit,
 }
 
-/// A packet on its way out of the qdisc.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Dequeued<T> {
-    /// The packet, as offered.
-    pub item: T,
-    /// Length of the packet as offered \[bytes\].
-    pub size: u32,
-    /// 0 for the packet, 1 for its copy.
-    pub copy: u8,
-    /// `true` if the packet was marked instead of lost. The kernel counts the mark as a drop.
-    pub marked: bool,
-    /// The flipped bit, or `None`. The kernel completes checksums before the flip of the bit, so a host with verification of checksums drops the packet.
-    pub corrupted: Option<FlippedBit>,
-    /// `true` if the packet left before waiting packets.
-    pub reordered: bool,
-}
-
 /// The place of a flipped bit.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct FlippedBit {
+pub(crate) struct FlippedBit {
     /// Index of the byte, from the beginning of the Ethernet header.
-    pub byte: u32,
+    pub(crate) byte: u32,
     /// Index of the bit in the byte, 0 for the least significant.
-    pub bit: u8,
+    pub(crate) bit: u8,
 }
 
 impl<T> Qdisc<T> {
     /// Makes the qdisc in its state right after `tc` has added the qdisc, at [`Instant::ZERO`]. `seed` seeds the values from the kernel's unseeded generator,
-    /// and also the seeded generator if the words have no `seed`.
+    /// and also the seeded generator if the words have no `seed`. `tables` returns the tables of distributions that are not built in.
     ///
     /// # Errors
     ///
-    /// [`QdiscError`] if options contradict each other, a delay does not fit into the ticks of `tc`, or a distribution is not built in.
-    pub fn new(netem: &Netem, seed: u64) -> Result<Self, QdiscError> {
-        Self::with_tables(netem, seed, |_| None)
-    }
-
-    /// Makes the qdisc like [`new`](Self::new). `tables` gives the tables of distributions that are not built in.
-    ///
-    /// # Errors
-    ///
-    /// Like [`new`](Self::new); a distribution is unknown if `tables` returns `None`.
-    pub fn with_tables(netem: &Netem, seed: u64, mut tables: impl FnMut(&TableName) -> Option<Table>) -> Result<Self, QdiscError> {
+    /// [`QdiscError`] if options contradict each other, a delay does not fit into the ticks of `tc`, or `tables` returns `None`.
+    pub(crate) fn new(netem: &Netem, seed: u64, mut tables: impl FnMut(&TableName) -> Option<Table>) -> Result<Self, QdiscError> {
         netem.check()?;
         let parameters = Parameters::new(netem)?;
         let mut table = |distribution: &Distribution| match distribution {
@@ -158,21 +139,15 @@ impl<T> Qdisc<T> {
 
     /// Returns the number of packets held, copies included. `limit` is the limit of this number.
     #[must_use]
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.reordered.len() + self.line.len()
-    }
-
-    /// Returns whether no packet is held.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// Returns the instant of the next call of [`dequeue`](Self::dequeue), or `None` if no packet is held. The instant may change with every call.
     ///
     /// No packet leaves before this instant. With slots a packet may leave later: the call then opens another slot first, and the instant moves on.
     #[must_use]
-    pub fn next_at(&self) -> Option<Instant> {
+    pub(crate) fn next_at(&self) -> Option<Instant> {
         let time = match self.reordered.last() {
             Some((time, _)) => *time,
             None => self.line.first_time()?.max(self.slots.as_ref().map_or(i64::MIN, |slots| slots.next)),
@@ -182,10 +157,10 @@ impl<T> Qdisc<T> {
     }
 
     /// Removes and returns a packet with its departure at `now`, or returns `None` if no further packet leaves.
-    pub fn dequeue(&mut self, now: Instant) -> Option<Dequeued<T>> {
+    pub(crate) fn dequeue(&mut self, now: Instant) -> Option<Packet<T>> {
         // Reordered packets leave before all further packets, and use no slot.
         if let Some((_, packet)) = self.reordered.pop() {
-            return Some(packet.leave(true));
+            return Some(packet);
         }
         let now = nanos(now);
         let time = self.line.first_time()?;
@@ -207,14 +182,14 @@ impl<T> Qdisc<T> {
         {
             slots.advance(now, &mut self.prng, &mut self.unseeded);
         }
-        Some(packet.leave(false))
+        Some(packet)
     }
 }
 
 impl<T: Clone> Qdisc<T> {
     /// Offers a packet of `size` bytes. The size **includes** the 14 bytes of the Ethernet header, as counted by the kernel (an overhead of −14 in `rate`
     /// subtracts these bytes again). `ect` says whether the packet can carry a congestion mark. `out` is called for each event of the packet in this call.
-    pub fn enqueue(&mut self, now: Instant, size: u32, ect: bool, item: T, out: &mut impl FnMut(Output<T>)) {
+    pub(crate) fn enqueue(&mut self, now: Instant, size: u32, ect: bool, item: T, out: &mut impl FnMut(Output<T>)) {
         let packet = Packet { item, size, copy: 0, ect, marked: false, corrupted: None };
         self.admit(nanos(now), packet, out);
     }
@@ -278,12 +253,6 @@ impl<T: Clone> Qdisc<T> {
             Some(last) => last.saturating_add(delay.wrapping_sub(last.wrapping_sub(now)).max(0)),
         };
         ready.saturating_add(airtime.of(size).cast_signed())
-    }
-}
-
-impl<T> Packet<T> {
-    fn leave(self, reordered: bool) -> Dequeued<T> {
-        Dequeued { item: self.item, size: self.size, copy: self.copy, marked: self.marked, corrupted: self.corrupted, reordered }
     }
 }
 

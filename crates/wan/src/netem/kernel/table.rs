@@ -3,7 +3,7 @@
 use alloc::boxed::Box;
 use core::f64::consts::SQRT_2;
 
-use crate::laws::delay::{DistTable, DistTableError, dist_file_entries};
+use crate::laws::delay::{DistTableError, dist_file_entries};
 
 /// An inverse distribution function at equal steps, in multiples of 1/8192 of the standard deviation: the content of a `.dist` file.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -12,17 +12,8 @@ pub struct Table {
 }
 
 impl Table {
-    /// Number of entries for the kernel, at most.
-    pub const LONGEST: usize = DistTable::MOST;
-
-    /// Makes a table of these entries. Returns `None` unless there are 1 to 16384 entries.
-    #[must_use]
-    pub fn new(entries: impl Into<Box<[i16]>>) -> Option<Self> {
-        let entries = entries.into();
-        (1..=Self::LONGEST).contains(&entries.len()).then_some(Self { entries })
-    }
-
-    /// Reads a `.dist` file like [`DistTable::parse`], and keeps the order of the file, because the kernel draws an index into the file's order.
+    /// Reads a `.dist` file like [`DistTable::parse`](crate::law::DistTable::parse), and keeps the order of the file, because the kernel draws an index into
+    /// the file's order.
     ///
     /// # Errors
     ///

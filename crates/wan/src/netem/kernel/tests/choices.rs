@@ -1,8 +1,9 @@
 //! Decisions packet by packet: duplication, loss, marks, and flipped bits.
 
 use crate::netem::Netem;
+use crate::netem::kernel::qdisc::FlippedBit;
 use crate::netem::kernel::tests::{Driver, SIZE, at, qdisc, run};
-use crate::netem::kernel::{DropReason, FlippedBit, Output, Prng, Qdisc, QdiscError, Table};
+use crate::netem::kernel::{DropReason, Output, Prng, Qdisc, QdiscError, Table};
 
 /// Collects the outputs of `enqueue` for one packet.
 fn told(words: &str, ect: bool) -> (Vec<Output<u64>>, Qdisc<u64>) {
@@ -121,12 +122,12 @@ fn the_seed_of_the_words_decides() {
 #[test]
 fn a_distribution_that_nobody_has_is_refused_and_one_that_is_given_is_used() {
     let netem = Netem::parse("delay 10ms 1ms distribution mine").unwrap();
-    let refused = Qdisc::<u64>::new(&netem, 1).unwrap_err();
+    let refused = Qdisc::<u64>::new(&netem, 1, |_| None).unwrap_err();
     assert!(matches!(&refused, QdiscError::UnknownTable { name } if name.as_str() == "mine"));
-    let mut qdisc = Qdisc::with_tables(&netem, 1, |_| Table::parse("8192").ok()).unwrap();
+    let mut qdisc = Qdisc::new(&netem, 1, |_| Table::parse("8192").ok()).unwrap();
     qdisc.enqueue(at(0), SIZE, false, 1, &mut |_| {});
     assert_eq!(qdisc.next_at(), Some(at(11_000_000)));
     let mut contradiction = netem;
     contradiction.ecn = true;
-    assert!(matches!(Qdisc::<u64>::new(&contradiction, 1), Err(QdiscError::Contradiction(_))));
+    assert!(matches!(Qdisc::<u64>::new(&contradiction, 1, |_| None), Err(QdiscError::Contradiction(_))));
 }

@@ -10,7 +10,8 @@ mod tables;
 
 use cohaptic_units::Instant;
 
-use super::{Dequeued, DropReason, Output, Qdisc};
+use super::qdisc::Packet;
+use super::{DropReason, Output, Qdisc};
 use crate::netem::Netem;
 
 /// Length of packets \[bytes\] in tests in which the length does not matter.
@@ -22,14 +23,30 @@ fn at(nanos: u64) -> Instant {
 
 fn qdisc(words: &str, seed: u64) -> Qdisc<u64> {
     let netem = Netem::parse(words).unwrap_or_else(|error| panic!("{}", error.excerpt(words)));
-    Qdisc::new(&netem, seed).unwrap_or_else(|error| panic!("{words}: {error}"))
+    Qdisc::new(&netem, seed, |_| None).unwrap_or_else(|error| panic!("{words}: {error}"))
+}
+
+/// A packet that left.
+#[derive(PartialEq, Debug)]
+struct Left {
+    packet: Packet<u64>,
+    /// `true` if the packet left before waiting packets.
+    reordered: bool,
+}
+
+impl core::ops::Deref for Left {
+    type Target = Packet<u64>;
+
+    fn deref(&self) -> &Packet<u64> {
+        &self.packet
+    }
 }
 
 /// Fates of packets that are numbered from 0.
 #[derive(Default)]
 struct Run {
     /// Packets that left, with their instants, in the order in which they left.
-    delivered: Vec<(Instant, Dequeued<u64>)>,
+    delivered: Vec<(Instant, Left)>,
     lost: Vec<u64>,
     over_limit: Vec<u64>,
     duplicated: u64,
@@ -47,8 +64,10 @@ impl Driver {
     }
 
     fn drain(&mut self, now: Instant) {
-        while let Some(packet) = self.qdisc.dequeue(now) {
-            self.run.delivered.push((now, packet));
+        loop {
+            let reordered = !self.qdisc.reordered.is_empty();
+            let Some(packet) = self.qdisc.dequeue(now) else { return };
+            self.run.delivered.push((now, Left { packet, reordered }));
         }
     }
 
@@ -72,7 +91,7 @@ impl Driver {
 
     fn finish(mut self) -> Run {
         self.advance(Instant::MAX);
-        assert!(self.qdisc.is_empty());
+        assert_eq!(self.qdisc.len(), 0);
         self.run
     }
 }

@@ -191,7 +191,7 @@ fn drain(qdisc: &mut Qdisc<u64>, naive: &mut Naive, now: u64) -> Result<(u64, u6
 proptest! {
     #[test]
     fn the_queue_does_what_a_sorted_vector_does(netem in netem(), operations in operations(), seed in any::<u64>()) {
-        let mut qdisc = Qdisc::new(&netem, seed).unwrap();
+        let mut qdisc = Qdisc::new(&netem, seed, |_| None).unwrap();
         let mut naive = Naive::new(&netem, seed);
         let (mut now, mut offered, mut copied, mut dropped, mut left) = (0, 0_u64, 0_u64, 0_u64, 0);
         for (wait, size) in operations {
@@ -233,7 +233,7 @@ proptest! {
         seed in any::<u64>(),
     ) {
         let table = |_: &crate::netem::TableName| crate::netem::kernel::Table::parse("-8192 0 8192").ok();
-        let Ok(mut qdisc) = Qdisc::with_tables(&netem, seed, table) else { return Ok(()) };
+        let Ok(mut qdisc) = Qdisc::new(&netem, seed, table) else { return Ok(()) };
         let (mut offered, mut copied, mut dropped, mut left, mut now) = (0, 0, 0, 0, 0);
         for size in sizes {
             now += spacing;

@@ -153,8 +153,7 @@ impl CrossTraffic {
     }
 
     /// Returns the mean rate in the long run \[bit/s\], framing not counted; 0 for a recording, because a recording ends.
-    #[must_use]
-    pub fn mean_rate(&self) -> f64 {
+    fn mean_rate(&self) -> f64 {
         match &self.0 {
             Source::Poisson(poisson) => bits_per_second(poisson.rate),
             Source::OnOff(on_off) => {
