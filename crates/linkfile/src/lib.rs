@@ -25,6 +25,10 @@
 mod address;
 pub mod document;
 mod fingerprint;
+/// Library of links with a name: each link with the sources of its numbers, the way from the sources to the numbers, and what is not modelled.
+pub mod library {
+    pub use crate::link::library::*;
+}
 pub mod link;
 pub mod mesh;
 mod quantity_text;
@@ -34,9 +38,10 @@ pub mod router;
 pub mod schema;
 
 pub use address::{AddressError, address};
-pub use document::{Diagnostic, FileError};
+pub use document::error::{Diagnostic, FileError};
 pub use fingerprint::{Fingerprint, FingerprintError};
-pub use link::library;
-pub use mesh::{KeysOfLinks, LinkChange, LinkKeys, LinkSelector, LinkTable, link_from_keys};
+pub use mesh::link_keys::{KeysOfLinks, LinkKeys, link_from_keys};
+pub use mesh::link_table::{LinkChange, LinkTable};
+pub use mesh::selector::LinkSelector;
 pub use quantity_text::{number_and_unit, text_of_quantity};
 pub use relay::{RelayChange, RelayFile, RelayLimits, RelayProgram, relay_link_keys_of_text};

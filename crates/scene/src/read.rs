@@ -4,13 +4,13 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use cohaptic_linkfile::FileError;
 use cohaptic_linkfile::document::{BEGINNING, Node, Sources, Value};
 use cohaptic_linkfile::link::read_modulators;
-use cohaptic_linkfile::mesh::{LinkClasses, LinkSelector, OnLinks, read_links};
+use cohaptic_linkfile::mesh::{LinkClasses, OnLinks, read_links};
 use cohaptic_linkfile::reading::{Context, Parsed, TableReader, default_title, parse, with_text};
 use cohaptic_linkfile::schema::link::{LINK_ENTRY, LINK_TABLE, MODULATOR};
 use cohaptic_linkfile::schema::{Form, Table, optional, required};
+use cohaptic_linkfile::{FileError, LinkSelector};
 use cohaptic_units::Instant;
 
 use crate::context::SceneContext;

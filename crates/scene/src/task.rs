@@ -118,7 +118,7 @@ pub enum TaskOutcome {
 
 impl TaskOutcome {
     /// Every outcome with its name and description.
-    pub const ALL: [(&'static str, Self, &'static str); 5] = [
+    pub(crate) const ALL: [(&'static str, Self, &'static str); 5] = [
         ("done", Self::Done, "all that was asked for was done"),
         ("timed-out", Self::TimedOut, "the time was over first"),
         ("failed", Self::Failed, "a judged peer failed"),

@@ -15,7 +15,7 @@
 //! let size: Bytes = parse::size("64B")?;
 //! let departure = Instant::ZERO + rate.serialisation_time(size);
 //! assert_eq!(departure.as_nanos(), 512_000);
-//! # Ok::<(), cohaptic_units::ParseError>(())
+//! # Ok::<(), parse::ParseError>(())
 //! ```
 #![cfg_attr(not(test), no_std)]
 #![cfg_attr(test, allow(clippy::float_cmp, clippy::cast_precision_loss, reason = "tests compare exact values and count samples"))]
@@ -35,7 +35,6 @@ mod visible;
 pub use excerpt::{Excerpt, Spot};
 pub use frequency::{Hertz, RadPerSec};
 pub use instant::Instant;
-pub use parse::ParseError;
 pub use probability::{Probability, ProbabilityError};
 pub use rate::Rate;
 pub use size::Bytes;

@@ -11,17 +11,17 @@ use super::error::{Diagnostic, Origin, shorten};
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub struct Place {
     /// Source text: 0 for the file, i for the i-th override, counted from 1.
-    pub source: usize,
+    pub(crate) source: usize,
     /// Index of the first byte.
-    pub start: usize,
+    pub(crate) start: usize,
     /// Index after the last byte.
-    pub end: usize,
+    pub(crate) end: usize,
 }
 
 impl Place {
     /// Returns the place of a span of bytes in the source with the number `source`.
     #[must_use]
-    pub const fn new(source: usize, span: Range<usize>) -> Self {
+    pub(crate) const fn new(source: usize, span: Range<usize>) -> Self {
         Self { source, start: span.start, end: span.end }
     }
 }
@@ -43,13 +43,13 @@ pub struct Sources<'a> {
 impl Sources<'_> {
     /// Returns the source text that contains a place.
     #[must_use]
-    pub fn text_of(&self, place: Place) -> &str {
+    pub(crate) fn text_of(&self, place: Place) -> &str {
         place.source.checked_sub(1).and_then(|index| self.overrides.get(index)).map_or(self.text, String::as_str)
     }
 
     /// Returns a diagnostic for a place, with the dotted path of the key and the message.
     #[must_use]
-    pub fn diagnostic(&self, place: Place, key: String, message: String) -> Diagnostic {
+    pub(crate) fn diagnostic(&self, place: Place, key: String, message: String) -> Diagnostic {
         // Source 0 is the file, and has no override.
         let given = place.source.checked_sub(1).and_then(|index| self.overrides.get(index));
         let (origin, text) = match given {
@@ -61,7 +61,7 @@ impl Sources<'_> {
 
     /// Describes a place for a note: `two.toml:6:9` in the file, `--set KEY=VALUE` in an override.
     #[must_use]
-    pub fn describe(&self, place: Place) -> String {
+    pub(crate) fn describe(&self, place: Place) -> String {
         let diagnostic = self.diagnostic(place, String::new(), String::new());
         match &diagnostic.origin {
             Origin::File(path) => format!("{}:{}:{}", path.display(), diagnostic.line(), diagnostic.column()),

@@ -75,7 +75,7 @@ impl Node {
     /// # Errors
     ///
     /// [`TooDeep`] beyond 16 levels.
-    pub fn value(value: &toml::Spanned<DeValue<'_>>, path: String, source: usize, offset: usize) -> Result<Self, TooDeep> {
+    pub(crate) fn value(value: &toml::Spanned<DeValue<'_>>, path: String, source: usize, offset: usize) -> Result<Self, TooDeep> {
         Self::convert(value, path, source, offset, 1)
     }
 
@@ -160,7 +160,7 @@ impl Node {
 
     /// Returns a copy of this table without the keys `keys`.
     #[must_use]
-    pub fn without(&self, keys: &[&str]) -> Self {
+    pub(crate) fn without(&self, keys: &[&str]) -> Self {
         let mut node = self.clone();
         if let Value::Table(table) = &mut node.value {
             table.0.retain(|entry| !keys.contains(&entry.name.as_str()));
@@ -196,7 +196,7 @@ impl Table {
     }
 
     /// Returns the value under a key. A missing value is made by `make` and added last, with the key at the place `key`.
-    pub fn get_or_insert(&mut self, name: &str, key: Place, make: impl FnOnce() -> Node) -> &mut Node {
+    pub(crate) fn get_or_insert(&mut self, name: &str, key: Place, make: impl FnOnce() -> Node) -> &mut Node {
         let index = self.0.iter().position(|entry| entry.name == name).unwrap_or_else(|| {
             self.0.push(Entry { name: name.to_owned(), key, node: Arc::new(make()) });
             self.0.len() - 1
@@ -205,7 +205,7 @@ impl Table {
     }
 
     /// Sets the value under a key. The key moves to the end of the table, because the new value is laid over all keys before.
-    pub fn insert(&mut self, name: &str, key: Place, node: Node) {
+    pub(crate) fn insert(&mut self, name: &str, key: Place, node: Node) {
         self.0.retain(|entry| entry.name != name);
         self.0.push(Entry { name: name.to_owned(), key, node: Arc::new(node) });
     }

@@ -7,7 +7,7 @@ use cohaptic_wan::{LINK_KIND_PARAMETERS, LINK_PARAMETERS};
 /// Keys of a link of any kind, in the order of the reference.
 pub const LINK: [&[Key]; 17] = joined(&[&LINK_PARAMETERS, &[&LINK_KIND_PARAMETERS, &PROFILE]]);
 
-/// Key that takes a link of the [library](crate::link::library).
+/// Key that takes a link of the [library](crate::library).
 const PROFILE: [Key; 1] = [usual(
     "profile",
     Form::Like(&["starlink/up", "transatlantic", "none"]),
@@ -21,7 +21,7 @@ pub static LINK_TABLE: Table = Table::of(&LINK);
 pub(crate) static LINK_CHANGE: Table = Table::over(&LINK);
 
 /// Keys of the two ends of a link.
-pub const ENDS: [Key; 2] = [required("from", Form::Text, "Name of the sender"), required("to", Form::Text, "Name of the receiver")];
+pub(crate) const ENDS: [Key; 2] = [required("from", Form::Text, "Name of the sender"), required("to", Form::Text, "Name of the receiver")];
 /// Table of an entry `[\[links\]]`: both ends, and keys laid over those of `[link]`.
 pub static LINK_ENTRY: Table = Table::over(&joined::<18>(&[&[&ENDS], &LINK]));
 

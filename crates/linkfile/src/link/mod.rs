@@ -6,7 +6,7 @@ mod cross_traffic;
 mod delay;
 mod distribution;
 pub(crate) mod keys;
-pub mod library;
+pub(crate) mod library;
 mod listed;
 mod loss;
 mod loss_pattern;

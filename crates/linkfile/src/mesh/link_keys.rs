@@ -79,7 +79,7 @@ pub struct LinkKeys {
 impl LinkKeys {
     /// Returns the keys of a table, in a file with the given modulators.
     #[must_use]
-    pub fn of_table(table: &Table, modulators: &Arc<Modulators>) -> Self {
+    pub(crate) fn of_table(table: &Table, modulators: &Arc<Modulators>) -> Self {
         Self { keys: keys_of(table), modulators: Arc::clone(modulators) }
     }
 

@@ -83,11 +83,11 @@ pub struct Context<'a> {
     /// Names of the ends of links. `None` before the list is read, and if the list was refused.
     pub names: Option<&'a Names>,
     /// Modulators of the file. `None` before the list is read, and if the list was refused.
-    pub modulators: Option<&'a Arc<Modulators>>,
+    pub(crate) modulators: Option<&'a Arc<Modulators>>,
     /// `true` if a table is read without the table below, over which the table will be laid. No key is reported as missing then.
     pub partial: bool,
     /// Length of the run. `None` if the run has no fixed end, or if the time was refused.
-    pub ends: Option<Duration>,
+    pub(crate) ends: Option<Duration>,
 }
 
 impl<'a> Context<'a> {

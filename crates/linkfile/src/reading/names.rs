@@ -16,7 +16,7 @@ pub struct Names {
 impl Names {
     /// Returns an empty list of names for ends that messages call `noun`. [`Names::default`] is an empty list for peers.
     #[must_use]
-    pub fn of(noun: &'static str) -> Self {
+    pub(crate) fn of(noun: &'static str) -> Self {
         Self { noun: Some(noun), ..Self::default() }
     }
 

@@ -68,7 +68,7 @@ impl<'a> TableReader<'a> {
     }
 
     /// Returns the names of all given keys, in the order of laying over.
-    pub fn names(&self) -> impl Iterator<Item = &'a str> {
+    pub(crate) fn names(&self) -> impl Iterator<Item = &'a str> {
         self.table.0.iter().map(|entry| entry.name.as_str())
     }
 

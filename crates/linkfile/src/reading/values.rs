@@ -2,7 +2,8 @@
 
 use core::time::Duration;
 
-use cohaptic_units::{Bytes, Instant, ParseError, Probability, Rate, parse};
+use cohaptic_units::parse::{self, ParseError};
+use cohaptic_units::{Bytes, Instant, Probability, Rate};
 use cohaptic_wan::ParameterValue;
 use cohaptic_wan::parameters::{Form, Key};
 
@@ -120,7 +121,7 @@ pub fn written(node: &Node) -> String {
 }
 
 /// Reads an integer in a range, both ends included.
-pub fn integer(node: &Node, context: Context<'_>, range: core::ops::RangeInclusive<u64>, expected: &str) -> Option<u64> {
+pub(crate) fn integer(node: &Node, context: Context<'_>, range: core::ops::RangeInclusive<u64>, expected: &str) -> Option<u64> {
     let Value::Integer(integer) = &node.value else {
         context.fault_at(node, format!("found {}: expected {expected}", node.describe()));
         return None;
@@ -199,12 +200,12 @@ pub fn instant(node: &Node, context: Context<'_>) -> Option<Instant> {
 }
 
 /// Reads a rate such as "10Mbit".
-pub fn rate(node: &Node, context: Context<'_>) -> Option<Rate> {
+pub(crate) fn rate(node: &Node, context: Context<'_>) -> Option<Rate> {
     quantity(node, context, parse::rate)
 }
 
 /// Reads a size such as "1500B".
-pub fn size(node: &Node, context: Context<'_>) -> Option<Bytes> {
+pub(crate) fn size(node: &Node, context: Context<'_>) -> Option<Bytes> {
     quantity(node, context, parse::size)
 }
 
@@ -235,7 +236,7 @@ pub(crate) fn signed_size(node: &Node, context: Context<'_>) -> Option<i32> {
 
 /// Parses a number of packets such as "100 packets". Returns `None`, without a fault, for any other text.
 #[must_use]
-pub fn packets(text: &str) -> Option<u64> {
+pub(crate) fn packets(text: &str) -> Option<u64> {
     let number = text.trim().strip_suffix("packets").or_else(|| text.trim().strip_suffix("packet"))?.trim();
     // `parse` also takes a sign, so the digits are checked here.
     let plain = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
@@ -243,7 +244,7 @@ pub fn packets(text: &str) -> Option<u64> {
 }
 
 /// Reports why the emulator refuses the values `nodes` together, at the value written last, or at `fallback` if no value is given.
-pub fn refuse(context: Context<'_>, nodes: &[Option<&Node>], fallback: &Node, error: &dyn core::fmt::Display) {
+pub(crate) fn refuse(context: Context<'_>, nodes: &[Option<&Node>], fallback: &Node, error: &dyn core::fmt::Display) {
     let last = nodes.iter().copied().flatten().max_by_key(|node| node.place);
     let error = error.to_string();
     let message = if error.contains("expected") { error } else { format!("{error}: expected another value") };

@@ -13,27 +13,7 @@ pub struct Network {
     prefix: u8,
 }
 
-/// Error: the prefix has more bits than the address.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[error("a prefix of {prefix} bits is longer than an address of {bits}")]
-pub struct PrefixTooLong {
-    /// Length of the prefix \[bits\].
-    pub prefix: u8,
-    /// Length of an address of this family \[bits\].
-    pub bits: u8,
-}
-
 impl Network {
-    /// Returns the network of an address, with the length of the prefix in bits.
-    ///
-    /// # Errors
-    ///
-    /// [`PrefixTooLong`] beyond 32 bits for IPv4 and 128 for IPv6.
-    pub const fn new(address: IpAddr, prefix: u8) -> Result<Self, PrefixTooLong> {
-        let bits = if address.is_ipv4() { 32 } else { 128 };
-        if prefix > bits { Err(PrefixTooLong { prefix, bits }) } else { Ok(Self { address, prefix }) }
-    }
-
     /// Returns the address as given, including the bits after the prefix.
     #[must_use]
     pub const fn address(self) -> IpAddr {
@@ -93,7 +73,8 @@ impl FromStr for Network {
             None if address.is_ipv4() => 32,
             None => 128,
         };
-        Self::new(address, prefix).map_err(|_| NoNetwork)
+        let bits = if address.is_ipv4() { 32 } else { 128 };
+        if prefix > bits { Err(NoNetwork) } else { Ok(Self { address, prefix }) }
     }
 }
 
@@ -126,6 +107,5 @@ mod tests {
         {
             assert_eq!(text.parse::<Network>(), Err(NoNetwork), "{text}");
         }
-        assert_eq!(Network::new(IpAddr::from([10, 0, 0, 1]), 33), Err(PrefixTooLong { prefix: 33, bits: 32 }));
     }
 }

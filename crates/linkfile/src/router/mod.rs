@@ -29,5 +29,5 @@ pub(crate) mod read;
 mod rules;
 mod sides;
 
-pub use address::{Network, NoNetwork, PrefixTooLong};
+pub use address::{Network, NoNetwork};
 pub use model::{Attachment, InterfaceSpec, Memory, NamedLink, Ports, Protocol, RouterFile, RuleSpec, Side, Target, TunSpec};

@@ -206,7 +206,7 @@ impl Protocol {
     pub const ICMPV6: Self = Self(58);
 
     /// Protocols with a name in router files, each after the name.
-    pub const NAMED: [(&'static str, Self); 4] = [("tcp", Self::TCP), ("udp", Self::UDP), ("icmp", Self::ICMP), ("icmpv6", Self::ICMPV6)];
+    pub(crate) const NAMED: [(&'static str, Self); 4] = [("tcp", Self::TCP), ("udp", Self::UDP), ("icmp", Self::ICMP), ("icmpv6", Self::ICMPV6)];
 
     /// Returns whether the router can read the ports of packets of this protocol: TCP and UDP.
     #[must_use]

@@ -79,7 +79,7 @@ impl ProfileName {
     /// # Errors
     ///
     /// [`NameError`] if the name has no direction and the directions of the profile differ.
-    pub fn one_direction(&self) -> Result<Direction, NameError> {
+    pub(crate) fn one_direction(&self) -> Result<Direction, NameError> {
         let name = &self.profile.name;
         match self.direction {
             Some(direction) => Ok(direction),
