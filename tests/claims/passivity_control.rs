@@ -3,9 +3,9 @@
 //! **Claim** (derived in `docs/claims.md`). W ≤ U + N·reserve at every tick, with W as in [`crate::claims::injected`] and U what the springs store at the beginning.
 
 use cohaptic_harness::{Model, Simulation};
-use cohaptic_peer::coordination::{Command, Context, LawValue};
+use cohaptic_peer::coordination::LawValue;
 use cohaptic_peer::wire::SampleKind;
-use cohaptic_peer::{Coordination, Gains, Held, State};
+use cohaptic_peer::{Command, Context, Coordination, Gains, Held, State};
 use cohaptic_scene::{Scene, Strategies};
 use cohaptic_tests::{Draft, keep, run};
 use proptest::prelude::*;

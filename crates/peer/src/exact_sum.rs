@@ -21,7 +21,7 @@ const MOST_ADDITIONS: u32 = 1 << 30;
 /// Each number is added to three digits of base 2³² in an integer that can hold all finite numbers (the small superaccumulator of Neal 2015, *Fast exact
 /// summation using small and large superaccumulators*). The sum is therefore the same in any order, and [`ExactSum::mean`] rounds once.
 #[derive(Clone, Debug)]
-pub struct ExactSum {
+pub(crate) struct ExactSum {
     /// Digits of base 2³² with signs, the least digit first. Between two carries a digit may exceed its base.
     digits: [i64; DIGITS],
     /// First digit ever changed, and the digit after the last digit ever changed.
@@ -39,19 +39,19 @@ impl Default for ExactSum {
 impl ExactSum {
     /// Returns a sum of zero.
     #[must_use]
-    pub const fn new() -> Self {
+    pub(crate) const fn new() -> Self {
         Self { digits: [0; DIGITS], reached: (DIGITS as u8, 0), additions: 0 }
     }
 
     /// Adds a finite number. After an infinite number or a NaN the sum is unspecified.
     #[inline]
-    pub fn add(&mut self, number: f64) {
+    pub(crate) fn add(&mut self, number: f64) {
         self.change(number.to_bits());
     }
 
     /// Subtracts a finite number.
     #[inline]
-    pub fn subtract(&mut self, number: f64) {
+    pub(crate) fn subtract(&mut self, number: f64) {
         self.change((-number).to_bits());
     }
 
@@ -62,7 +62,7 @@ impl ExactSum {
     ///
     /// [1]: https://en.wikipedia.org/wiki/2Sum
     #[inline]
-    pub fn replace(&mut self, before: f64, now: f64) {
+    pub(crate) fn replace(&mut self, before: f64, now: f64) {
         let difference = now - before;
         let rounded = difference - now;
         let error = (now - (difference - rounded)) - (before + rounded);
@@ -119,7 +119,7 @@ impl ExactSum {
     ///
     /// If `count` is zero.
     #[must_use]
-    pub fn mean(&self, count: u32) -> f64 {
+    pub(crate) fn mean(&self, count: u32) -> f64 {
         assert!(count > 0, "a mean is one of something");
         let Some((digits, is_negative)) = self.magnitude() else { return 0.0 };
         // Digits below FRACTION are zero, so the most significant digit is at FRACTION or above, and `top - 3` does not underflow.
@@ -140,7 +140,7 @@ impl ExactSum {
 
     /// Returns [`ExactSum::mean`] of the `count` numbers that remain without `number`.
     #[must_use]
-    pub fn mean_without(&self, number: f64, count: u32) -> f64 {
+    pub(crate) fn mean_without(&self, number: f64, count: u32) -> f64 {
         let mut others = self.clone();
         others.subtract(number);
         others.mean(count)

@@ -17,7 +17,7 @@ use crate::lead::{Lead, Moving};
 /// Until the first arrival, the initial state of a sender is held. The mean is stored until a sample changes it.
 ///
 /// Below [`EXACT_FROM`] samples the mean is a sum in a fixed order, divided by the number of samples. From [`EXACT_FROM`] samples on it is the exact mean,
-/// rounded once ([`ExactSum`](crate::ExactSum)), and an update takes a time that does not grow with the number of samples.
+/// rounded once, and an update takes a time that does not grow with the number of samples.
 #[derive(Clone, Debug)]
 pub struct Held<const A: usize> {
     /// Held samples, indexed by place: the senders in the order of peers, without the holder.
@@ -210,7 +210,7 @@ impl<const A: usize> Held<A> {
     /// # Panics
     ///
     /// If the index `place` is out of range.
-    pub fn hold(&mut self, place: usize, sent: Instant, state: State<A>) {
+    pub(crate) fn hold(&mut self, place: usize, sent: Instant, state: State<A>) {
         let state = self.weighed(place, state);
         self.ended.retain(|ended| *ended != place);
         self.replace(place, HeldSample { state, next: 0 });

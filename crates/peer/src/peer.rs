@@ -123,6 +123,7 @@ pub enum Reception {
 
 /// Reason for the refusal of a datagram. The peer is unchanged.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ReceiveError {
     /// The datagram is no sample in the format of this session.
     #[error(transparent)]
@@ -175,7 +176,7 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
 
     /// Step 1: writes the present sample of this peer into `datagram` and returns its length \[byte\]. `local_time` is the time on the peer's own clock.
     ///
-    /// A strategy with personal samples needs [`Peer::personal_samples`] instead.
+    /// A strategy with personal samples needs [`Peer::next_sample`] for each receiver instead, [`Peer::extra`], and [`Peer::all_sent`] after the last receiver.
     #[inline(always)]
     pub fn sample(&mut self, local_time: Instant, datagram: &mut [u8; MAX_LEN]) -> usize {
         let sample = self.next_sample(local_time);
@@ -187,25 +188,6 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         let extra = Extra { receiver: 0, numbers: self.extra(0), attitude: self.attitude() };
         self.all_sent();
         sample.encode_as(kind, &extra, axes, datagram)
-    }
-
-    /// Step 1 for a strategy with personal samples: calls `send` with the place of each receiver in the session and the datagram for this receiver. Each
-    /// datagram has a sequence number of its own.
-    pub fn personal_samples(&mut self, local_time: Instant, mut send: impl FnMut(u32, &[u8])) {
-        let Self { config: PeerConfig { place, axes, .. }, asked: Asked { kind, role, .. }, .. } = *self;
-        let mut datagram = [0; MAX_LEN];
-        for (other, receiver) in (0..).filter(|receiver| *receiver != place).take(self.held.len()).enumerate() {
-            // A client talks to its server only.
-            if matches!(role, Role::Client { server } if server != other) {
-                continue;
-            }
-            let numbers = self.extra(other);
-            let sample = self.next_sample(local_time);
-            let len = sample.encode_as(kind, &Extra { receiver, numbers, ..Extra::NONE }, axes, &mut datagram);
-            send(receiver, &datagram[..len]);
-        }
-        // Once per tick, after the last receiver: `Strategy::sent` ends the interval between two samples.
-        self.all_sent();
     }
 
     /// Returns the present sample of this peer, without the extra numbers of its strategy, and counts its sequence number.
@@ -415,8 +397,8 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
         self.rotation.as_deref_mut()
     }
 
-    /// Holds `state` for the other peer with index `other`, sampled at `sent` on the clock of that peer (see [`Held::hold`]). The index counts the other
-    /// peers in their order, without this peer.
+    /// Holds `state` for the other peer with index `other`, sampled at `sent` on the clock of that peer, as if nothing had ever arrived from it: any
+    /// sample is newer. The index counts the other peers in their order, without this peer.
     ///
     /// # Panics
     ///

@@ -23,7 +23,7 @@ pub enum SampleKind {
 impl SampleKind {
     /// Returns the version of the wire format for samples of this kind.
     #[must_use]
-    pub const fn version(self) -> u16 {
+    pub(crate) const fn version(self) -> u16 {
         match self {
             Self::State | Self::Attitude => 1,
             Self::Energy | Self::Wave | Self::Force => 2,

@@ -15,7 +15,7 @@ impl<const A: usize> State<A> {
 
     /// Returns position and velocity times `factor`.
     #[must_use]
-    pub fn times(&self, factor: f64) -> Self {
+    pub(crate) fn times(&self, factor: f64) -> Self {
         Self { position: self.position.map(|x| x * factor), velocity: self.velocity.map(|v| v * factor) }
     }
 

@@ -49,7 +49,7 @@ pub fn turning_torque<N: Real>(copy: (&Matrix3<N>, Triple<N>), device: (&Matrix3
 /// Returns the torque \[N·m\], in the body axes of a copy, of a force FC \[N\] in world axes that acts at `grasp` \[m\] from the centre of mass: r×RᵀFC.
 #[must_use]
 #[inline(always)]
-pub fn lever<N: Real>(copy: &Matrix3<N>, grasp: Triple<N>, force: Triple<N>) -> Triple<N> {
+pub(crate) fn lever<N: Real>(copy: &Matrix3<N>, grasp: Triple<N>, force: Triple<N>) -> Triple<N> {
     cross(grasp, in_body_axes(copy, force))
 }
 

@@ -5,7 +5,7 @@ use super::{Matrix3, Real, Triple};
 use crate::State;
 
 /// Greatest difference from 1 of the squared norm of a received quaternion.
-pub const NORM_TOLERANCE: f64 = 1.0 / (1 << 20) as f64;
+const NORM_TOLERANCE: f64 = 1.0 / (1 << 20) as f64;
 
 /// Orientation and angular velocity of a body.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -34,7 +34,7 @@ impl Attitude {
         self.orientation.iter().chain(&self.rate).all(|number| number.is_finite())
     }
 
-    /// Returns whether the quaternion has the norm 1, within [`NORM_TOLERANCE`] of its square.
+    /// Returns whether the quaternion has the norm 1, within 2⁻²⁰ of its square.
     #[must_use]
     #[inline]
     pub fn is_unit(&self) -> bool {

@@ -11,8 +11,8 @@ mod law;
 mod real;
 mod step;
 
-pub use alignment::{aligning_torque, lever, turning_torque};
-pub use attitude::{Attitude, NORM_TOLERANCE};
+pub use alignment::{aligning_torque, turning_torque};
+pub use attitude::Attitude;
 pub use body::{DeviceRotation, Rotation, RotationConfig, Torques};
 pub(crate) use held::HeldAttitude;
 pub use held::HeldAttitudes;

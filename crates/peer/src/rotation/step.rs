@@ -110,41 +110,6 @@ impl Spin {
     }
 }
 
-impl<C> RotationStep<C> {
-    /// Returns the method that computes the rotation.
-    #[must_use]
-    pub const fn method(&self) -> RotationMethod {
-        self.method
-    }
-
-    /// Returns the number of equal steps in the span.
-    #[must_use]
-    pub const fn steps(&self) -> u32 {
-        self.steps
-    }
-}
-
-impl<C: Copy> RotationStep<C> {
-    /// Returns the step with `coefficient` applied to each coefficient, always in the same order.
-    #[must_use]
-    #[inline(always)]
-    pub fn map<D: Copy>(&self, mut coefficient: impl FnMut(&C) -> D) -> RotationStep<D> {
-        let h = coefficient(&self.h);
-        let mut triple = |triple: &Triple<C>| -> Triple<D> { from_fn(|axis| coefficient(&triple[axis])) };
-        RotationStep {
-            method: self.method,
-            steps: self.steps,
-            h,
-            gyration: triple(&self.gyration),
-            mobility: triple(&self.mobility),
-            decay: triple(&self.decay),
-            whole: [triple(&self.whole[0]), triple(&self.whole[1])],
-            half: [triple(&self.half[0]), triple(&self.half[1])],
-            weights: from_fn(|weight| triple(&self.weights[weight])),
-        }
-    }
-}
-
 impl<N: Real> RotationStep<N> {
     /// Turns a body over the span under a torque held in body axes \[N·m\].
     #[inline(always)]
@@ -155,7 +120,7 @@ impl<N: Real> RotationStep<N> {
     /// Like [`RotationStep::advance`], and returns the integral of the angular velocity in body axes over the span \[rad\]. Its scalar product with the
     /// torque is the work of the torque.
     #[inline(always)]
-    pub fn travel(&self, body: &mut Attitude<N>, torque: Triple<N>) -> Triple<N> {
+    pub(crate) fn travel(&self, body: &mut Attitude<N>, torque: Triple<N>) -> Triple<N> {
         let forced = self.forced(torque);
         let mut travel = [N::of(0.0); 3];
         for _ in 0..self.steps {
@@ -179,7 +144,7 @@ impl<N: Real> RotationStep<N> {
     /// Returns the angular acceleration by a torque, τ/J [rad/s²].
     #[must_use]
     #[inline(always)]
-    pub fn forced(&self, torque: Triple<N>) -> Triple<N> {
+    fn forced(&self, torque: Triple<N>) -> Triple<N> {
         by_component(torque, self.mobility)
     }
 
@@ -199,7 +164,7 @@ impl<N: Real> RotationStep<N> {
     /// in body axes. `forced` is the result of [`RotationStep::forced`].
     #[must_use]
     #[inline(always)]
-    pub fn exponential(&self, rate: Triple<N>, forced: Triple<N>) -> (Triple<N>, Triple<N>) {
+    fn exponential(&self, rate: Triple<N>, forced: Triple<N>) -> (Triple<N>, Triple<N>) {
         let [e, g] = self.whole;
         let [e_half, g_half] = self.half;
         let [a, b, c, d, drift] = self.weights;

@@ -7,8 +7,8 @@
 
 use std::time::Duration;
 
-use cohaptic_peer::Gains;
-use cohaptic_peer::coordination::{Coordination, LawValue};
+use cohaptic_peer::coordination::LawValue;
+use cohaptic_peer::{Coordination, Gains};
 use cohaptic_scene::Scene;
 use cohaptic_stability::Matrix;
 use cohaptic_stability::frames::{Contacts, Event, LinearLaw, Node, NominalNetwork, Scale, Structure, Timetable};
