@@ -100,7 +100,7 @@ impl Kinds {
 
     /// Counts kinds.
     #[must_use]
-    pub fn count(kinds: impl IntoIterator<Item = VerdictKind>) -> Self {
+    fn count(kinds: impl IntoIterator<Item = VerdictKind>) -> Self {
         let mut counts = [0; 3];
         kinds.into_iter().for_each(|kind| counts[kind as usize] += 1);
         Self(counts)

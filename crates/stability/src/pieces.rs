@@ -12,7 +12,7 @@ pub struct Piece<'a> {
     /// The scene of the piece.
     pub scene: Cow<'a, Scene>,
     /// Number of equal axes for which the piece stands.
-    pub axes: usize,
+    pub(crate) axes: usize,
     /// Names of the components of a turning object's motion. Empty if the object does not turn.
     pub motion: String,
     /// `true` if each peer has no device in this piece, indexed by peer.

@@ -73,35 +73,17 @@ impl Admittance {
     ///
     /// [`AdmittanceError`] if the scene has no peer with this index, or if the scene cannot be analysed, for example because no frame of it repeats.
     pub fn of(scene: &Scene, peer: usize) -> Result<Self, AdmittanceError> {
-        Self::of_watched(scene, peer, &Unwatched)
+        Self::between_watched(scene, peer, None, None, &Unwatched)
     }
 
-    /// Like [`Admittance::of`], with a watch that can stop the computation of the scene's verdict.
+    /// Like [`Admittance::of`], for a push along or about the given axis, and the velocity of the same device along or about the axis `seen`. About an axis the
+    /// push is a torque and the velocity is an angular velocity. Without `axis` the push is along the axis along which the peer pushes the object, or along the
+    /// first axis. Without `seen` the velocity is taken on the axis of the push. The watch can stop the computation of the scene's verdict.
     ///
     /// # Errors
     ///
-    /// As [`Admittance::of`], and [`AnalysisError::Stopped`] if the watch ends the computation.
-    pub fn of_watched(scene: &Scene, peer: usize, watch: &dyn Watch) -> Result<Self, AdmittanceError> {
-        Self::along_watched(scene, peer, None, watch)
-    }
-
-    /// Like [`Admittance::of_watched`], for a push along or about the given axis. About an axis the push is a torque and the velocity is an angular velocity.
-    /// With `None` the push is along the axis along which the peer pushes the object, or along the first axis.
-    ///
-    /// # Errors
-    ///
-    /// As [`Admittance::between_watched`].
-    pub fn along_watched(scene: &Scene, peer: usize, axis: Option<PushedAxis>, watch: &dyn Watch) -> Result<Self, AdmittanceError> {
-        Self::between_watched(scene, peer, axis, None, watch)
-    }
-
-    /// Like [`Admittance::along_watched`], with the velocity of the same device along or about the axis `seen`. With `None` the velocity is taken on the axis
-    /// of the push.
-    ///
-    /// # Errors
-    ///
-    /// As [`Admittance::of_watched`]; if the scene does not have one of the axes; if an axis is a rotation and the device of the peer does not turn; if nothing
-    /// couples the two axes; and for a finger that pushes an object off its centre.
+    /// As [`Admittance::of`]; if the scene does not have one of the axes; if an axis is a rotation and the device of the peer does not turn; if nothing
+    /// couples the two axes; for a finger that pushes an object off its centre; and [`AnalysisError::Stopped`] if the watch ends the computation.
     pub fn between_watched(
         scene: &Scene,
         peer: usize,
@@ -189,8 +171,8 @@ impl Admittance {
         self.response_watched(frequencies, &Unwatched)
     }
 
-    /// Like [`Admittance::response`], with a watch. If the watch stops the computation, the points before the first missing frequency are returned. Each point
-    /// counts as [`Admittance::operations`] operations for the watch.
+    /// Like [`Admittance::response`], with a watch. If the watch stops the computation, the points before the first missing frequency are returned. The watch is
+    /// told the operations of each point.
     ///
     /// # Errors
     ///
@@ -221,7 +203,7 @@ impl Admittance {
     /// Returns the approximate number of operations for one frequency: each event of a frame works on all columns of its rows, and then a system of linear
     /// equations is solved.
     #[must_use]
-    pub fn operations(&self) -> f64 {
+    fn operations(&self) -> f64 {
         match &self.system {
             System::OneAxis(axis) => {
                 let columns = 6 * axis.nodes.len() + axis.timetable.depth.iter().sum::<usize>();

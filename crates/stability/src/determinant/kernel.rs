@@ -49,7 +49,7 @@ impl Jet {
 impl Kernel {
     /// Returns the number of steps that the kernel reaches back.
     #[must_use]
-    pub const fn steps(self) -> u32 {
+    pub(crate) const fn steps(self) -> u32 {
         match self {
             Self::Delay(steps) | Self::Sum(steps) => steps,
         }

@@ -14,8 +14,8 @@ mod tests;
 
 use num_complex::Complex64;
 
+use crate::Watch;
 use crate::rounding::real;
-use crate::{Unwatched, Watch};
 use contour::Circle;
 pub use delayed_loop::{DelayedLoop, DelayedLoopError};
 pub use kernel::Kernel;
@@ -26,16 +26,11 @@ const POINTS_A_STEP: f64 = 60.0;
 const OF_AN_ENTRY: f64 = 20.0;
 
 impl DelayedLoop {
-    /// Returns the number of roots with |z| > `radius`, each as often as its multiplicity; `None` if a root is so near to the circle that rounding hides its
-    /// side, if |z|^−j overflows on the circle, or if `radius` is not positive and finite.
+    /// Returns the number of roots with |z| > `radius`, each as often as its multiplicity, if it is the same for all loops whose matrices are each within
+    /// `perturbation` of these in the 2-norm; `None` if a root is so near to the circle that rounding or the perturbation hides its side, if |z|^−j overflows
+    /// on the circle, or if `radius` is not positive and finite.
     ///
     /// F has no poles but z = 0 and is close to z^n far away, so that the number of roots outside is n minus the turns of F along the circle.
-    #[must_use]
-    pub fn roots_outside(&self, radius: f64) -> Option<usize> {
-        self.count(radius, 0.0, &Unwatched)
-    }
-
-    /// Returns [`DelayedLoop::roots_outside`] if it is the same for all loops whose matrices are each within `perturbation` of these in the 2-norm.
     fn count(&self, radius: f64, perturbation: f64, watch: &dyn Watch) -> Option<usize> {
         if !(radius > 0.0 && radius.is_finite()) {
             return None;
@@ -45,7 +40,7 @@ impl DelayedLoop {
 
     /// Returns the approximate number of operations of [`DelayedLoop::bounded_radius`]: the number of points grows like the steps of delay.
     #[must_use]
-    pub fn operations(&self) -> f64 {
+    pub(crate) fn operations(&self) -> f64 {
         POINTS_A_STEP * real(usize::try_from(self.steps()).unwrap_or(usize::MAX)) * self.operations_of_a_point()
     }
 

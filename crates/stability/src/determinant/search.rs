@@ -18,8 +18,8 @@ impl DelayedLoop {
     /// value ± error.
     ///
     /// The upper end is certified by a count of no root outside, the lower end by a count of at least one root within a small circle (or outside the
-    /// lower end). Both counts hold for all such loops and include the rounding of the evaluation; see [`DelayedLoop::roots_outside`]. The distances of the
-    /// circles begin with the first-order sensitivity |A⁻¹|·|F/F'| of the root and grow threefold until the counts succeed.
+    /// lower end). Both counts hold for all such loops and include the rounding of the evaluation. The distances of the circles begin with the first-order
+    /// sensitivity |A⁻¹|·|F/F'| of the root and grow threefold until the counts succeed.
     ///
     /// If |z|^−j overflows at all roots, far inside, the interval reaches from 0 to the smallest radius of a count. The error is infinite if no count
     /// succeeded.

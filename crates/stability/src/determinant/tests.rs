@@ -2,7 +2,7 @@ use num_complex::Complex64;
 use proptest::prelude::*;
 
 use super::*;
-use crate::{Matrix, Verdict, bounded_radius, eigenvalues};
+use crate::{Matrix, Unwatched, Verdict, bounded_radius, eigenvalues};
 
 fn scalar(now: f64, terms: &[(Kernel, f64)]) -> DelayedLoop {
     let one = |entry| Matrix::from_fn(1, 1, |_, _| entry);
@@ -56,8 +56,8 @@ fn matrices_that_do_not_fit_are_refused() {
     assert_eq!(shape, Err(DelayedLoopError::Shape { rows: 2, columns: 3, size: 2 }));
     assert!(DelayedLoop::new(Matrix::default(), vec![]).is_err());
     assert_eq!(DelayedLoop::new(Matrix::identity(1).scaled(f64::NAN), vec![]), Err(DelayedLoopError::NotFinite));
-    assert_eq!(scalar(0.5, &[]).roots_outside(f64::NAN), None);
-    assert_eq!(scalar(0.5, &[]).roots_outside(0.0), None);
+    assert_eq!(scalar(0.5, &[]).count(f64::NAN, 0.0, &Unwatched), None);
+    assert_eq!(scalar(0.5, &[]).count(0.0, 0.0, &Unwatched), None);
 }
 
 #[test]
@@ -66,7 +66,7 @@ fn roots_of_unity_are_counted_on_both_sides() {
     for delay in [1, 2, 5, 60, 1000, 5000] {
         for root in [1.0 - 1e-10, 1.0 + 1e-10] {
             let looped = scalar(0.0, &[(Kernel::Delay(delay - 1), libm::pow(root, f64::from(delay)))]);
-            assert_eq!(looped.roots_outside(1.0), Some(if root > 1.0 { delay as usize } else { 0 }), "{delay} {root}");
+            assert_eq!(looped.count(1.0, 0.0, &Unwatched), Some(if root > 1.0 { delay as usize } else { 0 }), "{delay} {root}");
             let found = looped.bounded_radius(0.0);
             assert!((found.value - root).abs() <= found.error && found.error < 2e-11, "{found:?} for {delay} and {root}");
             assert_eq!(found.verdict(), if root > 1.0 { Verdict::Unstable } else { Verdict::Stable });
@@ -76,8 +76,8 @@ fn roots_of_unity_are_counted_on_both_sides() {
 
 #[test]
 fn a_root_on_the_circle_is_not_counted_on_either_side() {
-    assert_eq!(scalar(1.0, &[]).roots_outside(1.0), None);
-    assert_eq!(scalar(0.5, &[(Kernel::Delay(3), 0.5)]).roots_outside(1.0), None);
+    assert_eq!(scalar(1.0, &[]).count(1.0, 0.0, &Unwatched), None);
+    assert_eq!(scalar(0.5, &[(Kernel::Delay(3), 0.5)]).count(1.0, 0.0, &Unwatched), None);
 }
 
 #[test]
@@ -101,7 +101,7 @@ fn double_roots_get_the_error_that_they_have() {
     ] {
         let found = looped.bounded_radius(0.0);
         assert!((found.value - 0.5).abs() <= found.error && found.error < 1e-6, "{found:?}");
-        assert_eq!(looped.roots_outside(0.4999), Some(2));
+        assert_eq!(looped.count(0.4999, 0.0, &Unwatched), Some(2));
         // A perturbation of ε moves a double root by √ε.
         let wider = looped.bounded_radius(1e-8);
         assert!(wider.error > 0.9e-4 && wider.error < 2e-3, "{wider:?}");
@@ -158,7 +158,7 @@ proptest! {
         for radius in [0.9, 1.0, 1.05] {
             let outside = all.iter().filter(|value| value.norm() > radius).count();
             if all.iter().all(|value| (value.norm() - radius).abs() > 1e-7) {
-                prop_assert_eq!(looped.roots_outside(radius), Some(outside));
+                prop_assert_eq!(looped.count(radius, 0.0, &Unwatched), Some(outside));
             }
         }
         let found = looped.bounded_radius(0.0);

@@ -177,7 +177,7 @@ impl Family {
     /// # Errors
     ///
     /// As [`Family::radius`], and [`AnalysisError::Stopped`](crate::AnalysisError::Stopped) if the watch ends it.
-    pub fn radius_watched(&self, values: &[f64], scratch: &mut FamilyScratch, watch: &dyn Watch) -> Result<Cell<f64>, FamilyError> {
+    pub(crate) fn radius_watched(&self, values: &[f64], scratch: &mut FamilyScratch, watch: &dyn Watch) -> Result<Cell<f64>, FamilyError> {
         self.evaluate::<false>(values, scratch, watch).map(|cell| Cell { radius: cell.radius.value, is_nominal: cell.is_nominal })
     }
 
@@ -194,7 +194,7 @@ impl Family {
     ///
     /// # Errors
     ///
-    /// As [`Family::radius_watched`].
+    /// As [`Family::radius`], and [`AnalysisError::Stopped`](crate::AnalysisError::Stopped) if the watch ends it.
     pub(crate) fn bounded_radius_watched(&self, values: &[f64], scratch: &mut FamilyScratch, watch: &dyn Watch) -> Result<Cell<Radius>, FamilyError> {
         self.evaluate::<true>(values, scratch, watch)
     }

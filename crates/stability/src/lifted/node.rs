@@ -114,11 +114,11 @@ pub struct Rows {
     /// Row of the position of the copy; the row of the velocity follows.
     pub object: usize,
     /// Row of the force on the copy at the next tick, if forces act one tick late; the row of the force of the device's coupling follows.
-    pub pending: Option<usize>,
+    pub(crate) pending: Option<usize>,
     /// Row of the first number of the law's memory; the rest of the memory follows.
-    pub memory: usize,
+    pub(crate) memory: usize,
     /// First row of the own states of the latest ticks, the newest first, if the law looks back: one combination per tick, or position and velocity.
-    pub past: usize,
+    pub(crate) past: usize,
 }
 
 /// The units of the states.

@@ -41,7 +41,7 @@ impl Sampling {
     }
 
     /// Returns the factors of position and velocity as [`Sampling::shares`], but for a combined number without the division by K + B/time [N/m].
-    pub fn gains(self, channel: usize, time: f64) -> (f64, f64) {
+    pub(crate) fn gains(self, channel: usize, time: f64) -> (f64, f64) {
         match self {
             Self::Combined(Gains { stiffness, damping }) => (stiffness, damping / time),
             Self::Whole => self.shares(channel, time),
@@ -60,7 +60,7 @@ impl Sampling {
     }
 
     /// Returns the factor of number `channel` of a sample of age `age` \[s\] in the heard force of a row of a law [N/m].
-    pub fn heard(self, row: &LawRow, channel: usize, age: f64, time: f64) -> f64 {
+    pub(crate) fn heard(self, row: &LawRow, channel: usize, age: f64, time: f64) -> f64 {
         match (self, channel) {
             // All rows hear multiples of one combination. The factor of the multiple comes from whichever of its gains is not zero.
             (Self::Combined(gains), _) if row.heard == gains => self.unit(time),

@@ -115,30 +115,16 @@ impl Map {
     ///
     /// [`MapError`] if the family has not two keys or a cell cannot be computed.
     pub fn fill(family: &Family, grid: Grid, done: impl Fn(usize) + Sync, stop: impl Fn() -> bool + Sync) -> Result<Self, MapError> {
-        Self::resume(family, grid, Vec::new(), |row, _| done(row), stop)
+        Self::resume_watched(family, grid, Vec::new(), |row, _| done(row), &Asks(stop))
     }
 
     /// Fills a map as [`Map::fill`], with rows that are known: `known[row]` is a known row, or empty; rows beyond the end of `known` are not known. Known rows
-    /// are not computed again, and `done` is not called for known rows. For every other row `done` also gets the cells, so that they can be stored.
+    /// are not computed again, and `done` is not called for known rows. For every other row `done` also gets the cells, so that they can be stored. The watch
+    /// sees the progress of cells that take long and can stop the filling within a cell.
     ///
     /// # Errors
     ///
     /// As [`Map::fill`], and [`MapError::Known`] if a known row does not have as many cells as the grid has columns.
-    pub fn resume(
-        family: &Family,
-        grid: Grid,
-        known: Vec<MapRow>,
-        done: impl Fn(usize, &MapRow) + Sync,
-        stop: impl Fn() -> bool + Sync,
-    ) -> Result<Self, MapError> {
-        Self::resume_watched(family, grid, known, done, &Asks(stop))
-    }
-
-    /// Runs [`Map::resume`] with a watch, which sees the progress of cells that take long and can stop the filling within a cell.
-    ///
-    /// # Errors
-    ///
-    /// As [`Map::resume`].
     pub fn resume_watched(
         family: &Family,
         grid: Grid,

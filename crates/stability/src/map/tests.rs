@@ -2,6 +2,7 @@
 
 use super::contour::Polyline;
 use super::*;
+use crate::Unwatched;
 use crate::paper_scene::PAPER;
 
 fn family(keys: &[&str]) -> Family {
@@ -52,15 +53,15 @@ fn known_rows_are_not_computed_again() {
     known[first[0]] = MapRow { radius: vec![7.0; 6], nominal: vec![true; 6] };
     let again = Mutex::new(Vec::new());
     let put_away = |row: usize, cells: &MapRow| again.lock().unwrap().push((row, cells.clone()));
-    let resumed = Map::resume(&family, grid, known, put_away, || false).unwrap();
+    let resumed = Map::resume_watched(&family, grid, known, put_away, &Unwatched).unwrap();
     assert!(resumed.is_complete());
     let again = again.into_inner().unwrap();
     assert_eq!(first.len() + again.len(), 9);
     assert!(again.iter().all(|(row, cells)| !first.contains(row) && cells.radius == whole.radius[*row]));
     assert_eq!((&resumed.radius[first[0]], &resumed.nominal[first[0]]), (&vec![7.0; 6], &vec![true; 6]));
-    let odd = Map::resume(&family, grid, vec![known_row(vec![1.0; 5])], |_, _| (), || false);
+    let odd = Map::resume_watched(&family, grid, vec![known_row(vec![1.0; 5])], |_, _| (), &Unwatched);
     assert!(matches!(odd, Err(MapError::Known { row: 0, cells: 5, columns: 6 })));
-    let odd = Map::resume(&family, grid, vec![MapRow::default(); 10], |_, _| (), || false);
+    let odd = Map::resume_watched(&family, grid, vec![MapRow::default(); 10], |_, _| (), &Unwatched);
     assert!(matches!(odd, Err(MapError::Known { row: 9, .. })));
 }
 

@@ -189,7 +189,7 @@ fn chance_is_followed_in_the_parts() {
 /// About an axis it is that of the scene of one axis with the inertia and the gains of the turn.
 #[test]
 fn the_admittance_of_a_turn_is_that_of_its_scene() {
-    let about = |more: &[&str], axis| Admittance::along_watched(&scene(more), 0, Some(axis), &Unwatched);
+    let about = |more: &[&str], axis| Admittance::between_watched(&scene(more), 0, Some(axis), None, &Unwatched);
     let turns = ["peer.device.inertia=[2e-5, 3e-5, 1e-5]", "peer.device.rotational-damping=0.001", "peer.coupling.rotational-stiffness=3"];
     let one = [
         "scene.axes=1",
@@ -209,7 +209,7 @@ fn the_admittance_of_a_turn_is_that_of_its_scene() {
     assert!(matches!(about(&[], PushedAxis::Rx), Err(AdmittanceError::DoesNotTurn { axis: "rx", .. })));
     let error = about(&["peer.grasp=[0.01, 0, 0]", "peers.peer2.contact.push=+x"], PushedAxis::X).unwrap_err();
     assert!(error.to_string().starts_with("a one-sided contact of an object that turns"), "{error}");
-    assert!(matches!(Admittance::along_watched(&one, 0, Some(PushedAxis::Rx), &Unwatched), Err(AdmittanceError::NoSuchAxis { axis: "rx" })));
+    assert!(matches!(Admittance::between_watched(&one, 0, Some(PushedAxis::Rx), None, &Unwatched), Err(AdmittanceError::NoSuchAxis { axis: "rx" })));
 }
 
 #[test]

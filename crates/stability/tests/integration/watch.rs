@@ -113,7 +113,7 @@ fn a_delay_of_a_thousand_hours_is_told_or_refused_before_anything_is_made() {
     // A number of each sample, of the average of equal peers.
     assert!(told.last().states > 440_000_000 && told.last().operations > 1e12, "{}", told.last());
     let told = Told::allowing(MOST_MEMORY);
-    let refused = Admittance::of_watched(&scene, 0, &told).unwrap_err();
+    let refused = Admittance::between_watched(&scene, 0, None, None, &told).unwrap_err();
     assert_eq!((refused, told.last().states > 440_000_000), (AdmittanceError::Analysis(AnalysisError::Stopped), true));
     let refused = analyse_watched(&scene, Method::Full, &Unwatched).unwrap_err();
     assert!(matches!(refused, AnalysisError::TooMuchMemory { states, .. } if states > 2_600_000_000), "{refused}");
@@ -128,7 +128,7 @@ fn a_delay_of_a_thousand_hours_is_told_or_refused_before_anything_is_made() {
 fn what_spikes_add_to_the_mean_delay_is_told_too() {
     let scene = three(&["link.loss=0", "link.spike={ rate = 99990.0, height = \"60ms\", decay = \"400ms\" }"]);
     let told = Told::allowing(MOST_MEMORY);
-    let refused = Admittance::of_watched(&scene, 0, &told).unwrap_err();
+    let refused = Admittance::between_watched(&scene, 0, None, None, &told).unwrap_err();
     assert_eq!(refused, AdmittanceError::Analysis(AnalysisError::Stopped));
     assert!(told.last().states > 290_000, "{}", told.last());
 }
@@ -188,7 +188,9 @@ fn a_graph_and_the_verdict_of_an_admittance_end() {
         Err(GraphError::Analysis(AnalysisError::Stopped)) => true,
         found => found.is_err(),
     });
-    ends_wherever_it_is_asked(1, |ends| matches!(Admittance::of_watched(&scene, 0, ends), Err(AdmittanceError::Analysis(AnalysisError::Stopped))));
+    ends_wherever_it_is_asked(1, |ends| {
+        matches!(Admittance::between_watched(&scene, 0, None, None, ends), Err(AdmittanceError::Analysis(AnalysisError::Stopped)))
+    });
 }
 
 /// The matrix of many different peers is asked about while it is made: 60 peers with 12 rows each over some 4000 events are ten million entries.
