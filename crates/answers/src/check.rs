@@ -9,7 +9,7 @@ use cohaptic_stability::{Verdict, Watch};
 use cohaptic_units::print::Number;
 use serde::Serialize;
 
-use crate::{Quick, quick_verdict};
+use crate::verdict::{Quick, quick_verdict};
 
 /// Result of a check.
 #[derive(Clone, PartialEq, Debug)]

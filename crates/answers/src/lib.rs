@@ -2,9 +2,9 @@
 //!
 //! Use this crate if your program answers as `cohaptic --json` does: the command line and the Python package take their documents from this crate.
 //!
-//! [`run()`] is the document of a run, [`explanation()`] of the model of a scene. [`check()`] checks the expectations of a scene, and [`quick_verdict()`] tells
-//! by analysis whether a scene is stable. [`methods()`] lists the methods selectable in a scene, and [`measure()`] measures the cost and the error of each.
-//! [`map_picture()`], [`boundary_picture()`] and [`admittance_picture()`] draw analyses. [`document!`] makes a document.
+//! [`run()`] is the document of a run, [`explanation()`] of the model of a scene. [`check()`] checks the expectations of a scene. [`methods()`] lists the
+//! methods selectable in a scene, and [`measure()`] measures the cost and the error of each. [`map_picture()`], [`boundary_picture()`] and
+//! [`admittance_picture()`] draw analyses. [`document!`] makes a document.
 //!
 //! The other commands have a module each, with a function `document` for the JSON document and a function `words` for the text: [`campaign`], [`compare`],
 //! [`mod@link`], [`fit`], [`point`], [`map`], [`boundary`] and [`admittance`]. Five of these have a function `html` for a [`page`] too. [`shards`] has the
@@ -61,6 +61,6 @@ pub(crate) use pictures::{AdmittanceWords, admittance_words, axis_of_key, crossi
 pub use run::{angle_text, diverged, measured_lines, packets, run, run_words};
 pub use text_plot::TEXT_PLOT_SPANS;
 pub(crate) use text_plot::text_plot;
-pub use verdict::{OPERATIONS_A_SECOND, Quick, notes, quick_verdict};
+pub use verdict::{OPERATIONS_A_SECOND, notes};
 pub(crate) use words::LAW;
 pub use words::{are, figure, legend_name, length};

@@ -9,7 +9,7 @@ pub const OPERATIONS_A_SECOND: f64 = 1e9;
 
 /// Result of [`quick_verdict`]: a judgement by analysis, or that a simulation must decide.
 #[derive(Clone, PartialEq, Debug)]
-pub enum Quick {
+pub(crate) enum Quick {
     /// The judgement, which leaves nothing out.
     Known(Box<Judgement>),
     /// The analysis has no answer for the whole scene, so a simulation must decide. The text is the reason, if the second moment of the random links cannot be
@@ -23,8 +23,7 @@ pub enum Quick {
 ///
 /// Left to a simulation are: a scene which is not linear, a scene with a timeline, a scene whose random links have no second moment computable in that time,
 /// and an object with more than small turns about rest.
-#[must_use]
-pub fn quick_verdict(scene: &Scene, seconds: f64, watch: &dyn Watch) -> Quick {
+pub(crate) fn quick_verdict(scene: &Scene, seconds: f64, watch: &dyn Watch) -> Quick {
     if !scene.timeline.is_empty() || !scene.turns_about_rest() {
         return Quick::Simulate(None);
     }

@@ -49,7 +49,7 @@ impl WholeFile {
     /// # Errors
     ///
     /// The errors of [`WholeFile::create`].
-    pub fn create_by(path: impl Into<PathBuf>, worker: &str) -> io::Result<Self> {
+    fn create_by(path: impl Into<PathBuf>, worker: &str) -> io::Result<Self> {
         Self::begin(path.into(), &format!(".{worker}"))
     }
 
@@ -145,7 +145,8 @@ pub fn write_whole<E: From<io::Error>>(path: &Path, write: impl FnOnce(&mut Whol
     written(WholeFile::create(path)?, write)
 }
 
-/// Like [`write_whole`], for a file possibly written by processes on other machines at the same time: see [`WholeFile::create_by`].
+/// Like [`write_whole`], for a file possibly written by processes on other machines at the same time. The temporary name contains `worker`, because locks do
+/// not tell abandoned temporary files of other machines.
 ///
 /// # Errors
 ///

@@ -8,7 +8,7 @@ use cohaptic_harness::check::{Stability, stability};
 use cohaptic_scene::Scene;
 use cohaptic_stability::Watch;
 
-use crate::{Quick, quick_verdict};
+use crate::verdict::{Quick, quick_verdict};
 
 /// Longest time of the analysis, by its estimate \[s\]. Two runs judge instead if the analysis would take longer.
 const QUICK: f64 = 0.25;

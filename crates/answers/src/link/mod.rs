@@ -15,9 +15,9 @@ pub use picture::LinkPicture;
 pub use words::words;
 
 /// Greatest number of packets in the figures. Each packet takes 127 bytes during the computation, half a gigabyte in all.
-pub const MOST_MEASURED: u64 = 4_000_000;
+pub(crate) const MOST_MEASURED: u64 = 4_000_000;
 
-/// Measures a link from the records of its packets. Packets beyond [`MOST_MEASURED`] are only counted.
+/// Measures a link from the records of its packets. Packets beyond the first 4 million are only counted.
 #[derive(Clone, Debug)]
 pub struct Meter {
     accumulator: Accumulator,
@@ -28,19 +28,19 @@ pub struct Meter {
 #[derive(Clone, PartialEq, Debug)]
 pub struct Measured {
     /// The link as written by the user, in words of tc-netem or in keys of a scene.
-    pub said: String,
+    pub(crate) said: String,
     /// Figures requested of the link.
-    pub asked: Asked,
+    pub(crate) asked: Asked,
     /// Figures achieved by the link.
-    pub achieved: Achieved,
+    pub(crate) achieved: Achieved,
     /// Figures both requested and achieved, with their distance.
-    pub figures: Vec<Figure>,
+    pub(crate) figures: Vec<Figure>,
     /// Packets of the cross-traffic up to the last packet at the queue.
-    pub cross_traffic: CrossCounts,
+    pub(crate) cross_traffic: CrossCounts,
     /// Number of sent packets.
-    pub sent: u64,
+    pub(crate) sent: u64,
     /// Number of packets to send; larger than `sent` if the stream was interrupted.
-    pub wanted: u64,
+    pub(crate) wanted: u64,
 }
 
 /// Returns the reason, in words, why a stream is too long; `None` if the stream can be sent. Half of the range of instants is reserved for delays.

@@ -56,7 +56,7 @@ pub struct MeasuredMethod {
     pub option: String,
     /// `true` if the scene as it stands uses this method.
     pub chosen: bool,
-    /// Processor time per [`Kind::cost_of`] \[ms\], the median of some rounds. `None` if the method does not apply; the note then gives the reason.
+    /// Processor time per simulated second, or of one analysis \[ms\], the median of some rounds. `None` if the method does not apply; the note then gives the reason.
     pub cost_ms: Option<f64>,
     /// Largest difference from the reference, in [`Kind::error_unit`]. The error is computed, and the same every time. `None` if there is no such number; the
     /// note then gives the reason.

@@ -75,7 +75,7 @@ impl Kind {
 
     /// Returns the unit of work of the cost.
     #[must_use]
-    pub const fn cost_of(self) -> &'static str {
+    pub(crate) const fn cost_of(self) -> &'static str {
         match self {
             Self::Engine | Self::Axes | Self::Integrator | Self::Sampling => "simulated second",
             Self::Analysis => "analysis",
@@ -105,13 +105,13 @@ impl Kind {
 #[derive(Clone, Debug)]
 pub struct Method {
     /// Purpose of the method.
-    pub kind: Kind,
+    pub(crate) kind: Kind,
     /// Name of the method, unique within its kind.
     pub name: String,
     /// Option of the method on the command line; empty for the default.
-    pub option: String,
+    pub(crate) option: String,
     /// `true` if the scene as it stands uses this method.
-    pub chosen: bool,
+    pub(crate) chosen: bool,
     /// `true` if the errors of the methods of this kind are measured against this method.
     pub(crate) is_reference: bool,
     /// Work for measuring cost and error, or the reason why the method does not apply to the scene.

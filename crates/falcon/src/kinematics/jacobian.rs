@@ -26,12 +26,6 @@ impl Jacobian {
         rows.iter().flatten().all(|entry| entry.is_finite()).then_some(Self { rows })
     }
 
-    /// Returns the rows, one for each arm \[rad/m\].
-    #[must_use]
-    pub const fn rows(&self) -> &[Triple; 3] {
-        &self.rows
-    }
-
     /// Returns the torques of the arms \[N·m\] that make a force \[N\]: τ = J⁻ᵀ·F. `None` for a singular Jacobian, and for a force that is not finite.
     #[must_use]
     pub fn torques(&self, force: Triple) -> Option<Triple> {
@@ -48,7 +42,7 @@ impl Jacobian {
 
     /// Returns the angular velocities of the arms \[rad/s\] at a velocity of the grip \[m/s\].
     #[must_use]
-    pub fn turning(&self, velocity: Triple) -> Triple {
+    pub(crate) fn turning(&self, velocity: Triple) -> Triple {
         self.rows.map(|row| dot(row, velocity))
     }
 }
@@ -102,7 +96,7 @@ mod tests {
             assert!((1.0 / sin_theta2 - gain).abs() < 0.006, "at {z}: {}", 1.0 / sin_theta2);
             let step = 1e-6;
             let moved = inverse([0.0, 0.0, z + step]).unwrap()[0] - inverse([0.0, 0.0, z - step]).unwrap()[0];
-            assert!((Jacobian::at(position).unwrap().rows()[0][2] - moved / (2.0 * step)).abs() < 1e-6);
+            assert!((Jacobian::at(position).unwrap().rows[0][2] - moved / (2.0 * step)).abs() < 1e-6);
         }
     }
 
@@ -121,7 +115,7 @@ mod tests {
                 for leg in 0..3 {
                     let slope = (after[leg] - before[leg]) / (2.0 * step);
                     // The third derivative is below 1e6 rad/m³ here: step²·1e6/6 < 2e-5; rows are of 10 rad/m.
-                    prop_assert!((jacobian.rows()[leg][axis] - slope).abs() < 2e-5, "{} and {slope}", jacobian.rows()[leg][axis]);
+                    prop_assert!((jacobian.rows[leg][axis] - slope).abs() < 2e-5, "{} and {slope}", jacobian.rows[leg][axis]);
                 }
             }
         }

@@ -32,9 +32,9 @@ use crate::rows::{Input, InputRow};
 #[derive(Clone, Copy, Debug)]
 pub struct InputLine<'a> {
     /// The row.
-    pub row: &'a InputRow<'a>,
+    pub(crate) row: &'a InputRow<'a>,
     /// Names of the peers, indexed by peer.
-    pub names: &'a [String],
+    pub(crate) names: &'a [String],
 }
 
 impl fmt::Display for InputLine<'_> {
@@ -69,9 +69,9 @@ impl fmt::Display for InputLine<'_> {
 #[derive(Clone, Copy, Debug)]
 pub struct ClosingLine {
     /// Instant of the last row before.
-    pub at: Instant,
+    pub(crate) at: Instant,
     /// Number of rows between the header and the closing row.
-    pub rows: u64,
+    pub(crate) rows: u64,
 }
 
 impl fmt::Display for ClosingLine {
