@@ -38,7 +38,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod admission;
+mod admission;
 pub mod client;
 mod entropy;
 pub mod falcons;
@@ -47,11 +47,15 @@ mod key;
 mod place;
 pub mod pointers;
 mod seal;
-pub mod session;
+mod session;
 
-pub use admission::{Admission, AdmissionConfig, AdmissionConfigError, AdmissionControl, AdmissionStats, Admitted, Limits, Refusal, Seat};
+pub use admission::{
+    Admission, AdmissionConfig, AdmissionConfigError, AdmissionControl, AdmissionStats, Admitted, Limits, Refusal, Seat, SeatStatus,
+};
 pub use entropy::{Entropy, EntropyError, SystemEntropy};
 pub use key::{KeyFileError, SessionKey};
 pub use place::Place;
 pub use seal::{MAX_DATAGRAM, Nonce};
-pub use session::{Conductor, LinkChange, Report, Session, SessionConfig, SessionError, Status};
+pub use session::{
+    Conductor, EndedPacket, LinkChange, LinkStatus, Motion, PeerStatus, Recorded, Report, Session, SessionConfig, SessionError, SocketCounts, Status,
+};

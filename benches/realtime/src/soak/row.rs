@@ -48,7 +48,7 @@ impl Row {
             let count = u32::try_from(now.count - before.count).unwrap_or(u32::MAX);
             (now, (now.sum - before.sum).checked_div(count).unwrap_or_default())
         };
-        let of_session = |count: fn(&cohaptic_live::session::LinkStatus) -> u64| status.links.iter().map(count).sum();
+        let of_session = |count: fn(&cohaptic_live::LinkStatus) -> u64| status.links.iter().map(count).sum();
         Self {
             at,
             memory: machine::memory(),

@@ -10,8 +10,7 @@ use cohaptic_control::{
     Body, Description, Kind, LinkCounters, LinkEditor, LinkName, MeasureLabel, PeerName, PeerView, Presence as Shown, Snapshot, TurnView,
 };
 use cohaptic_harness::live::Presence;
-use cohaptic_live::session::{LinkStatus, PeerStatus};
-use cohaptic_live::{Conductor, LinkChange, Refusal, Status};
+use cohaptic_live::{Conductor, LinkChange, LinkStatus, PeerStatus, Refusal, Status};
 use cohaptic_scene::{LinkKeys, MeasureName, Scene};
 use cohaptic_units::Instant;
 

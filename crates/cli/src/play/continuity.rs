@@ -6,8 +6,8 @@ use std::path::Path;
 
 use cohaptic_harness::live::LiveScene;
 use cohaptic_harness::{Observer, TickRow};
+use cohaptic_live::PeerStatus;
 use cohaptic_live::pointers::Pointer;
-use cohaptic_live::session::PeerStatus;
 use cohaptic_units::Instant;
 
 use super::scene::PlayedScene;

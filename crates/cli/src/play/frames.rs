@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use cohaptic_harness::live::Presence;
-use cohaptic_live::session::{EndedPacket, Motion, PeerStatus};
+use cohaptic_live::{EndedPacket, Motion, PeerStatus};
 
 /// The newest motion. The motion is written as text when a page asks, on the page's thread, so that the real-time thread does not spend the time.
 #[derive(Default)]

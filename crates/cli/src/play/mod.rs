@@ -23,8 +23,7 @@ use std::time::Instant as Clock;
 use cohaptic_control::{Board, ServerConfig, serve_stage};
 use cohaptic_files::{OwnFolder, write_whole};
 use cohaptic_harness::Ending;
-use cohaptic_live::session::{Motion, Recorded, SessionConfig};
-use cohaptic_live::{Conductor, LinkChange, Report, Session, Status};
+use cohaptic_live::{Conductor, LinkChange, Motion, Recorded, Report, Session, SessionConfig, Status};
 use cohaptic_scene::{PeerKind, link_keys_of_text, scene_content_of_text};
 
 use self::scene::{PEERS, PlayedScene};

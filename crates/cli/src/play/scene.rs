@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use cohaptic_live::session::PeerStatus;
+use cohaptic_live::PeerStatus;
 use cohaptic_peer::{Contact, Gains};
 use cohaptic_scene::{LinkKeys, PeerKind, Scene, SceneError, scene_text};
 use toml::{Table, Value};

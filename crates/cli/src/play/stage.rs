@@ -11,8 +11,8 @@ use std::time::{Duration, Instant as Clock};
 
 use cohaptic_control::{LinkEditor, Role, Stage, StageFile};
 use cohaptic_harness::live::LiveDevice;
+use cohaptic_live::PeerStatus;
 use cohaptic_live::pointers::Pointer;
-use cohaptic_live::session::PeerStatus;
 use cohaptic_peer::Coordination;
 use cohaptic_scene::{PeerKind, Scene};
 use serde_json::{Value, json};

@@ -1,24 +1,4 @@
 //! Admission to a live session: decides which datagrams from outside reach the scene, and makes the datagrams to peers outside.
-//!
-//! ```text
-//!                      ┌── Sample: goes on to the scene's links
-//! datagram, address ──►│── Reply: a welcome, to be sent back
-//!                      └── Refused: counted by cause, and nothing else has changed
-//! ```
-//!
-//! Without a key the first sample for a seat joins, and the seat belongs to the address of the sample until no sample has been admitted for a while. With a key
-//! a peer says hello, gets a nonce of the server in a welcome, and joins with the first sample sealed under keys derived from the nonces of both sides. The
-//! session keeps no state for peers that have only said hello:
-//!
-//! - The server's nonce is a keyed hash of the place, of the number of joinings at the seat so far, and of the address that asked. The client's nonce comes
-//!   with every sealed sample. So the session can derive the keys again when a sample needs the keys.
-//! - When a seat is taken, every earlier server nonce for the seat becomes void. A sample recorded in an earlier joining, or sent from another address, then
-//!   has a wrong tag.
-//! - A hello changes nothing, and each hello with a right tag is answered. A limit on the number of answers would be used up by a flood of recorded hellos. A
-//!   host that repeats recorded hellos gets welcomes that the host cannot use. `docs/live-protocol.md` has the argument, attacker by attacker.
-//!
-//! Memory is bounded by the number of seats. Inside the session the sequence numbers of a seat never go back: an admitted sample has the number of the joining
-//! in its upper 24 bits and the peer's own number in the lower 40 bits. A peer that joins again and counts from 0 is therefore newer than before.
 
 mod config;
 mod refusal;
@@ -33,10 +13,10 @@ use zeroize::Zeroizing;
 
 use crate::handshake::hello::HELLO_MAGIC;
 use crate::handshake::{HANDSHAKE_LEN, Hello, Welcome};
+use crate::place::Place;
 use crate::seal::{JoiningKeys, MAX_DATAGRAM, SEAL_LEN, Sealed, nonce_of};
 use crate::{Entropy, Nonce, SessionKey};
 
-pub use crate::place::Place;
 pub use config::{AdmissionConfig, AdmissionConfigError, Limits, Seat};
 pub use refusal::{AdmissionStats, Refusal};
 pub use seats::SeatStatus;
@@ -91,7 +71,27 @@ impl Admitted {
     }
 }
 
-/// Decides about every received datagram of a session, and seals every sent sample. See the [module](self).
+/// Decides about every received datagram of a session, and seals every sent sample.
+///
+/// ```text
+///                      ┌── Sample: goes on to the scene's links
+/// datagram, address ──►│── Reply: a welcome, to be sent back
+///                      └── Refused: counted by cause, and nothing else has changed
+/// ```
+///
+/// Without a key the first sample for a seat joins, and the seat belongs to the address of the sample until no sample has been admitted for a while. With a key
+/// a peer says hello, gets a nonce of the server in a welcome, and joins with the first sample sealed under keys derived from the nonces of both sides. The
+/// session keeps no state for peers that have only said hello:
+///
+/// - The server's nonce is a keyed hash of the place, of the number of joinings at the seat so far, and of the address that asked. The client's nonce comes
+///   with every sealed sample. So the session can derive the keys again when a sample needs the keys.
+/// - When a seat is taken, every earlier server nonce for the seat becomes void. A sample recorded in an earlier joining, or sent from another address, then
+///   has a wrong tag.
+/// - A hello changes nothing, and each hello with a right tag is answered. A limit on the number of answers would be used up by a flood of recorded hellos. A
+///   host that repeats recorded hellos gets welcomes that the host cannot use. `docs/live-protocol.md` has the argument, attacker by attacker.
+///
+/// Memory is bounded by the number of seats. Inside the session the sequence numbers of a seat never go back: an admitted sample has the number of the joining
+/// in its upper 24 bits and the peer's own number in the lower 40 bits. A peer that joins again and counts from 0 is therefore newer than before.
 ///
 /// The driver hands each received datagram to [`AdmissionControl::handle_datagram`], carries out the decision, and asks [`AdmissionControl::seal`] for the
 /// bytes of each sample to a peer outside. There are no deadlines: whether a peer is silent is computed from the instant of the call that needs to know. If

@@ -5,7 +5,7 @@ use std::net::{SocketAddr, UdpSocket};
 use std::path::Path;
 use std::time::{Duration, Instant as Wall};
 
-use cohaptic_live::session::{Conductor, LinkChange, Session, SessionConfig, Status};
+use cohaptic_live::{Conductor, LinkChange, Session, SessionConfig, Status};
 use cohaptic_peer::State;
 use cohaptic_peer::wire::{MAX_LEN, Sample};
 use cohaptic_realtime::{Tolerance, Validity, Wishes};
