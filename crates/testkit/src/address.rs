@@ -116,7 +116,7 @@ impl Addresses {
 
     /// Returns the address of the same version as `other`.
     #[must_use]
-    pub const fn like(&self, other: IpAddr) -> IpAddr {
+    pub(crate) const fn like(&self, other: IpAddr) -> IpAddr {
         match other {
             IpAddr::V4(_) => IpAddr::V4(self.v4),
             IpAddr::V6(_) => IpAddr::V6(self.v6),

@@ -40,7 +40,7 @@
 //! | datagrams, and the addresses and names of hosts | [`UdpSocket`], [`Addresses`], [`AddressPlan`], [`ToSocketAddrs`] |
 #![cfg_attr(
     feature = "tcp",
-    doc = "| streams, as Linux does TCP, and every constant of it | [`TcpListener`], [`TcpStream`], [`TcpSocket`], [`TcpConfig`], [`tcp`], [`net`] |"
+    doc = "| streams, as Linux does TCP, and every constant of it | [`TcpListener`], [`TcpStream`], [`TcpSocket`], [`tcp::TcpConfig`], [`net`] |"
 )]
 #![cfg_attr(not(feature = "tcp"), doc = "| streams, as Linux does TCP | feature `tcp` |")]
 //! | timers to the nanosecond | [`time`], [`Instant`] |
@@ -171,7 +171,7 @@ pub use seed::SEED_VARIABLE;
 pub use socket::UdpSocket;
 pub use task::{JoinHandle, TaskStopped};
 #[cfg(feature = "tcp")]
-pub use tcp::{TcpConfig, TcpListener, TcpSocket, TcpStream};
+pub use tcp::{listener::TcpListener, socket::TcpSocket, stream::TcpStream};
 pub use trace::{Difference, Happening, Lost, PacketName, Trace, TraceEvent};
 pub use watch::STALL_VARIABLE;
 

@@ -17,7 +17,7 @@ use crate::seed::{Place, Seed};
 
 /// Name of the environment variable with the words of the loopback. A runtime of tokio that is built outside of a test bed then runs its programs on a test bed
 /// of one host, and packets of the host to itself take a link of these words.
-pub const LOOPBACK_VARIABLE: &str = "COHAPTIC_TEST_LOOPBACK";
+const LOOPBACK_VARIABLE: &str = "COHAPTIC_TEST_LOOPBACK";
 
 /// Link of the loopback of a runtime, and what the runtime has in common with the test beds that run its programs.
 pub struct Loopback {
@@ -28,7 +28,7 @@ pub struct Loopback {
 }
 
 impl Loopback {
-    /// Returns the loopback that the environment asks for, or `None` if [`LOOPBACK_VARIABLE`] is not set or empty.
+    /// Returns the loopback that the environment asks for, or `None` if `COHAPTIC_TEST_LOOPBACK` is not set or empty.
     ///
     /// # Panics
     ///

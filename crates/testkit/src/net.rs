@@ -13,7 +13,8 @@ pub use crate::{TcpListener, TcpSocket, TcpStream, ToSocketAddrs, UdpSocket};
 pub mod tcp {
     //! Halves of streams.
 
-    pub use crate::tcp::{OwnedReadHalf, OwnedWriteHalf, ReadHalf, ReuniteError, WriteHalf};
+    pub use crate::tcp::owned::{OwnedReadHalf, OwnedWriteHalf, ReuniteError};
+    pub use crate::tcp::split::{ReadHalf, WriteHalf};
 }
 
 /// Returns the addresses of a host.

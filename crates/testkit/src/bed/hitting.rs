@@ -8,7 +8,7 @@ impl Testbed {
     /// function.
     ///
     /// ```
-    /// use cohaptic_testkit::{Testbed, hit::{Flags, Verdict}};
+    /// use cohaptic_testkit::{Testbed, hit::Verdict, tcp::Flags};
     ///
     /// // The second packet with SYN; those of a program that answers have ACK too.
     /// let mut syns = 0;

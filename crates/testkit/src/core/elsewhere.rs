@@ -80,7 +80,6 @@ impl Shared {
     }
 
     #[cold]
-    #[inline(never)]
     fn refuse(&self, host: NodeId, kind: &str) -> io::Result<()> {
         let name = &self.names()[host.index()];
         if self.has_ended() {

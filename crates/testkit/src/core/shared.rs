@@ -281,7 +281,6 @@ impl Shared {
 
 /// Wakes the tasks that could not be woken during the access to the state.
 #[cold]
-#[inline(never)]
 fn wake(woken: Vec<Waker>) {
     woken.into_iter().for_each(Waker::wake);
 }

@@ -20,7 +20,8 @@ use crate::current;
 use crate::resolve::ToSocketAddrs;
 use crate::socket::UdpSocket;
 use crate::task::{Kept, OtherTasks};
-use crate::tcp::{TcpListener, TcpSocket, TcpStream};
+use crate::tcp::socket::TcpSocket;
+use crate::tcp::{TcpListener, TcpStream};
 
 /// Advice for a task without a host. The `tokio` of the program is the package that stands in, and the task was started outside of all hosts.
 const HOW: &str = "wrap the call, or the task that `tokio::spawn` started on no host, in `Host::scope`";

@@ -5,7 +5,8 @@ use std::io;
 use cohaptic_sockets::{Configured, KeepaliveTimes, Setting, Version};
 
 use crate::socket::UdpSocket;
-use crate::tcp::{Keepalive, TcpListener, TcpSocket, TcpStream};
+use crate::tcp::socket::TcpSocket;
+use crate::tcp::{Keepalive, TcpListener, TcpStream};
 
 const fn times(keepalive: Keepalive) -> KeepaliveTimes {
     KeepaliveTimes { idle: keepalive.idle, interval: keepalive.interval, probes: keepalive.probes }

@@ -74,8 +74,6 @@ mod words;
 
 use std::time::Duration;
 
-#[cfg(feature = "tcp")]
-pub use cohaptic_tcp::{Flags, Segment};
 pub use cohaptic_wan::random::Draws;
 pub use hits::Hits;
 pub(crate) use hits::PathHit;

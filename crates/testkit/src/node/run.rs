@@ -128,12 +128,6 @@ impl NodeRun {
         self.wire.now()
     }
 
-    /// Returns the names of the nodes, in the order in which they were added.
-    #[must_use]
-    pub fn names(&self) -> &[String] {
-        &self.names
-    }
-
     /// Returns the node named `name`.
     ///
     /// # Panics

@@ -7,7 +7,8 @@ use std::time::Duration;
 
 use cohaptic_sockets::{ByteStream, Connecting, Flag, Listener, Number, Ready, Socket, Stream};
 
-use super::{TcpListener, TcpSocket, TcpStream};
+use super::socket::TcpSocket;
+use super::{TcpListener, TcpStream};
 
 impl ByteStream for TcpStream {
     fn poll_readable(&self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {

@@ -24,11 +24,11 @@ const BACKLOG: usize = 128;
 /// Differences to tokio's listener, and further properties:
 ///
 /// - The listener is bound on the host of the task that calls `bind`; [`Host::listen`](crate::Host::listen) names another host.
-/// - At most 129 connections wait to be accepted; [`TcpSocket::listen`](super::TcpSocket::listen) takes another number. As with Linux, a SYN beyond that number
+/// - At most 129 connections wait to be accepted; [`TcpSocket::listen`](crate::TcpSocket::listen) takes another number. As with Linux, a SYN beyond that number
 ///   is dropped without an answer, so that its sender tries again after 1, 3, 7 … s.
 /// - A connection that is reset while it waits is accepted all the same, and reading from it fails.
 /// - A listener at `[::]` accepts connections over both versions of IP, as with Linux. The peer of a connection over IPv4 is then shown as `::ffff:10.0.0.1`.
-///   [`TcpSocket::set_only_v6`](super::TcpSocket::set_only_v6) leaves IPv4 to other sockets.
+///   [`TcpSocket::set_only_v6`](crate::TcpSocket::set_only_v6) leaves IPv4 to other sockets.
 /// - After its host has crashed, every method returns [`io::ErrorKind::ConnectionAborted`], with the way out. The same error comes from every method after the
 ///   run of the test bed has ended, also within the run of another test bed.
 /// - The listener belongs to the thread that runs the test bed. On another thread every method returns [`io::ErrorKind::Unsupported`], and the run fails.

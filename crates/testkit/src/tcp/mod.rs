@@ -1,20 +1,20 @@
-//! TCP: halves of streams, and the types of connections.
+//! TCP: the configuration and the state of connections.
 //!
-//! [`TcpListener`], [`TcpStream`] and [`TcpSocket`] have the methods of tokio's types, on a real TCP ([`cohaptic_tcp`]) whose segments are packets on the
-//! emulated links. The size of such a packet on its link is its whole length, headers of IP and TCP included; a UDP datagram counts with its content only. The
-//! module [`net`](crate::net) has the names of `tokio::net`, so that a program runs here after changing one import.
+//! [`TcpListener`], [`TcpStream`] and [`TcpSocket`](crate::TcpSocket) have the methods of tokio's types, on a real TCP ([`cohaptic_tcp`]) whose segments are
+//! packets on the emulated links. The size of such a packet on its link is its whole length, headers of IP and TCP included; a UDP datagram counts with its
+//! content only. The module [`net`](crate::net) has the names of `tokio::net`, so that a program runs here after changing one import.
 
 #[cfg(feature = "facade")]
 mod facade;
-mod listener;
+pub(crate) mod listener;
 mod options;
 #[cfg(feature = "tokio")]
-mod owned;
+pub(crate) mod owned;
 mod readiness;
-mod socket;
+pub(crate) mod socket;
 #[cfg(feature = "tokio")]
-mod split;
-mod stream;
+pub(crate) mod split;
+pub(crate) mod stream;
 #[cfg(feature = "tokio")]
 mod traits;
 
@@ -23,15 +23,9 @@ use std::net::SocketAddr;
 /// Name of these sockets in messages.
 const KIND: &str = "a TCP socket";
 
-pub use cohaptic_tcp::{CaState, ConfigError, CongestionControl, EcnFallback, Flags, Info, Keepalive, State, TcpConfig};
-#[cfg(feature = "tokio")]
-pub use owned::{OwnedReadHalf, OwnedWriteHalf, ReuniteError};
-#[cfg(feature = "tokio")]
-pub use split::{ReadHalf, WriteHalf};
-
-pub use listener::TcpListener;
-pub use socket::TcpSocket;
-pub use stream::TcpStream;
+pub use cohaptic_tcp::{CaState, ConfigError, CongestionControl, EcnFallback, Flags, Info, Keepalive, Segment, State, TcpConfig};
+pub(crate) use listener::TcpListener;
+pub(crate) use stream::TcpStream;
 
 /// State of one end of a connection: see [`Bed::connections`](crate::Bed::connections).
 #[derive(Clone, PartialEq, Eq, Debug)]

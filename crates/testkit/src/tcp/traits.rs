@@ -6,7 +6,9 @@ use std::task::{Context, Poll};
 
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 
-use super::{OwnedReadHalf, OwnedWriteHalf, ReadHalf, TcpStream, WriteHalf};
+use super::TcpStream;
+use super::owned::{OwnedReadHalf, OwnedWriteHalf};
+use super::split::{ReadHalf, WriteHalf};
 
 impl TcpStream {
     pub(super) fn poll_read_buf(&self, cx: &Context<'_>, buffer: &mut ReadBuf<'_>) -> Poll<io::Result<()>> {

@@ -78,7 +78,6 @@ impl Held {
     ///
     /// Always, except while this thread panics already: a value that is dropped during the unwinding may send again.
     #[cold]
-    #[inline(never)]
     #[expect(clippy::panic, reason = "the run would take all memory; names the sender, and the way out")]
     pub(crate) fn fail(&self, sender: impl fmt::Display) {
         if std::thread::panicking() {

@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+#[cfg(feature = "tcp")]
+use cohaptic_tcp::Segment;
 use cohaptic_units::Instant;
 use cohaptic_units::print::Counted;
 use cohaptic_wan::random::{Purpose, Stream};
@@ -10,8 +12,6 @@ use cohaptic_wan::{Network, Path};
 
 use super::exits::Exits;
 use super::parcel::Parcel;
-#[cfg(feature = "tcp")]
-use crate::hit::Segment;
 use crate::hit::{Laws, PacketLaw, Seen, SentPacket, Verdict};
 use crate::trace::PacketName;
 

@@ -221,7 +221,6 @@ impl<A: Default> Spare<A> {
 
 /// Returns a new parcel, all of whose fields the caller sets.
 #[cold]
-#[inline(never)]
 fn empty<A: Default>() -> Box<Parcel<A>> {
     Box::new(Parcel::new(A::default(), Octets::default(), false))
 }

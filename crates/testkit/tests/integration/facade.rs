@@ -8,7 +8,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
 use cohaptic_sockets::{Call, DatagramOption, Datagrams, Flag, Membership, Number, Socket, Stop, Stream, Version};
-use cohaptic_testkit::{Bed, TcpConfig, Testbed, time};
+use cohaptic_testkit::tcp::TcpConfig;
+use cohaptic_testkit::{Bed, Testbed, time};
 
 fn address(text: &str) -> SocketAddr {
     text.parse().unwrap()

@@ -224,7 +224,7 @@ fn packets_of_nodes_are_hit_too() {
 
 #[test]
 fn segments_of_tcp_are_known() {
-    use cohaptic_testkit::hit::{Flags, Segment};
+    use cohaptic_testkit::tcp::{Flags, Segment};
     // As a raw packet in a datagram: what sockets of TCP put on the wire.
     let segment = |sequence: u32, flags: Flags, data: &[u8]| {
         let mut packet = vec![0x45, 0, 0, 0, 0, 0, 0x40, 0, 64, 6, 0, 0, 10, 0, 0, 1, 10, 0, 0, 2];

@@ -8,8 +8,7 @@ mod program;
 use std::time::Duration;
 
 use cohaptic_benches_peers::{median, version};
-use cohaptic_testkit::TcpConfig;
-use cohaptic_testkit::tcp::CongestionControl;
+use cohaptic_testkit::tcp::{CongestionControl, TcpConfig};
 
 use super::{Effort, rounds};
 use crate::program::DELAY;

@@ -6,7 +6,8 @@ use std::time::Duration;
 
 use cohaptic_benches_common::machine::field;
 use cohaptic_testkit::hit::Verdict;
-use cohaptic_testkit::{Host, Instant, TcpConfig, TcpListener, TcpStream, Testbed, time};
+use cohaptic_testkit::tcp::TcpConfig;
+use cohaptic_testkit::{Host, Instant, TcpListener, TcpStream, Testbed, time};
 
 use super::program::{Net, PORT, answer, ask, crowd, feed, give, swallow, take};
 use crate::program::DELAY;
