@@ -2,7 +2,6 @@
 
 use cohaptic_harness::measures::Measures;
 use cohaptic_harness::record::Pictures;
-use cohaptic_harness::task::TaskWatch;
 use cohaptic_harness::{Observer, Simulation, Summary};
 use cohaptic_picture::Size;
 use cohaptic_units::Instant;
@@ -57,14 +56,14 @@ impl Run {
         law: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let laws = law.map(|law| Laws::new(&law, &scene.scene)).transpose()?;
-        let (measures, task) = (Measures::of(&scene.scene), TaskWatch::of(&scene.scene));
-        let watched = trajectory || packets || measures.is_some() || task.is_some() || laws.is_some();
+        let measures = Measures::of(&scene.scene);
+        let watched = trajectory || packets || measures.is_some() || laws.is_some();
         scene.refuse_too_large(model(general), watched).map_err(|error| of_scene(py, &error))?;
-        let (summary, ((kept_ticks, kept_packets), (pictures, (measures, task)))) = interruptible(py, |stop| {
+        let (summary, ((kept_ticks, kept_packets), (pictures, measures))) = interruptible(py, |stop| {
             let recorded = (trajectory.then(|| Trajectory::new(&scene.scene)), packets.then(|| Packets::new(&scene.scene)));
             // A picture shows both.
             let pictures = (trajectory && packets).then(|| Pictures::new(&scene.scene));
-            let mut observer = ((recorded, (pictures, (measures, task))), Asked { stop, laws: laws.as_ref() });
+            let mut observer = ((recorded, (pictures, measures)), Asked { stop, laws: laws.as_ref() });
             let Ok(summary) = match &laws {
                 None => Simulation::new(&scene.scene, model(general)).on_threads(threads.max(1)).run(&mut observer),
                 Some(laws) => Laws::attached(|| Simulation::with_strategies(&scene.scene, model(general), laws).run(&mut observer)),
@@ -74,8 +73,8 @@ impl Run {
         if let Some(laws) = &laws {
             laws.raise(py)?;
         }
-        let measured = measures.map(|measures| measures.values(summary.duration)).unwrap_or_default();
-        let task = task.map(|task| task.result(&summary));
+        let measured = measures.as_ref().map(|measures| measures.values(summary.duration)).unwrap_or_default();
+        let task = measures.and_then(|measures| measures.task(&summary));
         let document = json(&cohaptic_answers::run(&scene.scene, &summary, &measured, task.as_ref(), None));
         let table = |table: PyResult<Table>| Py::new(py, table?);
         let trajectory = kept_ticks.map(|ticks| table(ticks.table())).transpose()?;

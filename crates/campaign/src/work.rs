@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use cohaptic_harness::measures::{MeasuredValue, Measures};
-use cohaptic_harness::{Model, Summary, run_side_by_side};
+use cohaptic_harness::measures::{MeasuredRun, Measures};
+use cohaptic_harness::{Model, run_side_by_side};
 use cohaptic_scene::Scene;
 
 use crate::error::CampaignError;
@@ -100,19 +100,19 @@ impl Work<'_> {
     pub(crate) fn rows(&self, chunk: Chunk, known: &Scenes) -> Result<Vec<Row>, CampaignError> {
         let runs = chunk.start..chunk.end;
         let scenes = runs.clone().map(|run| self.scene(run, known)).collect::<Result<Vec<Scene>, CampaignError>>()?;
-        // Runs without measures share one pass over eight scenes, see `cohaptic_harness::run_side_by_side`.
-        let outcomes: Vec<(Summary, Vec<MeasuredValue>)> = if scenes.iter().all(|scene| scene.measure.is_none()) {
-            run_side_by_side(&scenes).into_iter().map(|summary| (summary, Vec::new())).collect()
+        // Runs without measures and tasks share one pass over eight scenes, see `cohaptic_harness::run_side_by_side`.
+        let outcomes: Vec<MeasuredRun> = if scenes.iter().all(|scene| scene.measure.is_none() && scene.task.is_none()) {
+            run_side_by_side(&scenes).into_iter().map(|summary| MeasuredRun { summary, values: Vec::new(), task: None }).collect()
         } else {
             // A measure needs an observer of its run, so these scenes are run one after the other.
             scenes.iter().map(|scene| Measures::run(scene, Model::Least)).collect()
         };
-        let rows = runs.zip(scenes.iter().zip(&outcomes)).map(|(run, (scene, (summary, measured)))| {
+        let rows = runs.zip(scenes.iter().zip(&outcomes)).map(|(run, (scene, measured))| {
             let (combination, _) = self.accepted.run(run);
             // The table numbers the runs of refused combinations too, while `run` counts accepted runs only.
             let place = RunId { run: self.accepted.number(run), combination, seed: scene.seed };
             let judgement = usize::try_from(combination).ok().and_then(|place| self.judgements.get(place));
-            row(place, self.plan.values(combination), judgement, (summary, measured), self.roster)
+            row(place, self.plan.values(combination), judgement, measured, self.roster)
         });
         let rows = rows.collect();
         self.watch.ran(chunk.end - chunk.start);

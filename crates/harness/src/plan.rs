@@ -58,7 +58,8 @@ impl Plan {
             Model::Least => Self {
                 axes: scene.axes,
                 ticking: ticking(scene.peers.iter()),
-                devices: (0..scene.peers.len()).map(|peer| device(scene, peer, ticks_are_observed)).collect(),
+                // A judge that ends the run observes the ticks too.
+                devices: (0..scene.peers.len()).map(|peer| device(scene, peer, ticks_are_observed || scene.ends_with_task())).collect(),
                 general_links: false,
             },
         }

@@ -63,7 +63,7 @@ impl<'a, S: Strategies> Simulation<'a, S> {
         Self { threads, ..self }
     }
 
-    /// Runs the scene to its end, until its numbers overflow, or until the observer ends the run.
+    /// Runs the scene to its end, until its task [ends the run](cohaptic_scene::TaskEnd::Stop), until its numbers overflow, or until the observer ends the run.
     ///
     /// # Errors
     ///
@@ -116,8 +116,10 @@ impl<'a, S: Strategies> Simulation<'a, S> {
 
     fn run_with_events(&self, plan: &Plan, observer: &mut (impl Observer<Error = Ended> + ?Sized)) -> Result<Summary, Ended> {
         match plan.axes {
-            Axes::One => run_to_end(self.world::<1, _>(plan, NoRemote), questions_of(self.scene), observer),
-            Axes::Two | Axes::Three => run_to_end(self.world::<3, _>(plan, NoRemote), questions_of(self.scene), observer),
+            Axes::One => run_to_end(self.world::<1, _>(plan, NoRemote).stopping_with_task(self.scene), questions_of(self.scene), observer),
+            Axes::Two | Axes::Three => {
+                run_to_end(self.world::<3, _>(plan, NoRemote).stopping_with_task(self.scene), questions_of(self.scene), observer)
+            }
         }
     }
 

@@ -1,9 +1,9 @@
-//! Peers whose copies a task judges.
+//! Peers whose copies a task judges, and the end of runs with a task.
 
 use cohaptic_peer::Contact;
 
 use crate::model::{ChangeKind, Scene};
-use crate::task::{Judged, TaskSpec};
+use crate::task::{Judged, TaskEnd, TaskSpec};
 
 impl TaskSpec {
     /// Returns the peers whose copies are judged, by index, in the order of the scene.
@@ -17,6 +17,12 @@ impl TaskSpec {
 }
 
 impl Scene {
+    /// Returns whether a run of the scene ends at the outcome of its task.
+    #[must_use]
+    pub fn ends_with_task(&self) -> bool {
+        self.task.as_ref().is_some_and(|task| task.end == TaskEnd::Stop)
+    }
+
     /// Returns whether the device of a peer touches the object at any time of the scene.
     ///
     /// # Panics

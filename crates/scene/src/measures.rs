@@ -99,10 +99,12 @@ registry! {
     AgeMean: Run, "age_mean_s", "s", "Mean age of held samples, tick less sampling, over ticks and pairs of peers from the first arrival on";
     AgeP99: Run, "age_p99_s", "s", "Quantile of 99 % of that age";
     TaskTime: Run, "task_time_s", "s", "Time from the start of the task to its end; no value for a task that is not done";
+    Throughput: Run, "throughput_bit_s", "bit/s", "Information rate of the movements to reached targets, by the spread of their ends; no value for fewer than two";
     MotionForce: Run, "motion_force_n", "N", "Mean over ticks of the task of the norm of the sum of the coupling forces of all peers";
     InternalForce: Run, "internal_force_n", "N", "Mean over ticks of the task of the part of the coupling forces that cancels, the smaller of the sums of positive and negative forces along each axis";
     TaskError: Peer, "error_rms_m", "m", "Root mean square over ticks of the task of the distance between the copy of this peer and the target";
-    Outside: Peer, "outside_s", "s", "Time for which the copy of this peer was outside of the held target after the first entry";
+    Overshoot: Peer, "overshoot_m", "m", "Largest distance of the copy of this peer beyond a target of the task, along the line from the target before";
+    Outside: Peer, "outside_s", "s", "Time for which the copy of this peer was outside of the held target after the first entry, or outside of the lane of a path";
     Effort: Peer, "effort_n2_s", "N²·s", "Integral over the task of the squared norm of the coupling force of this peer";
     Given: Peer, "given_j", "J", "Work of the hand and device of this peer on the object over the task, without the negative work";
     Taken: Peer, "taken_j", "J", "Negative work of the hand and device of this peer on the object over the task";
@@ -110,6 +112,8 @@ registry! {
     Submovements: Peer, "submovements", "", "Maxima of the speed of the copy of this peer over the task, each after a rise and before a fall of at least 5 mm/s";
     Sparc: Peer, "sparc", "", "Smoothness of the motion of the copy of this peer over the task, by the spectral arc length of its speed";
     Ldlj: Peer, "ldlj", "", "Smoothness of the motion of the copy of this peer over the task, by the logarithm of its dimensionless jerk";
+    Lag: Peer, "lag_s", "s", "Shift in time of the target, or of the copy of the first peer, with the least root mean square distance from the copy of this peer";
+    LagResidual: Peer, "lag_residual_m", "m", "Least root mean square distance, at that shift";
 }
 
 /// A measure of the run, or a measure together with a peer.
@@ -155,9 +159,11 @@ impl Measure {
     pub(crate) const fn is_of_task(self) -> bool {
         match self {
             Self::TaskTime
+            | Self::Throughput
             | Self::MotionForce
             | Self::InternalForce
             | Self::TaskError
+            | Self::Overshoot
             | Self::Outside
             | Self::Effort
             | Self::Given
@@ -165,7 +171,9 @@ impl Measure {
             | Self::LoadShare
             | Self::Submovements
             | Self::Sparc
-            | Self::Ldlj => true,
+            | Self::Ldlj
+            | Self::Lag
+            | Self::LagResidual => true,
             Self::DiscrepancyRms
             | Self::DiscrepancyP50
             | Self::DiscrepancyP95
@@ -210,7 +218,7 @@ mod tests {
         for measure in Measure::ALL {
             let unit = match measure.unit() {
                 "1/s" => "_per_s".to_owned(),
-                "bit/s" => "_bits_per_s".to_owned(),
+                "bit/s" if *measure == Measure::BitRate => "_bits_per_s".to_owned(),
                 // Ratios and counts have no unit.
                 "" => String::new(),
                 unit => format!("_{}", unit.replace(['·', '/'], "_").replace('²', "2").to_lowercase()),

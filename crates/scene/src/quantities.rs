@@ -26,6 +26,8 @@ pub(crate) const WALL_STIFFNESS: Quantity = Quantity::positive("N/m");
 pub(crate) const POSITION: Quantity = Quantity::any("m");
 /// Distance \[m\], above zero.
 pub(crate) const DISTANCE: Quantity = Quantity::positive("m");
+/// Least distance \[m\], at least zero.
+pub(crate) const DISTANCE_BOUND: Quantity = Quantity::not_negative("m");
 /// Velocity [m/s], any finite number.
 pub(crate) const VELOCITY: Quantity = Quantity::any("m/s");
 /// Limit of a speed [m/s], above zero.
@@ -52,6 +54,8 @@ pub(crate) const TORQUE: Quantity = Quantity::any("N·m");
 pub(crate) const COMPONENT: Quantity = Quantity::any("");
 /// Largest angle \[rad\], at least zero.
 pub(crate) const ANGLE_BOUND: Quantity = Quantity::not_negative("rad");
+/// Limit of an angle \[rad\], above zero.
+pub(crate) const POSITIVE_ANGLE: Quantity = Quantity::positive("rad");
 /// Angle \[rad\], any finite number.
 pub(crate) const ANGLE: Quantity = Quantity::any("rad");
 

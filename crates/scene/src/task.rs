@@ -4,6 +4,9 @@ use core::time::Duration;
 
 use cohaptic_peer::Signal;
 use cohaptic_units::Instant;
+use cohaptic_wan::random::{Purpose, Stream};
+
+use crate::path::PathTask;
 
 /// A task of a run. A task observes the run and changes no motion, packet or random number.
 #[derive(Clone, PartialEq, Debug)]
@@ -18,6 +21,17 @@ pub struct TaskSpec {
     pub who: Judged,
     /// Norm of the coupling force FC \[N\] above which a judged peer has dropped the object and the task has failed; `None` for no such limit.
     pub fail_force: Option<f64>,
+    /// What follows after the outcome.
+    pub end: TaskEnd,
+}
+
+/// What follows after the outcome of a task.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum TaskEnd {
+    /// The scene goes on to its end.
+    Continue,
+    /// The run ends at the outcome: no peer ticks after the outcome.
+    Stop,
 }
 
 /// Peers whose copies a task judges.
@@ -40,19 +54,53 @@ pub enum TaskKind {
     Track(Track),
     /// The object is kept at a target until the timeout.
     Hold(Hold),
+    /// The object is moved along a line.
+    Path(PathTask),
+    /// The object is moved to one target after the other, level or between two devices.
+    Carry(Carry),
 }
 
 /// Keys of a task that moves the object to targets.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Reach {
-    /// Targets \[m\], at least one, in the order of reaching. Components beyond the scene's axes are zero.
-    pub targets: Vec<[f64; 3]>,
+    /// Targets, at least one.
+    pub targets: Vec<Target>,
+    /// Order in which the targets are reached.
+    pub order: TargetOrder,
     /// Largest distance from a target that counts as at the target \[m\]; above zero.
     pub radius: f64,
     /// Largest speed at the target [m/s]; `None` for any speed.
     pub speed: Option<f64>,
+    /// Largest angle between a copy and the orientation of the target \[rad\]; above zero, and infinite for targets without orientation.
+    pub angle: f64,
     /// Duration for which the copies stay at the target before the target is reached.
     pub dwell: Duration,
+}
+
+/// Target of a task that moves the object.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Target {
+    /// Position \[m\]. Components beyond the scene's axes are zero.
+    pub position: [f64; 3],
+    /// Orientation, as a unit quaternion (w, x, y, z); `None` for any orientation.
+    pub orientation: Option<[f64; 4]>,
+}
+
+impl Target {
+    /// Returns the target at a position \[m\], for an object of any orientation.
+    #[must_use]
+    pub const fn at(position: [f64; 3]) -> Self {
+        Self { position, orientation: None }
+    }
+}
+
+/// Order in which targets are reached.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum TargetOrder {
+    /// The order of the scene.
+    Given,
+    /// A random order, which follows from the seed of the scene: see [`Reach::in_order`].
+    Shuffled,
 }
 
 /// Keys of a task that follows a moving target.
@@ -77,6 +125,28 @@ pub struct Hold {
     pub grace: Duration,
 }
 
+/// Keys of a task that carries the object to targets. The task fails at once when a limit is exceeded; at least one limit is present.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Carry {
+    /// Targets.
+    pub reach: Reach,
+    /// Largest angle between the z axis of a copy and the z axis of the world \[rad\]; above zero.
+    pub level: Option<f64>,
+    /// Limits of the distance between two devices.
+    pub gap: Option<Gap>,
+}
+
+/// Limits of the distance between the devices of two peers.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Gap {
+    /// The two peers, by the index in [`Scene::peers`](crate::Scene::peers).
+    pub peers: [usize; 2],
+    /// Least distance \[m\]; at least zero.
+    pub min: f64,
+    /// Largest distance \[m\]; above `min`.
+    pub max: f64,
+}
+
 impl TaskKind {
     /// Returns the name of the kind, as written in scenes.
     #[must_use]
@@ -85,7 +155,39 @@ impl TaskKind {
             Self::Reach(_) => "reach",
             Self::Track(_) => "track",
             Self::Hold(_) => "hold",
+            Self::Path(_) => "path",
+            Self::Carry(_) => "carry",
         }
+    }
+
+    /// Returns the targets of a kind that reaches targets; `None` for the other kinds.
+    #[must_use]
+    pub const fn reach(&self) -> Option<&Reach> {
+        match self {
+            Self::Reach(reach) | Self::Carry(Carry { reach, .. }) => Some(reach),
+            Self::Track(_) | Self::Hold(_) | Self::Path(_) => None,
+        }
+    }
+}
+
+impl Reach {
+    /// Returns the targets in the order of reaching, in a run with this seed. The order has no other influence on the random numbers of the run.
+    ///
+    /// A shuffled order is drawn after Fisher and Yates: from the last target to the second, each changes places with a target at or before its own place.
+    #[must_use]
+    pub fn in_order(&self, seed: u64) -> Vec<Target> {
+        let mut targets = self.targets.clone();
+        if self.order == TargetOrder::Shuffled {
+            // No link has this label, because a label of a link has an arrow.
+            let stream = Stream::new(seed, b"task order");
+            for last in (1..targets.len()).rev() {
+                let word = stream.packet(last as u64).first(Purpose::TargetOrder);
+                // The upper half of a product with the number of choices. Its bias is below 2^-50 for a thousand targets.
+                let chosen = (u128::from(word) * (last as u128 + 1)) >> 64;
+                targets.swap(last, usize::try_from(chosen).unwrap_or(last));
+            }
+        }
+        targets
     }
 }
 

@@ -42,6 +42,8 @@ pub enum Purpose {
     Modulation,
     /// Instants of opening slots. The n-th slot has the draws of packet n.
     Slot,
+    /// Order of the targets of a task, in a stream of its own. The n-th exchange of two targets has the draws of packet n.
+    TargetOrder,
     /// Process of an impairment of [the list](crate::Impairments), by its code. The n-th event has the draws of packet n.
     Listed(u8),
 }
@@ -62,6 +64,7 @@ impl Purpose {
             Self::CrossTraffic => 9,
             Self::Modulation => 10,
             Self::Slot => 12,
+            Self::TargetOrder => 18,
             Self::Listed(code) => code as u64,
         }
     }
@@ -295,7 +298,8 @@ mod tests {
     #[test]
     fn no_two_draws_share_an_address() {
         use Purpose::{
-            Corruption, CrossTraffic, Duplication, InitialState, Jitter, Listed, Loss, Modulation, Outage, Queue, Reordering, Slot, TraceLoss,
+            Corruption, CrossTraffic, Duplication, InitialState, Jitter, Listed, Loss, Modulation, Outage, Queue, Reordering, Slot, TargetOrder,
+            TraceLoss,
         };
         let mut words = std::collections::BTreeSet::new();
         let mut count = 0;
@@ -315,6 +319,7 @@ mod tests {
                     CrossTraffic,
                     Modulation,
                     Slot,
+                    TargetOrder,
                     Listed(14),
                     Listed(16),
                 ] {

@@ -26,6 +26,11 @@ pub(crate) fn columns(variations: &[Variation], verdicts: bool, roster: &Roster)
     columns.push(always("ending", Kind::Text));
     columns.push(always("ended_at_s", Kind::Number));
     columns.push(always("ticks", Kind::Integer));
+    if roster.tasks {
+        // Optional, because a run of the campaign may have no task.
+        columns.extend([column("task.outcome".to_owned(), Kind::Text, true), column("task.time_s".to_owned(), Kind::Number, true)]);
+        columns.push(column("task.reached".to_owned(), Kind::Integer, true));
+    }
     columns.push(always("max_discrepancy_m", Kind::Number));
     if roster.turns {
         columns.push(column("max_rotation_discrepancy_rad".to_owned(), Kind::Number, true));
@@ -75,6 +80,9 @@ pub(crate) struct Roster {
     /// `true` if the object turns in any run.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub(crate) turns: bool,
+    /// `true` if any run has a task.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub(crate) tasks: bool,
     /// Names of the measures of all runs.
     #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
     pub(crate) measures: BTreeSet<String>,
@@ -86,7 +94,16 @@ impl Roster {
         let axes = scene.axes.count();
         let access_lines = scene.peers.iter().any(|peer| peer.uplink.is_some() || peer.downlink.is_some());
         let measures = scene.measure.iter().flat_map(|measure| &measure.names).map(|name| name.text(scene)).collect();
-        Self { always: peers.len(), peers, axes, fewest_axes: axes, access_lines, turns: scene.rotation.is_some(), measures }
+        Self {
+            always: peers.len(),
+            peers,
+            axes,
+            fewest_axes: axes,
+            access_lines,
+            turns: scene.rotation.is_some(),
+            tasks: scene.task.is_some(),
+            measures,
+        }
     }
 
     /// Returns the measures in the order of their columns: the measure, the index of its peer in `peers` (`None` for a measure of the run), and the name of the
@@ -117,6 +134,7 @@ impl Roster {
         self.fewest_axes = self.fewest_axes.min(other.fewest_axes);
         self.access_lines |= other.access_lines;
         self.turns |= other.turns;
+        self.tasks |= other.tasks;
         self.measures.extend(other.measures.iter().cloned());
     }
 }
@@ -127,7 +145,7 @@ mod tests {
 
     fn roster(peers: &[&str], axes: usize) -> Roster {
         let peers: Vec<String> = peers.iter().map(|name| (*name).to_owned()).collect();
-        Roster { always: peers.len(), peers, axes, fewest_axes: axes, access_lines: false, turns: false, measures: BTreeSet::new() }
+        Roster { always: peers.len(), peers, axes, fewest_axes: axes, access_lines: false, turns: false, tasks: false, measures: BTreeSet::new() }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use cohaptic_harness::measures::MeasuredValue;
+use cohaptic_harness::measures::MeasuredRun;
 use cohaptic_harness::{Ending, Summary};
 use cohaptic_scene::MeasureName;
 use cohaptic_units::Instant;
@@ -26,7 +26,7 @@ pub(crate) fn row<'a>(
     place: RunId,
     varied: impl Iterator<Item = &'a Varied>,
     judgement: Option<&Judgement>,
-    (summary, measured): (&Summary, &[MeasuredValue]),
+    MeasuredRun { summary, values, task }: &MeasuredRun,
     roster: &Roster,
 ) -> Row {
     let mut row = vec![integer(place.run), integer(place.combination), integer(place.seed)];
@@ -46,6 +46,12 @@ pub(crate) fn row<'a>(
     row.push(Value::Text(Arc::from(summary.ending_name())));
     row.push(Value::Number(ended));
     row.push(integer(summary.ticks));
+    if roster.tasks {
+        row.extend(match task {
+            None => [const { Value::Absent }; 3],
+            Some(task) => [Value::Text(Arc::from(task.outcome.name())), Value::Number(task.time.as_secs_f64()), integer(task.reached.len() as u64)],
+        });
+    }
     row.push(Value::Number(summary.max_discrepancy));
     if roster.turns {
         row.push(summary.max_rotation_discrepancy.map_or(Value::Absent, Value::Number));
@@ -63,7 +69,7 @@ pub(crate) fn row<'a>(
     if roster.access_lines {
         counters(&mut row, summary.access_lines.iter().map(|line| (&line.stats, 1)));
     }
-    let measured: BTreeMap<MeasureName, Option<f64>> = measured.iter().map(|measured| (measured.name, measured.value)).collect();
+    let measured: BTreeMap<MeasureName, Option<f64>> = values.iter().map(|measured| (measured.name, measured.value)).collect();
     row.extend(roster.measures().map(|(measure, peer, _)| {
         let peer = peer.map(|place| place_of(summary, place, &roster.peers[place]));
         let value = match peer {

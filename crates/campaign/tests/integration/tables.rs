@@ -66,7 +66,7 @@ fn alone(cells: &[(String, String)], set: &[String], text: &str) {
     for cause in DropCause::ALL {
         expected.push((format!("links.dropped_{}", cause.name().replace('-', "_")), sum(&|stats| stats.dropped(cause))));
     }
-    for measured in Measures::run(&scene, Model::Least).1 {
+    for measured in Measures::run(&scene, Model::Least).values {
         expected.push((measured.name.text(&scene), measured.value.map_or_else(String::new, |value| format!("{value:?}"))));
     }
     for (name, value) in expected {
@@ -207,4 +207,19 @@ fn a_parquet_file_says_what_it_is_and_nothing_of_when() {
     assert_eq!((about.len(), about[0].key.as_str()), (1, "cohaptic.campaign"));
     assert_eq!(about[0].value.as_deref(), Some(std::fs::read_to_string(bench.path("out/campaign.json")).unwrap().as_str()));
     assert_eq!(bench.files("out"), ["campaign.json", "runs.parquet"]);
+}
+
+#[test]
+fn the_task_of_each_run_stands_in_its_row() {
+    let mut bench = Bench::new(&["task.radius=1,1e-9"], 2);
+    bench.format = Format::Csv;
+    bench.set = vec!["task={ kind = \"reach\", targets = [0.5], timeout = \"20ms\", radius = 1 }".to_owned()];
+    bench.finish("out", 2);
+    let (header, rows) = comma_separated(&bench.path("out/runs.csv"));
+    let place = header.iter().position(|name| name == "task.outcome").unwrap();
+    assert_eq!(header[place..place + 4], ["task.outcome", "task.time_s", "task.reached", "max_discrepancy_m"]);
+    let of_task: Vec<&[String]> = rows.iter().map(|row| &row[place..place + 3]).collect();
+    // Everything lies within a metre, and nobody is there to a nanometre.
+    assert_eq!(of_task[..2], [["done", "0.0", "1"]; 2]);
+    assert_eq!(of_task[2..], [["timed-out", "0.02", "0"]; 2]);
 }

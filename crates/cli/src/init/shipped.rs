@@ -114,6 +114,7 @@ shipped![
     "rigid/tray",
     "tasks/hold",
     "tasks/reach",
+    "tasks/stop",
     "tasks/track",
     "counterexamples/ap-unaffected",
     "counterexamples/below-the-bound",

@@ -6,6 +6,7 @@ use cohaptic_answers::page::{MOST_ROWS, made_by, scene_text};
 use cohaptic_harness::Summary;
 use cohaptic_harness::check::Outcome;
 use cohaptic_harness::measures::MeasuredValue;
+use cohaptic_harness::task::TaskResult;
 use cohaptic_picture::page::{Html, Page, Table};
 use cohaptic_scene::{Scene, scene_content_of_text};
 use cohaptic_units::print::SixDigits;
@@ -24,6 +25,7 @@ pub(super) struct Shown<'a> {
     pub(super) overrides: &'a [String],
     pub(super) summary: &'a Summary,
     pub(super) measured: &'a [MeasuredValue],
+    pub(super) task: Option<&'a TaskResult>,
     pub(super) outcomes: &'a [Outcome],
     /// Pictures with the names of their files.
     pub(super) pictures: &'a [(&'static str, String)],
@@ -32,8 +34,8 @@ pub(super) struct Shown<'a> {
 impl Shown<'_> {
     /// Returns the page of this run alone.
     pub(super) fn page(&self, arguments: &RunArguments) -> Result<String, Failure> {
-        let Self { scene, overrides, summary, measured, outcomes, pictures } = *self;
-        super::page::html(arguments, scene, overrides, (summary, measured), outcomes, pictures)
+        let Self { scene, overrides, summary, measured, task, outcomes, pictures } = *self;
+        super::page::html(arguments, scene, overrides, (summary, measured, task), outcomes, pictures)
     }
 }
 
@@ -75,7 +77,7 @@ fn each_once<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 
 /// Returns the facts as a table with a column for each run.
 fn compared_facts(arguments: &RunArguments, runs: &[Shown<'_>; 2]) -> Html {
-    let facts = runs.each_ref().map(|shown| facts(arguments, shown.scene, shown.overrides, shown.summary));
+    let facts = runs.each_ref().map(|shown| facts(arguments, shown.scene, shown.overrides, (shown.summary, shown.task)));
     let head = runs.iter().fold(Table::new().column(""), |table, shown| table.column(shown.scene.title.as_str()));
     let value = |facts: &[(&str, Html)], name: &str| {
         facts.iter().find(|(known, _)| *known == name).map_or_else(|| NOTHING.into(), |(_, value)| value.clone())

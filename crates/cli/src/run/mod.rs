@@ -18,7 +18,7 @@ use cohaptic_harness::check::{ExpectationWatch, Outcome};
 use cohaptic_harness::live::{Inputs, replay};
 use cohaptic_harness::measures::{MeasuredValue, Measures};
 use cohaptic_harness::record::{Bands, RecordError, RecordedPicture, Recorder, links_csv};
-use cohaptic_harness::task::{TaskResult, TaskWatch};
+use cohaptic_harness::task::TaskResult;
 use cohaptic_harness::{Model, Observer, Simulation, Summary, TickRow, Ticks};
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
@@ -115,12 +115,7 @@ const fn is_shown(arguments: &RunArguments) -> bool {
 
 /// Returns whether the run has an observer: the plot in the terminal, a record, a motion picture, a replay, measures or a task.
 fn is_watched(arguments: &RunArguments, scene: &Scene) -> bool {
-    is_shown(arguments)
-        || arguments.out.is_some()
-        || arguments.motion.is_some()
-        || arguments.inputs.is_some()
-        || Measures::of(scene).is_some()
-        || scene.task.is_some()
+    is_shown(arguments) || arguments.out.is_some() || arguments.motion.is_some() || arguments.inputs.is_some() || Measures::of(scene).is_some()
 }
 
 /// Returns the overrides of the scene: all `--set`, then the seed and the measures.
@@ -154,8 +149,8 @@ struct PageParts {
 impl Run {
     /// Returns the results for a page; `None` for a run without a page.
     fn shown<'a>(&'a self, scene: &'a Scene, overrides: &'a [String]) -> Option<Shown<'a>> {
-        let (summary, measured) = (&self.summary, &self.measured);
-        self.page.as_ref().map(|PageParts { outcomes, pictures }| Shown { scene, overrides, summary, measured, outcomes, pictures })
+        let (summary, measured, task) = (&self.summary, &self.measured, self.task.as_ref());
+        self.page.as_ref().map(|PageParts { outcomes, pictures }| Shown { scene, overrides, summary, measured, task, outcomes, pictures })
     }
 
     /// Writes the page of the run into the folder, if the run has a page and a folder.
@@ -186,26 +181,22 @@ fn run_one(arguments: &RunArguments, scene: &Scene, what: What<'_>, out: Option<
         places: arguments.motion.as_ref().map(|_| Places::new(scene.peers.len())),
     };
     let start = Clock::now();
-    let (measures, task) = (Measures::of(scene), TaskWatch::of(scene));
-    let values = |measures: Option<Measures>, summary: &Summary| measures.map(|measures| measures.values(summary.duration)).unwrap_or_default();
-    let (summary, measured, task, mut files, page) = match out {
+    let measures = Measures::of(scene);
+    let (summary, measures, mut files, page) = match out {
         None => {
-            let mut observer = (&mut watch, (measures, task));
+            let mut observer = (&mut watch, measures);
             let summary = execute(arguments, scene, what, &mut observer)?;
-            let (_, (measures, task)) = observer;
-            let measured = values(measures, &summary);
-            (summary, measured, task, Vec::new(), None)
+            (summary, observer.1, Vec::new(), None)
         }
         Some(folder) => {
             let recorder = Recorder::create(folder, scene)?.sized(arguments.pictures.size());
             let expectations = paged.then(|| ExpectationWatch::new(scene));
-            let mut observer = ((recorder, &mut watch), ((measures, task), expectations));
+            let mut observer = ((recorder, &mut watch), (measures, expectations));
             let summary = execute(arguments, scene, what, &mut observer)?;
-            let ((recorder, _), ((measures, task), expectations)) = observer;
-            let measured = values(measures, &summary);
+            let ((recorder, _), (measures, expectations)) = observer;
             let (files, pictures) = recorder.finish_with_pictures(&summary)?;
             let page = expectations.map(|expectations| PageParts { outcomes: expectations.outcomes(&summary), pictures });
-            (summary, measured, task, files, page)
+            (summary, measures, files, page)
         }
     };
     let wall_s = start.elapsed().as_secs_f64();
@@ -214,7 +205,8 @@ fn run_one(arguments: &RunArguments, scene: &Scene, what: What<'_>, out: Option<
         write_whole(path, |file| links_csv(&summary, |rows| file.write_all(rows))).map_err(unwritten(path))?;
         files.push(path.clone());
     }
-    let task = task.map(|task| task.result(&summary));
+    let measured = measures.as_ref().map(|measures| measures.values(summary.duration)).unwrap_or_default();
+    let task = measures.and_then(|measures| measures.task(&summary));
     Ok(Run { summary, measured, task, wall_s, positions: watch.positions, places: watch.places, files, page })
 }
 

@@ -6,6 +6,7 @@ use cohaptic_answers::OutcomeDocument;
 use cohaptic_answers::page::{self, MOST_ROWS, made_by, more_rows, scene_text};
 use cohaptic_harness::check::Outcome;
 use cohaptic_harness::measures::MeasuredValue;
+use cohaptic_harness::task::{TaskResult, task_words};
 use cohaptic_harness::{Ending, Summary};
 use cohaptic_picture::page::{Html, Page, Table};
 use cohaptic_scene::{Scene, scene_content_of_text};
@@ -24,7 +25,7 @@ pub(super) fn html(
     arguments: &RunArguments,
     scene: &Scene,
     overrides: &[String],
-    (summary, measured): (&Summary, &[MeasuredValue]),
+    (summary, measured, task): (&Summary, &[MeasuredValue], Option<&TaskResult>),
     outcomes: &[Outcome],
     pictures: &[(&'static str, String)],
 ) -> Result<String, Failure> {
@@ -32,7 +33,8 @@ pub(super) fn html(
     // The page shows the file as written, and names the overrides apart.
     let text = input::text(path)?;
     let content = input::with(path, |text, file| scene_content_of_text(text, file, overrides))?;
-    let mut page = Page::new(scene.title.as_str()).with(ending(scene, summary)).with(Html::facts(facts(arguments, scene, overrides, summary)));
+    let mut page =
+        Page::new(scene.title.as_str()).with(ending(scene, summary)).with(Html::facts(facts(arguments, scene, overrides, (summary, task))));
     page = page.with(made_by(&command_line(arguments)));
     page = page.with(section("Expectations", expectations(scene, outcomes))).with(measures(scene, measured)).with(Html::heading(2, "Pictures"));
     for (file, svg) in pictures {
@@ -60,7 +62,12 @@ pub(super) fn ending(scene: &Scene, summary: &Summary) -> Html {
 }
 
 /// Returns the facts about the run, each with its name.
-pub(super) fn facts<'a>(arguments: &RunArguments, scene: &Scene, overrides: &[String], summary: &Summary) -> Vec<(&'a str, Html)> {
+pub(super) fn facts<'a>(
+    arguments: &RunArguments,
+    scene: &Scene,
+    overrides: &[String],
+    (summary, task): (&Summary, Option<&TaskResult>),
+) -> Vec<(&'a str, Html)> {
     let mut facts = vec![
         ("Simulated", format!("{}, {}", Span(summary.duration), Counted(summary.ticks, "tick")).into()),
         ("Largest discrepancy between two copies", length(summary.max_discrepancy).into()),
@@ -72,6 +79,10 @@ pub(super) fn facts<'a>(arguments: &RunArguments, scene: &Scene, overrides: &[St
     if let Some(angle) = summary.max_rotation_discrepancy {
         // Beside the largest discrepancy, the other distance between copies.
         facts.insert(2, ("Largest angle between two copies", angle_text(angle).into()));
+    }
+    if let Some(task) = task {
+        // The task is what the scene is about, so its outcome comes first after the length of the run.
+        facts.insert(1, ("Task", task_words(task, scene).into()));
     }
     facts.extend(page::overrides(overrides));
     facts

@@ -152,6 +152,7 @@ impl Shape {
             (S::OF_SCENE || !scene.timeline.iter().any(changes_law), "the timeline changes the law of the strategy"),
             // A packet stores the index of its receiver in 16 bits.
             (scene.peers.len() <= usize::from(u16::MAX) || delay.is_some(), "there are more than 65,535 peers, over links that take memory"),
+            (!scene.ends_with_task(), "the run ends at the outcome of the task"),
             (scene.duration <= LONGEST && clock.tick <= LONGEST, "it lasts longer than a year"),
         ];
         // The first reason counts: explanations show a single one.
@@ -296,6 +297,10 @@ coordination = { strategy = "average-position", stiffness = 1, update = "8ms" }
             (change("coordination = { send-when = { position = 0.001 } }"), "dead bands"),
             ("scene.axes=3\nobject.inertia=[1, 1, 1]".to_owned(), "the object turns"),
             ("coordination.strategy=\"wave\"\ncoordination.wave.impedance=1".to_owned(), "not a law"),
+            (
+                "peer.contact=\"grasp\"\npeer.coupling.stiffness=1\ntask={ kind = \"hold\", target = 0, radius = 1, end = \"stop\" }".to_owned(),
+                "at the outcome of the task",
+            ),
             ("scene.duration=\"9000h\"".to_owned(), "longer than a year"),
         ] {
             assert!(refusal(&keys).is_some_and(|why| why.contains(expected)), "{keys}: {:?}", refusal(&keys));

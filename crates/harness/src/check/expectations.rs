@@ -13,13 +13,13 @@ use super::Outcome;
 use crate::measures::Measures;
 use crate::measures::travel::Travelled;
 use crate::observer::observe_by_field;
-use crate::task::{TaskResult, TaskWatch, task_words};
+use crate::task::{TaskResult, task_words};
 use crate::{Ending, Observer, Summary, TickRow, Ticks};
 
 /// Observer for all expectations of a scene.
 #[derive(Debug)]
 pub(crate) struct Watched {
-    seen: (Positions, (Option<Measures>, Option<TaskWatch>)),
+    seen: (Positions, Option<Measures>),
 }
 
 /// Positions and attitudes seen so far.
@@ -120,15 +120,14 @@ impl Observer for Positions {
 impl Watched {
     pub(crate) fn new(scene: &Scene, expect: &Expect) -> Self {
         let names: Vec<MeasureName> = expect.measures.iter().map(|expected| expected.name).collect();
-        let measures = (!names.is_empty()).then(|| Measures::new(scene, &names, &scene.measure_settings()));
-        let task = expect.task.and_then(|_| TaskWatch::of(scene));
-        Self { seen: (Positions::new(expect), (measures, task)) }
+        let measures = (!names.is_empty() || expect.task.is_some()).then(|| Measures::new(scene, &names, &scene.measure_settings()));
+        Self { seen: (Positions::new(expect), measures) }
     }
 
     /// Returns the outcome of each expectation, in the order of the sections in the file.
     pub(crate) fn outcomes(&self, scene: &Scene, expect: &Expect, summary: &Summary) -> Vec<Outcome> {
         let name = |peer: usize| &scene.peers[peer].name;
-        let (watched, (measures, task)) = &self.seen;
+        let (watched, measures) = &self.seen;
         let reach = Reach::of(scene, summary);
         let unseen = |peer: usize, at: Instant| reach.why_not(at).unwrap_or_else(|| format!("{} has not ticked by then", name(peer)));
         let mut outcomes = Vec::new();
@@ -176,8 +175,9 @@ impl Watched {
                 Some(value) => Outcome::number("measures", what, unit, &expected.bounds, value),
             })
         }));
-        if let (Some(expected), Some(task)) = (expect.task, task) {
-            outcomes.extend(of_task(expected, &task.result(summary), scene));
+        let task = measures.as_ref().and_then(|measures| measures.task(summary));
+        if let (Some(expected), Some(result)) = (expect.task, task) {
+            outcomes.extend(of_task(expected, &result, scene));
         }
         outcomes
     }
@@ -202,25 +202,29 @@ fn of_task(expected: ExpectTask, result: &TaskResult, scene: &Scene) -> Vec<Outc
     outcome.into_iter().chain(time).collect()
 }
 
-/// Part of the scene that a run reached. A run with overflowed numbers proves nothing about later instants, nor about the whole scene.
+/// Part of the scene that a run reached. A run with overflowed numbers proves nothing about later instants, nor about the whole scene. A run that its task has
+/// ended says nothing about later instants.
 struct Reach {
     /// First instant with a number that is not finite; `None` if the run reached its end.
     overflow: Option<Instant>,
-    /// End of the scene.
+    /// End of the run, or of the scene if the run diverged.
     end: Instant,
 }
 
 impl Reach {
     fn of(scene: &Scene, summary: &Summary) -> Self {
-        let overflow = match summary.ending {
-            Ending::Diverged(at) => Some(at),
-            Ending::Complete | Ending::Interrupted(_) => None,
+        let (overflow, duration) = match summary.ending {
+            Ending::Diverged(at) => (Some(at), scene.duration),
+            Ending::Complete | Ending::Interrupted(_) => (None, summary.duration),
         };
-        Self { overflow, end: Instant::ZERO.saturating_add(scene.duration) }
+        Self { overflow, end: Instant::ZERO.saturating_add(duration) }
     }
 
     /// Returns why the run says nothing about an instant; `None` if the run reached the instant.
     fn why_not(&self, at: Instant) -> Option<String> {
+        if self.overflow.is_none() && at > self.end {
+            return Some(format!("the run ended at {}, with its task", self.end));
+        }
         // The state at the instant of the overflow is not finite, so that instant was not reached either.
         let overflow = self.overflow.filter(|overflow| *overflow <= at)?;
         Some(if overflow < at { format!("the run diverged at {overflow}, before {at}") } else { format!("the run diverged at {overflow}") })

@@ -88,8 +88,10 @@ impl LiveScene {
         let plan = Plan::new(scene, Model::Least, true);
         let simulation = Simulation::new(scene, Model::Least);
         let world = match plan.axes {
-            Axes::One => AnyWorld::One(Box::new(simulation.world(&plan, RemotePeers::new(scene)).seated(scene, devices))),
-            Axes::Two | Axes::Three => AnyWorld::Three(Box::new(simulation.world(&plan, RemotePeers::new(scene)).seated(scene, devices))),
+            Axes::One => AnyWorld::One(Box::new(simulation.world(&plan, RemotePeers::new(scene)).seated(scene, devices).stopping_with_task(scene))),
+            Axes::Two | Axes::Three => {
+                AnyWorld::Three(Box::new(simulation.world(&plan, RemotePeers::new(scene)).seated(scene, devices).stopping_with_task(scene)))
+            }
         };
         // The seed is the session number of peers: see `Scene::peer_config`.
         Self { world, session: scene.seed, others: scene.peers.len() as u64 - 1, open: Instant::ZERO, ended: None }

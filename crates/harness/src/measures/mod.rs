@@ -1,7 +1,7 @@
-//! Measures: numbers that summarise a run, computed during the run, in one pass and, but for the smoothness of motions, constant memory. Sums are added in the order of ticks, so a measure has the
-//! same bits with every [`Model`].
+//! Measures: numbers that summarise a run, computed during the run, in one pass and, but for smoothness and lag of motions, constant
+//! memory. Sums are added in the order of ticks, so a measure has the same bits with every [`Model`].
 //!
-//! [`Measures`] is an [`Observer`]. A scene without measures has no such observer, and its runs are unwatched. [`cohaptic_scene::Measure`] has names, units and
+//! [`Measures`] is an [`Observer`]. A scene without measures and task has no such observer, and its runs are unwatched. [`cohaptic_scene::Measure`] has names, units and
 //! descriptions. Each file of this module accumulates one quantity and gives the measures of this quantity. A new quantity is a new file, a line in the list
 //! below, and lines in [`cohaptic_scene::Measure`].
 //!
@@ -19,20 +19,18 @@
 //!     measure = { names = ["age_mean_s"] }
 //! "#;
 //! let scene = Scene::parse(text, "two.toml".as_ref(), &[])?;
-//! let (_, values) = Measures::run(&scene, Model::Least);
+//! let run = Measures::run(&scene, Model::Least);
 //! // 24 ms on the way and 0 to 7 ms held.
-//! assert!((values[0].value.unwrap() - 0.0275).abs() < 1e-4);
+//! assert!((run.values[0].value.unwrap() - 0.0275).abs() < 1e-4);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 mod ages;
 mod discrepancy;
-mod effort;
 mod energy;
 mod forces;
 mod impedance;
 mod quantiles;
-mod smoothness;
 mod task;
 mod traffic;
 pub(crate) mod travel;
@@ -41,7 +39,9 @@ use std::convert::Infallible;
 use std::time::Duration;
 
 use cohaptic_scene::{Measure, MeasureName, MeasureSettings, Scene};
+use cohaptic_units::Instant;
 
+use crate::task::{TaskResult, TaskView, has_diverged};
 use crate::{HoldRow, InstantRow, Model, NoObserver, Observer, SendRow, Simulation, StepRow, Summary, TickRow};
 
 /// Accumulated quantity of a run, and the measures computed from this quantity.
@@ -53,6 +53,11 @@ trait Accumulator: Sized {
     const GIVES: &'static [(Measure, Self::Figure)];
     /// Kinds of rows that the accumulator takes.
     const ROWS: Rows;
+
+    /// Returns whether a run has the accumulator even if none of its measures is asked for.
+    fn is_needed(_scene: &Scene) -> bool {
+        false
+    }
 
     /// Returns the accumulator before the run.
     fn new(asked: &Asked<'_>) -> Self;
@@ -119,6 +124,17 @@ pub struct MeasuredValue {
     pub value: Option<f64>,
 }
 
+/// Results of a run with its measures.
+#[derive(Clone, PartialEq, Debug)]
+pub struct MeasuredRun {
+    /// Results of the run.
+    pub summary: Summary,
+    /// Values of the measures, in the order of their names; empty if the scene measures nothing.
+    pub values: Vec<MeasuredValue>,
+    /// Result of the task; `None` for a scene without a task.
+    pub task: Option<TaskResult>,
+}
+
 macro_rules! accumulators {
     ($($field:ident: $kind:ty;)+) => {
         /// Measures of one run.
@@ -136,8 +152,8 @@ macro_rules! accumulators {
                 let asked = Asked { scene, names, settings };
                 let mut rows = Rows::NONE;
                 $(
-                    // Only accumulators of an asked measure exist, so a run computes nothing else.
-                    let needed = <$kind>::GIVES.iter().any(|(measure, _)| asked.has(*measure));
+                    // Only accumulators of an asked measure exist, and the judge of a task, so a run computes nothing else.
+                    let needed = <$kind>::is_needed(scene) || <$kind>::GIVES.iter().any(|(measure, _)| asked.has(*measure));
                     let $field = needed.then(|| {
                         rows = rows.and(<$kind>::ROWS);
                         <$kind>::new(&asked)
@@ -219,34 +235,33 @@ accumulators! {
     impedance: impedance::Impedance;
     traffic: traffic::Traffic;
     ages: ages::Ages;
-    task: task::TaskFigures;
-    effort: effort::Effort;
-    smoothness: smoothness::Smoothness;
+    task: task::TaskMeasures;
 }
 
 impl Measures {
-    /// Returns the measures in `[measure]` of the scene; `None` if the scene has no such section.
+    /// Returns the measures in `[measure]` of the scene, with a judge if the scene has a `[task]`; `None` if the scene has neither.
     #[must_use]
     pub fn of(scene: &Scene) -> Option<Self> {
-        scene.measure.as_ref().map(|measure| Self::new(scene, &measure.names, &measure.settings))
+        let names = scene.measure.as_ref().map_or(&[][..], |measure| &measure.names);
+        (scene.measure.is_some() || scene.task.is_some()).then(|| Self::new(scene, names, &scene.measure_settings()))
     }
 
-    /// Runs a scene and returns the values of its measures; no values if the scene has no `[measure]`.
+    /// Runs a scene with its measures and with a judge of its task.
     ///
     /// # Panics
     ///
     /// If the scene needs events and has more than 23,170 peers; see [`crate::too_large`].
     #[must_use]
-    pub fn run(scene: &Scene, model: Model) -> (Summary, Vec<MeasuredValue>) {
+    pub fn run(scene: &Scene, model: Model) -> MeasuredRun {
         let simulation = Simulation::new(scene, model);
         let Some(mut measures) = Self::of(scene) else {
             let Ok(summary) = simulation.run(&mut NoObserver);
-            return (summary, Vec::new());
+            return MeasuredRun { summary, values: Vec::new(), task: None };
         };
         // Rows are many and cheap for measures, so a dynamic call for each row would be a good part of the run.
         let Ok(summary) = simulation.run_compiled(&mut measures);
-        let values = measures.values(summary.duration);
-        (summary, values)
+        let (values, task) = (measures.values(summary.duration), measures.task(&summary));
+        MeasuredRun { summary, values, task }
     }
 
     /// Returns the value of each measure after `elapsed` of the scene, in the order of the names. At the end of a run `elapsed` is [`Summary::duration`].
@@ -255,6 +270,18 @@ impl Measures {
         // Overflowed values have no meaning and are left out.
         let value = |name: MeasureName| self.value(name, elapsed).filter(|value| value.is_finite());
         self.names.iter().map(|name| MeasuredValue { name: *name, value: value(*name) }).collect()
+    }
+
+    /// Returns the result of the task after the run with this summary; `None` for a scene without a task.
+    #[must_use]
+    pub fn task(&self, summary: &Summary) -> Option<TaskResult> {
+        self.task.as_ref()?.result(has_diverged(summary), summary.duration)
+    }
+
+    /// Returns what there is to see of the task at an instant of a run that goes on; `None` for a scene without a task.
+    #[must_use]
+    pub fn task_view(&self, at: Instant) -> Option<TaskView> {
+        self.task.as_ref()?.view(at)
     }
 }
 

@@ -107,7 +107,7 @@ mod tests {
         let (_, first) = copy.1[0];
         assert_eq!(first.to_bits(), 0.0_f64.to_bits(), "the copy begins where the server's does");
         let (reached, _) = copy.1.iter().find(|(_, position)| (position - first).abs() >= 0.02).unwrap();
-        let (_, measured) = Measures::run(&scene, Model::Least);
+        let measured = Measures::run(&scene, Model::Least).values;
         assert_eq!(measured.iter().map(|measure| measure.value).collect::<Vec<_>>(), [Some(*reached)]);
         let outcome = check_with(&scene, Model::Least, |_, _| unreachable!("stability is not expected"), || true).outcomes.remove(0);
         assert_eq!(outcome.measured, Some(*reached), "{outcome:?}");

@@ -7,7 +7,7 @@
 //! | `links.csv` | one row a link or access line: its counters at the end |
 //! | `task.csv`, `task-events.csv` | of a scene with a task: one row a judged instant: target, error; one row an event |
 //! | `inputs.csv` | of a live session: one row a thing that came in from outside |
-//! | `positions.svg`, `forces.svg` | plots over time |
+//! | `positions.svg`, `forces.svg` | plots over time; the targets of a task stand in the positions |
 //! | `orientations.svg`, `views.svg` | of an object that turns: rotation vectors over time; the copies from three sides |
 //! | `network.svg` | delays, losses and the distribution of the delay of up to six links |
 //!
@@ -22,6 +22,7 @@ mod packets;
 mod pictures;
 mod plot;
 mod recorder;
+mod targets;
 mod task;
 mod trajectory;
 mod views;

@@ -8,6 +8,7 @@ use cohaptic_scene::Scene;
 use super::band::Bands;
 use super::network::Network;
 use super::plot::{Panel, Plot, SANE_POSITION};
+use super::targets::Targets;
 use super::views::Views;
 use crate::{Observer, PacketRow, TickRow};
 
@@ -28,6 +29,8 @@ pub struct Pictures {
     orientations: Option<Bands>,
     /// Poses of the copies; `None` if the object does not turn.
     views: Option<Views>,
+    /// Targets of the task; `None` for a scene without a task.
+    targets: Option<Targets>,
 }
 
 /// Spans of time in a plot, as long as its curves are few.
@@ -58,6 +61,7 @@ impl Pictures {
             network: Network::new(scene, spans),
             orientations: scene.rotation.is_some().then(|| bands(4 * names.len())),
             views: Views::new(scene, spans),
+            targets: Targets::new(scene, spans),
             names,
         }
     }
@@ -65,8 +69,8 @@ impl Pictures {
     /// Draws the pictures and returns them with the names of their files.
     #[must_use]
     pub fn drawn(&self, size: Size) -> Vec<RecordedPicture> {
-        let Self { title, names, positions, forces, network, orientations, views } = self;
-        let mut pictures = Vec::new();
+        let Self { title, names, positions, forces, network, orientations, views, targets } = self;
+        let (targets, mut pictures) = (targets.as_ref().map(Targets::settled), Vec::new());
         let mut drawn = vec![
             ("positions.svg", positions, "position of each copy", Axis::new("Position").symbol("x_O").unit("cm"), 100.0, SANE_POSITION),
             ("forces.svg", forces, "coordination force on each copy", Axis::new("Coordination force").symbol("F_T").unit("N"), 1.0, SANE_FORCE),
@@ -83,7 +87,10 @@ impl Pictures {
                 (_, 1) => String::new(),
                 _ => format!("along {}", AXES[along]),
             };
-            let panel = |(along, bands)| Panel { title: heading(along), axis: axis.clone(), names, bands, scale, sane };
+            let panel = |(along, bands)| {
+                let targets = targets.as_ref().filter(|_| file == "positions.svg").map(|targets| (targets, along));
+                Panel { title: heading(along), axis: axis.clone(), names, bands, scale, sane, targets }
+            };
             let panels: Vec<Panel<'_>> = by_axis.iter().enumerate().map(panel).collect();
             let plot = Plot { title: format!("{title}: {what}"), panels };
             pictures.push((file, plot.picture().size(size).svg()));
@@ -108,6 +115,9 @@ impl Observer for Pictures {
     }
 
     fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Infallible> {
+        if let Some(targets) = &mut self.targets {
+            targets.on_tick(row);
+        }
         for axis in 0..row.coupling_force.len() {
             // Curves are ordered by axis, then peer, as `Bands::split` expects.
             let curve = axis * self.names.len() + row.peer;

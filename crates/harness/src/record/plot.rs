@@ -6,6 +6,7 @@ use cohaptic_picture::{Axis, Line, Look, Picture};
 
 use super::band::Bands;
 use super::file::RecordFile;
+use super::targets::Targets;
 use crate::record::RecordError;
 
 /// Distance from its initial position beyond which no person at a desktop device moves a copy \[m\].
@@ -28,6 +29,8 @@ pub(crate) struct Panel<'a> {
     pub(crate) scale: f64,
     /// Bound of the curves in a scene that does not diverge: see [`Bands::range`].
     pub(crate) sane: f64,
+    /// Targets of the task and the axis of the scene; `None` for a plot without targets.
+    pub(crate) targets: Option<(&'a Targets, usize)>,
 }
 
 /// Greatest number of curves with names and different looks. More curves have one look and no names.
@@ -61,9 +64,18 @@ pub(super) const CUT: &str = "What goes far beyond is cut off.";
 fn drawn(panel: &Panel<'_>) -> (cohaptic_picture::Panel, bool) {
     // A scene that diverges would press all sane values into a line, so the range is cut.
     let (range, cut) = panel.bands.range(panel.sane);
+    // A target that no copy came near is shown too. In a cut plot it would press all sane values into a line.
+    let range = match panel.targets.filter(|_| !cut).and_then(|(targets, axis)| targets.range(axis)) {
+        Some(targets) => range.start.min(targets.start)..range.end.max(targets.end),
+        None => range,
+    };
     let range = range.start * panel.scale..range.end * panel.scale;
     let time = Axis::new("Time").symbol("t").unit("s").range(0.0, panel.bands.seconds());
     let mut drawn = cohaptic_picture::Panel::new(time, panel.axis.clone().range(range.start, range.end)).titled(panel.title.as_str());
+    // Targets come first, so that curves are drawn over them.
+    if let Some((targets, axis)) = panel.targets {
+        drawn = targets.onto(drawn, axis, panel.scale);
+    }
     let few = panel.bands.curves() <= MOST_NAMED;
     for curve in 0..panel.bands.curves() {
         // With more curves than looks, names and colours would repeat.
@@ -121,7 +133,7 @@ mod tests {
         let title =
             "Section 5.1: two of three users, AP at 2100 N/m, with arms, with coordination.strategy=proportional-derivative: position of each copy";
         let axis = Axis::new("Position").symbol("x_O").unit("cm");
-        let panel = Panel { title: String::new(), axis, names: &names, bands: &bands, scale: 100.0, sane: 1.0 };
+        let panel = Panel { title: String::new(), axis, names: &names, bands: &bands, scale: 100.0, sane: 1.0, targets: None };
         let svg = Plot { title: title.to_owned(), panels: vec![panel] }.picture().svg();
         assert_eq!(faults(&svg), [""; 0]);
         let drawn = svg.split_once("</desc>").expect("there is a description").1;

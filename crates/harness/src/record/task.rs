@@ -6,12 +6,13 @@ use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
 use super::file::{RecordError, RecordFile, push_f64, push_seconds, push_whole};
-use crate::task::{Event, Judge, Seen, TaskRow, without_outcome};
+use crate::task::{Event, Judge, Seen, TaskRow, has_diverged};
 use crate::{Summary, TickRow};
 
-/// Writes the columns `t,goal,gx,error_m,inside` of `task.csv`, with `gy` and `gz` after `gx` for further axes, and `t,peer,event,goal` of `task-events.csv`.
+/// Writes the columns `t,goal,gx,error_m,inside` of `task.csv`, with `gy` and `gz` after `gx` for further axes and `error_rad` after `error_m` for targets with
+/// orientations, and `t,peer,event,goal` of `task-events.csv`.
 ///
-/// Targets are counted from 1. `inside` is 1 or 0, and empty for a task without a radius. `peer` is empty for an event of all judged peers together.
+/// Targets are counted from 1, in the order of reaching. `inside` is 1 or 0, and empty for a task without a radius. `peer` is empty for an event of all judged peers together.
 #[derive(Debug)]
 pub(crate) struct TaskRecord {
     judge: Judge,
@@ -38,7 +39,8 @@ impl TaskRecord {
         for column in [",gy", ",gz"].into_iter().take(axes - 1) {
             rows.write(column.as_bytes())?;
         }
-        rows.write(b",error_m,inside\n")?;
+        let turns = scene.task.as_ref().and_then(|task| task.kind.reach()).is_some_and(|reach| reach.angle.is_finite());
+        rows.write(if turns { b",error_m,error_rad,inside\n".as_slice() } else { b",error_m,inside\n" })?;
         let mut events = RecordFile::create(folder.join("task-events.csv"))?;
         events.write(b"t,peer,event,goal\n")?;
         let names = scene.peers.iter().map(|peer| peer.name.clone()).collect();
@@ -48,7 +50,9 @@ impl TaskRecord {
     pub(crate) fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), RecordError> {
         let Self { judge, files } = self;
         let mut written = Ok(());
-        judge.on_tick(row, &mut |at, row| files.take(at, row, &mut written));
+        judge.on_tick(row, &mut |at, row| {
+            files.take(at, row, &mut written);
+        });
         written
     }
 
@@ -56,7 +60,9 @@ impl TaskRecord {
     pub(crate) fn finish(self, summary: &Summary) -> Result<[PathBuf; 2], RecordError> {
         let Self { judge, mut files } = self;
         let mut written = Ok(());
-        judge.finish(without_outcome(summary), summary.duration, &mut |at, row| files.take(at, row, &mut written));
+        judge.finish(has_diverged(summary), summary.duration, &mut |at, row| {
+            files.take(at, row, &mut written);
+        });
         written?;
         Ok([files.rows.finish()?, files.events.finish()?])
     }
@@ -73,13 +79,13 @@ impl Files {
         }
     }
 
-    fn write_judged(&mut self, at: Instant, Seen { goal, target, error, is_inside }: Seen) -> Result<(), RecordError> {
+    fn write_judged(&mut self, at: Instant, Seen { goal, target, error, turn, is_inside }: Seen) -> Result<(), RecordError> {
         let Self { axes, rows, line, .. } = self;
         line.clear();
         push_seconds(line, at);
         line.push(b',');
         push_whole(line, goal as u64 + 1);
-        for value in target[..*axes].iter().chain([&error]) {
+        for value in target.position[..*axes].iter().chain([&error]).chain(&turn) {
             line.push(b',');
             push_f64(line, *value);
         }

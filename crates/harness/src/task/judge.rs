@@ -2,24 +2,28 @@
 
 use std::time::Duration;
 
-use cohaptic_scene::{Hold, Judged, Reach, Scene, TaskKind, TaskOutcome, TaskSpec};
+use cohaptic_scene::{Carry, Gap, Hold, Judged, Reach, Scene, Target, TaskKind, TaskOutcome, TaskSpec};
 use cohaptic_units::Instant;
 
-use super::TaskResult;
+use super::copies::{Copy, Group, direction, distance, dot, less, norm};
+use super::rows::{Event, Failure, FailureReason, OnRow, Seen, TaskRow};
+use super::{TaskResult, TaskView};
 use crate::TickRow;
 
 /// Judge of a task during a run.
 #[derive(Clone, Debug)]
 pub(crate) struct Judge {
     spec: TaskSpec,
+    /// Targets in the order of reaching, or the held target. Empty for a moving target and for a path.
+    targets: Vec<Target>,
+    /// Positions of the two devices with a limited distance \[m\]; `None` before the first tick of the device's peer.
+    devices: [Option<[f64; 3]>; 2],
     axes: usize,
     /// End of the time for the task: `start` and the timeout, or the end of the scene.
     deadline: Instant,
-    /// True if the deadline lies within the scene.
-    is_in_scene: bool,
     /// Judged copies at their latest ticks.
     copies: Vec<Copy>,
-    /// Copies that are judged together. One group of all copies or, where each peer is judged alone, a group a copy.
+    /// Copies that are judged together: one group of all copies or, where each peer is judged alone, a group a copy.
     groups: Vec<Group>,
     /// Latest instant with a tick of a judged peer, which is not judged yet; `None` before the first tick.
     now: Option<Instant>,
@@ -29,175 +33,62 @@ pub(crate) struct Judge {
     outcome: Option<(TaskOutcome, Instant, Option<Failure>)>,
 }
 
-/// Copy of a judged peer at its latest tick.
-#[derive(Clone, Copy, Debug)]
-struct Copy {
-    /// Index of the peer.
-    peer: usize,
-    position: [f64; 3],
-    /// Norm of the velocity [m/s].
-    speed: f64,
-    /// Norm of the coupling force \[N\].
-    force: f64,
-    /// False before the first tick.
-    has_ticked: bool,
-    /// True if the copy was within the radius at the latest judgement.
-    is_inside: bool,
-    /// Σ of the squared distances from the target \[m²\].
-    squares: f64,
-    /// Number of distances in `squares`.
-    count: u64,
-    /// Time outside of a held target.
-    outside: Duration,
-}
-
-/// Progress of copies that are judged together.
-#[derive(Clone, Debug)]
-struct Group {
-    /// First copy, by index in [`Judge::copies`].
-    first: usize,
-    /// Number of copies.
-    count: usize,
-    /// Instants at which targets were reached.
-    reached: Vec<Instant>,
-    /// First instant of the unbroken time for which the copies have been at the target until now; `None` while a copy is elsewhere.
-    since: Option<Instant>,
-    /// First instant of the unbroken time outside of the target, after an entry; `None` while inside and before the first entry.
-    outside_since: Option<Instant>,
-    /// True after the first entry.
-    has_entered: bool,
-}
-
-/// Failure of a task.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Failure {
-    /// Index of the peer that failed.
-    pub peer: usize,
-    /// Reason of the failure.
-    pub reason: FailureReason,
-}
-
-/// Reason of a failure of a peer.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum FailureReason {
-    /// The coupling force exceeded the limit of the task.
-    Dropped,
-    /// The copy was outside of the target for longer than the grace time.
-    Left,
-}
-
-impl FailureReason {
-    /// Returns the reason in one word, for documents.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Dropped => "dropped",
-            Self::Left => "left",
-        }
-    }
-}
-
-/// Event of a task. A peer is an index in [`Scene::peers`]; `None` stands for all judged peers together.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) enum Event {
-    /// The copy of a peer came within the radius of the target.
-    Entered {
-        /// The peer.
-        peer: usize,
-        /// Number of the target, from 0.
-        goal: usize,
-    },
-    /// The copy of a peer left the radius of the target.
-    Left {
-        /// The peer.
-        peer: usize,
-        /// Number of the target, from 0.
-        goal: usize,
-    },
-    /// A target was reached.
-    Reached {
-        /// The peer.
-        peer: Option<usize>,
-        /// Number of the target, from 0.
-        goal: usize,
-    },
-    /// The task has its outcome.
-    Ended {
-        /// The peer that is done or has failed.
-        peer: Option<usize>,
-        /// The outcome.
-        outcome: TaskOutcome,
-        /// Number of the target at the end, from 0.
-        goal: usize,
-    },
-}
-
-/// Row of the records of a task.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) enum TaskRow {
-    /// An instant was judged.
-    Judged(Seen),
-    /// Something happened at the instant.
-    Event(Event),
-}
-
-/// Function that takes the rows of a task, each with its instant, in order of time.
-pub(crate) type OnRow<'a> = &'a mut dyn FnMut(Instant, TaskRow);
-
-/// State of a group at a judgement, for records: of the group with the most reached targets, and among equals of the first.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) struct Seen {
-    /// Number of the target, from 0.
-    pub(crate) goal: usize,
-    /// Position of the target \[m\].
-    pub(crate) target: [f64; 3],
-    /// Largest distance of a copy of the group from the target \[m\].
-    pub(crate) error: f64,
-    /// True if all copies of the group are within the radius; `None` for a task without a radius.
-    pub(crate) is_inside: Option<bool>,
-}
-
 impl Judge {
     /// Returns the judge before the run; `None` for a scene without a task.
     pub(crate) fn of(scene: &Scene) -> Option<Self> {
         let spec = (**scene.task.as_ref()?).clone();
-        let copy = |peer| Copy {
-            peer,
-            position: [0.0; 3],
-            speed: 0.0,
-            force: 0.0,
-            has_ticked: false,
-            is_inside: false,
-            squares: 0.0,
-            count: 0,
-            outside: Duration::ZERO,
-        };
-        let copies: Vec<Copy> = spec.judged(scene).into_iter().map(copy).collect();
-        let group = |first, count| Group { first, count, reached: Vec::new(), since: None, outside_since: None, has_entered: false };
+        let copies: Vec<Copy> = spec.judged(scene).into_iter().map(Copy::of).collect();
         let groups = match spec.who {
-            Judged::Any => (0..copies.len()).map(|first| group(first, 1)).collect(),
-            Judged::All | Judged::Peer(_) => vec![group(0, copies.len())],
+            Judged::Any => (0..copies.len()).map(|first| Group::new(first, 1)).collect(),
+            Judged::All | Judged::Peer(_) => vec![Group::new(0, copies.len())],
+        };
+        let targets = match &spec.kind {
+            TaskKind::Reach(reach) | TaskKind::Carry(Carry { reach, .. }) => reach.in_order(scene.seed),
+            TaskKind::Hold(hold) => vec![Target::at(hold.target)],
+            TaskKind::Track(_) | TaskKind::Path(_) => Vec::new(),
         };
         let end = Instant::ZERO.saturating_add(scene.duration);
         let deadline = spec.timeout.map_or(end, |timeout| spec.start.saturating_add(timeout));
-        let is_in_scene = deadline <= end;
-        Some(Self { axes: scene.axes.count(), deadline, is_in_scene, copies, groups, now: None, measured: None, outcome: None, spec })
+        Some(Self { axes: scene.axes.count(), targets, devices: [None; 2], deadline, copies, groups, now: None, measured: None, outcome: None, spec })
     }
 
     /// Takes the state of a peer at a tick. The states of peers that are not judged have no effect. An instant is judged at the first row of a later instant,
     /// when the ticks of all peers of the instant are known.
     pub(crate) fn on_tick(&mut self, row: &TickRow<'_>, on_row: OnRow<'_>) {
-        if let Some(at) = self.now.take_if(|at| *at < row.at) {
-            self.on_instant(at, on_row);
+        if self.now.is_some_and(|at| at < row.at) {
+            self.settle(on_row);
+        }
+        if let Some(place) = self.gap().and_then(|gap| gap.peers.iter().position(|peer| *peer == row.peer)) {
+            self.devices[place] = Some(std::array::from_fn(|axis| row.device.position.get(axis).copied().unwrap_or(0.0)));
         }
         // Judged peers are in order of their indices.
         let Ok(place) = self.copies.binary_search_by_key(&row.peer, |copy| copy.peer) else { return };
         self.now = Some(row.at);
         let copy = &mut self.copies[place];
         copy.position[..self.axes].copy_from_slice(row.object.position);
+        if let Some(turn) = &row.turn {
+            copy.attitude = *turn.object;
+        }
         copy.speed = norm(row.object.velocity);
         copy.force = norm(row.coupling_force);
         copy.has_ticked = true;
+    }
+
+    /// Judges the latest instant with rows, if this instant is not judged yet. For a caller that knows that no further peer ticks at this instant.
+    pub(crate) fn settle(&mut self, on_row: OnRow<'_>) {
+        if let Some(at) = self.now.take() {
+            self.on_instant(at, on_row);
+        }
+    }
+
+    /// Returns the instant of the outcome; `None` while there is none.
+    pub(crate) fn ended(&self) -> Option<Instant> {
+        self.outcome.map(|(_, at, _)| at)
+    }
+
+    /// Returns the end of the time for the task: `start` and the timeout, or the end of the scene.
+    pub(crate) const fn deadline(&self) -> Instant {
+        self.deadline
     }
 
     /// Returns whether an instant with rows seen by [`on_tick`](Self::on_tick) belongs to the time of the task, from the start to the outcome, both included.
@@ -211,11 +102,19 @@ impl Judge {
         self.copies.iter().find(|copy| copy.peer == peer).map(|copy| (copy.squares, copy.count))
     }
 
-    /// Returns the time for which the copy of a peer was outside of the held target, after the first entry of all judged copies together. `None` for a task of
-    /// another kind, and for a peer that is not judged.
+    /// Returns the time for which the copy of a peer was outside of the held target, after the first entry of all judged copies together, or outside of the
+    /// lane of a path. `None` for a task of another kind, and for a peer that is not judged.
     pub(crate) fn outside(&self, peer: usize) -> Option<Duration> {
         let copy = self.copies.iter().find(|copy| copy.peer == peer)?;
-        matches!(self.spec.kind, TaskKind::Hold(_)).then_some(copy.outside)
+        matches!(self.spec.kind, TaskKind::Hold(_) | TaskKind::Path(_)).then_some(copy.outside)
+    }
+
+    /// Returns the largest distance by which the copy of a peer was beyond a target, along the line to this target from the target before \[m\]; zero if the
+    /// copy was never beyond. The line to the first target begins where the copy was at the first judged instant. `None` for a task of another kind than
+    /// reaching, and for a peer that is not judged.
+    pub(crate) fn overshoot(&self, peer: usize) -> Option<f64> {
+        let copy = self.copies.iter().find(|copy| copy.peer == peer)?;
+        self.spec.kind.reach().map(|_| copy.overshoot)
     }
 
     /// Judges an instant. Nothing is judged before the start, after the outcome, and before each judged peer has ticked once.
@@ -234,6 +133,8 @@ impl Judge {
             && let Some(copy) = self.copies.iter().find(|copy| copy.force > limit)
         {
             self.fail(at, Failure { peer: copy.peer, reason: FailureReason::Dropped }, on_row);
+        } else if let Some(failure) = self.not_carried() {
+            self.fail(at, failure, on_row);
         } else {
             self.judge(at, on_row);
         }
@@ -243,44 +144,78 @@ impl Judge {
     }
 
     /// Returns the result at the end of a run of the simulated duration `duration`, after judging the last instant, and the judge with that instant in its
-    /// sums. `otherwise`: outcome of a task without an outcome until then; `None` if the run came to the end of the scene, so that the deadline decides.
-    pub(crate) fn finish(mut self, otherwise: Option<TaskOutcome>, duration: Duration, on_row: OnRow<'_>) -> (TaskResult, Self) {
-        if let Some(at) = self.now {
-            self.on_instant(at, on_row);
-        }
+    /// sums. `has_diverged`: the run diverged, which is the outcome of a task without an outcome until then.
+    pub(crate) fn finish(mut self, has_diverged: bool, duration: Duration, on_row: OnRow<'_>) -> (TaskResult, Self) {
+        self.settle(on_row);
         let end = Instant::ZERO.saturating_add(duration);
         if self.outcome.is_none() {
-            // No tick lies at the end of the scene, so a deadline at the end is decided here.
-            match otherwise {
-                None if self.is_in_scene => self.time_is_over(on_row),
-                otherwise => self.end(otherwise.unwrap_or(TaskOutcome::Unfinished), end, None, None, on_row),
+            if has_diverged {
+                self.end(TaskOutcome::Diverged, end, None, None, on_row);
+            } else if end >= self.deadline {
+                // No tick lies at the end of a run, so a deadline at the end is decided here.
+                self.time_is_over(on_row);
+            } else {
+                self.end(TaskOutcome::Unfinished, end, None, None, on_row);
             }
         }
         let (outcome, at, failure) = self.outcome.unwrap_or((TaskOutcome::Unfinished, end, None));
         let time = at.saturating_duration_since(self.spec.start);
-        let reached = self.groups[self.leading()].reached.clone();
-        (TaskResult { outcome, at, time, reached, failure }, self)
+        let Group { reached, movements, .. } = self.groups[self.leading()].clone();
+        (TaskResult { outcome, at, time, reached, movements, failure }, self)
+    }
+
+    /// Returns the limits of the distance between two devices; `None` without such limits.
+    fn gap(&self) -> Option<&Gap> {
+        match &self.spec.kind {
+            TaskKind::Carry(carry) => carry.gap.as_ref(),
+            TaskKind::Reach(_) | TaskKind::Track(_) | TaskKind::Hold(_) | TaskKind::Path(_) => None,
+        }
+    }
+
+    /// Returns the failure of a task that carries the object, at the present instant; `None` if no limit is exceeded.
+    fn not_carried(&self) -> Option<Failure> {
+        let TaskKind::Carry(carry) = &self.spec.kind else { return None };
+        if let Some(copy) = carry.level.and_then(|level| self.copies.iter().find(|copy| copy.tilt() > level)) {
+            return Some(Failure { peer: copy.peer, reason: FailureReason::Tilted });
+        }
+        let (gap, [Some(one), Some(other)]) = (self.gap()?, self.devices) else { return None };
+        let is_beyond = !(gap.min..=gap.max).contains(&distance(one, other, self.axes));
+        // Only a judged peer can fail. There is one, because a task without is refused.
+        let peer = self.copies.iter().find(|copy| gap.peers.contains(&copy.peer)).or(self.copies.first())?.peer;
+        is_beyond.then_some(Failure { peer, reason: FailureReason::Gap })
     }
 
     /// Adds an instant to the sums of all copies, before the instant is judged.
     fn measure(&mut self, at: Instant) {
         let is_warm = match &self.spec.kind {
             TaskKind::Track(track) => at.saturating_duration_since(self.spec.start) >= track.warm_up,
-            TaskKind::Reach(_) | TaskKind::Hold(_) => true,
+            TaskKind::Reach(_) | TaskKind::Hold(_) | TaskKind::Path(_) | TaskKind::Carry(_) => true,
         };
         let passed = self.measured.replace(at).map_or(Duration::ZERO, |before| at.saturating_duration_since(before));
         for place in 0..self.groups.len() {
-            let target = self.target_of(place, at);
-            let group = &self.groups[place];
-            let has_entered = group.has_entered;
-            for copy in &mut self.copies[group.first..group.first + group.count] {
+            let target = self.target_of(place, at).position;
+            let before = self.groups[place].reached.len().checked_sub(1).map(|before| self.targets[before].position);
+            let is_reached = self.spec.kind.reach().is_some();
+            let path = if let TaskKind::Path(path) = &self.spec.kind { Some(path) } else { None };
+            let group = &mut self.groups[place];
+            group.begin(&self.copies);
+            // A held target counts from the first entry on, a lane from the start.
+            let has_entered = group.has_entered || path.is_some();
+            for copy in &mut self.copies[group.places()] {
+                let began = *copy.began.get_or_insert(copy.position);
+                if is_reached && let Some(along) = direction(before.unwrap_or(began), target, self.axes) {
+                    copy.overshoot = copy.overshoot.max(dot(less(copy.position, target), along));
+                }
                 // The state at the instant before holds until this instant.
                 if has_entered && !copy.is_inside {
                     copy.outside += passed;
                 }
+                match path {
+                    Some(path) => (copy.progress, copy.error) = path.nearest(copy.position, copy.progress),
+                    None => copy.error = distance(copy.position, target, self.axes),
+                }
                 if is_warm {
-                    let error = distance(copy.position, target, self.axes);
-                    copy.squares += error * error;
+                    copy.squares += copy.error * copy.error;
                     copy.count += 1;
                 }
             }
@@ -289,12 +224,12 @@ impl Judge {
 
     /// Judges an instant by the law of the kind.
     fn judge(&mut self, at: Instant, on_row: OnRow<'_>) {
-        let Self { spec, copies, groups, axes, .. } = self;
+        let Self { spec, targets, copies, groups, axes, .. } = self;
         let mut decided = None;
         match &spec.kind {
-            TaskKind::Reach(reach) => {
+            TaskKind::Reach(reach) | TaskKind::Carry(Carry { reach, .. }) => {
                 for group in groups {
-                    if group.reach(at, reach, copies, *axes, on_row) {
+                    if group.reach(at, (reach, targets, spec.start), copies, *axes, on_row) {
                         decided = Some((group.alone(copies), None));
                         break;
                     }
@@ -306,6 +241,16 @@ impl Judge {
                         decided = Some((Some(failure.peer), Some(failure)));
                         break;
                     }
+                }
+            }
+            TaskKind::Path(path) => {
+                for group in groups {
+                    match group.follow(at, path, copies, on_row) {
+                        Ok(false) => continue,
+                        Ok(true) => decided = Some((group.alone(copies), None)),
+                        Err(failure) => decided = Some((Some(failure.peer), Some(failure))),
+                    }
+                    break;
                 }
             }
             TaskKind::Track(_) => {}
@@ -320,7 +265,7 @@ impl Judge {
     /// Decides the task at its deadline.
     fn time_is_over(&mut self, on_row: OnRow<'_>) {
         let outcome = match &self.spec.kind {
-            TaskKind::Reach(_) => TaskOutcome::TimedOut,
+            TaskKind::Reach(_) | TaskKind::Path(_) | TaskKind::Carry(_) => TaskOutcome::TimedOut,
             TaskKind::Track(_) => TaskOutcome::Done,
             // A target that was never entered was not held.
             TaskKind::Hold(_) if self.groups.iter().any(|group| group.has_entered) => TaskOutcome::Done,
@@ -346,112 +291,65 @@ impl Judge {
 
     /// Returns the number of the target of a group: the last one if all are reached.
     fn goal_of(&self, group: usize) -> usize {
-        match &self.spec.kind {
-            TaskKind::Reach(reach) => self.groups[group].reached.len().min(reach.targets.len() - 1),
-            TaskKind::Track(_) | TaskKind::Hold(_) => 0,
-        }
+        self.groups[group].reached.len().min(self.targets.len().saturating_sub(1))
     }
 
-    /// Returns what there is to see at an instant, before the instant is judged.
+    /// Returns what there is to see at an instant, before the instant is judged and after it is measured.
     fn seen(&self, at: Instant) -> Seen {
         let leading = self.leading();
         let (goal, target) = (self.goal_of(leading), self.target_of(leading, at));
-        let radius = match &self.spec.kind {
-            TaskKind::Reach(Reach { radius, .. }) | TaskKind::Hold(Hold { radius, .. }) => Some(*radius),
-            TaskKind::Track(_) => None,
-        };
         let group = &self.groups[leading];
-        let error = group.of(&self.copies).iter().map(|copy| distance(copy.position, target, self.axes)).fold(0.0, f64::max);
-        Seen { goal, target, error, is_inside: radius.map(|radius| error <= radius) }
+        let copies = group.of(&self.copies);
+        let error = copies.iter().map(|copy| copy.error).fold(0.0, f64::max);
+        let turn = copies.iter().filter_map(|copy| copy.turn(&target)).reduce(f64::max);
+        let is_turned = turn.is_none_or(|turn| turn <= self.angle());
+        Seen { goal, target, error, turn, is_inside: self.radius().map(|radius| error <= radius && is_turned) }
     }
 
-    /// Returns the position of the target of a group at an instant \[m\].
-    fn target_of(&self, group: usize, at: Instant) -> [f64; 3] {
+    /// Returns what there is to see at an instant, at or after the latest judged instant.
+    pub(crate) fn view(&self, at: Instant) -> TaskView {
+        let leading = self.leading();
+        let group = &self.groups[leading];
+        let dwell = self.spec.kind.reach().map_or(Duration::ZERO, |reach| reach.dwell);
+        // A task with an outcome shows the target of the outcome, which may move, at that instant.
+        let seen = self.ended().unwrap_or(at).max(self.spec.start);
+        TaskView {
+            target: self.target_of(leading, seen),
+            radius: self.radius(),
+            reached: group.reached.len(),
+            targets: self.targets.len(),
+            dwelt: group.dwelt(at, dwell),
+            until_start: self.spec.start.saturating_duration_since(at),
+            left: self.deadline.saturating_duration_since(seen),
+            outcome: self.outcome.map(|(outcome, _, _)| outcome),
+        }
+    }
+
+    /// Returns the radius of the targets, or half the width of a lane \[m\]; `None` for a task without a radius.
+    fn radius(&self) -> Option<f64> {
         match &self.spec.kind {
-            TaskKind::Reach(reach) => reach.targets[self.goal_of(group)],
-            TaskKind::Track(track) => track.target(at.saturating_duration_since(self.spec.start)),
-            TaskKind::Hold(hold) => hold.target,
-        }
-    }
-}
-
-impl Group {
-    /// Returns the copies of the group.
-    fn of<'a>(&self, copies: &'a [Copy]) -> &'a [Copy] {
-        &copies[self.first..self.first + self.count]
-    }
-
-    /// Returns the peer of a group of one copy; `None` for a larger group.
-    fn alone(&self, copies: &[Copy]) -> Option<usize> {
-        match self.of(copies) {
-            [copy] => Some(copy.peer),
-            _ => None,
+            TaskKind::Reach(Reach { radius, .. })
+            | TaskKind::Hold(Hold { radius, .. })
+            | TaskKind::Carry(Carry { reach: Reach { radius, .. }, .. }) => Some(*radius),
+            TaskKind::Path(path) => Some(0.5 * path.width),
+            TaskKind::Track(_) => None,
         }
     }
 
-    /// Notes for each copy whether it is within the radius of a target, with events of changes. Returns whether all copies are.
-    fn see(&self, at: Instant, (goal, target, radius): (usize, [f64; 3], f64), copies: &mut [Copy], axes: usize, on_row: OnRow<'_>) -> bool {
-        let mut all = true;
-        for copy in &mut copies[self.first..self.first + self.count] {
-            let is_inside = distance(copy.position, target, axes) <= radius;
-            if is_inside != copy.is_inside {
-                let peer = copy.peer;
-                on_row(at, TaskRow::Event(if is_inside { Event::Entered { peer, goal } } else { Event::Left { peer, goal } }));
+    /// Returns the largest angle between a copy and the orientation of a target \[rad\]; infinite without a limit.
+    fn angle(&self) -> f64 {
+        self.spec.kind.reach().map_or(f64::INFINITY, |reach| reach.angle)
+    }
+
+    /// Returns the target of a group at an instant.
+    fn target_of(&self, group: usize, at: Instant) -> Target {
+        match &self.spec.kind {
+            TaskKind::Track(track) => Target::at(track.target(at.saturating_duration_since(self.spec.start))),
+            TaskKind::Path(path) => {
+                let progress = self.groups[group].of(&self.copies).iter().map(|copy| copy.progress).reduce(f64::min);
+                Target::at(path.point(progress.unwrap_or(0.0)))
             }
-            copy.is_inside = is_inside;
-            all &= is_inside;
+            TaskKind::Reach(_) | TaskKind::Hold(_) | TaskKind::Carry(_) => self.targets[self.goal_of(group)],
         }
-        all
     }
-
-    /// Judges an instant of a task that reaches targets. Returns whether the last target was reached.
-    ///
-    /// A target is reached at the first instant t with all copies within the radius, no faster than the speed, at every judged instant of [t − dwell, t], but
-    /// not before the target was the next one.
-    fn reach(&mut self, at: Instant, reach: &Reach, copies: &mut [Copy], axes: usize, on_row: OnRow<'_>) -> bool {
-        // Without a dwell time a copy may reach several targets at one instant.
-        while let Some(target) = reach.targets.get(self.reached.len()) {
-            let goal = self.reached.len();
-            let inside = self.see(at, (goal, *target, reach.radius), copies, axes, on_row);
-            let is_slow = reach.speed.is_none_or(|speed| self.of(copies).iter().all(|copy| copy.speed <= speed));
-            if !(inside && is_slow) {
-                self.since = None;
-                return false;
-            }
-            let since = *self.since.get_or_insert(at);
-            if at.saturating_duration_since(since) < reach.dwell {
-                return false;
-            }
-            self.reached.push(at);
-            on_row(at, TaskRow::Event(Event::Reached { peer: self.alone(copies), goal }));
-            self.since = None;
-            // The next target is another place: each copy enters anew.
-            copies[self.first..self.first + self.count].iter_mut().for_each(|copy| copy.is_inside = false);
-        }
-        true
-    }
-
-    /// Judges an instant of a task that holds a target. Returns the failure of a group that was outside for longer than the grace time.
-    fn hold(&mut self, at: Instant, hold: &Hold, copies: &mut [Copy], axes: usize, on_row: OnRow<'_>) -> Option<Failure> {
-        let inside = self.see(at, (0, hold.target, hold.radius), copies, axes, on_row);
-        self.has_entered |= inside;
-        if inside || !self.has_entered {
-            self.outside_since = None;
-            return None;
-        }
-        let since = *self.outside_since.get_or_insert(at);
-        let is_over = at.saturating_duration_since(since) > hold.grace;
-        let outside = || self.of(copies).iter().find(|copy| !copy.is_inside);
-        is_over.then(outside).flatten().map(|copy| Failure { peer: copy.peer, reason: FailureReason::Left })
-    }
-}
-
-/// Returns the norm of a vector.
-fn norm(vector: &[f64]) -> f64 {
-    vector.iter().map(|component| component * component).sum::<f64>().sqrt()
-}
-
-/// Returns the distance of two positions along the first `axes` axes \[m\].
-fn distance(a: [f64; 3], b: [f64; 3], axes: usize) -> f64 {
-    (0..axes).map(|axis| (a[axis] - b[axis]) * (a[axis] - b[axis])).sum::<f64>().sqrt()
 }

@@ -1,11 +1,12 @@
 //! Tasks: what the users of a scene are asked to do, judged during a run.
 //!
-//! A [`TaskWatch`] is an [`Observer`]: it reads the states of the copies and changes nothing, so a scene moves the same, to the bit, with and without its task.
-//! Every instant at which a judged peer ticks is judged, with the states of all judged peers at their latest ticks. [`crate::record`] writes the files of a task.
+//! The judge reads the states of the copies and changes nothing, so a scene moves the same, to the bit, with and without its task. Every instant at which a
+//! judged peer ticks is judged, with the states of all judged peers at their latest ticks. [`Measures`](crate::measures::Measures) has the result of a task, and
+//! [`crate::record`] writes its files.
 //!
 //! ```
-//! use cohaptic_harness::task::TaskWatch;
-//! use cohaptic_harness::{Model, Simulation};
+//! use cohaptic_harness::Model;
+//! use cohaptic_harness::measures::Measures;
 //! use cohaptic_scene::{Scene, TaskOutcome};
 //!
 //! let text = r#"
@@ -18,28 +19,30 @@
 //!     task = { kind = "reach", targets = [0.1], radius = 0.005 }
 //! "#;
 //! let scene = Scene::parse(text, "two.toml".as_ref(), &[])?;
-//! let mut watch = TaskWatch::of(&scene).expect("the scene has a task");
-//! let summary = Simulation::new(&scene, Model::Least).run(&mut watch)?;
-//! let result = watch.result(&summary);
+//! let result = Measures::run(&scene, Model::Least).task.expect("the scene has a task");
 //! assert_eq!(result.outcome, TaskOutcome::Done);
 //! assert_eq!(result.reached.len(), 1);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod copies;
 mod judge;
+mod rows;
 #[cfg(test)]
 mod tests;
+mod throughput;
 
-use std::convert::Infallible;
 use std::time::Duration;
 
-use cohaptic_scene::{Scene, TaskOutcome};
+use cohaptic_scene::{Scene, Target, TaskOutcome};
 use cohaptic_units::Instant;
 use cohaptic_units::print::Span;
 
-use crate::{Ending, Observer, Summary, TickRow};
-pub(crate) use judge::{Event, Judge, Seen, TaskRow};
-pub use judge::{Failure, FailureReason};
+use crate::{Ending, Summary};
+pub(crate) use judge::Judge;
+pub(crate) use rows::{Event, Seen, TaskRow};
+pub use rows::{Failure, FailureReason};
+pub use throughput::{Movement, throughput};
 
 /// Result of a task.
 #[derive(Clone, PartialEq, Debug)]
@@ -52,8 +55,31 @@ pub struct TaskResult {
     pub time: Duration,
     /// Instants at which targets were reached, in the order of reaching. Where each peer is judged alone, the instants of the peer with the most targets.
     pub reached: Vec<Instant>,
+    /// Movements to these targets, without those from a target to the same place.
+    pub movements: Vec<Movement>,
     /// The failure; `None` unless the outcome is [`TaskOutcome::Failed`].
     pub failure: Option<Failure>,
+}
+
+/// What there is to see of a task at an instant of a run that goes on, of the judged copies with the most reached targets.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct TaskView {
+    /// The target of the instant.
+    pub target: Target,
+    /// Largest distance from the target that counts as at the target \[m\]; `None` for a task without a radius.
+    pub radius: Option<f64>,
+    /// Number of reached targets.
+    pub reached: usize,
+    /// Number of all targets; zero for a target that moves, and for a path.
+    pub targets: usize,
+    /// Part of the dwell time for which the copies have been at the target without a break, 0 to 1. Zero without a dwell time.
+    pub dwelt: f64,
+    /// Time from the instant to the start of the task; zero after the start.
+    pub until_start: Duration,
+    /// Time from the instant, or from the later start, to the end of the time for the task.
+    pub left: Duration,
+    /// The outcome; `None` while there is none.
+    pub outcome: Option<TaskOutcome>,
 }
 
 /// Returns the outcome of a task in words: `done after 2.821 s`, `failed after 1.2 s: left dropped the object`.
@@ -65,6 +91,8 @@ pub fn task_words(result: &TaskResult, scene: &Scene) -> String {
         match failure.reason {
             FailureReason::Dropped => format!(": {name} dropped the object"),
             FailureReason::Left => format!(": {name} left the target"),
+            FailureReason::Tilted => format!(": {name} tilted the object"),
+            FailureReason::Gap => format!(": the devices were too near or too far apart"),
         }
     });
     match result.outcome {
@@ -76,44 +104,8 @@ pub fn task_words(result: &TaskResult, scene: &Scene) -> String {
     }
 }
 
-/// Observer that judges the task of a scene.
-#[derive(Clone, Debug)]
-pub struct TaskWatch {
-    judge: Judge,
-}
-
-impl TaskWatch {
-    /// Returns the observer before the run; `None` for a scene without a task.
-    #[must_use]
-    pub fn of(scene: &Scene) -> Option<Self> {
-        Judge::of(scene).map(|judge| Self { judge })
-    }
-
-    /// Returns the result after the run with this summary.
-    #[must_use]
-    pub fn result(&self, summary: &Summary) -> TaskResult {
-        self.judge.clone().finish(without_outcome(summary), summary.duration, &mut |_, _| ()).0
-    }
-}
-
-impl Observer for TaskWatch {
-    type Error = Infallible;
-
-    fn wants_ticks(&self) -> bool {
-        true
-    }
-
-    fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Infallible> {
-        self.judge.on_tick(row, &mut |_, _| ());
-        Ok(())
-    }
-}
-
-/// Returns the outcome of a task that had no outcome before the end of a run; `None` if the deadline of the task decides. A run has diverged as
-/// [`Summary::has_diverged`] says.
-pub(crate) fn without_outcome(summary: &Summary) -> Option<TaskOutcome> {
-    match summary.ending {
-        Ending::Complete | Ending::Diverged(_) => summary.has_diverged().then_some(TaskOutcome::Diverged),
-        Ending::Interrupted(_) => Some(TaskOutcome::Unfinished),
-    }
+/// Returns whether divergence is the outcome of a task without an outcome until the end of a run. A run has diverged as [`Summary::has_diverged`] says, but an
+/// interrupted run leaves its task unfinished.
+pub(crate) fn has_diverged(summary: &Summary) -> bool {
+    !matches!(summary.ending, Ending::Interrupted(_)) && summary.has_diverged()
 }

@@ -1,11 +1,12 @@
 //! Tests of the laws on positions that each test writes down, without a simulation.
 
+use cohaptic_peer::rotation::Attitude;
 use cohaptic_scene::{Scene, TaskOutcome};
 use cohaptic_units::Instant;
 
-use super::{Event, Failure, FailureReason, Judge, TaskResult, TaskRow};
+use super::{Event, Failure, FailureReason, Judge, Movement, TaskResult, TaskRow};
 use crate::TickRow;
-use crate::rows::StateRow;
+use crate::rows::{StateRow, TurnRow};
 
 /// State of one copy at a tick: position, velocity and coupling force.
 type Row = (f64, f64, f64);
@@ -13,10 +14,15 @@ type Row = (f64, f64, f64);
 /// Result and events of a task with the keys `task` in a scene of 10 ms with two peers, `left` and `right`, which both touch. `rows` has the states of both
 /// copies at each millisecond.
 fn judged(task: &str, rows: &[[Row; 2]]) -> (TaskResult, Vec<(u64, Event)>) {
-    judged_until(task, rows, None, 10)
+    judged_until(task, rows, false, 10)
 }
 
-fn judged_until(task: &str, rows: &[[Row; 2]], otherwise: Option<TaskOutcome>, duration: u64) -> (TaskResult, Vec<(u64, Event)>) {
+fn judged_until(task: &str, rows: &[[Row; 2]], has_diverged: bool, duration: u64) -> (TaskResult, Vec<(u64, Event)>) {
+    let (result, _, events) = judge_of(&scene(task), rows, &[], has_diverged, duration);
+    (result, events)
+}
+
+fn scene(task: &str) -> Scene {
     let text = format!(
         "scene = {{ duration = \"10ms\" }}
          object = {{ mass = 0.45 }}
@@ -25,17 +31,24 @@ fn judged_until(task: &str, rows: &[[Row; 2]], otherwise: Option<TaskOutcome>, d
          peers = [{{ name = \"left\" }}, {{ name = \"right\" }}]
          task = {{ {task} }}"
     );
-    let scene = Scene::parse(&text, "test.toml".as_ref(), &[]).unwrap_or_else(|error| panic!("{error}"));
-    let mut judge = Judge::of(&scene).unwrap();
+    Scene::parse(&text, "test.toml".as_ref(), &[]).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Result, judge and events of the task of a scene. `attitudes`: attitude of both copies at each millisecond; empty for an object that does not turn.
+fn judge_of(scene: &Scene, rows: &[[Row; 2]], attitudes: &[Attitude], has_diverged: bool, duration: u64) -> (TaskResult, Judge, Vec<(u64, Event)>) {
+    let mut judge = Judge::of(scene).unwrap();
     let mut events = Vec::new();
     let mut note = |at: Instant, row: TaskRow| {
         if let TaskRow::Event(event) = row {
             events.push((at.as_nanos() / 1_000_000, event));
         }
     };
+    let axes = scene.axes.count();
     for (tick, copies) in (0_u64..).zip(rows) {
+        let attitude = usize::try_from(tick).ok().and_then(|tick| attitudes.get(tick));
         for (peer, &(position, velocity, force)) in copies.iter().enumerate() {
-            let state = StateRow { position: &[position], velocity: &[velocity] };
+            let (position, velocity) = ([position, 0.0, 0.0], [velocity, 0.0, 0.0]);
+            let state = StateRow { position: &position[..axes], velocity: &velocity[..axes] };
             let row = TickRow {
                 at: millis(tick),
                 peer,
@@ -44,13 +57,13 @@ fn judged_until(task: &str, rows: &[[Row; 2]], otherwise: Option<TaskOutcome>, d
                 target: state,
                 coupling_force: &[force],
                 coordination_force: &[0.0],
-                turn: None,
+                turn: attitude.map(|object| TurnRow { object, device: None, coupling_torque: &[0.0; 3], coordination_torque: &[0.0; 3] }),
             };
             judge.on_tick(&row, &mut note);
         }
     }
-    let (result, _) = judge.finish(otherwise, millis(duration) - Instant::ZERO, &mut note);
-    (result, events)
+    let (result, judge) = judge.finish(has_diverged, millis(duration) - Instant::ZERO, &mut note);
+    (result, judge, events)
 }
 
 fn millis(count: u64) -> Instant {
@@ -145,10 +158,9 @@ fn the_time_ends_at_the_timeout_and_the_instant_of_the_timeout_still_counts() {
 fn a_run_that_ends_early_leaves_the_task_unfinished_or_diverged() {
     let task = r#"kind = "hold", target = 0.0, radius = 0.01"#;
     let rows = together(&[0.0, 0.0, 0.0]);
-    for (otherwise, expected) in
-        [(Some(TaskOutcome::Unfinished), TaskOutcome::Unfinished), (Some(TaskOutcome::Diverged), TaskOutcome::Diverged), (None, TaskOutcome::Done)]
+    for (has_diverged, duration, expected) in [(false, 2, TaskOutcome::Unfinished), (true, 2, TaskOutcome::Diverged), (false, 10, TaskOutcome::Done)]
     {
-        let (result, events) = judged_until(task, &rows, otherwise, 2);
+        let (result, events) = judged_until(task, &rows, has_diverged, duration);
         assert_eq!(result.outcome, expected);
         assert!(matches!(events.last(), Some((_, Event::Ended { outcome, .. })) if *outcome == expected), "{events:?}");
     }
@@ -185,4 +197,144 @@ fn who_pulls_too_hard_has_dropped_the_object() {
     assert_eq!(events, [(5, Event::Ended { peer: Some(1), outcome: TaskOutcome::Failed, goal: 0 })]);
     // A peer that is not judged cannot fail.
     assert_eq!(outcome(&format!(r#"{task}, who = "left""#), &rows), (TaskOutcome::Done, 10));
+}
+
+/// Attitude after a turn about the z axis \[rad\].
+fn turned(angle: f64) -> Attitude {
+    Attitude { orientation: [(0.5 * angle).cos(), 0.0, 0.0, (0.5 * angle).sin()], rate: [0.0; 3] }
+}
+
+#[test]
+fn a_target_with_an_orientation_is_reached_by_a_turned_copy() {
+    let text = "scene = { duration = \"10ms\", axes = 3 }
+        object = { mass = 0.45, inertia = 0.001 }
+        coordination = { strategy = \"average-position\", stiffness = 1000.0, damping = 5.0, update = \"8ms\" }
+        peer = { device = { mass = 0.1 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
+        peers = [{ name = \"left\" }, { name = \"right\" }]
+        task = { kind = \"reach\", targets = [[0, 0, 0], [0, 0, 0]], orientations = [[1, 0, 0, 0], [1, 0, 0, 1]], angle = 0.25, radius = 0.01, dwell = \"1ms\" }";
+    let scene = Scene::parse(text, "test.toml".as_ref(), &[]).unwrap_or_else(|error| panic!("{error}"));
+    // The second orientation is a quarter of a turn about z. At one instant each, the copies are 0.3 and 0.26 rad away, which is too much.
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let angles = [0.3, 0.2, 0.3, -0.2, -0.24, quarter - 0.24, quarter + 0.26, quarter + 0.2, quarter, quarter];
+    let attitudes = angles.map(turned);
+    let (result, _, events) = judge_of(&scene, &together(&[0.0; 10]), &attitudes, false, 10);
+    assert_eq!((result.outcome, reached(&result)), (TaskOutcome::Done, vec![4, 8]));
+    let entered: Vec<u64> = events.iter().filter(|(_, event)| matches!(event, Event::Entered { peer: 0, .. })).map(|(at, _)| *at).collect();
+    assert_eq!(entered, [1, 3, 5, 7]);
+}
+
+#[test]
+fn a_copy_beyond_the_target_is_too_far_along_the_line_from_the_target_before() {
+    let overshoot = |positions: &[f64], task: &str| {
+        let (_, judge, _) = judge_of(&scene(task), &together(positions), &[], false, 10);
+        [0, 1].map(|peer| judge.overshoot(peer))
+    };
+    let task = r#"kind = "reach", targets = [0.1, 0.0], radius = 0.01, dwell = "1ms""#;
+    // 3 mm too far at the first target. On the way back 99 mm lie before the second target, and then 4 mm beyond it.
+    assert_eq!(overshoot(&[0.05, 0.102, 0.103, 0.099, -0.004, 0.0], task).map(|m| m.map(|m| (m * 1e6).round())), [Some(4000.0); 2]);
+    assert_eq!(overshoot(&[0.05, 0.102, 0.103, 0.099, 0.004, 0.0], task).map(|m| m.map(|m| (m * 1e6).round())), [Some(3000.0); 2]);
+    assert_eq!(overshoot(&[0.05, 0.095, 0.095], task), [Some(0.0); 2]);
+    // From the other side, too far is the other way.
+    assert_eq!(overshoot(&[0.2, 0.1, 0.098, 0.102], task).map(|m| m.map(|m| (m * 1e6).round())), [Some(2000.0); 2]);
+    assert_eq!(overshoot(&[0.2, 0.1], r#"kind = "hold", target = 0.1, radius = 0.01"#), [None; 2]);
+}
+
+#[test]
+fn a_movement_goes_from_where_the_one_before_ended() {
+    let task = r#"kind = "reach", targets = [0.1, 0.1, 0.0], radius = 0.01, start = "1ms""#;
+    let (result, _) = judged(task, &together(&[0.5, 0.02, 0.05, 0.104, 0.05, -0.003]));
+    let rounded: Vec<_> = result
+        .movements
+        .iter()
+        .map(|Movement { distance, deviation, time }| ((distance * 1e6).round(), (deviation * 1e6).round(), time.as_millis()))
+        .collect();
+    // The second target is at the place of the first: no movement leads there. Distances go from 20 to 104 mm, and from there to −3 mm.
+    assert_eq!(rounded, [(84_000.0, 4_000.0, 2), (107_000.0, 3_000.0, 2)]);
+}
+
+#[test]
+fn the_view_of_a_task_fills_with_the_dwell_time() {
+    let scene = scene(r#"kind = "reach", targets = [0.1, 0.0], radius = 0.01, start = "2ms", timeout = "6ms", dwell = "4ms""#);
+    let mut judge = Judge::of(&scene).unwrap();
+    let mut see = |tick: u64, position: f64| {
+        for peer in 0..2 {
+            let state = StateRow { position: &[position], velocity: &[0.0] };
+            let row = TickRow {
+                at: millis(tick),
+                peer,
+                device: state,
+                object: state,
+                target: state,
+                coupling_force: &[0.0],
+                coordination_force: &[0.0],
+                turn: None,
+            };
+            judge.on_tick(&row, &mut |_, _| ());
+        }
+        judge.settle(&mut |_, _| ());
+        let view = judge.view(millis(tick));
+        (view.target.position[0], view.reached, view.dwelt, view.until_start.as_millis(), view.left.as_millis(), view.outcome)
+    };
+    assert_eq!(see(0, 0.1), (0.1, 0, 0.0, 2, 6, None));
+    assert_eq!(see(2, 0.1), (0.1, 0, 0.0, 0, 6, None));
+    assert_eq!(see(5, 0.1), (0.1, 0, 0.75, 0, 3, None));
+    assert_eq!(see(6, 0.1), (0.0, 1, 0.0, 0, 2, None));
+    assert_eq!(see(8, 0.0), (0.0, 1, 0.0, 0, 0, Some(TaskOutcome::TimedOut)));
+}
+
+#[test]
+fn a_path_is_done_at_its_end_and_not_by_a_short_cut() {
+    let task = |leave: &str| format!(r#"kind = "path", points = [0.0, 0.1, 0.0], width = 0.04, leave = "{leave}""#);
+    // To 0.1 m and back. At 1 ms both copies are at the end of the path already, but only 0.04 m further than they were.
+    let there_and_back = [0.0, 0.0, 0.04, 0.08, 0.1, 0.07, 0.03, 0.0, 0.0, 0.0];
+    assert_eq!(outcome(&task("fail"), &together(&there_and_back)), (TaskOutcome::Done, 7));
+    assert_eq!(outcome(&task("count"), &together(&[0.0, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])), (TaskOutcome::TimedOut, 10));
+    // 21 mm beyond the turning point is outside, for 2 ms.
+    let wide = [0.0, 0.0, 0.04, 0.08, 0.121, 0.121, 0.1, 0.07, 0.03, 0.0];
+    let (result, judge, events) = judge_of(&scene(&task("count")), &together(&wide), &[], false, 10);
+    assert_eq!((result.outcome, judge.outside(1)), (TaskOutcome::Done, Some(std::time::Duration::from_millis(2))));
+    assert!(events.contains(&(4, Event::Left { peer: 1, goal: 0 })) && events.contains(&(6, Event::Entered { peer: 1, goal: 0 })), "{events:?}");
+    let (result, _) = judged(&task("fail"), &together(&wide));
+    assert_eq!((result.outcome, result.failure), (TaskOutcome::Failed, Some(Failure { peer: 0, reason: FailureReason::Left })));
+    // Each copy has its own progress: the second one goes there only.
+    let apart: Vec<[Row; 2]> = there_and_back.iter().map(|&left| [(left, 0.0, 0.0), (left.min(0.04), 0.0, 0.0)]).collect();
+    assert_eq!(outcome(&task("count"), &apart), (TaskOutcome::TimedOut, 10));
+    assert_eq!(outcome(&format!("{}, who = \"any\"", task("count")), &apart), (TaskOutcome::Done, 7));
+}
+
+/// The rows have the devices at the copies.
+#[test]
+fn devices_that_are_too_far_apart_have_dropped_what_they_carry() {
+    let task = r#"kind = "carry", targets = [0.1], radius = 0.02, gap = { peers = ["right", "left"], min = 0.01, max = 0.03 }"#;
+    let rows = |right: &[f64]| right.iter().map(|&right| [(0.0, 0.0, 0.0), (right, 0.0, 0.0)]).collect::<Vec<[Row; 2]>>();
+    assert_eq!(outcome(task, &rows(&[0.011, 0.029, 0.02, 0.02])), (TaskOutcome::TimedOut, 10));
+    assert_eq!(outcome(task, &rows(&[0.02, 0.02, 0.031])), (TaskOutcome::Failed, 2));
+    assert_eq!(outcome(task, &rows(&[0.02, 0.009, 0.02])), (TaskOutcome::Failed, 1));
+    let (result, _) = judged(task, &rows(&[0.04]));
+    assert_eq!(result.failure, Some(Failure { peer: 0, reason: FailureReason::Gap }));
+    let near = [(0.1, 0.0, 0.0), (0.115, 0.0, 0.0)];
+    assert_eq!(outcome(task, &[near]), (TaskOutcome::Done, 0));
+}
+
+#[test]
+fn an_object_that_is_tilted_is_spilt() {
+    let text = "scene = { duration = \"10ms\", axes = 3 }
+        object = { mass = 0.45, inertia = 0.001 }
+        coordination = { strategy = \"average-position\", stiffness = 1000.0, damping = 5.0, update = \"8ms\" }
+        peer = { device = { mass = 0.1 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
+        peers = [{ name = \"left\" }, { name = \"right\" }]
+        task = { kind = \"carry\", targets = [[0.1, 0, 0]], radius = 0.01, level = 0.2 }";
+    let scene = Scene::parse(text, "test.toml".as_ref(), &[]).unwrap_or_else(|error| panic!("{error}"));
+    let about = |axis: usize, angle: f64| {
+        let mut attitude = turned(0.0);
+        (attitude.orientation[0], attitude.orientation[1 + axis]) = ((0.5 * angle).cos(), (0.5 * angle).sin());
+        attitude
+    };
+    let result = |attitude: Attitude| judge_of(&scene, &together(&[0.0, 0.0, 0.0]), &[turned(0.0), about(0, -0.19), attitude], false, 10).0;
+    // A turn about the vertical axis tilts nothing.
+    assert_eq!(result(about(2, 1.0)).outcome, TaskOutcome::TimedOut);
+    assert_eq!(result(about(1, 0.19)).outcome, TaskOutcome::TimedOut);
+    let tilted = result(about(1, 0.21));
+    assert_eq!((tilted.outcome, tilted.at.as_nanos()), (TaskOutcome::Failed, 2_000_000));
+    assert_eq!(tilted.failure, Some(Failure { peer: 0, reason: FailureReason::Tilted }));
 }

@@ -7,6 +7,7 @@ mod changes;
 pub(crate) mod live;
 mod member;
 mod remote;
+mod stopping;
 mod turning;
 mod watch;
 
@@ -14,7 +15,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use cohaptic_peer::coordination::Role;
-use cohaptic_peer::rotation::Attitude;
+use cohaptic_peer::rotation::{Attitude, Rotation};
 use cohaptic_peer::wire::{Sample, SampleKind};
 use cohaptic_peer::{Contact, Device, LastSent, Peer, Reception, SendWhen, State, Strategy};
 use cohaptic_scene::{Change, Scene, Topology};
@@ -32,6 +33,7 @@ use crate::summary::{AccessSummary, Ending, LinkSummaries, PeerSummary, Summary}
 use changes::{ParameterChange, parameter_changes};
 use member::{DeviceModel, Member};
 pub(crate) use remote::{Arriving, NoRemote, Remote};
+use stopping::Stopping;
 use turning::Turning;
 pub(crate) use watch::Watch;
 
@@ -58,7 +60,10 @@ pub(crate) struct World<const A: usize, S, E: Remote<A> = NoRemote> {
     coordination_factors: Vec<f64>,
     /// Neighbours of each peer; `None` if every peer sends to all other peers.
     topology: Option<Arc<Topology>>,
+    /// End of the run: the end of the scene, or the outcome of a task that ends the run.
     end: Instant,
+    /// Ends the run at the outcome of the task; `None` for a run to the end of the scene.
+    stopping: Option<Box<Stopping>>,
     now: Instant,
     /// Position of each copy at its latest tick \[m\], indexed by peer. NaN for a silent peer in another process.
     latest: Vec<[f64; A]>,
@@ -124,6 +129,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                 .collect(),
             topology: scene.topology.clone(),
             end: Instant::ZERO.saturating_add(scene.duration),
+            stopping: None,
             now: Instant::ZERO,
             max_discrepancy: 0.0,
             finite: true,
@@ -133,12 +139,19 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         }
     }
 
+    /// Lets the outcome of the task end the run, if the task says so.
+    pub(crate) fn stopping_with_task(mut self, scene: &Scene) -> Self {
+        self.stopping = Stopping::of(scene);
+        self.stop_at_outcome();
+        self
+    }
+
     /// Returns the instant of the latest step.
     pub(crate) fn now(&self) -> Instant {
         self.now
     }
 
-    /// Returns the end of the scene.
+    /// Returns the end of the run: the end of the scene, unless its task has ended the run.
     pub(crate) fn end(&self) -> Instant {
         self.end
     }
@@ -170,7 +183,17 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         if watch.instants {
             observer.on_instant(&InstantRow { at: now, discrepancy })?;
         }
+        self.stop_at_outcome();
         Ok(Step::Ticked)
+    }
+
+    /// Ends the run at the outcome of its task, if the task is decided and says so. The next step then finds the run at its end.
+    fn stop_at_outcome(&mut self) {
+        if let Some(stopping) = &mut self.stopping
+            && let Some(end) = stopping.end(self.schedule.next_instant())
+        {
+            self.end = self.end.min(end);
+        }
     }
 
     /// Returns the results of the run up to `ending`.
@@ -301,7 +324,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             }
             Schedule::EventDriven(_) => None,
         };
-        if let (Some(span), false, true) = (lockstep, watch.ticks || watch.steps, E::IS_EMPTY) {
+        if let (Some(span), false, true) = (lockstep, watch.ticks || watch.steps || self.stopping.is_some(), E::IS_EMPTY) {
             self.move_together(now, span);
             return Ok(());
         }
@@ -320,7 +343,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             if let (Some(turning), Some(rotation)) = (&mut self.turning, member.peer.rotation()) {
                 turning.latest[place] = *rotation.copy();
             }
-            if watch.ticks {
+            if watch.ticks || self.stopping.is_some() {
                 let axes = self.axes;
                 let device = member.peer.device().state();
                 let tick = TickRow {
@@ -333,9 +356,12 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                     coordination_force: &forces.coordination[..axes],
                     turn: None,
                 };
-                match member.peer.rotation() {
-                    None => observer.on_tick(&tick)?,
-                    Some(rotation) => turning::on_tick(observer, tick, rotation)?,
+                let rotation = member.peer.rotation();
+                if let Some(stopping) = &mut self.stopping {
+                    show(&mut **stopping, tick, rotation)?;
+                }
+                if watch.ticks {
+                    show(observer, tick, rotation)?;
                 }
             }
             member.tick += 1;
@@ -517,6 +543,15 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> Receivers<'_, A, S, E> {
             observer.on_packet(&event.record)?;
         }
         Ok(())
+    }
+}
+
+/// Shows a tick to an observer, with the turn of a peer that turns.
+#[inline(always)]
+fn show(observer: &mut (impl Observer<Error = Ended> + ?Sized), tick: TickRow<'_>, rotation: Option<&Rotation>) -> Result<(), Ended> {
+    match rotation {
+        None => observer.on_tick(&tick),
+        Some(rotation) => turning::on_tick(observer, tick, rotation),
     }
 }
 

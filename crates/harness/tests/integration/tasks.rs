@@ -3,11 +3,12 @@
 use std::fs;
 use std::path::Path;
 
-use cohaptic_harness::measures::Measures;
+use cohaptic_harness::live::LiveScene;
+use cohaptic_harness::measures::{MeasuredRun, Measures};
 use cohaptic_harness::record::Recorder;
-use cohaptic_harness::task::TaskWatch;
-use cohaptic_harness::{Model, Simulation};
+use cohaptic_harness::{Ending, Model, NoObserver, Simulation, run_side_by_side};
 use cohaptic_scene::{Scene, TaskOutcome};
+use cohaptic_units::Instant;
 use proptest::prelude::*;
 
 use crate::cases;
@@ -40,12 +41,76 @@ fn recorded(scene: &Scene) -> Vec<(String, Vec<u8>)> {
 
 #[test]
 fn a_task_changes_no_byte_of_the_run() {
-    let without = recorded(&scene(SCENE));
-    let with = recorded(&scene(&format!("{SCENE}\n{REACH}")));
-    let (of_task, others): (Vec<_>, Vec<_>) = with.into_iter().partition(|(name, _)| name.starts_with("task"));
-    assert!(others == without, "a file of the run differs");
-    let names: Vec<&str> = of_task.iter().map(|(name, _)| name.as_str()).collect();
-    assert_eq!(names, ["task.csv", "task-events.csv"]);
+    let turning = SCENE
+        .replace("duration = \"2s\"", "duration = \"2s\", axes = 3")
+        .replace("mass = 0.45", "mass = 0.45, inertia = 0.001")
+        .replace("position = 0.1", "position = [0.1, 0, 0]");
+    let both = "orientations = [[1, 0, 0, 0], [1, 0, 0, 0.1]], angle = 0.2, targets = [[0.1, 0, 0], [0, 0, 0]]";
+    for (scene_text, task) in [
+        (SCENE, REACH.to_owned()),
+        (SCENE, REACH.replace("radius", "order = \"shuffled\", radius")),
+        (SCENE, REACH.replace("radius", "who = \"any\", start = \"100ms\", timeout = \"1s\", fail = { force = 20 }, radius")),
+        (SCENE, "task = { kind = \"track\", sines = [{ amplitude = 0.02, frequency = 0.5 }], who = \"right\" }".to_owned()),
+        (SCENE, "task = { kind = \"hold\", target = 0.1, radius = 0.01, grace = \"100ms\" }".to_owned()),
+        (SCENE, "task = { kind = \"path\", points = [0.0, 0.1], width = 0.02 }".to_owned()),
+        (SCENE, REACH.replace("reach", "carry").replace("radius", "gap = { peers = [\"left\", \"right\"], max = 0.5 }, radius")),
+        (&turning, format!("task = {{ kind = \"reach\", radius = 0.01, {both} }}")),
+    ] {
+        let without = recorded(&scene(scene_text));
+        let with = recorded(&scene(&format!("{scene_text}\n{task}")));
+        let is_of_task = |name: &str| name.starts_with("task") || name == "positions.svg";
+        let (of_task, others): (Vec<_>, Vec<_>) = with.into_iter().partition(|(name, _)| is_of_task(name));
+        let without: Vec<_> = without.into_iter().filter(|(name, _)| !is_of_task(name)).collect();
+        assert!(others == without, "a file of the run differs: {task}");
+        let names: Vec<&str> = of_task.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(names, ["task.csv", "task-events.csv", "positions.svg"]);
+    }
+}
+
+/// The files of a run that ends at the outcome are the beginnings of those of the run that goes on.
+#[test]
+fn a_run_that_ends_at_the_outcome_is_a_prefix() {
+    for (task, outcome, last) in [
+        (REACH.to_owned(), TaskOutcome::Done, None),
+        (REACH.replace("radius", "who = \"any\", radius"), TaskOutcome::Done, None),
+        (REACH.replace("radius = 0.01", "radius = 0.01, fail = { force = 5 }"), TaskOutcome::Failed, None),
+        // The timeout lies on a tick and between two ticks.
+        (REACH.replace("radius = 0.01", "radius = 0.00001, timeout = \"300ms\""), TaskOutcome::TimedOut, Some("0.3")),
+        (REACH.replace("radius = 0.01", "radius = 0.00001, timeout = \"300500us\""), TaskOutcome::TimedOut, Some("0.3")),
+    ] {
+        let of = |end: &str| scene(&format!("{SCENE}\n{}", task.replace("radius", &format!("end = \"{end}\", radius"))));
+        let (stopping, going_on) = (of("stop"), of("continue"));
+        let (stopped, whole) = (recorded(&stopping), recorded(&going_on));
+        let text =
+            |files: &[(String, Vec<u8>)], name: &str| String::from_utf8(files.iter().find(|(file, _)| file == name).unwrap().1.clone()).unwrap();
+        for name in ["trajectory.csv", "packets.csv"] {
+            let (part, all) = (text(&stopped, name), text(&whole, name));
+            assert!(all.starts_with(&part) && part.len() < all.len(), "{name}: {task}");
+        }
+        for name in ["task.csv", "task-events.csv"] {
+            assert_eq!(text(&stopped, name), text(&whole, name), "{name}: {task}");
+        }
+        let MeasuredRun { summary, task: Some(result), .. } = Measures::run(&stopping, Model::Least) else { panic!("the scene has a task") };
+        assert_eq!((result.outcome, summary.ending, summary.duration), (outcome, Ending::Complete, result.at - Instant::ZERO));
+        assert_eq!(Some(&result), Measures::run(&going_on, Model::Least).task.as_ref());
+        let trajectory = text(&stopped, "trajectory.csv");
+        let last_tick = trajectory.lines().last().unwrap().split(',').next().unwrap();
+        let at = result.at.as_secs_f64();
+        assert_eq!(last_tick, last.map_or_else(|| at.to_string(), str::to_owned), "{task}");
+        // Every engine and a session stop at the same tick.
+        let Ok(unwatched) = Simulation::new(&stopping, Model::Least).run(&mut NoObserver);
+        let Ok(general) = Simulation::new(&stopping, Model::General).run(&mut NoObserver);
+        let Ok(threads) = Simulation::new(&stopping, Model::Least).on_threads(2).run(&mut NoObserver);
+        let mut live = LiveScene::new(&stopping, |_| None);
+        while let Some(due) = live.poll_timeout() {
+            let Ok(()) = live.handle_timeout(due, &mut NoObserver);
+        }
+        assert_eq!(live.ended(), Some(Ending::Complete));
+        let [beside] = &run_side_by_side(std::slice::from_ref(&stopping))[..] else { panic!("one run") };
+        for other in [&unwatched, &general, &threads, &live.summary(), beside] {
+            assert_eq!(other, &summary, "{task}");
+        }
+    }
 }
 
 /// Columns `t`, `peer`, `xo` and `vo` of a trajectory.
@@ -101,10 +166,8 @@ proptest! {
         let files = recorded(&scene);
         let trajectory = &files.iter().find(|(name, _)| name == "trajectory.csv").unwrap().1;
         let expected = reached(&states(trajectory), &[first, second], radius, speed, f64::from(dwell) * 1e-3);
-        let mut watch = TaskWatch::of(&scene).unwrap();
-        let Ok(summary) = Simulation::new(&scene, Model::Least).run(&mut watch);
-        let result = watch.result(&summary);
-        let found: Vec<f64> = result.reached.iter().map(|at| (*at - cohaptic_units::Instant::ZERO).as_secs_f64()).collect();
+        let result = Measures::run(&scene, Model::Least).task.unwrap();
+        let found: Vec<f64> = result.reached.iter().map(|at| (*at - Instant::ZERO).as_secs_f64()).collect();
         prop_assert_eq!(&found, &expected);
         prop_assert_eq!(result.outcome, if expected.len() == 2 { TaskOutcome::Done } else { TaskOutcome::TimedOut });
     }
@@ -116,7 +179,7 @@ fn measures_of_a_task_are_those_of_the_recorded_rows() {
         scene(&format!("{SCENE}\n{REACH}\nmeasure = {{ names = [\"task_time_s\", \"peers.left.error_rms_m\", \"peers.left.effort_n2_s\"] }}"));
     let files = recorded(&scene);
     let text = |name: &str| String::from_utf8(files.iter().find(|(file, _)| file == name).unwrap().1.clone()).unwrap();
-    let (_, values) = Measures::run(&scene, Model::Least);
+    let values = Measures::run(&scene, Model::Least).values;
     let value = |place: usize| values[place].value.unwrap();
     let events = text("task-events.csv");
     let end: f64 = events.lines().last().unwrap().split(',').next().unwrap().parse().unwrap();
@@ -147,9 +210,8 @@ fn the_task_of_a_run_that_diverges_is_not_merely_late() {
     let outcome = |stiffness: &str| {
         let text = format!("{SCENE}\n{REACH}").replace("stiffness = 1000.0", &format!("stiffness = {stiffness}"));
         let scene = scene(&text);
-        let mut watch = TaskWatch::of(&scene).unwrap();
-        let Ok(summary) = Simulation::new(&scene, Model::Least).run(&mut watch);
-        (summary.has_diverged(), watch.result(&summary).outcome)
+        let run = Measures::run(&scene, Model::Least);
+        (run.summary.has_diverged(), run.task.unwrap().outcome)
     };
     assert_eq!(outcome("1000.0"), (false, TaskOutcome::Done));
     assert_eq!(outcome("8000.0"), (true, TaskOutcome::Diverged));

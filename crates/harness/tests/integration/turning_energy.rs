@@ -20,7 +20,7 @@ fn value(scene: &Scene, name: &str) -> f64 {
     let text = format!("[measure]\nnames = [\"{name}\"]\n");
     let measured = read(&format!("{}{text}", untouched(3, "average-position", "mass = 1", "stiffness = 1", &vec![String::new(); scene.peers.len()])));
     scene.measure = measured.measure;
-    Measures::run(&scene, Model::Least).1[0].value.unwrap()
+    Measures::run(&scene, Model::Least).values[0].value.unwrap()
 }
 
 /// A copy that nobody touches and that ground does not damp gets energy from the coordination alone.
@@ -108,7 +108,7 @@ fn an_automatic_damping_lets_turns_inject_no_more_than_is_in_their_springs() {
             3.0_f64.sqrt() / 2.0
         );
         let scene = read(&text);
-        Measures::run(&scene, Model::Least).1[0].value.unwrap()
+        Measures::run(&scene, Model::Least).values[0].value.unwrap()
     };
     // KR·(1 − cos 60°).
     let spring = 0.02 * 0.5;

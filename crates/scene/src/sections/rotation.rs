@@ -12,8 +12,17 @@ use crate::model::Axes;
 use crate::quantities::{COMPONENT, INERTIA, ROTATIONAL_STIFFNESS};
 
 /// Keys without a meaning if the object has no inertia, in any table.
-const ROTATIONAL: [&str; 8] =
-    ["rotational-damping", "rotational-stiffness", "orientation", "angular-velocity", "grasp", "torque", "rotation-steps", "rotation-discrepancy"];
+const ROTATIONAL: [&str; 9] = [
+    "rotational-damping",
+    "rotational-stiffness",
+    "orientation",
+    "orientations",
+    "angular-velocity",
+    "grasp",
+    "torque",
+    "rotation-steps",
+    "rotation-discrepancy",
+];
 
 /// Rotational keys of `[object]`.
 #[derive(Clone, Copy, PartialEq, Debug)]

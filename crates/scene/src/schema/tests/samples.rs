@@ -107,6 +107,16 @@ pub(super) const SCENES: [&str; 4] = [
     [expect]
     rotation-discrepancy = { max = 1 }
     orientation = [{ peer = "a", at = "1s", of = [1, 0, 0, 0], max = 3 }]
+    [task]
+    kind = "carry"
+    level = 0.2
+    gap = { peers = ["a", "b"], min = 0.01, max = 0.2 }
+    targets = [[0.1, 0, 0], [0, 0, 0]]
+    order = "shuffled"
+    radius = 0.01
+    orientations = [[1, 0, 0, 0.2], [1, 0, 0, 0]]
+    angle = 0.1
+    end = "stop"
     "#,
 ];
 

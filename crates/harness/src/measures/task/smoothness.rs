@@ -3,19 +3,12 @@
 //! The speed of the copy is sampled every 10 ms of the task, at the first tick at or after each such instant. Arc length and jerk are those of Balasubramanian,
 //! Melendez-Calderon, Roby-Brami & Burdet, *On the analysis of movement smoothness* (2015), with the parameters of the authors' code.
 
-use std::time::Duration;
-
-use cohaptic_scene::{Measure, Scene};
+use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
-use super::{Accumulator, Asked, Rows};
+use super::{PERIOD_S, is_due};
 use crate::TickRow;
-use crate::task::Judge;
 
-/// Time between two samples of the speed.
-const PERIOD: Duration = Duration::from_millis(10);
-/// The same \[s\].
-const PERIOD_S: f64 = 0.01;
 /// Least rise before and least fall after a maximum of the speed that counts as a submovement [m/s].
 const SUBMOVEMENT: f64 = 0.005;
 /// Highest frequency of the arc length \[Hz\].
@@ -26,49 +19,34 @@ const LEAST_AMPLITUDE: f64 = 0.05;
 /// Speeds of all copies over the task.
 #[derive(Clone, Debug)]
 pub(super) struct Smoothness {
-    /// `None` for a scene without a task, which asks for no such measure.
-    judge: Option<Judge>,
     /// Samples of the speed of each copy [m/s]. Eight bytes a sample: an hour of a peer takes 3 MB.
     speeds: Vec<Vec<f64>>,
     start: Instant,
 }
 
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Figure {
+pub(in crate::measures) enum Figure {
     Submovements,
     Sparc,
     Ldlj,
 }
 
-impl Accumulator for Smoothness {
-    type Figure = Figure;
-
-    const GIVES: &'static [(Measure, Figure)] =
-        &[(Measure::Submovements, Figure::Submovements), (Measure::Sparc, Figure::Sparc), (Measure::Ldlj, Figure::Ldlj)];
-    const ROWS: Rows = Rows { ticks: true, ..Rows::NONE };
-
-    fn new(asked: &Asked<'_>) -> Self {
-        let scene: &Scene = asked.scene;
+impl Smoothness {
+    pub(super) fn new(scene: &Scene) -> Self {
         let start = scene.task.as_ref().map_or(Instant::ZERO, |task| task.start);
-        Self { judge: Judge::of(scene), speeds: vec![Vec::new(); scene.peers.len()], start }
+        Self { speeds: vec![Vec::new(); scene.peers.len()], start }
     }
 
-    fn on_tick(&mut self, row: &TickRow<'_>) {
-        let Some(judge) = &mut self.judge else { return };
-        judge.on_tick(row, &mut |_, _| ());
-        if !judge.is_under_way(row.at) {
-            return;
-        }
+    pub(super) fn on_tick(&mut self, row: &TickRow<'_>) {
         let speeds = &mut self.speeds[row.peer];
-        let due = u32::try_from(speeds.len()).map_or(Instant::MAX, |count| self.start.saturating_add(PERIOD.saturating_mul(count)));
-        if row.at >= due {
+        if is_due(self.start, speeds.len(), row.at) {
             speeds.push(libm::sqrt(row.object.velocity.iter().map(|component| component * component).sum()));
         }
     }
 
     #[expect(clippy::cast_precision_loss, reason = "fewer submovements than 2^53")]
-    fn value(&self, figure: Figure, peer: Option<usize>, _elapsed: Duration) -> Option<f64> {
-        let speeds = self.speeds.get(peer?)?;
+    pub(super) fn value(&self, figure: Figure, peer: usize) -> Option<f64> {
+        let speeds = self.speeds.get(peer)?;
         match figure {
             Figure::Submovements => (!speeds.is_empty()).then(|| submovements(speeds) as f64),
             Figure::Sparc => spectral_arc_length(speeds),

@@ -5,18 +5,14 @@
 
 use std::time::Duration;
 
-use cohaptic_scene::Measure;
+use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
-use super::{Accumulator, Asked, Rows};
 use crate::TickRow;
-use crate::task::Judge;
 
 /// Sums over the ticks of a task.
 #[derive(Clone, Debug)]
 pub(super) struct Effort {
-    /// `None` for a scene without a task, which asks for no such measure.
-    judge: Option<Judge>,
     axes: usize,
     peers: Vec<OfPeer>,
     /// Latest instant of the task with a row, which is not in the sums over instants yet.
@@ -49,7 +45,7 @@ struct OfPeer {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Figure {
+pub(in crate::measures) enum Figure {
     Motion,
     Internal,
     Effort,
@@ -58,25 +54,12 @@ pub(super) enum Figure {
     Share,
 }
 
-impl Accumulator for Effort {
-    type Figure = Figure;
-
-    const GIVES: &'static [(Measure, Figure)] = &[
-        (Measure::MotionForce, Figure::Motion),
-        (Measure::InternalForce, Figure::Internal),
-        (Measure::Effort, Figure::Effort),
-        (Measure::Given, Figure::Given),
-        (Measure::Taken, Figure::Taken),
-        (Measure::LoadShare, Figure::Share),
-    ];
-    const ROWS: Rows = Rows { ticks: true, ..Rows::NONE };
-
-    fn new(asked: &Asked<'_>) -> Self {
+impl Effort {
+    pub(super) fn new(scene: &Scene) -> Self {
         let of_peer = |tick: Duration| OfPeer { tick: tick.as_secs_f64(), latest: None, squares: 0.0, given: 0.0, taken: 0.0, share: 0.0 };
         Self {
-            judge: Judge::of(asked.scene),
-            axes: asked.scene.axes.count(),
-            peers: asked.scene.peers.iter().map(|peer| of_peer(peer.clock.tick)).collect(),
+            axes: scene.axes.count(),
+            peers: scene.peers.iter().map(|peer| of_peer(peer.clock.tick)).collect(),
             now: None,
             motion: 0.0,
             internal: 0.0,
@@ -85,10 +68,8 @@ impl Accumulator for Effort {
         }
     }
 
-    fn on_tick(&mut self, row: &TickRow<'_>) {
-        let Some(judge) = &mut self.judge else { return };
-        judge.on_tick(row, &mut |_, _| ());
-        let is_under_way = judge.is_under_way(row.at);
+    /// Takes a row of any time. `is_under_way`: the instant of the row belongs to the task.
+    pub(super) fn on_tick(&mut self, row: &TickRow<'_>, is_under_way: bool) {
         if let Some(at) = self.now
             && at < row.at
         {
@@ -111,7 +92,7 @@ impl Accumulator for Effort {
     }
 
     #[expect(clippy::cast_precision_loss, reason = "fewer instants than 2^53")]
-    fn value(&self, figure: Figure, peer: Option<usize>, _elapsed: Duration) -> Option<f64> {
+    pub(super) fn value(&self, figure: Figure, peer: Option<usize>) -> Option<f64> {
         // The latest instant has no later row that would have added it.
         let mut whole = self.clone();
         if whole.now.take().is_some() {
@@ -129,9 +110,7 @@ impl Accumulator for Effort {
             Figure::Share => of_peer().and_then(|peer| mean(peer.share, whole.loaded)),
         }
     }
-}
 
-impl Effort {
     /// Adds the latest forces of all peers to the sums over instants.
     fn add_instant(&mut self) {
         let forces: Vec<[f64; 3]> = self.peers.iter().map(|peer| peer.latest.map_or([0.0; 3], |(force, _)| force)).collect();

@@ -1,0 +1,126 @@
+//! Lag of each copy: how much later the copy does what it follows, and how different it moves apart from the lag.
+//!
+//! The target of a task that tracks is followed; in other tasks, the copy of the first peer. The position of each copy is sampled every 10 ms of the task, at the
+//! first tick at or after each such instant.
+
+use std::time::Duration;
+
+use cohaptic_scene::{Scene, TaskKind, Track};
+use cohaptic_units::Instant;
+
+use super::{PERIOD, PERIOD_S, is_due};
+use crate::TickRow;
+
+/// Largest lag, in samples: one second.
+const MOST: usize = 100;
+
+/// Positions of all copies over the task.
+#[derive(Clone, Debug)]
+pub(super) struct Following {
+    /// Motion of the target; `None` if the copies follow the first copy.
+    track: Option<Track>,
+    /// Positions of each copy \[m\]. An hour of a peer takes 9 MB, and twice this with a target.
+    copies: Vec<Vec<[f64; 3]>>,
+    /// Positions of the target at the ticks of these samples \[m\]. Empty without a moving target.
+    targets: Vec<Vec<[f64; 3]>>,
+    start: Instant,
+    /// Samples of the warm-up, for which a target is followed but not measured.
+    warm_up: usize,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(in crate::measures) enum Figure {
+    Lag,
+    Residual,
+}
+
+impl Following {
+    pub(super) fn new(scene: &Scene) -> Self {
+        let task = scene.task.as_ref();
+        let track = task.and_then(|task| match &task.kind {
+            TaskKind::Track(track) => Some(track.clone()),
+            TaskKind::Reach(_) | TaskKind::Hold(_) | TaskKind::Path(_) | TaskKind::Carry(_) => None,
+        });
+        let warm_up = track.as_ref().map_or(Duration::ZERO, |track| track.warm_up).as_nanos().div_ceil(PERIOD.as_nanos());
+        Self {
+            copies: vec![Vec::new(); scene.peers.len()],
+            targets: vec![Vec::new(); if track.is_some() { scene.peers.len() } else { 0 }],
+            start: task.map_or(Instant::ZERO, |task| task.start),
+            warm_up: usize::try_from(warm_up).unwrap_or(usize::MAX),
+            track,
+        }
+    }
+
+    pub(super) fn on_tick(&mut self, row: &TickRow<'_>) {
+        let copies = &mut self.copies[row.peer];
+        if !is_due(self.start, copies.len(), row.at) {
+            return;
+        }
+        copies.push(std::array::from_fn(|axis| row.object.position.get(axis).copied().unwrap_or(0.0)));
+        if let Some(track) = &self.track {
+            self.targets[row.peer].push(track.target(row.at.saturating_duration_since(self.start)));
+        }
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "at most a hundred samples")]
+    pub(super) fn value(&self, figure: Figure, peer: usize) -> Option<f64> {
+        let followed = if self.track.is_some() { self.targets.get(peer) } else { self.copies.first() };
+        let (lag, residual) = shift(self.copies.get(peer)?, followed?, self.warm_up)?;
+        Some(match figure {
+            Figure::Lag => lag as f64 * PERIOD_S,
+            Figure::Residual => residual,
+        })
+    }
+}
+
+/// Returns the number of samples, at most [`MOST`], by which `followed` must be shifted to later instants for the least root mean square distance from `copy`, and
+/// this distance \[m\]. The least shift of several equal ones counts. All shifts are compared over the same samples of `copy`: those from `warm_up` and from
+/// [`MOST`] on. `None` without such samples.
+#[expect(clippy::cast_precision_loss, reason = "fewer samples than 2^53")]
+fn shift(copy: &[[f64; 3]], followed: &[[f64; 3]], warm_up: usize) -> Option<(usize, f64)> {
+    let (first, end) = (warm_up.max(MOST), copy.len().min(followed.len()));
+    let squared = |(a, b): (&[f64; 3], &[f64; 3])| (0..3).map(|axis| (a[axis] - b[axis]) * (a[axis] - b[axis])).sum::<f64>();
+    let distance = |lag: usize| {
+        let squares: f64 = copy[first..end].iter().zip(&followed[first - lag..end - lag]).map(squared).sum();
+        libm::sqrt(squares / (end - first) as f64)
+    };
+    if first >= end {
+        return None;
+    }
+    (0..=MOST).map(|lag| (lag, distance(lag))).reduce(|least, other| if other.1 < least.1 { other } else { least })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Samples of a motion along two axes, `late` \[s\] later.
+    fn motion(late: f64) -> Vec<[f64; 3]> {
+        let at = |t: f64| [0.02 * libm::sin(1.3 * t), 0.01 * libm::cos(3.1 * t), 0.0];
+        (0..400).map(|place| at(f64::from(place) * PERIOD_S - late)).collect()
+    }
+
+    #[test]
+    fn a_shifted_motion_has_its_shift_and_no_residual() {
+        let (lag, residual) = shift(&motion(0.05), &motion(0.0), 0).unwrap();
+        assert!(lag == 5 && residual < 1e-12, "{lag} {residual}");
+        assert_eq!(shift(&motion(0.0), &motion(0.0), 0), Some((0, 0.0)));
+        let (lag, residual) = shift(&motion(1.0), &motion(0.0), 150).unwrap();
+        assert!(lag == MOST && residual < 1e-12, "{lag} {residual}");
+    }
+
+    /// An offset is no lag: the root mean square distance from the shifted motion is the offset.
+    #[test]
+    fn what_is_left_is_the_residual() {
+        let offset: Vec<[f64; 3]> = motion(0.2).iter().map(|[x, y, _]| [*x, *y, 0.003]).collect();
+        let (lag, residual) = shift(&offset, &motion(0.0), 0).unwrap();
+        assert!(lag == 20 && (residual - 0.003).abs() < 1e-12, "{lag} {residual}");
+    }
+
+    #[test]
+    fn a_task_of_a_second_has_no_lag() {
+        assert_eq!(shift(&motion(0.0)[..MOST], &motion(0.0), 0), None);
+        assert_eq!(shift(&motion(0.0), &motion(0.0), 400), None);
+        assert!(shift(&motion(0.0), &motion(0.0), 399).is_some());
+    }
+}
