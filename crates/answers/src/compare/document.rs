@@ -1,6 +1,6 @@
 //! The JSON document of a comparison.
 
-use cohaptic_campaign::{Cell, Estimate, Figures, Judgement, MeasuredColumn};
+use cohaptic_campaign::{Cell, Estimate, Figures, Judgement, MeasuredColumn, Share};
 use serde::Serialize;
 
 use super::Finished;
@@ -24,7 +24,10 @@ pub fn document(finished: &Finished, written: Option<&Written>) -> impl Serializ
             refused: cell.refused.as_deref(),
             runs: cell.diverged.map_or(0, |share| share.of),
             // `null` if nothing was run.
-            diverged: cell.diverged.map(|share| document! { count: share.count, share: share.value(), low: share.low, high: share.high }),
+            diverged: cell.diverged.map(share_and_ends),
+            // Only of a scene with a task.
+            #[serde(flatten)]
+            done: cell.done.map(|share| document! { done: share_and_ends(share) }),
             #[serde(flatten)]
             judgement: finished.judgement(strategy, other).map(of_judgement),
             measures: measures_of(finished, cell),
@@ -45,6 +48,11 @@ pub fn document(finished: &Finished, written: Option<&Written>) -> impl Serializ
         measures: measures.collect::<Vec<_>>(),
         combinations: cells.collect::<Vec<_>>(),
     }
+}
+
+/// Returns a count, its share of all runs, and the ends of the interval of the share.
+fn share_and_ends(share: Share) -> impl Serialize {
+    document! { count: share.count, share: share.value(), low: share.low, high: share.high }
 }
 
 /// Returns the document of a judgement. All keys are `null` without a verdict; the radius is `null` for a verdict without a radius.

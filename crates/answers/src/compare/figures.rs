@@ -46,8 +46,8 @@ fn title(measure: &MeasuredColumn) -> String {
     // Names of measures end in the unit, in lower case and with underscores.
     let suffix = match measure.unit.as_str() {
         "1/s" => "_per_s".to_owned(),
-        "bit/s" => "_bits_per_s".to_owned(),
-        unit => format!("_{}", unit.replace(['·', '/'], "_").to_lowercase()),
+        "bit/s" if name.ends_with("_bits_per_s") => "_bits_per_s".to_owned(),
+        unit => format!("_{}", unit.replace(['·', '/'], "_").replace('²', "2").to_lowercase()),
     };
     let words = name.strip_suffix(&suffix).unwrap_or(name).replace('_', " ");
     peer.map_or_else(|| words.clone(), |peer| format!("{words} of {peer}"))
@@ -144,6 +144,8 @@ mod tests {
             ("viscosity_n_s_m", "N·s/m", "viscosity"),
             ("packets_per_s", "1/s", "packets"),
             ("sent_bits_per_s", "bit/s", "sent"),
+            ("throughput_bit_s", "bit/s", "throughput"),
+            ("peers.left.effort_n2_s", "N²·s", "effort of left"),
             ("max_discrepancy_m", "m", "max discrepancy"),
         ] {
             assert_eq!(title(&MeasuredColumn { name: name.to_owned(), unit: unit.to_owned(), about: String::new() }), expected);

@@ -6,7 +6,7 @@ use cohaptic_units::print::csv_field;
 use super::Finished;
 
 /// Columns after the columns of the keys.
-const COLUMNS: &str = "refused,runs,diverged,verdict,judged,measure,count,mean,low,high,pairs,difference,difference_low,difference_high";
+const COLUMNS: &str = "refused,runs,diverged,done,verdict,judged,measure,count,mean,low,high,pairs,difference,difference_low,difference_high";
 
 /// Returns the table. Numbers have the fewest digits that read back as the same `f64`; a cell without a number is empty. A refused combination has a single
 /// row.
@@ -25,11 +25,13 @@ pub fn csv(finished: &Finished) -> String {
             continue;
         }
         let (runs, diverged) = cell.diverged.map_or((0, 0), |share| (share.of, share.count));
+        // Empty for a scene without a task.
+        let done = cell.done.map_or_else(String::new, |share| share.count.to_string());
         let (verdict, judged) =
             finished.judgement(strategy, other).and_then(Judgement::verdict).map_or(("", ""), |known| (&*known.word, &*known.judged));
         for (measure, figures) in comparison.measures.iter().zip(&cell.figures) {
             let [mean, difference] = [figures.mean, figures.difference].map(|estimate| estimate_cells(estimate.as_ref()));
-            text.push_str(&format!("{head},{runs},{diverged},{verdict},{judged},{},{mean},{difference}\n", csv_field(&measure.name)));
+            text.push_str(&format!("{head},{runs},{diverged},{done},{verdict},{judged},{},{mean},{difference}\n", csv_field(&measure.name)));
         }
     }
     text

@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use cohaptic_campaign::{Figures, Judgement};
+use cohaptic_campaign::{Figures, Judgement, Share};
 use cohaptic_units::print::Counted;
 
 use super::Finished;
@@ -70,9 +70,13 @@ fn head(finished: &Finished, wall_s: f64) -> Vec<String> {
 fn strategies(finished: &Finished) -> Vec<Vec<String>> {
     let comparison = &finished.comparison;
     let mut rows = vec![["", "strategy", "diverged", "stable", "refused"].map(str::to_owned).to_vec()];
+    let has_task = comparison.has_task();
+    if has_task {
+        rows[0].insert(2, "done".to_owned());
+    }
     for (number, name) in comparison.strategies.iter().enumerate() {
         let sum = Sum::of(finished, number);
-        let diverged = cohaptic_campaign::Share::of(sum.diverged, sum.runs).map_or_else(|| NOTHING.to_owned(), |share| figures::share(&share));
+        let diverged = Share::of(sum.diverged, sum.runs).map_or_else(|| NOTHING.to_owned(), |share| figures::share(&share));
         let stable = if sum.judged == 0 {
             NOTHING.to_owned()
         } else if comparison.others() == 1 {
@@ -82,7 +86,8 @@ fn strategies(finished: &Finished) -> Vec<Vec<String>> {
             format!("{} of {}", sum.stable, sum.judged)
         };
         let refused = if sum.refused == 0 { NOTHING.to_owned() } else { format!("{} of {}", sum.refused, comparison.others()) };
-        rows.push(vec![(number + 1).to_string(), name.clone(), diverged, stable, refused]);
+        let done = has_task.then(|| sum.done_words(NOTHING));
+        rows.push([(number + 1).to_string(), name.clone()].into_iter().chain(done).chain([diverged, stable, refused]).collect());
     }
     rows
 }
@@ -92,6 +97,8 @@ fn strategies(finished: &Finished) -> Vec<Vec<String>> {
 pub(super) struct Sum {
     pub(super) runs: u64,
     pub(super) diverged: u64,
+    /// Runs whose task was done.
+    pub(super) done: u64,
     pub(super) stable: usize,
     pub(super) judged: usize,
     pub(super) refused: usize,
@@ -104,6 +111,7 @@ impl Sum {
             let cell = finished.comparison.cell(strategy, other);
             sum.runs += cell.diverged.map_or(0, |share| share.of);
             sum.diverged += cell.diverged.map_or(0, |share| share.count);
+            sum.done += cell.done.map_or(0, |share| share.count);
             sum.refused += usize::from(cell.refused.is_some());
             // A refused combination and a judgement without a verdict count neither as stable nor as judged.
             if let Some(verdict) = finished.judgement(strategy, other).and_then(Judgement::verdict) {
@@ -112,6 +120,11 @@ impl Sum {
             }
         }
         sum
+    }
+
+    /// Returns the share of runs whose task was done; `nothing` if nothing was run.
+    pub(super) fn done_words(&self, nothing: &str) -> String {
+        Share::of(self.done, self.runs).map_or_else(|| nothing.to_owned(), |share| figures::share(&share))
     }
 }
 

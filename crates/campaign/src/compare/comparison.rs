@@ -8,6 +8,8 @@
 
 use super::interval::{Estimate, Share};
 use super::measured::{MeasuredColumn, measured};
+use cohaptic_scene::Measure;
+
 use crate::error::CampaignError;
 use crate::plan::{Accepted, CampaignPlan, Refused};
 use crate::table::{Column, RunColumns};
@@ -33,6 +35,8 @@ pub struct Cell {
     pub refused: Option<String>,
     /// Share of diverged runs; `None` if the combination has no runs.
     pub diverged: Option<Share>,
+    /// Share of runs whose task was done; `None` if the combination has no runs or the scene no task.
+    pub done: Option<Share>,
     /// Figures, indexed like [`Comparison::measures`].
     pub figures: Vec<Figures>,
 }
@@ -74,6 +78,7 @@ impl Comparison {
         // A measure without any value is left out, such as a measure of a peer absent from every run.
         let has = |column: &Vec<f64>| column.iter().enumerate().any(|(run, value)| value.is_finite() && is_whole(run));
         let known: Vec<bool> = columns.columns.iter().map(has).collect();
+        let times = measures.iter().position(|measure| measure.name == Measure::TaskTime.name()).map(|place| &columns.columns[place]);
         let cell = |(combination, start): (usize, &Option<usize>)| {
             let baseline = starts[combination % others].filter(|_| combination >= others);
             let figures = columns.columns.iter().zip(&known).filter(|(_, known)| **known).map(|(column, _)| {
@@ -84,7 +89,12 @@ impl Comparison {
                 let diverged = (start..start + each).filter(|run| !is_whole(*run)).count();
                 Share::of(diverged as u64, each as u64)
             });
-            Cell { refused: refused.get(&(combination as u64)).cloned(), diverged, figures: figures.collect() }
+            // Only a done task has a time, also in a run that diverged later.
+            let done = start.zip(times.as_ref()).and_then(|(start, times)| {
+                let done = times[start..start + each].iter().filter(|time| time.is_finite()).count();
+                Share::of(done as u64, each as u64)
+            });
+            Cell { refused: refused.get(&(combination as u64)).cloned(), diverged, done, figures: figures.collect() }
         };
         let cells = starts.iter().enumerate().map(cell).collect();
         let measures = measures.into_iter().zip(known).filter_map(|(measure, known)| known.then_some(measure)).collect();
@@ -95,6 +105,12 @@ impl Comparison {
     #[must_use]
     pub const fn others(&self) -> usize {
         self.cells.len() / self.strategies.len()
+    }
+
+    /// Returns whether the scene has a task.
+    #[must_use]
+    pub fn has_task(&self) -> bool {
+        self.cells.iter().any(|cell| cell.done.is_some())
     }
 
     /// Returns the cell of a strategy at a combination of the other keys, both counted from 0.
@@ -183,11 +199,26 @@ mod tests {
     fn what_is_refused_has_no_figures_and_a_baseline_that_is_refused_no_differences() {
         let refused: Refused = [(1, "chance".to_owned()), (4, "chance".to_owned())].into();
         let comparison = compared(&refused, vec![true; 12], vec![(0..12).map(f64::from).collect()]);
-        assert_eq!(comparison.cell(2, 0), &Cell { refused: Some("chance".into()), diverged: None, figures: vec![Figures::default()] });
+        assert_eq!(comparison.cell(2, 0), &Cell { refused: Some("chance".into()), diverged: None, done: None, figures: vec![Figures::default()] });
         let at = |strategy, other| comparison.cell(strategy, other).figures[0];
         assert_eq!(at(1, 0).difference.map(|difference| (difference.mean, difference.half_width)), Some((3.0, Some(0.0))));
         assert_eq!((at(1, 1).mean.map(|mean| mean.mean), at(1, 1).difference), (Some(7.0), None));
         assert_eq!((at(2, 1).mean.map(|mean| mean.mean), at(2, 1).difference), (Some(10.0), None));
+    }
+
+    /// A run whose task was done and which diverged later counts as done, but its time counts in no mean.
+    #[test]
+    fn the_share_of_done_tasks_is_that_of_runs_with_a_time() {
+        let mut times = vec![NONE; 18];
+        (times[0], times[1], times[6]) = (1.0, 2.0, 4.0);
+        let mut complete = vec![true; 18];
+        complete[1] = false;
+        let (plan, measures) = (plan(3), vec![measure("task_time_s")]);
+        let accepted = Accepted::new(plan.combinations(), plan.runs_of_each(), [].into_iter());
+        let comparison = Comparison::of(&plan, &accepted, &Refused::new(), measures, &RunColumns { complete, columns: vec![times] });
+        let done = |strategy, other| comparison.cell(strategy, other).done.map(|share| (share.count, share.of));
+        assert_eq!((done(0, 0), done(1, 0), done(2, 1)), (Some((2, 3)), Some((1, 3)), Some((0, 3))));
+        assert_eq!(comparison.cell(0, 0).figures[0].mean.map(|mean| (mean.count, mean.mean)), Some((1, 1.0)));
     }
 
     #[test]

@@ -10,22 +10,23 @@ use crate::compare::words::{self, Sum};
 /// Returns the table of strategies: description, parameters, and counts of diverged, stable and refused combinations.
 pub(super) fn strategies(finished: &Finished, words: &[(&'static str, String)]) -> Html {
     let comparison = &finished.comparison;
-    let head =
-        Table::new().column("strategy").column("each copy is drawn").column("parameters").number("diverged").number("stable").number("refused");
+    let has_task = comparison.has_task();
+    let head = Table::new().column("strategy").column("each copy is drawn").column("parameters");
+    let head = if has_task { head.number("task done") } else { head };
+    let head = head.number("diverged").number("stable").number("refused");
     let table = comparison.strategies.iter().zip(words).enumerate().fold(head, |table, (place, (name, (about, parameters)))| {
         let sum = Sum::of(finished, place);
         let baseline = if place == 0 { " (baseline)" } else { "" };
         // Without a run there is no share, and a dash tells more than "0 of 0".
         let diverged = Share::of(sum.diverged, sum.runs).map_or_else(|| NOTHING.to_owned(), |share| figures::share(&share));
+        let about = [Html::code(name).and(baseline), (*about).into(), parameters.as_str().into()];
+        let done = has_task.then(|| Html::from(sum.done_words(NOTHING)));
         let cells = [
-            Html::code(name).and(baseline),
-            (*about).into(),
-            parameters.as_str().into(),
             diverged.into(),
             Html::text(&if sum.judged == 0 { NOTHING.to_owned() } else { format!("{} of {}", sum.stable, sum.judged) }),
             Html::text(&if sum.refused == 0 { NOTHING.to_owned() } else { format!("{} of {}", sum.refused, comparison.others()) }),
         ];
-        table.row(cells)
+        table.row(about.into_iter().chain(done).chain(cells))
     });
     Html::table(&table)
 }
@@ -84,7 +85,8 @@ pub(super) fn stability(finished: &Finished) -> Html {
         let verdict = finished.judgement(strategy, other).map_or_else(String::new, words::verdict);
         // Most cells have no diverged run, and the verdict then stands alone.
         let diverged = cell.diverged.filter(|share| share.count > 0).map(|share| Html::text(&format!("diverged {}", figures::share(&share))));
-        Html::lines(std::iter::once(verdict.into()).chain(diverged))
+        let done = cell.done.map(|share| Html::text(&format!("task done {}", figures::share(&share))));
+        Html::lines(std::iter::once(verdict.into()).chain(diverged).chain(done))
     })
 }
 

@@ -53,7 +53,7 @@ pub(super) const DOCUMENTS: [Document; 25] = [
                 "where the scene has a [task](tasks.md): its kind, its outcome, and the time from its start to the outcome",
             ),
             ("task.reached_s", "instants at which targets were reached"),
-            ("task.failed_by, task.reason", "of a task that has failed: the name of a peer, and `dropped` or `left`"),
+            ("task.failed_by, task.reason", "of a task that has failed: the name of a peer, and `dropped`, `left`, `tilted` or `gap`"),
             ("measures.NAME", "each [measure](#measures) that is asked for; `null` where it has no value"),
             ("files", "paths written by `--out` and `--links`"),
             ("replayed_otherwise", "with `--inputs --force`: what differs from the scene of the session, and what the record lacks"),
@@ -166,6 +166,7 @@ pub(super) const DOCUMENTS: [Document; 25] = [
         lines: &[
             "cohaptic compare scenarios/network/loss-independent.toml --strategies average-position,local-damping,extrapolated --vary link.delay=8ms,24ms --runs 2 \
              --out compared --json",
+            "cohaptic compare scenarios/tasks/reach.toml --strategies average-position,extrapolated --runs 2 --out tasks --json",
         ],
         rows: &[
             ("title", "of the scene of the first combination that runs"),
@@ -183,6 +184,10 @@ pub(super) const DOCUMENTS: [Document; 25] = [
             (
                 "combinations[].diverged.count, combinations[].diverged.share, combinations[].diverged.low, combinations[].diverged.high",
                 "runs that diverged, with Wilson's interval of 95 %; `diverged` is `null` where nothing runs",
+            ),
+            (
+                "combinations[].done.count, combinations[].done.share, combinations[].done.low, combinations[].done.high",
+                "where the scene has a [task](tasks.md): runs in which the task was done, with the same interval",
             ),
             (
                 "combinations[].verdict, combinations[].judged, combinations[].radius",
@@ -345,10 +350,14 @@ pub(super) const DOCUMENTS: [Document; 25] = [
     },
     Document {
         command: "live",
-        lines: &["cohaptic live scenarios/live/two-and-a-program.toml --set measure.names=all --for 50ms --listen 127.0.0.1:0 --no-priority --json"],
+        lines: &[
+            "cohaptic live scenarios/live/two-and-a-program.toml --set measure.names=all --for 50ms --listen 127.0.0.1:0 --no-priority --json",
+            "cohaptic live scenarios/tasks/hold.toml --set task.fail.force=0.001 --for 50ms --no-priority --json",
+        ],
         rows: &[
             ("measures.NAME", "each [measure](#measures) of the scene; of energy, only that of copies that the session simulates"),
             ("title, duration_s, ending, ticks, max_discrepancy_m, files", "as [of a run](#run)"),
+            ("task.kind, task.outcome, task.time_s, task.reached_s, task.failed_by, task.reason", "as of a run"),
             ("valid", "whether at most one in a thousand ticks and datagrams was later than the tolerance"),
             ("late_ticks", "ticks later than the tolerance"),
             ("lateness_us.@Lateness", "of ticks"),
