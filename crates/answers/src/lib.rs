@@ -58,7 +58,7 @@ pub use methods::{Kind, Measured, MeasuredMethod, MeasurementWatch, Method, cost
 pub use parts::{access_line, link, link_quantiles, link_totals, measures_of, peer, peer_links, rotation};
 pub use pictures::{AdmittanceCurve, NamedMap, admittance_picture, axis_of, boundary_picture, map_picture};
 pub(crate) use pictures::{AdmittanceWords, admittance_words, axis_of_key, crossing_in_words, label};
-pub use run::{angle_text, diverged, measured_lines, packets, run, run_words};
+pub use run::{angle_text, diverged, measured_lines, packets, run, run_words, task_of};
 pub use text_plot::TEXT_PLOT_SPANS;
 pub(crate) use text_plot::text_plot;
 pub use verdict::{OPERATIONS_A_SECOND, notes};

@@ -40,7 +40,7 @@ pub fn run(scene: &Scene, summary: &Summary, measured: &[MeasuredValue], task: O
 }
 
 /// Returns the document of the result of a task. `failed_by` and `reason` are present only for a failure.
-fn task_of(scene: &Scene, task: &TaskResult) -> impl Serialize + use<> {
+pub fn task_of(scene: &Scene, task: &TaskResult) -> impl Serialize + use<> {
     document! {
         kind: scene.task.as_ref().map(|task| task.kind.name()),
         outcome: task.outcome.name(),

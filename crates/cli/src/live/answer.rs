@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use cohaptic_answers::{access_line, link_quantiles, link_totals, measured_lines, measures_of, peer, peer_links, rotation};
+use cohaptic_answers::{access_line, link_quantiles, link_totals, measured_lines, measures_of, peer, peer_links, rotation, task_of};
 use cohaptic_harness::Ending;
 use cohaptic_harness::live::SeatStats;
+use cohaptic_harness::task::task_words;
 use cohaptic_live::{AdmissionStats, Report, SocketCounts};
 use cohaptic_realtime::Wish;
 use cohaptic_scene::Scene;
@@ -48,6 +49,8 @@ pub(super) fn of(scene: &Scene, report: &Report) -> impl Serialize {
         rotation: rotation(summary),
         #[serde(flatten)]
         measures: measures_of(scene, &report.measures),
+        #[serde(flatten)]
+        task: report.task.as_ref().map(|task| document! { task: task_of(scene, task) }),
         #[serde(flatten)]
         // A session without peers in other programs has no door.
         admission: report.admission.as_ref().map(|(stats, socket)| document! { door: of_admission(stats, socket) }),
@@ -103,6 +106,7 @@ pub(super) fn describe(scene: &Scene, report: &Report) -> String {
         line(format!("{} ({}) ends at {}{seat}", peer.name, spec.kind.name(), position.join(", ")));
     }
     line(packets(summary));
+    report.task.iter().for_each(|task| line(format!("task: {}", task_words(task, scene))));
     measured_lines(scene, &report.measures).into_iter().for_each(&mut line);
     if let Some((door, socket)) = &report.admission {
         line(format!("session at {}: {} accepted, {} sent", socket.address, Counted(door.admitted, "sample"), door.sent));

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use cohaptic_answers::page::{self, AnswerPage, Origin};
 use cohaptic_harness::Ending;
+use cohaptic_harness::task::task_words;
 use cohaptic_live::Report;
 use cohaptic_picture::page::{Html, Table};
 use cohaptic_realtime::{LatenessSummary, Wish};
@@ -44,11 +45,13 @@ pub(super) fn html(arguments: &LiveArguments, path: &Path, played: &Played<'_>, 
     };
     // A session that is not valid has a warning above, with the numbers.
     let valid = if report.validity.is_valid() { ", and was on time (valid)" } else { "" };
-    let sentences = vec![
+    let mut sentences = vec![
         format!("{lasted}{valid}"),
         format!("the largest discrepancy between two copies is {}", length(summary.max_discrepancy)),
         packets(summary),
     ];
+    let task = report.task.as_ref().map(|task| format!("the task: {}", task_words(task, scene)));
+    sentences.extend(task);
     let tables = Html::heading(2, "Lateness").and(Html::table(&lateness(report))).and(measures(scene, &report.measures));
     let mut tables = tables.and(Html::heading(2, "Peers")).and(peers(scene, summary)).and(attached(scene, report));
     tables = tables.and(Html::heading(2, "Links")).and(links(summary));

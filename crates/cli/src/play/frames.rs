@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use cohaptic_harness::live::Presence;
+use cohaptic_harness::task::TaskView;
 use cohaptic_live::{EndedPacket, Motion, PeerStatus};
 
 /// The newest motion. The motion is written as text when a page asks, on the page's thread, so that the real-time thread does not spend the time.
@@ -70,7 +71,8 @@ impl Frames {
     }
 }
 
-/// Returns the motion as `{"part":1,"t":0.5,"peers":[…],"packets":[[from,to,ms,lost],…]}`. Positions are in m with six decimals, forces in N with three.
+/// Returns the motion as `{"part":1,"t":0.5,"peers":[…],"packets":[[from,to,ms,lost],…]}`, with `task` for a scene with a task. Positions are in m with six
+/// decimals, forces in N with three.
 fn written(part: usize, axes: usize, motion: &Motion) -> String {
     let mut text = format!("{{\"part\":{part},\"t\":{:.4},\"peers\":[", motion.elapsed.as_secs_f64());
     for (place, peer) in motion.peers.iter().enumerate() {
@@ -82,8 +84,35 @@ fn written(part: usize, axes: usize, motion: &Motion) -> String {
         let comma = if place == 0 { "" } else { "," };
         let _ = write!(text, "{comma}[{from},{to},{:.1},{}]", after.as_secs_f64() * 1e3, u8::from(*is_lost));
     }
-    text.push_str("]}");
+    text.push(']');
+    if let Some(task) = &motion.task {
+        write_task(&mut text, axes, task);
+    }
+    text.push('}');
     text
+}
+
+/// Appends the task: target, radius \[m\], number of reached and of all targets, part of the dwell time, time until the start and time left \[s\], and outcome.
+fn write_task(text: &mut String, axes: usize, task: &TaskView) {
+    text.push_str(",\"task\":{\"at\":");
+    write_numbers(text, &task.target.position[..axes], 6);
+    if let Some(orientation) = task.target.orientation {
+        text.push_str(",\"turned\":");
+        write_numbers(text, &orientation, 4);
+    }
+    if let Some(radius) = task.radius {
+        let _ = write!(text, ",\"radius\":{radius:.6}");
+    }
+    let (until, left) = (task.until_start.as_secs_f64(), task.left.as_secs_f64());
+    let _ = write!(
+        text,
+        ",\"reached\":{},\"targets\":{},\"dwelt\":{:.3},\"until\":{until:.2},\"left\":{left:.2}",
+        task.reached, task.targets, task.dwelt
+    );
+    if let Some(outcome) = task.outcome {
+        let _ = write!(text, ",\"outcome\":\"{}\"", outcome.name());
+    }
+    text.push('}');
 }
 
 /// Appends the state of one peer, with vectors cut to the scene's axes.
@@ -125,6 +154,7 @@ mod tests {
 
     use cohaptic_harness::live::PeerState;
     use cohaptic_peer::State;
+    use cohaptic_scene::{Target, TaskOutcome};
 
     use super::*;
 
@@ -136,6 +166,16 @@ mod tests {
         let motion = Motion {
             elapsed: Duration::from_millis(1500),
             peers: vec![PeerStatus { state: seen, force: [1.0, -0.5, 7.0], seat: None }],
+            task: Some(TaskView {
+                target: Target { position: [0.1, 0.0, 7.0], orientation: Some([1.0, 0.0, 0.0, 0.0]) },
+                radius: Some(0.005),
+                reached: 1,
+                targets: 2,
+                dwelt: 0.5,
+                until_start: Duration::ZERO,
+                left: Duration::from_millis(2500),
+                outcome: Some(TaskOutcome::Done),
+            }),
             packets: vec![packet],
         };
         let frames = Frames::default();
@@ -148,6 +188,10 @@ mod tests {
             "part": 3, "t": 1.5,
             "peers": [{ "hand": "present", "at": [0.012346, null], "force": [1.0, -0.5], "device": [0.02, null] }],
             "packets": [[0, 2, 24.0, 1]],
+            "task": {
+                "at": [0.1, 0.0], "turned": [1.0, 0.0, 0.0, 0.0], "radius": 0.005,
+                "reached": 1, "targets": 2, "dwelt": 0.5, "until": 0.0, "left": 2.5, "outcome": "done",
+            },
         });
         assert_eq!((number, value), (1, expected));
     }

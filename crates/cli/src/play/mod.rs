@@ -23,6 +23,7 @@ use std::time::Instant as Clock;
 use cohaptic_control::{Board, ServerConfig, serve_stage};
 use cohaptic_files::{OwnFolder, write_whole};
 use cohaptic_harness::Ending;
+use cohaptic_harness::task::task_words;
 use cohaptic_live::{Conductor, LinkChange, Motion, Recorded, Report, Session, SessionConfig, Status};
 use cohaptic_scene::{PeerKind, link_keys_of_text, scene_content_of_text};
 
@@ -83,7 +84,8 @@ pub(crate) fn play(arguments: &PlayArguments) -> Result<ExitCode, Failure> {
         let fell_apart = matches!(report.summary.ending, Ending::Diverged(_));
         // A diverged part has no finite state for a next part, so that the next part begins anew.
         next = stage.finish(&part, records.inputs(number), fell_apart);
-        say(&format!("part {number}: {}, the run is {}", part.scene.coordination.strategy.name(), report.validity));
+        let task = report.task.as_ref().map(|task| format!(", task: {}", task_words(task, &part.scene))).unwrap_or_default();
+        say(&format!("part {number}: {}, the run is {}{task}", part.scene.coordination.strategy.name(), report.validity));
         if is_over {
             break;
         }

@@ -14,7 +14,7 @@ use cohaptic_harness::live::LiveDevice;
 use cohaptic_live::PeerStatus;
 use cohaptic_live::pointers::Pointer;
 use cohaptic_peer::Coordination;
-use cohaptic_scene::{PeerKind, Scene};
+use cohaptic_scene::{PeerKind, Scene, TaskKind};
 use serde_json::{Value, json};
 
 use super::compare::{Finished, compare};
@@ -187,6 +187,8 @@ impl Stage for PlayStage {
             "most_peers": PEERS.end(),
             "edges": scene.rotation.as_ref().and_then(|_| scene.even_box()),
             "walls": scene.object.enclosure.map(|walls| [walls.min, walls.max]),
+            "task": scene.task.as_ref().map(|task| task.kind.name()),
+            "path": scene.task.as_ref().and_then(|task| if let TaskKind::Path(path) = &task.kind { Some(&path.points) } else { None }),
             "guided": self.is_guided,
             "host": is_host,
             // The address holds the token of guests, so that only the host hands out the address.

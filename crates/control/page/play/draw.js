@@ -43,6 +43,7 @@ function drawRoom(context, room, i) {
   context.stroke();
   context.clip();
   if (facts.walls) drawWalls(context, room);
+  drawTarget(context, room);
   shown.forEach((other, k) => { if (k !== i) drawGhost(context, room, other, k); });
   const body = shown[i];
   drawCube(context, room, body, i);

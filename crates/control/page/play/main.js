@@ -46,6 +46,7 @@ matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
 });
 addEventListener('resize', drawCurves);
 setInterval(showNumbers, 250);
+setInterval(showTask, 250);
 setInterval(() => showValid().catch(() => {}), 2000);
 let before = performance.now();
 requestAnimationFrame(function next(now) {

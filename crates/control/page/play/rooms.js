@@ -51,6 +51,8 @@ function lookAround(passed) {
   const size = facts.edges ? lengthOf(facts.edges) / 2 : 0;
   let most = 0.12;
   for (const { at, device } of shown) for (const place of [at, device]) most = Math.max(most, 1.15 * (Math.max(...place.map(Math.abs)) + size));
+  // The target is seen before anybody is there.
+  if (frame.task) most = Math.max(most, 1.15 * (Math.max(...wide(frame.task.at).map(Math.abs)) + (frame.task.radius || 0)));
   most = Math.min(most, LARGEST_REACH + size);
   const share = still.matches ? 1 : 1 - Math.exp(-passed / (most > reach ? 60 : 1500));
   reach += (most - reach) * share;

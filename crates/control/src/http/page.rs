@@ -38,6 +38,7 @@ const PLAY_SCRIPT: &str = concat!(
     include_str!("../../page/play/motion.js"),
     include_str!("../../page/play/rooms.js"),
     include_str!("../../page/play/packets.js"),
+    include_str!("../../page/play/task.js"),
     include_str!("../../page/play/draw.js"),
     include_str!("../../page/play/hand.js"),
     include_str!("../../page/play/keyboard.js"),

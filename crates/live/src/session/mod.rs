@@ -151,6 +151,7 @@ impl Session {
             files,
             pictures,
             measures: self.watch.measured(summary.duration),
+            task: self.watch.task(&summary),
             summary,
         })
     }
@@ -224,7 +225,8 @@ impl Session {
 
     fn motion(&mut self) -> Motion {
         let packets = self.watch.ended.as_mut().map(EndedPackets::take).unwrap_or_default();
-        Motion { elapsed: self.live.open().saturating_duration_since(Instant::ZERO), peers: self.peers(), packets }
+        let now = self.live.open();
+        Motion { elapsed: now.saturating_duration_since(Instant::ZERO), peers: self.peers(), task: self.watch.task_view(now), packets }
     }
 
     fn status(&self) -> Status {

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use cohaptic_harness::PacketRow;
+use cohaptic_harness::task::TaskView;
 use cohaptic_wan::Fate;
 
 use super::status::PeerStatus;
@@ -14,6 +15,8 @@ pub struct Motion {
     pub elapsed: Duration,
     /// Peers in the order of the scene.
     pub peers: Vec<PeerStatus>,
+    /// The task; `None` for a scene without a task.
+    pub task: Option<TaskView>,
     /// Packets that ended since the previous [`Motion`]: every 16th packet of each link and every lost packet, at most 64 packets in total.
     pub packets: Vec<EndedPacket>,
 }

@@ -8,6 +8,7 @@ use cohaptic_harness::Summary;
 use cohaptic_harness::live::{PeerState, SeatStats};
 use cohaptic_harness::measures::MeasuredValue;
 use cohaptic_harness::record::RecordedPicture;
+use cohaptic_harness::task::TaskResult;
 use cohaptic_realtime::udp::EndpointCounts;
 use cohaptic_realtime::{LatenessSummary, Prepared, Validity};
 use cohaptic_wan::LinkStats;
@@ -68,6 +69,8 @@ pub struct Report {
     pub summary: Summary,
     /// Measures of the scene. Empty if the scene asks for no measures.
     pub measures: Vec<MeasuredValue>,
+    /// Result of the task; `None` for a scene without a task.
+    pub task: Option<TaskResult>,
     /// Lateness of the ticks.
     pub ticks: LatenessSummary,
     /// Number of ticks that were later than the tolerance.

@@ -4,7 +4,8 @@ use std::time::Duration;
 
 use cohaptic_harness::live::InputRow;
 use cohaptic_harness::measures::{MeasuredValue, Measures};
-use cohaptic_harness::{HoldRow, InstantRow, Observer, PacketRow, SendRow, StepRow, TickRow};
+use cohaptic_harness::task::{TaskResult, TaskView};
+use cohaptic_harness::{HoldRow, InstantRow, Observer, PacketRow, SendRow, StepRow, Summary, TickRow};
 use cohaptic_realtime::Lateness;
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
@@ -90,6 +91,16 @@ impl Watch {
     /// Returns the measures at the logical time `elapsed`. Empty if the scene asks for no measures.
     pub(super) fn measured(&self, elapsed: Duration) -> Vec<MeasuredValue> {
         self.measures.as_ref().map(|measures| measures.values(elapsed)).unwrap_or_default()
+    }
+
+    /// Returns what there is to see of the task at an instant; `None` for a scene without a task.
+    pub(super) fn task_view(&self, at: Instant) -> Option<TaskView> {
+        self.measures.as_ref().and_then(|measures| measures.task_view(at))
+    }
+
+    /// Returns the result of the task of a session with this summary; `None` for a scene without a task.
+    pub(super) fn task(&self, summary: &Summary) -> Option<TaskResult> {
+        self.measures.as_ref().and_then(|measures| measures.task(summary))
     }
 
     /// Counts a datagram that was queued for another program, and hands its row to the record.

@@ -209,3 +209,26 @@ fn measure_pictures_a_second_with_ten_peers() {
     browser.picture("play-ten");
     end(session);
 }
+
+/// The page says what to do, how much time is left, and how it ended, and draws the target where the second one lies.
+#[test]
+#[ignore = ".ci/nightly runs it: it needs a browser"]
+fn a_task_is_asked_for_shown_and_judged() {
+    let Some(mut browser) = Browser::start() else { return };
+    let desk = Desk::new();
+    let task = "\n[task]\nkind = \"reach\"\ntargets = [[0.0, 0.0], [0.1, 0.08]]\nradius = 0.02\nstart = \"6s\"\ndwell = \"2s\"\ntimeout = \"5s\"\n";
+    desk.write("task.toml", format!("{}{task}", include_str!("../../../scenarios/live/play.toml")));
+    let mut session = Session::play(&desk, "task.toml");
+    open(&mut browser, &mut session);
+    let says = |text: &str| format!("document.getElementById('task-what').textContent === '{text}'");
+    browser.wait(&says("Soon: Move the cube to target 1 of 2"));
+    browser.wait("document.getElementById('task-left').textContent.startsWith('begins in ')");
+    browser.wait(&says("Move the cube to target 1 of 2"));
+    browser.wait("document.getElementById('task-left').textContent.endsWith(' s left')");
+    browser.wait(&says("Move the cube to target 2 of 2"));
+    browser.picture("play-task");
+    browser.wait(&says("The time is over, 1 of 2 targets reached"));
+    assert_eq!(browser.value("document.getElementById('task-left').textContent"), json!(""));
+    assert_eq!(browser.complaints, [""; 0]);
+    end(session);
+}

@@ -1,0 +1,69 @@
+// ---- The task: its target in each room, and what is asked for in words.
+
+const TASK_OUTCOMES = { done: 'Done', 'timed-out': 'The time is over', failed: 'Failed', diverged: 'The copies came apart', unfinished: 'The task ended before its time' };
+
+/** What is asked for now, as a sentence. */
+function taskWords(task) {
+  if (task.outcome) return TASK_OUTCOMES[task.outcome] + (task.targets > 1 ? ', ' + task.reached + ' of ' + task.targets + ' targets reached' : '');
+  const what = {
+    reach: task.targets > 1 ? 'Move the cube to target ' + Math.min(task.reached + 1, task.targets) + ' of ' + task.targets : 'Move the cube to the target',
+    carry: task.targets > 1 ? 'Carry the cube to target ' + Math.min(task.reached + 1, task.targets) + ' of ' + task.targets : 'Carry the cube to the target',
+    path: 'Move the cube along the line',
+    track: 'Follow the target with the cube',
+    hold: 'Keep the cube at the target',
+  }[facts.task] || '';
+  return task.until > 0 ? 'Soon: ' + what : what;
+}
+
+/** The sentence, and the time left, four times a second. Only the sentence is announced: a clock would speak all the time. */
+function showTask() {
+  const task = frame && frame.task;
+  $('task').hidden = !task;
+  if (!task) return;
+  put($('task-what'), taskWords(task));
+  $('task-what').className = task.outcome === 'done' ? 'good' : task.outcome ? 'bad' : '';
+  const left = (seconds) => seconds.toFixed(1) + ' s';
+  put($('task-left'), task.outcome ? '' : task.until > 0 ? 'begins in ' + left(task.until) : left(task.left) + ' left');
+}
+
+/** The target: a disc as large as its radius, a cross in the middle, and a ring that fills while the copies stay for the time asked for. */
+function drawTarget(context, room) {
+  const { task } = frame;
+  if (!task) return;
+  const { x, y } = onCanvas(room, wide(task.at));
+  const radius = Math.max(5, (task.radius || 0) * scaleOf(room));
+  context.strokeStyle = context.fillStyle = ink.accent;
+  if (facts.path) {
+    context.globalAlpha = 0.5;
+    context.lineWidth = 1;
+    context.beginPath();
+    facts.path.map((point) => onCanvas(room, point)).forEach((at, k) => (k ? context.lineTo(at.x, at.y) : context.moveTo(at.x, at.y)));
+    context.stroke();
+  }
+  context.globalAlpha = 0.16;
+  context.beginPath();
+  context.arc(x, y, radius, 0, 2 * Math.PI);
+  context.fill();
+  context.globalAlpha = task.outcome || task.until > 0 ? 0.4 : 1;
+  context.lineWidth = 1.5;
+  context.stroke();
+  context.beginPath();
+  context.moveTo(x - 5, y);
+  context.lineTo(x + 5, y);
+  context.moveTo(x, y - 5);
+  context.lineTo(x, y + 5);
+  context.stroke();
+  if (task.turned && facts.edges) {
+    context.setLineDash([6, 4]);
+    outlineBox(context, room, { at: wide(task.at), turned: task.turned });
+    context.stroke();
+    context.setLineDash([]);
+  }
+  if (task.dwelt > 0 && !task.outcome) {
+    context.lineWidth = 4;
+    context.beginPath();
+    context.arc(x, y, radius + 6, -Math.PI / 2, -Math.PI / 2 + 2 * Math.PI * task.dwelt);
+    context.stroke();
+  }
+  context.globalAlpha = 1;
+}
