@@ -8,8 +8,8 @@ use cohaptic_linkfile::router::RouterFile;
 use crate::schema::FileSchema;
 use crate::{Scene, SceneError, scene_files};
 
-/// Four scenes with every table and every key that the shipped scenes leave out.
-pub(super) const SCENES: [&str; 4] = [
+/// Five scenes with every table and every key that the shipped scenes leave out.
+pub(super) const SCENES: [&str; 5] = [
     r#"
     scene = { duration = "4s" }
     object = { mass = 1, enclosure = { min = -1, max = 1, stiffness = 100, damping = 1 } }
@@ -117,6 +117,13 @@ pub(super) const SCENES: [&str; 4] = [
     orientations = [[1, 0, 0, 0.2], [1, 0, 0, 0]]
     angle = 0.1
     end = "stop"
+    "#,
+    r#"
+    scene = { duration = "4s", axes = 2, count = 2 }
+    object = { mass = 1 }
+    coordination = { strategy = "average-position", stiffness = 1, update = "8ms" }
+    peer = { device = { mass = 1 }, coupling = { stiffness = 1 } }
+    task = { kind = "path", points = [[0, 0], [0.1, 0]], width = 0.02, leave = "fail", who = "any" }
     "#,
 ];
 
