@@ -47,6 +47,7 @@ function drawRoom(context, room, i) {
   shown.forEach((other, k) => { if (k !== i) drawGhost(context, room, other, k); });
   const body = shown[i];
   drawCube(context, room, body, i);
+  drawDwell(context, room);
   drawPull(context, room, body, i);
   if (own && hand.holding) drawHand(context, room);
   context.fillStyle = ink.text;

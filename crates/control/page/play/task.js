@@ -1,4 +1,4 @@
-// ---- The task: its target in each room, and what is asked for in words.
+// ---- The task: its target in each room, a ring that fills while the copies stay there, and what is asked for in words.
 
 const TASK_OUTCOMES = { done: 'Done', 'timed-out': 'The time is over', failed: 'Failed', diverged: 'The copies came apart', unfinished: 'The task ended before its time' };
 
@@ -26,12 +26,14 @@ function showTask() {
   put($('task-left'), task.outcome ? '' : task.until > 0 ? 'begins in ' + left(task.until) : left(task.left) + ' left');
 }
 
-/** The target: a disc as large as its radius, a cross in the middle, and a ring that fills while the copies stay for the time asked for. */
+/** The radius of the target on the canvas; a target without one is a point. */
+const radiusOf = (room) => Math.max(5, (frame.task.radius || 0) * scaleOf(room));
+
+/** The target: a disc as large as its radius, and a cross in the middle. */
 function drawTarget(context, room) {
   const { task } = frame;
   if (!task) return;
   const { x, y } = onCanvas(room, wide(task.at));
-  const radius = Math.max(5, (task.radius || 0) * scaleOf(room));
   context.strokeStyle = context.fillStyle = ink.accent;
   if (facts.path) {
     context.globalAlpha = 0.5;
@@ -42,7 +44,7 @@ function drawTarget(context, room) {
   }
   context.globalAlpha = 0.16;
   context.beginPath();
-  context.arc(x, y, radius, 0, 2 * Math.PI);
+  context.arc(x, y, radiusOf(room), 0, 2 * Math.PI);
   context.fill();
   context.globalAlpha = task.outcome || task.until > 0 ? 0.4 : 1;
   context.lineWidth = 1.5;
@@ -59,11 +61,19 @@ function drawTarget(context, room) {
     context.stroke();
     context.setLineDash([]);
   }
-  if (task.dwelt > 0 && !task.outcome) {
-    context.lineWidth = 4;
-    context.beginPath();
-    context.arc(x, y, radius + 6, -Math.PI / 2, -Math.PI / 2 + 2 * Math.PI * task.dwelt);
+  context.globalAlpha = 1;
+}
+
+/** The ring: over the cube, which is there while the ring fills. */
+function drawDwell(context, room) {
+  const { task } = frame;
+  if (!task || task.outcome || !(task.dwelt > 0)) return;
+  const { x, y } = onCanvas(room, wide(task.at));
+  context.beginPath();
+  context.arc(x, y, radiusOf(room) + 6, -Math.PI / 2, -Math.PI / 2 + 2 * Math.PI * task.dwelt);
+  for (const [style, width] of [[ink.ground, 7], [ink.text, 4]]) {
+    context.strokeStyle = style;
+    context.lineWidth = width;
     context.stroke();
   }
-  context.globalAlpha = 1;
 }

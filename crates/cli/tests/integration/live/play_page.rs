@@ -217,7 +217,10 @@ fn a_task_is_asked_for_shown_and_judged() {
     let Some(mut browser) = Browser::start() else { return };
     let desk = Desk::new();
     let task = "\n[task]\nkind = \"reach\"\ntargets = [[0.0, 0.0], [0.1, 0.08]]\nradius = 0.02\nstart = \"6s\"\ndwell = \"2s\"\ntimeout = \"5s\"\n";
-    desk.write("task.toml", format!("{}{task}", include_str!("../../../scenarios/live/play.toml")));
+    desk.write(
+        "task.toml",
+        format!("{}{task}", include_str!("../../../scenarios/live/play.toml").replace("duration = \"3s\"", "duration = \"30s\"")),
+    );
     let mut session = Session::play(&desk, "task.toml");
     open(&mut browser, &mut session);
     let says = |text: &str| format!("document.getElementById('task-what').textContent === '{text}'");
