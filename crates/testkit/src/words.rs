@@ -300,7 +300,7 @@ mod tests {
     fn what_makes_no_sense_is_shown_with_its_place() {
         assert_eq!(
             read("a -> b: delay 24ms\nb -> a: delay 24ms parsecs loss 1%").unwrap_err(),
-            "2:20: unknown word \"parsecs\": expected limit, delay, distribution, loss, ecn, corrupt, duplicate, reorder, gap, rate, slot, seed or the end\n\
+            "2:20: unknown word \"parsecs\": expected limit, delay, distribution, loss, ecn, corrupt, duplicate, reorder, gap, rate, cross, slot, seed or the end\n\
              \u{20} |\n2 | b -> a: delay 24ms parsecs loss 1%\n  |                    ^^^^^^^"
         );
         for (text, expected) in [

@@ -68,7 +68,7 @@ impl Chance {
         let slots = netem.slot.as_ref().is_some_and(|slot| !matches!(slot.gap, SlotGap::Range { max: None, .. }));
         let others = [netem.corrupt.as_ref(), netem.duplicate.as_ref(), netem.reorder.as_ref().map(|reorder| &reorder.chance)];
         // With `ecn` chance marks packets in place of losing them, so the list of lost packets is not the whole effect.
-        if jitters || slots || netem.ecn || others.into_iter().any(happens) {
+        if jitters || slots || netem.ecn || netem.cross.is_some() || others.into_iter().any(happens) {
             return Self::Other;
         }
         match &netem.loss {

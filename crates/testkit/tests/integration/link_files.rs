@@ -39,6 +39,41 @@ fn hosts_links_and_seed_are_those_of_the_file() {
     assert_eq!((links.between(0, 1), links.between(1, 0)), (&"delay 3ms 1ms loss 30%".to_link(), &"delay 5ms".to_link()));
 }
 
+/// A datagram waits for the cross packets of the words, each 1.2 ms long, and for none where the words have none. Both forms of the words are one link.
+#[test]
+fn cross_packets_of_the_words_keep_datagrams_waiting() {
+    let delays = |words: &str| {
+        let bed = Testbed::new(["a", "b"]).link("a", "b", words).seed(5);
+        bed.run(|bed| async move {
+            let (sender, receiver) = (bed.host("a").bind("0.0.0.0:1").unwrap(), bed.host("b").bind("0.0.0.0:1").unwrap());
+            let mut delays = Vec::new();
+            for _ in 0..200 {
+                let begin = time::Instant::now();
+                sender.send_to(b"hello", "b:1").await.unwrap();
+                receiver.recv_from(&mut [0; 8]).await.unwrap();
+                delays.push(begin.elapsed());
+            }
+            delays
+        })
+    };
+    let (alone, beside) = (delays("delay 20ms rate 10mbit"), delays("delay 20ms rate 10mbit cross poisson 8mbit"));
+    assert!(alone.iter().all(|delay| *delay == alone[0]));
+    // The line is free for a fifth of the time, and a wait has a mean of two cross packets.
+    let free = beside.iter().filter(|delay| **delay == alone[0]).count();
+    let mean = beside.iter().sum::<Duration>() / 200;
+    assert!((20..80).contains(&free) && (1_500..3_500).contains(&(mean - alone[0]).as_micros()), "{free} met a free line, mean {mean:?}");
+    let links = LinkFile::parse("a -> b: rate 10mbit cross on-off 10 2mbit 200ms 800ms size 500\n").unwrap();
+    assert_eq!(links.between(0, 1), &"cross on-off 10 2mbit 0.2s 0.8s 1.5 size 500 rate 10mbit".to_link());
+    for (words, expected) in [
+        ("a -> b: delay 1ms cross poisson 8mbit", "1:19: cross packets share a line: expected rate too"),
+        ("a -> b: rate 1mbit cross poisson 8mbit", "1:20: cross packets alone need the whole line"),
+        ("a -> b: rate 1mbit cross poison 8kbit", "1:26: \"poison\" is not what cross takes here: expected poisson RATE or on-off"),
+    ] {
+        let error = LinkFile::parse(words).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}");
+    }
+}
+
 fn message(act: impl FnOnce() + std::panic::UnwindSafe) -> String {
     catch_unwind(act).unwrap_err().downcast_ref::<String>().unwrap().clone()
 }

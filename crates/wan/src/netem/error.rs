@@ -75,7 +75,7 @@ impl fmt::Display for NetemErrorKind {
         match self {
             Self::UnknownWord { word } => write!(
                 f,
-                "unknown word \"{word}\": expected limit, delay, distribution, loss, ecn, corrupt, duplicate, reorder, gap, rate, slot, seed or the end"
+                "unknown word \"{word}\": expected limit, delay, distribution, loss, ecn, corrupt, duplicate, reorder, gap, rate, cross, slot, seed or the end"
             ),
             Self::Value { option, word, expected } => write!(f, "\"{word}\" is not what {option} takes here: expected {expected}"),
             Self::NoUnit { option, word, readings } => write!(f, "\"{word}\" of {option} has no unit: {readings}"),

@@ -145,6 +145,7 @@ impl Netem {
             }),
             limit: self.limit.map(u64::from),
             bottleneck: self.rate.as_ref().map(bottleneck).transpose()?,
+            cross_traffic: self.cross.map(|cross| cross.traffic(self.rate.as_ref())).transpose()?,
             slots: self.slots(tables)?,
             reorder: self.reordering()?,
             delay: self.delay.as_ref().map_or_else(|| Ok(Delay::default()), |spec| delay(spec, tables))?,
@@ -263,7 +264,7 @@ fn deviation_of_half_width(half_width: Duration) -> Duration {
     Duration::from_nanos(nanos)
 }
 
-fn bottleneck(spec: &RateSpec) -> Result<Bottleneck, ExactError> {
+pub(super) fn bottleneck(spec: &RateSpec) -> Result<Bottleneck, ExactError> {
     let bytes_per_sec = spec.bytes_per_sec.get();
     // `tc` counts bytes per second, and the model bits.
     let rate = bytes_per_sec.checked_mul(8).and_then(Rate::bits_per_sec).ok_or(ExactError::Rate { bytes_per_sec })?;

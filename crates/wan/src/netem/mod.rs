@@ -3,7 +3,8 @@
 //! The module has three parts:
 //!
 //! - [`Netem`]: the options in the words. [`Netem::parse`] reads words as `tc` of iproute2 6.6 does (without `tc qdisc … netem`), refuses nonsense with
-//!   [an error that points at the word](NetemError::excerpt), and `Display` prints words that read back to the same value.
+//!   [an error that points at the word](NetemError::excerpt), and `Display` prints words that read back to the same value. One option is not of `tc`: `cross`,
+//!   packets of other senders.
 //! - [`Netem::to_link_config`]: a link with exactly the behaviour of the words.
 //! - [`kernel`]: the behaviour of Linux 6.6 with the same words, draw for draw. The kernel often differs from the words: `loss 1% 25%` loses 0.00015 %.
 //!
@@ -21,6 +22,7 @@
 //! # Ok::<(), cohaptic_wan::netem::NetemError>(())
 //! ```
 
+mod cross;
 mod error;
 mod exact;
 pub mod kernel;
@@ -32,6 +34,7 @@ mod print;
 mod rules;
 mod spec;
 
+pub use cross::{CrossSource, CrossSpec};
 pub use error::{NetemError, NetemErrorKind};
 pub use exact::ExactError;
 pub use percent::Percent;

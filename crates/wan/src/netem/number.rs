@@ -91,6 +91,7 @@ pub(super) fn without_unit(text: &str, kind: Plain) -> Option<String> {
                 "tc reads {text} us up to version 6.8 and {text} ns from 6.9 on, and a scene reads no time without its unit: expected {text}us or {text}ns"
             )
         }
+        Plain::Cross => format!("expected {text}ms, or another unit (s, us, ns)"),
         Plain::Slot => format!("tc reads {text} ns, and a scene reads no time without its unit: expected {text}ns"),
     })
 }
@@ -101,6 +102,8 @@ pub(super) enum Plain {
     Percentage,
     Delay,
     Slot,
+    /// `cross`, which `tc` does not read.
+    Cross,
 }
 
 /// Converts a scale to a real number. Every scale is below 2⁵³ or has few bits set, and is exact.
@@ -240,6 +243,11 @@ pub(super) fn signed(text: &str) -> Option<i64> {
         Some(digits) => magnitude(digits).map(|magnitude| -magnitude),
         None => magnitude(text),
     }
+}
+
+/// Reads a real number of at least zero, without a unit.
+pub(super) fn real_number(text: &str) -> Option<f64> {
+    number(text).filter(|number| number.unit.is_empty()).map(|number| number.value)
 }
 
 /// Reads a decimal integer of at least zero, without a sign.

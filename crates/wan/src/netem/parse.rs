@@ -10,18 +10,19 @@ use core::num::NonZeroU32;
 use core::ops::Range;
 use core::time::Duration;
 
+use super::cross::MOST_SOURCES;
 use super::number::{self, PERCENT, Plain, RATE, TIME};
 use super::{
-    CellSpec, ChanceSpec, Contradiction, DelaySpec, Distribution, FramingSpec, GemodelSpec, JitterSpec, LossSpec, Netem, NetemError, NetemErrorKind,
-    Percent, RateSpec, ReorderSpec, SlotGap, SlotSpec, StateSpec,
+    CellSpec, ChanceSpec, Contradiction, CrossSource, CrossSpec, DelaySpec, Distribution, FramingSpec, GemodelSpec, JitterSpec, LossSpec, Netem,
+    NetemError, NetemErrorKind, Percent, RateSpec, ReorderSpec, SlotGap, SlotSpec, StateSpec,
 };
 
 /// Full name of an option, also in messages.
 type Keyword = &'static str;
 
 /// Words for options in the order of the comparisons of `tc`, and the option of each. So `l` is `limit`, `d` is `delay`, `r` is `reorder`, and `s` is
-/// `seed`.
-const KEYWORDS: [(&str, Keyword); 14] = [
+/// `seed`. Options that `tc` does not know come last, so that each shortened word of `tc` keeps its meaning.
+const KEYWORDS: [(&str, Keyword); 15] = [
     ("limit", "limit"),
     ("latency", "delay"),
     ("delay", "delay"),
@@ -36,6 +37,7 @@ const KEYWORDS: [(&str, Keyword); 14] = [
     ("distribution", "distribution"),
     ("rate", "rate"),
     ("slot", "slot"),
+    ("cross", "cross"),
 ];
 
 const COUNT: &str = "a count of packets from 0 to 4294967295";
@@ -45,6 +47,11 @@ const SLOT_COUNT: &str = "a number from 1 to 2147483647";
 const GAP: &str = "a number of packets from 1 to 4294967295";
 const OVERHEAD: &str = "a number of bytes from -2147483648 to 2147483647";
 const CELL: &str = "a cell size from 1 to 4294967295 bytes";
+const CROSS: &str = "poisson RATE or on-off SOURCES PEAK ON OFF [SHAPE]";
+const SOURCES: &str = "a number of sources from 1 to 65536";
+const SPAN: &str = "a time above zero such as 200ms (units: s, ms, us, ns)";
+const SHAPE: &str = "a shape above 1 and below 2 such as 1.5";
+const SIZE: &str = "a size from 1 to 4294967295 bytes such as 1500";
 const SEED: &str = "a decimal number from 0 to 18446744073709551615";
 
 impl Netem {
@@ -131,6 +138,7 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
             "duplicate" => self.netem.duplicate = Some(self.chance(option)?),
             "distribution" => self.distribution = Some(self.value(option, NAME, Distribution::named)?),
             "rate" => self.netem.rate = Some(self.rate()?),
+            "cross" => self.netem.cross = Some(self.cross()?),
             // `slot`, the only option left in the table.
             _ => self.netem.slot = Some(self.slot()?),
         }
@@ -222,6 +230,34 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
             }
         };
         Ok(RateSpec { bytes_per_sec, framing })
+    }
+
+    fn cross(&mut self) -> Result<CrossSpec, NetemError> {
+        let kind = self.value("cross", CROSS, |text| ["poisson", "on-off"].into_iter().find(|kind| *kind == text))?;
+        let source = if kind == "poisson" {
+            CrossSource::Poisson { bytes_per_sec: self.value("cross", RATE, number::rate)? }
+        } else {
+            let sources = self.value("cross", SOURCES, |text| count(text).filter(|sources| sources.get() <= MOST_SOURCES))?;
+            let peak = self.value("cross", RATE, number::rate)?;
+            let [on, off] = [self.span()?, self.span()?];
+            let is_shape = |shape: &f64| *shape > 1.0 && *shape < 2.0;
+            let shape =
+                if self.number_follows() { Some(self.value("cross", SHAPE, |text| number::real_number(text).filter(is_shape))?) } else { None };
+            CrossSource::OnOff { sources, peak, on, off, shape }
+        };
+        // Not shortened, because `s` is `seed`.
+        let size = if self.words.peek().is_some_and(|word| word.text == "size") {
+            self.skip();
+            Some(self.value("cross", SIZE, |text| number::size(text).and_then(NonZeroU32::new))?)
+        } else {
+            None
+        };
+        Ok(CrossSpec { source, size })
+    }
+
+    /// Reads the mean of a span of sources of cross packets.
+    fn span(&mut self) -> Result<Duration, NetemError> {
+        self.with_unit("cross", SPAN, Plain::Cross, |text| number::time(text).filter(|span| !span.is_zero()))
     }
 
     fn slot(&mut self) -> Result<SlotSpec, NetemError> {
@@ -323,8 +359,16 @@ impl<'a, W: Iterator<Item = Word<'a>>> Parser<'a, W> {
             Contradiction::WaysOutOfState3 => &[Place::Probability(2)],
             Contradiction::SlotRange => &[Place::SlotMax],
             Contradiction::SlotWithoutJitter => &[Place::SlotJitter],
+            Contradiction::CrossWithoutRate | Contradiction::CrossFillsLine | Contradiction::CrossTooDense | Contradiction::CrossSpans => {
+                &[Place::Option("cross")]
+            }
             // The parser refuses these values word by word, so no text leads here.
-            Contradiction::ProbabilitySkipped | Contradiction::SlotTooLarge | Contradiction::TimeTooLong => &[],
+            Contradiction::ProbabilitySkipped
+            | Contradiction::SlotTooLarge
+            | Contradiction::TimeTooLong
+            | Contradiction::CrossShape
+            | Contradiction::CrossSources
+            | Contradiction::CrossInKernel => &[],
         };
         let at = self.seen.iter().find(|(place, _)| places.contains(place));
         let span = at.map_or_else(|| self.last.clone(), |(_, span)| span.clone());

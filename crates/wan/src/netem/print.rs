@@ -4,10 +4,10 @@ use core::fmt;
 use core::num::NonZeroU64;
 use core::time::Duration;
 
-use super::{ChanceSpec, DelaySpec, GemodelSpec, LossSpec, Netem, Percent, RateSpec, SlotGap, SlotSpec, StateSpec};
+use super::{ChanceSpec, CrossSource, CrossSpec, DelaySpec, GemodelSpec, LossSpec, Netem, Percent, RateSpec, SlotGap, SlotSpec, StateSpec};
 
 impl fmt::Display for Netem {
-    /// Prints words for `tc`, in the order of its manual, with every time and rate as an integer. A netem without options prints nothing.
+    /// Prints words for `tc`, and after `rate` those of `cross`, in the order of its manual, with every time and rate as an integer. A netem without options prints nothing.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut words = Words { f, separator: "" };
         if let Some(limit) = self.limit {
@@ -37,6 +37,9 @@ impl fmt::Display for Netem {
         }
         if let Some(rate) = &self.rate {
             words.rate(rate)?;
+        }
+        if let Some(cross) = &self.cross {
+            words.cross(cross)?;
         }
         if let Some(slot) = &self.slot {
             words.slot(slot)?;
@@ -104,6 +107,22 @@ impl Words<'_, '_> {
         self.put(cell.size)?;
         match cell.overhead {
             Some(overhead) => self.put(overhead),
+            None => Ok(()),
+        }
+    }
+
+    fn cross(&mut self, cross: &CrossSpec) -> fmt::Result {
+        match cross.source {
+            CrossSource::Poisson { bytes_per_sec } => self.put(format_args!("cross poisson {}", Bits(bytes_per_sec)))?,
+            CrossSource::OnOff { sources, peak, on, off, shape } => {
+                self.put(format_args!("cross on-off {sources} {} {} {}", Bits(peak), Time(on), Time(off)))?;
+                if let Some(shape) = shape {
+                    self.put(shape)?;
+                }
+            }
+        }
+        match cross.size {
+            Some(size) => self.put(format_args!("size {size}")),
             None => Ok(()),
         }
     }

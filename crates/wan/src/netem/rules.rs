@@ -31,6 +31,20 @@ pub enum Contradiction {
     SlotTooLarge,
     /// A time does not fit into the kernel's signed 64 bits of nanoseconds.
     TimeTooLong,
+    /// `cross` without `rate`: the packets of other senders have no line to share.
+    CrossWithoutRate,
+    /// The packets of `cross` alone need the whole line, and the queue would grow for ever.
+    CrossFillsLine,
+    /// More than one packet of `cross` per nanosecond, the resolution of instants.
+    CrossTooDense,
+    /// A mean span of sending of `cross` below the time of one packet at the peak rate, or no silence.
+    CrossSpans,
+    /// A shape of `cross` that is not between 1 and 2.
+    CrossShape,
+    /// Too many sources of `cross`.
+    CrossSources,
+    /// `cross` for the kernel's netem, which has no such option.
+    CrossInKernel,
 }
 
 impl fmt::Display for Contradiction {
@@ -47,6 +61,17 @@ impl fmt::Display for Contradiction {
             Self::SlotWithoutJitter => f.write_str("a slot distribution without deviation: expected a jitter above zero"),
             Self::SlotTooLarge => f.write_str("expected at most 2147483647 packets and bytes in a slot"),
             Self::TimeTooLong => f.write_str("expected times below 292 years"),
+            Self::CrossWithoutRate => f.write_str("cross packets share a line: expected rate too"),
+            Self::CrossFillsLine => {
+                f.write_str("cross packets alone need the whole line, and its queue would grow for ever: expected fewer of them, or a higher rate")
+            }
+            Self::CrossTooDense => f.write_str("more than one cross packet per nanosecond: expected a lower rate or a larger size"),
+            Self::CrossSpans => {
+                f.write_str("expected a mean span of sending of at least one packet at the peak rate, and a mean span of silence above zero")
+            }
+            Self::CrossShape => f.write_str("expected a shape above 1 (below, spans have no mean) and below 2 (above, no long memory)"),
+            Self::CrossSources => write!(f, "expected at most {} sources of cross packets", super::cross::MOST_SOURCES),
+            Self::CrossInKernel => f.write_str("cross is no option of the kernel's netem: expected the profile exact, or no cross"),
         }
     }
 }
@@ -65,6 +90,13 @@ impl Contradiction {
             Self::WaysOutOfState1 | Self::WaysOutOfState3 | Self::ProbabilitySkipped => "loss",
             Self::SlotRange | Self::SlotWithoutJitter | Self::SlotTooLarge => "slot",
             Self::TimeTooLong => "delay",
+            Self::CrossWithoutRate
+            | Self::CrossFillsLine
+            | Self::CrossTooDense
+            | Self::CrossSpans
+            | Self::CrossShape
+            | Self::CrossSources
+            | Self::CrossInKernel => "cross",
         }
     }
 }
@@ -77,7 +109,7 @@ impl Netem {
     ///
     /// # Errors
     ///
-    /// The first [`Contradiction`] in the order of the checks: delay, loss, `ecn`, `reorder`, `slot`.
+    /// The first [`Contradiction`] in the order of the checks: delay, loss, `ecn`, `reorder`, `cross`, `slot`.
     pub fn check(&self) -> Result<(), Contradiction> {
         self.delay.as_ref().map_or(Ok(()), check_delay)?;
         match &self.loss {
@@ -89,6 +121,9 @@ impl Netem {
             return Err(Contradiction::EcnWithoutLoss);
         }
         self.check_reorder()?;
+        if let Some(cross) = &self.cross {
+            cross.traffic(self.rate.as_ref())?;
+        }
         self.slot.as_ref().map_or(Ok(()), check_slot)
     }
 

@@ -4,7 +4,7 @@ use alloc::string::String;
 use core::num::{NonZeroU32, NonZeroU64};
 use core::time::Duration;
 
-use super::Percent;
+use super::{CrossSpec, Percent};
 
 /// The options of one netem, as written. A missing option is `None`.
 ///
@@ -27,6 +27,8 @@ pub struct Netem {
     pub reorder: Option<ReorderSpec>,
     /// `rate`: the rate of the transmitter, and the framing of packets.
     pub rate: Option<RateSpec>,
+    /// `cross`: packets of other senders that share the line of `rate`. Unknown to `tc` and to the kernel.
+    pub cross: Option<CrossSpec>,
     /// `slot`: lets packets leave in bunches.
     pub slot: Option<SlotSpec>,
     /// `seed`: the seed of the kernel's generator.

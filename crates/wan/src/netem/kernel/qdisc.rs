@@ -11,7 +11,7 @@ use super::prng::{Prng, Unseeded};
 use super::slot::Slots;
 use super::table::Table;
 use super::time_fifo::TimeFifo;
-use crate::netem::{Distribution, Netem, SlotGap, TableName};
+use crate::netem::{Contradiction, Distribution, Netem, SlotGap, TableName};
 
 /// The netem of Linux 6.6, on a device of infinite speed.
 ///
@@ -97,6 +97,9 @@ impl<T> Qdisc<T> {
     /// [`QdiscError`] if options contradict each other, a delay does not fit into the ticks of `tc`, or `tables` returns `None`.
     pub(crate) fn new(netem: &Netem, seed: u64, mut tables: impl FnMut(&TableName) -> Option<Table>) -> Result<Self, QdiscError> {
         netem.check()?;
+        if netem.cross.is_some() {
+            return Err(Contradiction::CrossInKernel.into());
+        }
         let parameters = Parameters::new(netem)?;
         let mut table = |distribution: &Distribution| match distribution {
             Distribution::Uniform => Ok(None),

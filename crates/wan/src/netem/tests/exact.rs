@@ -3,7 +3,7 @@
 use alloc::sync::Arc;
 use core::time::Duration;
 
-use cohaptic_units::{Probability, Rate};
+use cohaptic_units::{Bytes, Probability, Rate};
 
 use crate::laws::chance::Chance;
 use crate::laws::delay::{DistTable, Distribution};
@@ -12,7 +12,7 @@ use crate::stages::config::{Layout, LinkConfig};
 use crate::stages::corruption::{Checksum, Corruption, Flips};
 use crate::stages::delay::{Correlation, Delay, Jitter};
 use crate::stages::loss::{FourState, GilbertElliott, Loss};
-use crate::stages::queue::{Bottleneck, Cells, Framing};
+use crate::stages::queue::{Bottleneck, Cells, CrossTraffic, Framing, OnOff, Poisson};
 use crate::stages::reorder::{Displacement, Reorder};
 use crate::stages::slots::Slots;
 
@@ -44,6 +44,25 @@ fn delay(jitter: Jitter) -> LinkConfig {
 
 fn loss(loss: Loss) -> LinkConfig {
     netem(LinkConfig { loss, ..LinkConfig::default() })
+}
+
+/// A line of 10 Mbit/s with the cross-traffic of the words, and with that of the configuration.
+#[test]
+fn cross_packets_share_the_line() {
+    let rate = |bits| Rate::bits_per_sec(bits).unwrap();
+    let with = |traffic: CrossTraffic| {
+        let bottleneck = Some(Bottleneck::at_rate(rate(10_000_000)));
+        netem(LinkConfig { bottleneck, cross_traffic: Some(traffic), ..LinkConfig::default() })
+    };
+    let poisson = |size| CrossTraffic::poisson(Poisson { rate: rate(8_000_000), size: Bytes::new(size) }).unwrap();
+    assert_eq!(exact("rate 10mbit cross poisson 8mbit"), with(poisson(1500)));
+    assert_eq!(exact("rate 10mbit cross poisson 8mbit size 200"), with(poisson(200)));
+    let on_off = |shape| {
+        let (on, off) = (200 * MILLISECOND, 800 * MILLISECOND);
+        CrossTraffic::on_off(OnOff { sources: 10, peak: rate(2_000_000), size: Bytes::new(1500), on, off, shape }).unwrap()
+    };
+    assert_eq!(exact("rate 10mbit cross on-off 10 2mbit 200ms 800ms"), with(on_off(1.5)));
+    assert_eq!(exact("rate 10mbit cross on-off 10 2mbit 200ms 800ms 1.8"), with(on_off(1.8)));
 }
 
 #[test]

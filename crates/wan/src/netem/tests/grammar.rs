@@ -4,8 +4,8 @@ use core::num::{NonZeroU32, NonZeroU64};
 use core::time::Duration;
 
 use crate::netem::{
-    CellSpec, ChanceSpec, DelaySpec, Distribution, FramingSpec, GemodelSpec, JitterSpec, LossSpec, Netem, Percent, RateSpec, ReorderSpec, SlotGap,
-    SlotSpec, StateSpec,
+    CellSpec, ChanceSpec, CrossSource, CrossSpec, DelaySpec, Distribution, FramingSpec, GemodelSpec, JitterSpec, LossSpec, Netem, Percent, RateSpec,
+    ReorderSpec, SlotGap, SlotSpec, StateSpec,
 };
 
 fn percent(value: f64) -> Percent {
@@ -24,7 +24,7 @@ const MILLISECOND: Duration = Duration::from_millis(1);
 #[test]
 fn every_option_is_read() {
     let words = "limit 50 delay 24ms 2ms 25% distribution paretonormal loss gemodel 1% 10% 70% 0.1% ecn corrupt 0.1% 5% duplicate 1% \
-                 reorder 25% 50% gap 5 rate 5kbit 20 100 -5 slot 800us 10ms packets 42 bytes 64k seed 7";
+                 reorder 25% 50% gap 5 rate 5kbit 20 100 -5 cross poisson 800bit size 1k slot 800us 10ms packets 42 bytes 64k seed 7";
     let expected = Netem {
         limit: Some(50),
         delay: Some(DelaySpec {
@@ -45,6 +45,7 @@ fn every_option_is_read() {
             bytes_per_sec: NonZeroU64::new(625).unwrap(),
             framing: Some(FramingSpec { overhead: 20, cell: Some(CellSpec { size: NonZeroU32::new(100).unwrap(), overhead: Some(-5) }) }),
         }),
+        cross: Some(CrossSpec { source: CrossSource::Poisson { bytes_per_sec: NonZeroU64::new(100).unwrap() }, size: NonZeroU32::new(1024) }),
         slot: Some(SlotSpec {
             gap: SlotGap::Range { min: Duration::from_micros(800), max: Some(10 * MILLISECOND) },
             packets: NonZeroU32::new(42),
@@ -53,6 +54,21 @@ fn every_option_is_read() {
         seed: Some(7),
     };
     assert_eq!(netem(words), expected);
+}
+
+#[test]
+fn the_sources_of_cross_packets_are_told_apart() {
+    let on_off = |shape| {
+        let (sources, peak) = (NonZeroU32::new(10).unwrap(), NonZeroU64::new(250_000).unwrap());
+        CrossSource::OnOff { sources, peak, on: 200 * MILLISECOND, off: 800 * MILLISECOND, shape }
+    };
+    let cross = |words: &str| netem(words).cross;
+    assert_eq!(cross("cross on-off 10 2mbit 200ms 0.8s rate 10mbit"), Some(CrossSpec { source: on_off(None), size: None }));
+    let whole = Some(CrossSpec { source: on_off(Some(1.25)), size: NonZeroU32::new(64) });
+    assert_eq!(cross("rate 10mbit cross on-off 10 2mbit 200ms 800ms 1.25 size 64 delay 5ms"), whole);
+    assert_eq!(netem("rate 1mbit cr poisson 8kbit").cross, netem("cross poisson 8kbit rate 1mbit").cross);
+    // A word of tc keeps its meaning.
+    assert!(netem("c 5%").corrupt.is_some() && netem("rate 1mbit cross poisson 8kbit s 5").seed == Some(5));
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Words that are refused, and the word at which the error points.
 
-use crate::netem::{Contradiction, DelaySpec, LossSpec, Netem, NetemErrorKind, Percent, StateSpec};
+use crate::netem::{Contradiction, CrossSource, CrossSpec, DelaySpec, LossSpec, Netem, NetemErrorKind, Percent, StateSpec};
 
 /// Refused words, and the part of the words to which the error must point.
 const REFUSED: &[(&str, &str)] = &[
@@ -53,10 +53,32 @@ const REFUSED: &[(&str, &str)] = &[
     ("slot 1us packets 0", "0"),
     ("slot 1us bytes 3000000000", "3000000000"),
     ("slot 1us packets 5 packets 6", "packets"),
+    ("rate 1mbit cross", "cross"),
+    ("rate 1mbit cross 8kbit", "8kbit"),
+    ("rate 1mbit cross pois 8kbit", "pois"),
+    ("rate 1mbit cross poisson", "poisson"),
+    ("rate 1mbit cross poisson 5%", "5%"),
+    ("rate 1mbit cross poisson 8kbit size 0", "0"),
+    ("rate 1mbit cross poisson 8kbit size 1.5x", "1.5x"),
+    ("rate 1mbit cross on-off 0 2kbit 1s 1s", "0"),
+    ("rate 1mbit cross on-off 65537 2kbit 1s 1s", "65537"),
+    ("rate 1mbit cross on-off 5 2kbit 0s 1s", "0s"),
+    ("rate 1mbit cross on-off 5 2kbit 9s", "9s"),
+    ("rate 1mbit cross on-off 5 2kbit 9s 9", "9"),
+    ("rate 1mbit cross on-off 5 2kbit 9s 9s 2", "2"),
+    ("rate 1mbit cross on-off 5 2kbit 9s 9s 1", "1"),
+    ("rate 1mbit cross on-off 5 2kbit 9s 9s 1.5 1.5", "1.5"),
     // Options given twice.
     ("delay 1ms loss 1% delay 2ms", "delay"),
     ("loss 1% drop 2%", "drop"),
     // Contradictions.
+    ("delay 1ms cross poisson 8kbit", "cross"),
+    ("cross poisson 1mbit rate 1mbit", "cross"),
+    ("rate 1mbit cross poisson 1000kbit loss 1%", "cross"),
+    ("rate 1mbit 1500 cross poisson 500kbit", "cross"),
+    ("rate 1mbit cross on-off 2 1mbit 1s 1s", "cross"),
+    ("rate 1mbit cross on-off 1 1mbit 11ms 1s", "cross"),
+    ("rate 1tbit cross poisson 16gbit size 1", "cross"),
     ("loss 1% reorder 25%", "reorder"),
     ("reorder 25% delay 0ms", "reorder"),
     ("gap 5 delay 1ms", "gap"),
@@ -171,6 +193,18 @@ fn what_cannot_be_said_is_found_in_values_made_by_hand() {
     assert_eq!(netem.check(), Err(Contradiction::ProbabilitySkipped));
     let netem = Netem { delay: Some(DelaySpec { time: core::time::Duration::MAX, jitter: None }), ..Netem::default() };
     assert_eq!(netem.check(), Err(Contradiction::TimeTooLong));
+    let words = Netem::parse("rate 1mbit cross on-off 2 9kbit 9s 9s").unwrap();
+    let check = |change: fn(&mut u32, &mut f64)| {
+        let mut netem = words.clone();
+        let Some(CrossSpec { source: CrossSource::OnOff { sources, shape, .. }, .. }) = &mut netem.cross else { panic!() };
+        let (mut number, mut law) = (sources.get(), 1.5);
+        change(&mut number, &mut law);
+        (*sources, *shape) = (number.try_into().unwrap(), Some(law));
+        netem.check()
+    };
+    assert_eq!(check(|_, _| ()), Ok(()));
+    assert_eq!(check(|sources, _| *sources = 65_537), Err(Contradiction::CrossSources));
+    assert_eq!(check(|_, shape| *shape = f64::NAN), Err(Contradiction::CrossShape));
 }
 
 #[test]

@@ -7,8 +7,8 @@ use proptest::option::of;
 use proptest::prelude::*;
 
 use crate::netem::{
-    CellSpec, ChanceSpec, DelaySpec, Distribution, FramingSpec, GemodelSpec, JitterSpec, LossSpec, Netem, Percent, RateSpec, ReorderSpec, SlotGap,
-    SlotSpec, StateSpec,
+    CellSpec, ChanceSpec, CrossSource, CrossSpec, DelaySpec, Distribution, FramingSpec, GemodelSpec, JitterSpec, LossSpec, Netem, Percent, RateSpec,
+    ReorderSpec, SlotGap, SlotSpec, StateSpec,
 };
 
 fn percent() -> impl Strategy<Value = Percent> {
@@ -58,6 +58,20 @@ fn rate() -> impl Strategy<Value = RateSpec> {
     (bytes, of(framing)).prop_map(|(bytes_per_sec, framing)| RateSpec { bytes_per_sec, framing })
 }
 
+fn cross() -> impl Strategy<Value = CrossSpec> {
+    let rate = || (1..=40_u32, any::<u64>()).prop_map(|(bits, word)| NonZeroU64::new((word >> (64 - bits)).max(1)).unwrap());
+    let sources = (1..=65_536_u32).prop_map(|sources| NonZeroU32::new(sources).unwrap());
+    let on_off = (sources, rate(), time(), time(), of(1.000_1..1.999_9)).prop_map(|(sources, peak, on, off, shape)| CrossSource::OnOff {
+        sources,
+        peak,
+        on,
+        off,
+        shape,
+    });
+    let source = prop_oneof![rate().prop_map(|bytes_per_sec| CrossSource::Poisson { bytes_per_sec }), on_off];
+    (source, of((1..=u32::MAX).prop_map(|size| NonZeroU32::new(size).unwrap()))).prop_map(|(source, size)| CrossSpec { source, size })
+}
+
 fn slot() -> impl Strategy<Value = SlotSpec> {
     let range = (time(), of(time())).prop_map(|(a, b)| match b {
         None => SlotGap::Range { min: a, max: None },
@@ -71,9 +85,9 @@ fn slot() -> impl Strategy<Value = SlotSpec> {
 pub(in crate::netem) fn netem() -> impl Strategy<Value = Netem> {
     let reorder = (chance(), of((1..=u32::MAX).prop_map(|gap| NonZeroU32::new(gap).unwrap()))).prop_map(|(chance, gap)| ReorderSpec { chance, gap });
     let head = (of(any::<u32>()), of(delay()), of(loss()), any::<bool>());
-    let tail = (of(chance()), of(chance()), of(reorder), of(rate()), of(slot()), of(any::<u64>()));
+    let tail = (of(chance()), of(chance()), of(reorder), of(rate()), of(cross()), of(slot()), of(any::<u64>()));
     (head, tail)
-        .prop_map(|((limit, delay, loss, ecn), (corrupt, duplicate, reorder, rate, slot, seed))| Netem {
+        .prop_map(|((limit, delay, loss, ecn), (corrupt, duplicate, reorder, rate, cross, slot, seed))| Netem {
             limit,
             delay,
             loss,
@@ -82,11 +96,15 @@ pub(in crate::netem) fn netem() -> impl Strategy<Value = Netem> {
             duplicate,
             reorder,
             rate,
+            cross,
             slot,
             seed,
         })
         .prop_map(|mut netem| {
             // Options that would contradict others are removed.
+            if (Netem { rate: netem.rate, cross: netem.cross, ..Netem::default() }).check().is_err() {
+                netem.cross = None;
+            }
             netem.ecn = netem.ecn && Netem { reorder: None, ..netem.clone() }.check().is_ok();
             if netem.check().is_err() {
                 netem.reorder = None;
@@ -116,6 +134,10 @@ fn salad() -> impl Strategy<Value = String> {
             "normal",
             "rate",
             "slot",
+            "cross",
+            "poisson",
+            "on-off",
+            "size",
             "packets",
             "bytes",
             "seed",

@@ -1,9 +1,9 @@
 //! Decisions packet by packet: duplication, loss, marks, and flipped bits.
 
-use crate::netem::Netem;
 use crate::netem::kernel::qdisc::FlippedBit;
 use crate::netem::kernel::tests::{Driver, SIZE, at, qdisc, run};
 use crate::netem::kernel::{DropReason, Output, Prng, Qdisc, QdiscError, Table};
+use crate::netem::{Contradiction, Netem};
 
 /// Collects the outputs of `enqueue` for one packet.
 fn told(words: &str, ect: bool) -> (Vec<Output<u64>>, Qdisc<u64>) {
@@ -130,4 +130,6 @@ fn a_distribution_that_nobody_has_is_refused_and_one_that_is_given_is_used() {
     let mut contradiction = netem;
     contradiction.ecn = true;
     assert!(matches!(Qdisc::<u64>::new(&contradiction, 1, |_| None), Err(QdiscError::Contradiction(_))));
+    let cross = Netem::parse("rate 1mbit cross poisson 8kbit").unwrap();
+    assert!(matches!(Qdisc::<u64>::new(&cross, 1, |_| None), Err(QdiscError::Contradiction(Contradiction::CrossInKernel))));
 }
