@@ -47,6 +47,9 @@ pub struct Scene {
     pub relay: bool,
     /// Directed links between the peers. An entry between two peers that are not neighbours in the topology has no effect.
     pub links: LinkTable,
+    /// Links of the library that the scene names, with versions: `starlink@1/down`. A link with equal directions has no direction in its name. The configurations
+    /// above and in the timeline hold the keys of these links, and the names only tell where the keys are from.
+    pub profiles: Vec<String>,
     /// Changes during the run, in order of time; changes at the same instant are in the order of the file.
     pub timeline: Vec<Change>,
     /// Task of the users; `None` if the scene has no table `[task]`.
@@ -78,6 +81,8 @@ impl fmt::Debug for Scene {
             topology,
             relay,
             links,
+            // Equal links move equally, whatever their keys are from.
+            profiles: _,
             timeline,
             task,
             measure,

@@ -215,6 +215,7 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
         relay: topology.as_ref().is_some_and(|ways| ways.relay),
         topology: topology?.neighbours,
         links: links.as_ref().and_then(LinkClasses::table)?,
+        profiles: file.profiles(),
         timeline: timeline?,
         task: task?.map(Box::new),
         measure: measure?,

@@ -315,6 +315,10 @@ impl Rows {
 
     fn network(&mut self, scene: &Scene, is_broadcast: bool) {
         self.topology(scene);
+        if !scene.profiles.is_empty() {
+            let why = "profile and access of the scene; cohaptic link NAME --show prints each key with its source";
+            self.model("links of the library", scene.profiles.join(", "), why);
+        }
         let used = used_links(scene);
         for (config, count) in &used {
             let part = format!("{count} {}", if *count == 1 { "link" } else { "links" });

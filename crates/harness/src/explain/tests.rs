@@ -99,6 +99,18 @@ fn every_stage_is_described_with_its_numbers() {
     }
 }
 
+/// Links of the library are named with their versions, also those without a modulator and those of changes.
+#[test]
+fn links_of_the_library_are_named() {
+    let row = |text: &str| explain(&scene(text)).models.into_iter().find(|row| row.part == "links of the library").map(|row| row.model);
+    assert_eq!(row("delay = \"1ms\""), None);
+    assert_eq!(row("profile = \"transatlantic\"").as_deref(), Some("transatlantic@1"));
+    let change = "profile = \"dsl/down\"\n[[timeline]]\nat = \"100ms\"\nlink = \"all\"\nset = { profile = \"starlink/up\" }";
+    assert_eq!(row(change).as_deref(), Some("dsl@1/down, starlink@1/up"));
+    let access = "delay = \"1ms\"\n[[peers]]\nname = \"peer1\"\naccess = \"dsl\"\nuplink.profile = \"cable/up\"";
+    assert_eq!(row(access).as_deref(), Some("cable@1, dsl@1/down"));
+}
+
 /// Returns the processor time of a simulated second of ten peers [ms].
 fn busy(link: &str, clock: &str) -> f64 {
     let text = format!(

@@ -42,6 +42,8 @@ pub(super) fn resolve(node: &Node, context: Context<'_>) -> Option<Option<Resolv
             return Some(None);
         }
     }
+    let title = profile.title();
+    context.note_profile(if profile.is_symmetric() { title } else { format!("{title}/{}", direction.word()) });
     // Entries stand in the order of laying over. What stands before the profile in another table lies below the profile, which says everything about its link.
     let is_over = |(index, other): (usize, &&Entry)| index != place && (index > place || written_together(other, entry));
     let over: Vec<Entry> = table.0.iter().enumerate().filter(|(index, other)| is_over((*index, other))).map(|(_, other)| other.clone()).collect();

@@ -3,7 +3,7 @@
 use core::any::Any;
 use core::cell::RefCell;
 use core::fmt;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -52,6 +52,10 @@ impl Faults {
 /// Modulators of a file by name, each with the names of the states.
 pub type Modulators = BTreeMap<String, (Modulator, Vec<String>)>;
 
+/// Collector of the links of the library that a document names, with version and, if the directions differ, direction.
+#[derive(Debug, Default)]
+pub(crate) struct Profiles(RefCell<BTreeSet<String>>);
+
 /// Reader of the files named in a document: a function from a path to the bytes of the file.
 ///
 /// A program that takes documents from strangers decides in this function which files may be opened, and how.
@@ -80,6 +84,8 @@ pub struct Context<'a> {
     pub(crate) files: &'a Files,
     /// Reader of the bytes of these files.
     pub(crate) reader: FileReader<'a>,
+    /// Collector of the links of the library that the document names.
+    pub(crate) profiles: &'a Profiles,
     /// Names of the ends of links. `None` before the list is read, and if the list was refused.
     pub names: Option<&'a Names>,
     /// Modulators of the file. `None` before the list is read, and if the list was refused.
@@ -113,6 +119,17 @@ impl<'a> Context<'a> {
     #[must_use]
     pub const fn of_part(self) -> Self {
         Self { partial: true, ..self }
+    }
+
+    /// Notes that the document names a link of the library, by the full name of the link.
+    pub(crate) fn note_profile(&self, name: String) {
+        self.profiles.0.borrow_mut().insert(name);
+    }
+
+    /// Returns the full names of the links of the library that the document has named so far, sorted.
+    #[must_use]
+    pub fn profiles(&self) -> Vec<String> {
+        self.profiles.0.borrow().iter().cloned().collect()
     }
 
     /// Reports a fault at a place, with the dotted path of the key.

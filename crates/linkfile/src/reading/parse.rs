@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use cohaptic_files::MOST_TOML_BYTES;
 use toml::de::DeTable;
 
-use super::context::{Context, Faults, FileReader, Files};
+use super::context::{Context, Faults, FileReader, Files, Profiles};
 use super::overrides;
 use crate::document::{BEGINNING, Diagnostic, FileError, Node, Place, Sources, TooDeep, join};
 use crate::fingerprint::Fingerprint;
@@ -84,7 +84,9 @@ pub fn parse_with<T>(
     let mut document = parse_toml(sources.text, sources)?;
     let faults = Faults::default();
     let files = Files::default();
-    let context = Context { sources, faults: &faults, files: &files, reader, names: None, modulators: None, partial: false, ends: None };
+    let profiles = Profiles::default();
+    let context =
+        Context { sources, faults: &faults, files: &files, reader, profiles: &profiles, names: None, modulators: None, partial: false, ends: None };
     overrides::apply(&mut document, sources.overrides, context);
     let whole = read(&document, context);
     match (faults.into_first(), whole) {
