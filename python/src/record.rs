@@ -168,6 +168,8 @@ pub(crate) fn links(summary: &Summary) -> PyResult<Table> {
     columns.push(("delivered".to_owned(), counts(&LinkStats::delivered)));
     columns.extend(DropCause::ALL.map(|cause| (cause.name().to_owned(), counts(&|stats| stats.dropped(cause)))));
     columns.push(("in-flight".to_owned(), counts(&LinkStats::in_flight)));
+    columns.push(("cross-offered".to_owned(), counts(&|stats| stats.cross_traffic().offered)));
+    columns.push(("cross-dropped".to_owned(), counts(&|stats| stats.cross_traffic().dropped)));
     let delays = stats.iter().map(|stats| stats.mean_delay().map_or(f64::NAN, |delay| delay.as_secs_f64()));
     columns.push(("mean-delay-s".to_owned(), Arc::new(delays.collect::<Vec<f64>>().into_iter().collect::<Float64Array>())));
     Table::new(columns)

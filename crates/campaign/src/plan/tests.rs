@@ -28,7 +28,16 @@ fn nothing_varied_is_one_combination() {
 }
 
 fn parts(runs: u64, events: u64, columns: usize, part: Option<u64>) -> Parts {
-    let roster = Roster { peers: Vec::new(), always: 0, axes: 1, fewest_axes: 1, access_lines: false, turns: false, measures: BTreeSet::new() };
+    let roster = Roster {
+        peers: Vec::new(),
+        always: 0,
+        axes: 1,
+        fewest_axes: 1,
+        access_lines: false,
+        cross_traffic: false,
+        turns: false,
+        measures: BTreeSet::new(),
+    };
     Parts::of(&plan(&[], runs, part), &Checked { roster, events, numbers: BTreeMap::new(), refused: BTreeMap::new() }, columns).unwrap()
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use cohaptic_scene::{Measure, Scene, Scope};
+use cohaptic_scene::{ChangeKind, Measure, Scene, Scope};
 use cohaptic_wan::DropCause;
 use serde::{Deserialize, Serialize};
 
@@ -46,19 +46,20 @@ pub(crate) fn columns(variations: &[Variation], verdicts: bool, roster: &Roster)
     }
     columns.push(always("stale_samples", Kind::Integer));
     columns.push(always("refused_samples", Kind::Integer));
-    counters("links", &mut columns);
+    counters("links", roster, &mut columns);
     if roster.access_lines {
-        counters("access", &mut columns);
+        counters("access", roster, &mut columns);
     }
     columns.extend(roster.measures().map(|(_, _, name)| column(name, Kind::Number, true)));
     columns
 }
 
 /// Adds the columns of the counters of all links (`of` is `links`) or of all access lines (`access`).
-fn counters(of: &str, columns: &mut Vec<Column>) {
+fn counters(of: &str, roster: &Roster, columns: &mut Vec<Column>) {
     let causes = DropCause::ALL.into_iter().map(|cause| format!("dropped_{}", cause.name().replace('-', "_")));
     let names = ["offered", "duplicated", "delivered"].map(str::to_owned).into_iter().chain(causes);
-    let names = names.chain(["in_flight", "marked", "damaged"].map(str::to_owned));
+    let cross: &[&str] = if roster.cross_traffic { &["cross_offered", "cross_dropped"] } else { &[] };
+    let names = names.chain(["in_flight", "marked", "damaged"].iter().chain(cross).map(|name| (*name).to_owned()));
     columns.extend(names.map(|name| Column { name: format!("{of}.{name}"), kind: Kind::Integer, optional: false }));
     columns.push(Column { name: format!("{of}.mean_delay_s"), kind: Kind::Number, optional: true });
 }
@@ -77,6 +78,9 @@ pub(crate) struct Roster {
     pub(crate) fewest_axes: usize,
     /// Whether any run has an access line, through which a peer sends or receives.
     pub(crate) access_lines: bool,
+    /// `true` if a line of any run has cross-traffic, at the start or after a change.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub(crate) cross_traffic: bool,
     /// `true` if the object turns in any run.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub(crate) turns: bool,
@@ -100,6 +104,7 @@ impl Roster {
             axes,
             fewest_axes: axes,
             access_lines,
+            cross_traffic: has_cross_traffic(scene),
             turns: scene.rotation.is_some(),
             tasks: scene.task.is_some(),
             measures,
@@ -133,10 +138,28 @@ impl Roster {
         self.axes = self.axes.max(other.axes);
         self.fewest_axes = self.fewest_axes.min(other.fewest_axes);
         self.access_lines |= other.access_lines;
+        self.cross_traffic |= other.cross_traffic;
         self.turns |= other.turns;
         self.tasks |= other.tasks;
         self.measures.extend(other.measures.iter().cloned());
     }
+}
+
+/// Returns whether a link or an access line of a scene has cross-traffic, at the start or after a change of the timeline.
+fn has_cross_traffic(scene: &Scene) -> bool {
+    let lines = scene.peers.iter().flat_map(|peer| [&peer.uplink, &peer.downlink]).flatten();
+    let changed = scene.timeline.iter().flat_map(|change| match &change.what {
+        ChangeKind::Link(link) => std::slice::from_ref(&link.config),
+        ChangeKind::AllLinks(links) => links.configs(),
+        ChangeKind::Contact { .. }
+        | ChangeKind::Hand { .. }
+        | ChangeKind::HandTorque { .. }
+        | ChangeKind::Coordination(_)
+        | ChangeKind::RotationalGains(_)
+        | ChangeKind::Parameters(_)
+        | ChangeKind::SendWhen(_) => &[],
+    });
+    scene.links.configs().iter().chain(lines).chain(changed).any(|link| link.has_cross_traffic())
 }
 
 #[cfg(test)]
@@ -145,7 +168,17 @@ mod tests {
 
     fn roster(peers: &[&str], axes: usize) -> Roster {
         let peers: Vec<String> = peers.iter().map(|name| (*name).to_owned()).collect();
-        Roster { always: peers.len(), peers, axes, fewest_axes: axes, access_lines: false, turns: false, tasks: false, measures: BTreeSet::new() }
+        Roster {
+            always: peers.len(),
+            peers,
+            axes,
+            fewest_axes: axes,
+            access_lines: false,
+            cross_traffic: false,
+            turns: false,
+            tasks: false,
+            measures: BTreeSet::new(),
+        }
     }
 
     #[test]

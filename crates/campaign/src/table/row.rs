@@ -7,7 +7,7 @@ use cohaptic_harness::measures::MeasuredRun;
 use cohaptic_harness::{Ending, Summary};
 use cohaptic_scene::MeasureName;
 use cohaptic_units::Instant;
-use cohaptic_wan::{DropCause, LinkStats};
+use cohaptic_wan::{CrossCounts, DropCause, LinkStats};
 
 use super::{Roster, Row, Value};
 use crate::judgement::Judgement;
@@ -65,9 +65,9 @@ pub(crate) fn row<'a>(
     }
     row.push(integer(summary.peers.iter().map(|peer| peer.stale_samples).sum()));
     row.push(integer(summary.peers.iter().map(|peer| peer.refused_samples).sum()));
-    counters(&mut row, summary.links.counted());
+    counters(&mut row, roster, summary.links.counted());
     if roster.access_lines {
-        counters(&mut row, summary.access_lines.iter().map(|line| (&line.stats, 1)));
+        counters(&mut row, roster, summary.access_lines.iter().map(|line| (&line.stats, 1)));
     }
     let measured: BTreeMap<MeasureName, Option<f64>> = values.iter().map(|measured| (measured.name, measured.value)).collect();
     row.extend(roster.measures().map(|(measure, peer, _)| {
@@ -89,13 +89,17 @@ fn place_of(summary: &Summary, place: usize, name: &str) -> Option<usize> {
 }
 
 /// Adds the counters of the links. Each entry of `stats` comes with its number of links.
-fn counters<'a>(row: &mut Row, stats: impl Iterator<Item = (&'a LinkStats, u64)> + Clone) {
+fn counters<'a>(row: &mut Row, roster: &Roster, stats: impl Iterator<Item = (&'a LinkStats, u64)> + Clone) {
     // The counters are sums over all links; the mean delay is weighted by the delivered packets.
     let mut total = LinkStats::default();
     stats.clone().for_each(|(stats, links)| total.add(stats, links));
     row.extend([total.offered(), total.duplicated(), total.delivered()].map(integer));
     row.extend(DropCause::ALL.into_iter().map(|cause| integer(total.dropped(cause))));
     row.extend([total.in_flight(), total.marked(), total.damaged()].map(integer));
+    if roster.cross_traffic {
+        let CrossCounts { offered, dropped, .. } = total.cross_traffic();
+        row.extend([offered, dropped].map(integer));
+    }
     row.push(mean_delay(stats));
 }
 

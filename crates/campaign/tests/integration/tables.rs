@@ -63,6 +63,10 @@ fn alone(cells: &[(String, String)], set: &[String], text: &str) {
     expected.push(("links.in_flight".to_owned(), sum(&|stats| stats.in_flight())));
     expected.push(("links.marked".to_owned(), sum(&|stats| stats.marked())));
     expected.push(("links.damaged".to_owned(), sum(&|stats| stats.damaged())));
+    if cells.iter().any(|(column, _)| column == "links.cross_offered") {
+        expected.push(("links.cross_offered".to_owned(), sum(&|stats| stats.cross_traffic().offered)));
+        expected.push(("links.cross_dropped".to_owned(), sum(&|stats| stats.cross_traffic().dropped)));
+    }
     for cause in DropCause::ALL {
         expected.push((format!("links.dropped_{}", cause.name().replace('-', "_")), sum(&|stats| stats.dropped(cause))));
     }
@@ -76,6 +80,29 @@ fn alone(cells: &[(String, String)], set: &[String], text: &str) {
 
 fn named(header: &[String], row: &[String]) -> Vec<(String, String)> {
     header.iter().cloned().zip(row.iter().cloned()).collect()
+}
+
+/// The columns of cross packets stand in a table whose lines have cross-traffic in some run, also if it begins later, and in no other table.
+#[test]
+fn cross_packets_are_counted_where_there_are_some() {
+    const CROSS: &str = "{ poisson = { rate = \"200kbit\", size = \"100B\" } }";
+    let begins = format!("timeline=[{{ at = \"20ms\", link = \"all\", set = {{ cross-traffic = {CROSS} }} }}]");
+    for (cross, has_columns) in [("link.cross-traffic=\"none\"".to_owned(), false), (format!("link.cross-traffic={CROSS}"), true), (begins, true)] {
+        let mut bench = Bench::new(&VARY[1..], 2);
+        bench.format = Format::Csv;
+        bench.set = vec!["link.rate=\"400kbit\"".to_owned(), "link.queue.limit=\"2 packets\"".to_owned(), cross];
+        bench.finish("out", 1);
+        let (header, rows) = comma_separated(&bench.path("out/runs.csv"));
+        let place = header.iter().position(|name| name == "links.cross_offered");
+        assert_eq!((place.is_some(), header.iter().any(|name| name == "access.cross_offered")), (has_columns, false));
+        for row in &rows {
+            let cells = named(&header, row);
+            let loss = cells.iter().find(|(name, _)| name == "link.loss_percent").unwrap().1.clone();
+            let set: Vec<String> = bench.set.iter().cloned().chain([format!("link.loss={loss}%")]).collect();
+            alone(&cells, &set, SCENE);
+            assert!(place.is_none_or(|place| row[place].parse::<u64>().unwrap() > 0), "{row:?}");
+        }
+    }
 }
 
 #[test]

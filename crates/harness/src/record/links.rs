@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use cohaptic_units::Instant;
-use cohaptic_wan::{DropCause, LinkName, LinkStats};
+use cohaptic_wan::{CrossCounts, DropCause, LinkName, LinkStats};
 
 use super::file::{RecordFile, push_display, push_seconds, push_whole};
 use crate::Summary;
@@ -21,15 +21,15 @@ pub(crate) fn write(folder: &Path, summary: &Summary) -> Result<PathBuf, RecordE
     file.finish()
 }
 
-/// Passes the text of `links.csv` to `write` piece by piece: one row for each link and access line, with the numbers of packets by fate and the mean delay of
-/// the delivered packets (empty without any).
+/// Passes the text of `links.csv` to `write` piece by piece: one row for each link and access line, with the numbers of packets by fate, of the packets of the
+/// cross-traffic, and the mean delay of the delivered packets (empty without any).
 ///
 /// # Errors
 ///
 /// The first error of `write`, which is not called again after it.
 pub fn links_csv<E>(summary: &Summary, mut write: impl FnMut(&[u8]) -> Result<(), E>) -> Result<(), E> {
     let causes = DropCause::ALL.map(DropCause::name).join(",");
-    let mut rows = format!("link,offered,duplicated,delivered,{causes},in-flight,mean-delay-s\n").into_bytes();
+    let mut rows = format!("link,offered,duplicated,delivered,{causes},in-flight,cross-offered,cross-dropped,mean-delay-s\n").into_bytes();
     let name = |peer: usize| summary.peers[peer].name.as_str();
     for line in &summary.access_lines {
         let named = if line.uplink { LinkName::uplink(name(line.peer)) } else { LinkName::downlink(name(line.peer)) };
@@ -63,8 +63,9 @@ pub fn links_csv<E>(summary: &Summary, mut write: impl FnMut(&[u8]) -> Result<()
 /// Appends the columns of a row after the name of the link.
 fn push_counters(row: &mut Vec<u8>, stats: &LinkStats) {
     let counts = [stats.offered(), stats.duplicated(), stats.delivered()].into_iter();
+    let CrossCounts { offered, dropped, .. } = stats.cross_traffic();
     let mut zeros = 0;
-    for count in counts.chain(DropCause::ALL.map(|cause| stats.dropped(cause))).chain([stats.in_flight()]) {
+    for count in counts.chain(DropCause::ALL.map(|cause| stats.dropped(cause))).chain([stats.in_flight(), offered, dropped]) {
         // Most counts are zero: their columns are appended in one piece.
         // A comma and the digit 0 for each column.
         if count == 0 {
@@ -84,9 +85,12 @@ fn push_counters(row: &mut Vec<u8>, stats: &LinkStats) {
     row.push(b'\n');
 }
 
+/// Number of columns with counts: the causes of drops, and offered, duplicated, delivered, in flight, and two of the cross-traffic.
+const COUNTS: usize = DropCause::ALL.len() + 6;
+
 /// Text of the longest possible run of columns with the count 0.
-const ZEROS: [u8; 2 * (DropCause::ALL.len() + 4)] = {
-    let mut zeros = [b'0'; 2 * (DropCause::ALL.len() + 4)];
+const ZEROS: [u8; 2 * COUNTS] = {
+    let mut zeros = [b'0'; 2 * COUNTS];
     let mut at = 0;
     while at < zeros.len() {
         zeros[at] = b',';
@@ -128,7 +132,7 @@ mod tests {
             push_counters(&mut row, &stats);
             let dropped: String = counts[2..].iter().map(|count| format!(",{count}")).collect();
             let delay = if delivered > 0 { "0.024" } else { "" };
-            prop_assert_eq!(String::from_utf8(row).unwrap(), format!(",{offered},0,{delivered}{dropped},{},{delay}\n", stats.in_flight()));
+            prop_assert_eq!(String::from_utf8(row).unwrap(), format!(",{offered},0,{delivered}{dropped},{},0,0,{delay}\n", stats.in_flight()));
         }
     }
 }
