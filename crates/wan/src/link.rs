@@ -123,6 +123,19 @@ impl<P: Clone> Link<P> {
         Ok(())
     }
 
+    /// Lets time pass until `now` like [`Link::handle_timeout`], and computes the packets of [cross-traffic](crate::CrossTraffic) up to `now`. A link without
+    /// packets of its own asks for no wake, so the next packet has to wait for the computation of all cross packets since the last packet. A driver in real time
+    /// calls this function several times a second, so that no wait is long. Fates and counters are the same with any calls.
+    ///
+    /// # Errors
+    ///
+    /// [`TimeWentBack`] if an earlier call had a later instant. The link is then unchanged.
+    pub fn catch_up(&mut self, now: Instant) -> Result<(), TimeWentBack> {
+        self.handle_timeout(now)?;
+        self.line.catch_up(now, &mut self.outputs, &mut self.traffic);
+        Ok(())
+    }
+
     /// Returns the instant of the next necessary call of [`Link::handle_timeout`], or `None` if no packet is inside the link. Never before the latest instant
     /// given. After a live change, nothing need happen at the returned instant.
     #[must_use]

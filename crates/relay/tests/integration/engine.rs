@@ -258,3 +258,33 @@ fn a_relay_that_cannot_be_is_refused_and_a_file_becomes_one() {
     let hello = Arrival { at: at(0), port: Port::Program(NodeId(1)), from: "[::1]:9".parse().unwrap(), bytes: b"x", ecn: None };
     assert_eq!(engine.handle_datagram(hello), Intake::Offered);
 }
+
+/// The loop of a relay comes by during a silence, and the engine computes the cross packets of the silence then. Releases are the same with any calls, also over a
+/// link that gets its cross-traffic by a change.
+#[test]
+fn a_silence_beside_cross_traffic_changes_no_release() {
+    let crossed = link(&["delay=1ms", "rate=1Mbit", "cross-traffic={ poisson = { rate = \"900kbit\", size = \"1500B\" } }"]);
+    let run = |look_ms: Option<u64>| {
+        let mut config = three(link(&["delay=1ms", "rate=1Mbit"]), &[((0, 1), crossed.clone())]);
+        config.changes = vec![Change { at: at(5_000_000), from: NodeId(0), to: NodeId(2), model: crossed.clone() }];
+        let mut engine = Engine::new(config).unwrap();
+        let mut left = Vec::new();
+        for begin in [0, 20_000, 45_000_u64] {
+            for to in [1, 2] {
+                engine.handle_datagram(arrival(at(begin * 1_000), 0, to, b"after a silence", None));
+            }
+            run_out(&mut engine, &mut left);
+            for look in look_ms.into_iter().flat_map(|look| (begin..begin + 15_000).step_by(usize::try_from(look).unwrap())) {
+                engine.handle_timeout(at(look * 1_000));
+                drain(&mut engine, &mut left);
+            }
+        }
+        (left, [1, 2].map(|to| engine.link_stats(NodeId(0), NodeId(to)).unwrap().0))
+    };
+    let (left, stats) = run(None);
+    assert_eq!(left.len(), 6);
+    assert!(stats.iter().all(|stats| stats.cross_traffic().offered > 2_000), "{stats:?}");
+    for look_ms in [1, 7, 50] {
+        assert_eq!(run(Some(look_ms)), (left.clone(), stats), "a look each {look_ms} ms");
+    }
+}

@@ -52,6 +52,11 @@ impl Lane {
         self.link.handle_timeout(now).expect(IN_ORDER);
     }
 
+    /// Lets time pass inside the link until `now`, and computes the cross packets up to `now`.
+    pub(super) fn catch_up(&mut self, now: Instant) {
+        self.link.catch_up(now).expect(IN_ORDER);
+    }
+
     /// Gives the link another model from `now` on.
     pub(super) fn change(&mut self, now: Instant, model: &LinkModel) {
         self.link.set_model(now, model.clone()).expect(IN_ORDER);

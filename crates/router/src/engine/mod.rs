@@ -12,6 +12,7 @@
 mod lane;
 mod snapshot;
 
+use core::time::Duration;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -33,6 +34,8 @@ pub use snapshot::{Count, Counters, LaneSnapshot, Received};
 pub struct Engine {
     /// Latest instant given by the driver.
     now: Instant,
+    /// Latest instant up to which the cross packets of all links are computed.
+    caught_up: Instant,
     rules: Rules,
     /// Names of the links, indexed by link.
     names: Vec<String>,
@@ -51,6 +54,10 @@ pub struct Engine {
     /// Packets for which a default decided, indexed by side.
     by_default: [Count; 2],
 }
+
+/// Time after which the cross packets that no packet has met are computed. The loop of the router comes by at least every 50 ms, also in a silence; so the first
+/// packet after any silence waits for the cross packets of 50 ms at most, 0.1 ms at 10,000 packets a second.
+const CATCH_UP: Duration = Duration::from_millis(10);
 
 /// Packet leaving the router.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -80,6 +87,7 @@ impl Engine {
         let lanes = file.links.iter().flat_map(|link| Side::BOTH.map(|from| Lane::new(file.seed, link, from))).collect();
         Self {
             now: Instant::ZERO,
+            caught_up: Instant::ZERO,
             rules: Rules::new(file),
             names: file.links.iter().map(|link| link.name.clone()).collect(),
             lanes,
@@ -150,6 +158,11 @@ impl Engine {
             self.drain(place);
         }
         self.now = self.now.max(now);
+        if self.now.saturating_duration_since(self.caught_up) >= CATCH_UP {
+            self.caught_up = self.now;
+            // Everything due has happened, so no packet leaves a link here.
+            self.lanes.iter_mut().for_each(|lane| lane.catch_up(self.now));
+        }
     }
 
     /// Returns the instant of the next necessary call of [`Engine::handle_timeout`], or `None` if no packet is inside a link. Never before the latest instant

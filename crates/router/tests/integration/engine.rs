@@ -88,6 +88,33 @@ fn an_engine_that_is_asked_late_gives_the_same_departures() {
     assert_eq!(seen(&found), seen(&expected));
 }
 
+/// The loop of a router comes by during a silence, and the engine computes the cross packets of the silence then. Departures and counts are the same with any
+/// calls.
+#[test]
+fn a_silence_beside_cross_traffic_changes_no_departure() {
+    let text =
+        "router = { seed = 3, default = \"x\" }\nlinks = { x = { delay = \"5ms\", rate = \"1Mbit\", cross-traffic.poisson.rate = \"900kbit\" } }";
+    let run = |look_ms: Option<u64>| {
+        let mut engine = Engine::new(&file(text));
+        let mut left = Vec::new();
+        for begin in [0, 20_000, 45_000_u64] {
+            for side in Side::BOTH {
+                engine.handle_packet(at(begin * 1_000), side, udp([1, 9], 30));
+            }
+            left.append(&mut finish(&mut engine));
+            for look in look_ms.into_iter().flat_map(|look| (begin..begin + 15_000).step_by(usize::try_from(look).unwrap())) {
+                engine.handle_timeout(at(look * 1_000));
+            }
+        }
+        (left, engine.counters().lanes.iter().map(|lane| lane.stats.cross_traffic()).collect::<Vec<_>>())
+    };
+    let (left, crossed) = run(None);
+    assert!(left.len() == 6 && crossed.iter().all(|counts| counts.offered > 2_000), "{crossed:?}");
+    for look_ms in [1, 7, 50] {
+        assert_eq!(run(Some(look_ms)), (left.clone(), crossed.clone()), "a look each {look_ms} ms");
+    }
+}
+
 /// A link of the router treats its packets like a single link with the same name and seed, independent of packets in other links.
 #[test]
 fn fates_are_those_of_the_link_alone() {

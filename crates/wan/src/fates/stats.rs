@@ -75,6 +75,8 @@ pub struct CrossCounts {
     pub offered: u64,
     /// Cross packets dropped by the queue, for any cause.
     pub dropped: u64,
+    /// Bytes of the offered cross packets, framing not counted.
+    pub bytes: u64,
 }
 
 impl CrossCounts {
@@ -82,6 +84,7 @@ impl CrossCounts {
     pub(crate) const fn add(&mut self, other: Self, times: u64) {
         self.offered += other.offered * times;
         self.dropped += other.dropped * times;
+        self.bytes += other.bytes * times;
     }
 }
 

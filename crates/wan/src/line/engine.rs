@@ -70,7 +70,7 @@ impl<T> Engine<T> {
 
 impl<T: Clone> Engine<T> {
     pub(crate) const fn new(kind: Kind<T>) -> Self {
-        Self { kind, retiring: Vec::new(), announced: None, crossed: CrossCounts { offered: 0, dropped: 0 } }
+        Self { kind, retiring: Vec::new(), announced: None, crossed: CrossCounts { offered: 0, dropped: 0, bytes: 0 } }
     }
 
     /// Offers a packet with `inside` further packets inside the link.
@@ -101,6 +101,13 @@ impl<T: Clone> Engine<T> {
         // An engine without a next event holds no packet any more.
         self.retiring.retain(|kind| kind.next_at().is_some());
         self.kind.pass(now, outputs);
+    }
+
+    /// Computes the cross packets up to `now` that no packet of the link has met: see [`Staged::catch_up`].
+    pub(crate) fn catch_up(&mut self, now: Instant, outputs: &mut Outputs<T>) {
+        if let Kind::Staged(staged) = &mut self.kind {
+            staged.catch_up(now, outputs);
+        }
     }
 
     /// Returns the instant of the next call of [`Engine::pass`], or `None` if no packet waits.

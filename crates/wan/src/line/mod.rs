@@ -162,6 +162,14 @@ impl<P, T: Clone> Line<P, T> {
         self.come_out(outputs, sink);
     }
 
+    /// Computes the cross packets up to `now` that no packet of the line has met. Everything due by `now` has happened before.
+    pub(crate) fn catch_up(&mut self, now: Instant, outputs: &mut Outputs<T>, sink: &mut impl Sink<T>) {
+        if let Some(engine) = self.pipeline.engine() {
+            engine.catch_up(now, outputs);
+        }
+        self.come_out(outputs, sink);
+    }
+
     /// Changes the model at `now`. Packets in propagation keep their delay.
     pub(crate) fn reconfigure(
         &mut self,

@@ -270,6 +270,18 @@ impl<T: Clone> Staged<T> {
         }
     }
 
+    /// Computes the cross packets up to `now`, if no packet of the line is at the bottleneck. Without this call the next packet has to wait for the computation.
+    /// No fate and no count depends on this call.
+    pub(crate) fn catch_up(&mut self, now: Instant, outputs: &mut Outputs<T>) {
+        // Changes of state up to `now` come first, because each state has cross-traffic of its own.
+        self.pass(now, outputs);
+        if let (Some(bottleneck), Some(cross)) = (&mut self.bottleneck, &mut self.cross)
+            && !bottleneck.has_own()
+        {
+            bottleneck.catch_up(now, cross, outputs);
+        }
+    }
+
     #[inline(never)]
     fn let_happen(&mut self, now: Instant, outputs: &mut Outputs<T>) {
         loop {
@@ -616,4 +628,36 @@ enum Travel {
 
 fn drop<T>(outputs: &mut Outputs<T>, now: Instant, cause: DropCause, packet: Carried<T>) {
     outputs.push(Output { packet, exit: Exit::Dropped(now, cause) });
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec::Vec;
+
+    use cohaptic_units::Rate;
+
+    use super::*;
+    use crate::line::name::LinkName;
+    use crate::stages::queue::{Bottleneck, CrossTraffic, Poisson};
+
+    /// After a silence with calls, what is left for the next packet are the cross packets since the last call; without calls, those of the whole silence.
+    #[test]
+    fn cross_packets_of_a_silence_are_computed_on_the_way() {
+        let rate = |bits| Rate::bits_per_sec(bits).unwrap();
+        let cross_traffic = Some(CrossTraffic::poisson(Poisson { rate: rate(6_000_000), size: Bytes::new(1500) }).unwrap());
+        let config = LinkConfig { bottleneck: Some(Bottleneck::at_rate(rate(12_000_000))), cross_traffic, ..LinkConfig::default() };
+        let direct = || Direct::new(1, &LinkName::between("a", "b"), &LinkConfig::default());
+        let mut staged = Staged::<()>::new(Instant::ZERO, direct(), config, None);
+        let next = |staged: &Staged<()>| staged.cross.as_ref().and_then(|cross| cross.next_at()).unwrap();
+        let mut outputs = Vec::new();
+        for second in 1..=20 {
+            let now = Instant::from_nanos(second * 1_000_000_000);
+            staged.pass(now, &mut outputs);
+            assert!(next(&staged) < now, "nobody has computed the last second");
+            staged.catch_up(now, &mut outputs);
+            assert!(next(&staged) > now && staged.next_at().is_none());
+        }
+        // Nothing comes out, and a cross packet is reported only once a packet of the line has met the queue.
+        assert!(outputs.is_empty() && staged.crossed().offered == 0);
+    }
 }

@@ -388,6 +388,19 @@ impl<P: Clone> Network<P> {
         self.let_pass(now)
     }
 
+    /// Lets time pass until `now`, and computes the packets of cross-traffic of a link up to `now`: see [`crate::Link::catch_up`].
+    ///
+    /// # Errors
+    ///
+    /// [`NetworkError`] if `now` is before an earlier call's instant or the link is missing; the network is unchanged then.
+    pub fn catch_up(&mut self, now: Instant, from: NodeId, to: NodeId) -> Result<(), NetworkError> {
+        let path = self.path(from, to)?;
+        self.let_pass(now)?;
+        let (link, _) = self.link_and_place(path);
+        self.with_engine(LineId::Link(link), |line, outputs, exits| line.catch_up(now, outputs, exits));
+        Ok(())
+    }
+
     /// Returns the instant of the next necessary call of [`Network::handle_timeout`], or `None` if no packet is on the way. The instant is never before the
     /// last instant given, once all events are polled. After a change of rate nothing may happen at the instant.
     #[must_use]

@@ -7,13 +7,14 @@ use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::random::{Purpose, Stream};
 use cohaptic_wan::{
     Bottleneck, CoDel, CrossCounts, CrossRecording, CrossTraffic, Delay, Discipline, Distribution, DropCause, Fate, FqCoDel, Jitter, Link,
-    LinkConfig, LinkName, Loss, PacketInfo, Pie, Poisson, QueueLimit,
+    LinkConfig, LinkName, Loss, Network, NetworkConfig, NodeId, PacketInfo, Pie, Poisson, QueueLimit,
 };
+use proptest::prelude::*;
 use rand_distr::{Distribution as _, Exp1};
 
-use crate::any_link::{all_events, micros};
+use crate::any_link::{all_events, any_link, any_model, micros, packets};
 use crate::laws::NORMAL_9995;
-use crate::random_links::{BYTE_A_MICROSECOND, probability, rate};
+use crate::random_links::{BYTE_A_MICROSECOND, SEED, cases, probability, rate};
 
 /// Probability that a packet of M/D/1 waits for at most `x` transmission times, with the load `rho` (Erlang 1909):
 /// P(W ≤ x) = (1 − ρ)·Σⱼ₌₀^⌊x⌋ (ρ(j − x))ʲ·e^(−ρ(j − x))/j!.
@@ -126,7 +127,7 @@ fn a_packet_waits_for_what_came_before_it() {
     let rows = "0,100\n0.000010,100\n0.000020,100\n0.000330,5\n0.000400,100\n";
     let (seen, counts) = ends(line(None, Discipline::TailDrop), rows, &[15, 310, 334]);
     assert_eq!(seen, [(210, true), (320, true), (345, true)]);
-    assert_eq!(counts, CrossCounts { offered: 4, dropped: 0 });
+    assert_eq!(counts, CrossCounts { offered: 4, dropped: 0, bytes: 305 });
     // At one instant a departure comes first, then the cross packet, then the packet of the link.
     let (seen, _) = ends(line(Some(QueueLimit::Packets(0)), Discipline::TailDrop), "0,100\n0.000100,20\n", &[100, 120]);
     assert_eq!(seen, [(100, false), (130, true)]);
@@ -138,8 +139,8 @@ fn a_packet_waits_for_what_came_before_it() {
 fn cross_packets_keep_the_limit_and_the_discipline() {
     let one = Some(QueueLimit::Packets(1));
     let rows = "0,100\n0.000010,100\n0.000020,100\n";
-    assert_eq!(ends(line(one, Discipline::TailDrop), rows, &[15]), (vec![(15, false)], CrossCounts { offered: 2, dropped: 0 }));
-    assert_eq!(ends(line(one, Discipline::HeadDrop), rows, &[15]), (vec![(20, false)], CrossCounts { offered: 2, dropped: 1 }));
+    assert_eq!(ends(line(one, Discipline::TailDrop), rows, &[15]), (vec![(15, false)], CrossCounts { offered: 2, dropped: 0, bytes: 200 }));
+    assert_eq!(ends(line(one, Discipline::HeadDrop), rows, &[15]), (vec![(20, false)], CrossCounts { offered: 2, dropped: 1, bytes: 200 }));
     // CoDel: packets that wait for more than 5 µs for 20 µs are dropped, cross packets and others alike.
     let codel = Discipline::CoDel(CoDel { target: micros(5), interval: micros(20), mtu: Bytes::new(1), ecn: true });
     let many: String = (0..40).map(|n| format!("{:.6},20\n", f64::from(n) * 5e-6)).collect();
@@ -158,17 +159,18 @@ fn cross_packets_have_a_queue_of_their_own() {
             Discipline::FqCoDel(FqCoDel { quantum: quantum.try_into().unwrap(), flows: flows.try_into().unwrap(), ..FqCoDel::default() })
         };
         let rows = "0,100\n0.000010,100\n0.000020,100\n";
-        let counts = |offered, dropped| CrossCounts { offered, dropped };
-        assert_eq!(ends(line(None, fq_codel(100)), rows, &[15]), (vec![(110, true)], counts(2, 0)));
-        assert_eq!(ends(line(None, fq_codel(200)), rows, &[15]), (vec![(210, true)], counts(2, 0)));
+        let counts = |offered, dropped, bytes| CrossCounts { offered, dropped, bytes };
+        assert_eq!(ends(line(None, fq_codel(100)), rows, &[15]), (vec![(110, true)], counts(2, 0, 200)));
+        assert_eq!(ends(line(None, fq_codel(200)), rows, &[15]), (vec![(210, true)], counts(2, 0, 200)));
         let one = Some(QueueLimit::Packets(1));
-        assert_eq!(ends(line(one, fq_codel(100)), rows, &[15]), (vec![(110, true)], counts(2, 1)));
-        assert_eq!(ends(line(one, fq_codel(100)), "0,100\n0.000020,5\n", &[15]), (vec![(20, false)], counts(1, 0)));
+        assert_eq!(ends(line(one, fq_codel(100)), rows, &[15]), (vec![(110, true)], counts(2, 1, 200)));
+        assert_eq!(ends(line(one, fq_codel(100)), "0,100\n0.000020,5\n", &[15]), (vec![(20, false)], counts(1, 0, 100)));
     }
 }
 
-/// A driver that comes when a link asks for a wake and one that comes long after see the same, and a link asks for a wake at the instant of each of its events:
-/// queues with a flow of their own for cross packets drop packets at any instant, and PIE counts every packet that is sent.
+/// A driver that comes when a link asks for a wake and one that comes long after see the same, also if it catches up with the cross packets between two packets, and
+/// a link asks for a wake at the instant of each of its events: queues with a flow of their own for cross packets drop packets at any instant, and PIE counts every
+/// packet that is sent.
 #[test]
 fn drivers_of_every_habit_see_the_same() {
     let millis = Duration::from_millis;
@@ -180,11 +182,16 @@ fn drivers_of_every_habit_see_the_same() {
         let traffic = CrossTraffic::poisson(Poisson { rate: rate(20_000), size: Bytes::new(40) }).unwrap();
         let bottleneck = Some(Bottleneck { limit: Some(QueueLimit::Packets(limit)), discipline, ..Bottleneck::at_rate(rate(80_000)) });
         let config = LinkConfig { bottleneck, cross_traffic: Some(traffic), ..LinkConfig::default() };
-        let events = |is_punctual: bool| {
+        let events = |is_punctual: bool, catches_up: bool| {
             let mut link = Link::new(3, &LinkName::between("a", "b"), config.clone());
             let mut events = Vec::new();
             for number in 0..20_000_u64 {
-                let now = Instant::from_nanos(number * 6_000_000);
+                // Every hundredth packet comes after a silence, in which the queue drains.
+                let now = Instant::from_nanos(number * 6_000_000 + number / 100 * 900_000_000);
+                if catches_up && number % 3 == 0 {
+                    let between = now.as_nanos().saturating_sub(number % 7 * 1_000_000);
+                    link.catch_up(Instant::from_nanos(between)).unwrap();
+                }
                 while let Some(at) = link.poll_timeout().filter(|at| is_punctual && *at < now) {
                     link.handle_timeout(at).unwrap();
                     events.extend(std::iter::from_fn(|| link.poll_event()).map(|event| (at, event.record)));
@@ -197,14 +204,17 @@ fn drivers_of_every_habit_see_the_same() {
             assert!(events.iter().all(|(polled, event)| *polled == event.at));
             link.handle_timeout(Instant::MAX).unwrap();
             let rest = std::iter::from_fn(|| link.poll_event()).map(|event| event.record);
-            events.into_iter().map(|(_, event)| event).chain(rest).collect::<Vec<_>>()
+            (events.into_iter().map(|(_, event)| event).chain(rest).collect::<Vec<_>>(), link.stats().cross_traffic())
         };
-        let punctual = events(true);
+        let (punctual, counts) = events(true, false);
         for dropped in [DropCause::QueueFull, cause] {
             let count = punctual.iter().filter(|event| event.fate == Fate::Dropped(dropped)).count();
             assert!(count > 5, "{discipline:?}: {count} drops for {dropped:?}");
         }
-        assert_eq!(punctual, events(false));
+        for (is_punctual, catches_up) in [(false, false), (false, true)] {
+            let (found, found_counts) = events(is_punctual, catches_up);
+            assert!(found == punctual && found_counts == counts, "{discipline:?}, {catches_up}");
+        }
     }
 }
 
@@ -263,4 +273,45 @@ fn cross_packets_wake_nobody() {
         }
     }
     assert_eq!(wakes, 1);
+}
+
+proptest! {
+    #![proptest_config(cases(200))]
+
+    /// Links of every kind, changed links and links of a network give the same events and counts, wherever a driver catches up between two packets.
+    #[test]
+    fn catching_up_changes_nothing(model in any_model(), changed in any_model(), offered in packets(), parts in 1..4u32, change in 0..60u64) {
+        let (mut alone, mut subject) = (any_link(model.clone()), any_link(model.clone()));
+        let nodes = ["left", "right"].map(String::from).to_vec();
+        let mut network = Network::new(NetworkConfig { seed: SEED, nodes, general: false }, |_, _| model.clone());
+        let mut now = Instant::ZERO;
+        for ((gap, info), payload) in offered.into_iter().zip(0..) {
+            for part in 1..=parts {
+                let between = now + gap * part / parts;
+                subject.catch_up(between).unwrap();
+                network.catch_up(between, NodeId(0), NodeId(1)).unwrap();
+            }
+            now += gap;
+            alone.handle_packet(now, info, payload).unwrap();
+            subject.handle_packet(now, info, payload).unwrap();
+            network.handle_packet(now, NodeId(0), NodeId(1), info, payload).unwrap();
+            if payload == change {
+                alone.set_model(now, changed.clone()).unwrap();
+                subject.set_model(now, changed.clone()).unwrap();
+                network.set_link(now, NodeId(0), NodeId(1), changed.clone()).unwrap();
+            }
+        }
+        for link in [&mut alone, &mut subject] {
+            link.handle_timeout(Instant::MAX).unwrap();
+        }
+        network.handle_timeout(Instant::MAX).unwrap();
+        let expected: Vec<_> = std::iter::from_fn(|| alone.poll_event()).map(|event| event.record).collect();
+        prop_assert_eq!(&expected, &std::iter::from_fn(|| subject.poll_event()).map(|event| event.record).collect::<Vec<_>>());
+        prop_assert_eq!(alone.stats(), subject.stats());
+        // Copies have other numbers in a network.
+        let of_network = std::iter::from_fn(|| network.poll_event()).map(|event| (event.sequence, event.copy > 0, event.at, event.fate));
+        let expected = expected.iter().map(|record| (record.sequence, record.copy > 0, record.at, record.fate));
+        prop_assert_eq!(expected.collect::<Vec<_>>(), of_network.collect::<Vec<_>>());
+        prop_assert_eq!(network.link_stats(NodeId(0), NodeId(1)).unwrap().cross_traffic(), alone.stats().cross_traffic());
+    }
 }

@@ -396,7 +396,7 @@ impl<T> BottleneckStage<T> {
     }
 
     /// Returns whether a packet of the link waits or is in transmission.
-    fn has_own(&self) -> bool {
+    pub(crate) fn has_own(&self) -> bool {
         self.queue.sums().own > 0 || self.queue.on_line().is_some_and(|on_line| on_line.packet.is_own())
     }
 

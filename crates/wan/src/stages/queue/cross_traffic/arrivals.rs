@@ -104,6 +104,7 @@ impl CrossStage {
         self.advance();
         let (draws, number) = (self.draws, self.counts.offered);
         self.counts.offered += 1;
+        self.counts.bytes += size.get();
         Some((at, size, move || draws.packet(number).more(Purpose::CrossTraffic).next_word()))
     }
 
