@@ -10,7 +10,7 @@ use cohaptic_linkfile::library::{NameError, ProfileName};
 use cohaptic_linkfile::link_from_keys;
 use cohaptic_measure::asked::Asked;
 use cohaptic_measure::steady::SteadyStream;
-use cohaptic_units::{Bytes, Instant};
+use cohaptic_units::{Bytes, Ecn, Instant};
 use cohaptic_wan::{DropCause, Fate, Link as Emulated, LinkModel, LinkName, PacketInfo, PacketRecord};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
@@ -176,7 +176,7 @@ impl Link {
         }
         let no_time = |_| PyValueError::new_err(format!("{every} s is not a time between packets: expected seconds, from 0 on"));
         let every = Duration::try_from_secs_f64(every).map_err(no_time)?;
-        let stream = SteadyStream { packets, every, info: PacketInfo { size: Bytes::new(size), ecn_capable: ecn } };
+        let stream = SteadyStream { packets, every, info: PacketInfo { size: Bytes::new(size), ecn: if ecn { Ecn::Capable0 } else { Ecn::NotCapable } } };
         if let Some(why) = too_long(&stream) {
             return Err(PyValueError::new_err(why));
         }
@@ -196,7 +196,7 @@ impl Link {
     /// Offers a packet now \[s\].
     fn handle_packet(&self, now: f64, size: u64, payload: Py<PyAny>, ecn: bool) -> PyResult<()> {
         let at = instant(now).ok_or_else(|| no_instant(now))?;
-        let info = PacketInfo { size: Bytes::new(size), ecn_capable: ecn };
+        let info = PacketInfo { size: Bytes::new(size), ecn: if ecn { Ecn::Capable0 } else { Ecn::NotCapable } };
         self.live().handle_packet(at, info, Arc::new(payload)).map_err(|_| gone_back(now))
     }
 
@@ -252,7 +252,7 @@ impl Link {
             }
             for (now, place) in chunk.iter().zip(place..) {
                 let size = if let [size] = sizes { *size } else { sizes[place] };
-                let info = PacketInfo { size: Bytes::new(size), ecn_capable: ecn };
+                let info = PacketInfo { size: Bytes::new(size), ecn: if ecn { Ecn::Capable0 } else { Ecn::NotCapable } };
                 let at = instant(*now).ok_or_else(|| no_instant(*now))?;
                 link.handle_packet(at, info, ()).map_err(|_| gone_back(*now))?;
                 while let Some(event) = link.poll_event() {

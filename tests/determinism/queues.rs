@@ -30,6 +30,8 @@ fn disciplines() -> impl Strategy<Value = String> {
             .prop_map(|(target, ecn)| { format!("{{ fq-codel = {{ target = \"{target}ms\", interval = \"30ms\", mtu = \"64B\", ecn = {ecn} }} }}") }),
         (1..20_u32, any::<bool>())
             .prop_map(|(target, ecn)| format!("{{ pie = {{ target = \"{target}ms\", burst = \"30ms\", mtu = \"64B\", ecn = {ecn} }} }}")),
+        (1..20_u32, 1..9_u32)
+            .prop_map(|(target, factor)| format!("{{ dualpi2 = {{ target = \"{target}ms\", tupdate = \"3ms\", coupling-factor = {factor} }} }}")),
         (0..100_u32, 0.0..1.0).prop_map(|(min, weight)| format!(
             "{{ red = {{ min = \"{min}B\", max = \"300B\", max-probability = 0.5, weight = {}, mean-packet = \"64B\" }} }}",
             1.0 - weight
@@ -135,7 +137,8 @@ fn a_run_that_diverges_has_counted_what_happened() {
     let of_flows = |ecn: bool| format!("{{ fq-codel = {{ target = \"5ms\", interval = \"30ms\", mtu = \"64B\", ecn = {ecn} }} }}");
     let pie = |ecn: bool| format!("{{ pie = {{ target = \"5ms\", burst = \"0ms\", mtu = \"64B\", ecn = {ecn} }} }}");
     let all = |ecn| [codel(ecn), of_flows(ecn), pie(ecn), red(ecn)];
-    for discipline in ["\"head-drop\"".to_owned()].into_iter().chain(all(false)).chain(all(true)) {
+    let dualpi2 = "{ dualpi2 = { target = \"5ms\" } }".to_owned();
+    for discipline in ["\"head-drop\"".to_owned(), dualpi2].into_iter().chain(all(false)).chain(all(true)) {
         // Samples come every 8 ms, and take 8.5 ms each.
         let link = format!("delay = \"9ms\", jitter = \"2ms\", rate = \"60kbit\", queue = {{ limit = \"9 packets\", discipline = {discipline} }}");
         for shift in [0, 2, 5] {

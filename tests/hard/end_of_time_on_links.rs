@@ -4,11 +4,11 @@
 use std::time::Duration;
 
 use cohaptic_tests::same_cases;
-use cohaptic_units::{Bytes, Instant, Probability, Rate};
+use cohaptic_units::{Bytes, Ecn, Instant, Probability, Rate};
 use cohaptic_wan::{
-    Bottleneck, Chance, CoDel, Correlation, Delay, DeliveryTrace, Discipline, Displacement, Distribution, Fate, FqCoDel, Framing, IdleOutages,
-    Jitter, KernelNetem, Layout, Link, LinkConfig, LinkModel, LinkName, Network, NetworkConfig, NodeId, Order, Outage, Outages, PacketInfo, Peak,
-    Pie, QueueLimit, RandomOutages, Red, Reorder, Service, Slots, Sojourn, TokenBucket, netem,
+    Bottleneck, Chance, CoDel, Correlation, Delay, DeliveryTrace, Discipline, Displacement, Distribution, DualPi2, Fate, FqCoDel, Framing,
+    IdleOutages, Jitter, KernelNetem, Layout, Link, LinkConfig, LinkModel, LinkName, Network, NetworkConfig, NodeId, Order, Outage, Outages,
+    PacketInfo, Peak, Pie, QueueLimit, RandomOutages, Red, Reorder, Service, Slots, Sojourn, TokenBucket, netem,
 };
 use proptest::collection::vec;
 use proptest::option;
@@ -67,7 +67,9 @@ fn bottleneck() -> impl Strategy<Value = Bottleneck> + Clone {
         Discipline::FqCoDel(FqCoDel { codel: CoDel { target, interval, mtu: Bytes::ZERO, ecn: false }, ..FqCoDel::default() })
     });
     let pie = (span(), span()).prop_map(|(target, burst)| Discipline::Pie(Pie { target, burst, mtu: Bytes::ZERO, ecn: false }));
-    let discipline = prop_oneof![Just(Discipline::TailDrop), Just(Discipline::HeadDrop), Just(Discipline::Red(red)), codel, fq_codel, pie];
+    let dualpi2 = (span(), span(), span())
+        .prop_map(|(target, tupdate, step_thresh)| Discipline::DualPi2(DualPi2 { target, tupdate, step_thresh, ..DualPi2::default() }));
+    let discipline = prop_oneof![Just(Discipline::TailDrop), Just(Discipline::HeadDrop), Just(Discipline::Red(red)), codel, fq_codel, pie, dualpi2];
     let recorded =
         select(vec!["1", "9000000000000", "0\n1\n1\n"]).prop_map(|text| Service::Recorded(DeliveryTrace::parse(text, Bytes::new(1500)).unwrap()));
     let service = prop_oneof![3 => rate().prop_map(Service::Rate), 1 => recorded];
@@ -178,7 +180,7 @@ proptest! {
                 link.set_model(*now, other.clone()).unwrap();
             }
             let size = bounded(size, &[&one, &other]);
-            link.handle_packet(*now, PacketInfo { size, ecn_capable: number % 2 == 0 }, 0).unwrap();
+            link.handle_packet(*now, PacketInfo { size, ecn: Ecn::from_bits((number % 4) as u8) }, 0).unwrap();
             prop_assert!(is_conserved(&link));
             if number % 3 == 0 {
                 drained(&mut link);

@@ -185,7 +185,7 @@ fn quantile(sorted: &[f64], p: f64) -> Option<f64> {
 mod tests {
     use std::time::Duration;
 
-    use cohaptic_units::Bytes;
+    use cohaptic_units::{Bytes, Ecn};
     use cohaptic_wan::netem::Netem;
     use cohaptic_wan::{Link, LinkConfig, LinkName, PacketInfo};
 
@@ -198,7 +198,7 @@ mod tests {
 
     /// Returns the comparison of a link configured by `done` with the figures asked by `asked`.
     fn figures(asked: &str, done: &str) -> Vec<Figure> {
-        let info = PacketInfo { size: Bytes::new(64), ecn_capable: true };
+        let info = PacketInfo { size: Bytes::new(64), ecn: Ecn::Capable0 };
         let stream = SteadyStream { packets: 60_000, every: Duration::from_millis(1), info };
         let mut beside = Comparison::default();
         let mut link = Link::new(5, &LinkName::between("a", "b"), config(done));

@@ -58,13 +58,13 @@ impl SteadyStream {
 
 #[cfg(test)]
 mod tests {
-    use cohaptic_units::Bytes;
+    use cohaptic_units::{Bytes, Ecn};
     use cohaptic_wan::{Delay, Fate, LinkConfig, LinkName};
 
     use super::*;
 
     const STREAM: SteadyStream =
-        SteadyStream { packets: 3000, every: Duration::from_millis(2), info: PacketInfo { size: Bytes::new(64), ecn_capable: false } };
+        SteadyStream { packets: 3000, every: Duration::from_millis(2), info: PacketInfo { size: Bytes::new(64), ecn: Ecn::NotCapable } };
 
     fn link() -> Link<()> {
         let config = LinkConfig { delay: Delay::constant(Duration::from_millis(5)), ..LinkConfig::default() };

@@ -437,7 +437,7 @@ fn an_expectation_that_says_nothing_is_refused() {
         ("[expect]\ndelay = [{ max = 0.1 }]", "19:18: expect.delay.0.max: found the number 0.1: expected a duration"),
         (
             "[expect]\nloss = [{ max = 1, cause = \"bad-luck\" }]",
-            "19:28: expect.loss.0.cause: unknown name \"bad-luck\": expected one of filter, mtu, outage, loss, limit, queue-full, red, codel, pie, checksum, end-of-log",
+            "19:28: expect.loss.0.cause: unknown name \"bad-luck\": expected one of filter, mtu, outage, loss, limit, queue-full, red, codel, pie, dualpi2, checksum, end-of-log",
         ),
         (
             "[expect]\ntravel = [{ peer = \"left\", distance = 0, max = \"1s\" }]",

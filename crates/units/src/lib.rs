@@ -22,6 +22,7 @@
 
 extern crate alloc;
 
+mod ecn;
 mod excerpt;
 mod frequency;
 mod instant;
@@ -32,6 +33,7 @@ mod rate;
 mod size;
 mod visible;
 
+pub use ecn::Ecn;
 pub use excerpt::{Excerpt, Spot};
 pub use frequency::{Hertz, RadPerSec};
 pub use instant::Instant;

@@ -96,7 +96,7 @@ pub use stages::outage::{IdleOutages, Outage, Outages, OutagesError, RandomOutag
 pub use stages::path_trace::{Between, PathTrace, PathTraceError};
 pub use stages::queue::{
     Bottleneck, Cells, CoDel, CrossRecording, CrossRecordingError, CrossTraffic, CrossTrafficError, DeliveryTrace, DeliveryTraceError, Discipline,
-    FqCoDel, Framing, Load, MAHIMAHI_BYTES, OnOff, Peak, Pie, Poisson, QueueLimit, Red, RedError, Service, TokenBucket,
+    DualPi2, FqCoDel, Framing, Load, MAHIMAHI_BYTES, OnOff, Peak, Pie, Poisson, QueueLimit, Red, RedError, Service, TokenBucket,
 };
 pub use stages::reorder::{Displacement, Reorder};
 pub use stages::slots::{SlotGap, Slots, SlotsError};

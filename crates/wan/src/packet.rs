@@ -3,7 +3,7 @@
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 
-use cohaptic_units::{Bytes, Instant};
+use cohaptic_units::{Bytes, Ecn, Instant};
 
 use crate::fates::damage::Damage;
 use crate::fates::fate::DropCause;
@@ -13,13 +13,13 @@ use crate::fates::fate::DropCause;
 pub struct PacketInfo {
     /// Size of the packet.
     pub size: Bytes,
-    /// `true` if both ends understand explicit congestion notification (RFC 3168). An active queue marks such a packet in place of a drop.
-    pub ecn_capable: bool,
+    /// ECN codepoint of the packet. An active queue marks a capable packet in place of a drop (RFC 3168).
+    pub ecn: Ecn,
 }
 
 impl From<Bytes> for PacketInfo {
     fn from(size: Bytes) -> Self {
-        Self { size, ecn_capable: false }
+        Self { size, ecn: Ecn::NotCapable }
     }
 }
 

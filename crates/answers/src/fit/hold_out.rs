@@ -6,7 +6,7 @@ use std::time::Duration;
 use cohaptic_measure::fit::hold_out::{Figures, HoldOut, LAGS};
 use cohaptic_measure::fit::{Fitted, Measurement, Measurements};
 use cohaptic_measure::steady::SteadyStream;
-use cohaptic_units::Bytes;
+use cohaptic_units::{Bytes, Ecn};
 use cohaptic_wan::{Fate, Link, LinkConfig, LinkName, PacketInfo};
 use serde::Serialize;
 
@@ -36,7 +36,7 @@ pub(super) fn judge(fitted: &Fitted, config: LinkConfig, first: &Measurements, r
 
 /// Sends packets over a link, and returns them as measurements.
 fn packets_of(config: LinkConfig, every: Duration) -> Measurements {
-    let stream = SteadyStream { packets: PACKETS, every, info: PacketInfo { size: Bytes::new(64), ecn_capable: false } };
+    let stream = SteadyStream { packets: PACKETS, every, info: PacketInfo { size: Bytes::new(64), ecn: Ecn::NotCapable } };
     let mut delays: Vec<Option<f64>> = vec![None; usize::try_from(PACKETS).unwrap_or(usize::MAX)];
     let mut link = Link::new(SEED, &LinkName::between("sender", "receiver"), config);
     let sent = stream.over(

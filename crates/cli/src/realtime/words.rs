@@ -183,7 +183,7 @@ fn millis(span: Duration) -> String {
 #[cfg(test)]
 mod tests {
     use cohaptic_realtime::Refused;
-    use cohaptic_units::{Bytes, Instant};
+    use cohaptic_units::{Bytes, Ecn, Instant};
     use cohaptic_wan::{Link, LinkName, PacketInfo};
 
     use super::*;
@@ -214,7 +214,7 @@ mod tests {
         let mut link = Link::new(0, &LinkName::between("a", "b"), model.clone());
         let asked = ConfiguredDelay::of(&model);
         assert_eq!(asked.beside(&link.stats()), None, "nothing was delivered yet");
-        link.handle_packet(Instant::ZERO, PacketInfo { size: Bytes::new(1), ecn_capable: false }, ()).unwrap();
+        link.handle_packet(Instant::ZERO, PacketInfo { size: Bytes::new(1), ecn: Ecn::NotCapable }, ()).unwrap();
         link.handle_timeout(Instant::from_nanos(24_000_000)).unwrap();
         assert_eq!(asked.beside(&link.stats()).unwrap(), "mean delay 24.000 ms, asked 24.000 ms");
         let changed = ConfiguredDelay { changes: 2, ..asked };

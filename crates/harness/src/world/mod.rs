@@ -19,7 +19,7 @@ use cohaptic_peer::rotation::{Attitude, Rotation};
 use cohaptic_peer::wire::{Sample, SampleKind};
 use cohaptic_peer::{Contact, Device, LastSent, Peer, Reception, SendWhen, State, Strategy};
 use cohaptic_scene::{Change, Scene, Topology};
-use cohaptic_units::{Bytes, Instant};
+use cohaptic_units::{Bytes, Ecn, Instant};
 use cohaptic_wan::{AccessLine, Fate, LinkModel, Network, NetworkConfig, NodeId, PacketEvent, PacketInfo, Path};
 
 use crate::disturbance::Disturbance;
@@ -474,7 +474,7 @@ fn network<T: Clone>(scene: &Scene, plan: &Plan) -> Network<T> {
 /// Returns the properties of each sample's packet for the network.
 fn packet(kind: SampleKind, scene: &Scene) -> PacketInfo {
     // Packets are ECN-capable, so a marking queue has packets to mark. No sender reacts to a mark, and a marked packet arrives.
-    PacketInfo { size: Bytes::new(kind.datagram_len(scene.axes.count()) as u64), ecn_capable: true }
+    PacketInfo { size: Bytes::new(kind.datagram_len(scene.axes.count()) as u64), ecn: Ecn::Capable0 }
 }
 
 /// Stores a sample with the attitude and the extra numbers of the peer at index `from`: numbers for each receiver if the kind is personal, else one set for

@@ -1,9 +1,9 @@
 //! Readers of `queue` and of limits: the room for waiting packets, and the discipline that drops packets.
 
-use core::num::NonZeroU32;
+use core::num::{NonZeroU8, NonZeroU32};
 
 use cohaptic_units::Bytes;
-use cohaptic_wan::{CoDel, Discipline, FqCoDel, Pie, QueueLimit, Red};
+use cohaptic_wan::{CoDel, Discipline, DualPi2, FqCoDel, Pie, QueueLimit, Red};
 
 use super::{UNLIMITED, unless};
 use crate::document::{Node, quote};
@@ -19,7 +19,8 @@ pub(super) struct Queue {
     pub(super) discipline: Discipline,
 }
 
-const DISCIPLINES: &str = "one of tail-drop, head-drop, codel, fq-codel, pie, red, { codel = … }, { fq-codel = … }, { pie = … } or { red = … }";
+const DISCIPLINES: &str =
+    "one of tail-drop, head-drop, codel, fq-codel, pie, dualpi2, red, { codel = … }, { fq-codel = … }, { pie = … }, { dualpi2 = … } or { red = … }";
 const LIMIT: &str = "a limit such as \"100 packets\", \"64kB\" or \"50ms\"";
 
 /// Reads a queue: limit and discipline.
@@ -66,6 +67,7 @@ fn read_discipline(node: &Node, context: Context<'_>, limit: Option<QueueLimit>)
             "codel" => read_codel(&nothing(node), context).map(Discipline::CoDel),
             "fq-codel" => read_fq_codel(&nothing(node), context).map(Discipline::FqCoDel),
             "pie" => read_pie(&nothing(node), context).map(Discipline::Pie),
+            "dualpi2" => read_dualpi2(&nothing(node), context).map(Discipline::DualPi2),
             "red" => read_plain_red(node, context, limit),
             other => {
                 context.fault_at(node, format!("unknown name {}: expected {DISCIPLINES}", quote(other)));
@@ -74,13 +76,14 @@ fn read_discipline(node: &Node, context: Context<'_>, limit: Option<QueueLimit>)
         };
     }
     let mut table = TableReader::new(node, context, LINK_TABLE.table("queue.discipline"), DISCIPLINES)?;
-    let entries = ["codel", "fq-codel", "pie", "red"].map(|name| table.entry(name));
+    let entries = ["codel", "fq-codel", "pie", "dualpi2", "red"].map(|name| table.entry(name));
     table.finish();
     let chosen = only_one(node, context, &entries, DISCIPLINES)?;
     match chosen.name.as_str() {
         "codel" => read_codel(&chosen.node, context).map(Discipline::CoDel),
         "fq-codel" => read_fq_codel(&chosen.node, context).map(Discipline::FqCoDel),
         "pie" => read_pie(&chosen.node, context).map(Discipline::Pie),
+        "dualpi2" => read_dualpi2(&chosen.node, context).map(Discipline::DualPi2),
         _ => read_red(&chosen.node, context, None).map(Discipline::Red),
     }
 }
@@ -123,6 +126,27 @@ fn read_pie(node: &Node, context: Context<'_>) -> Option<Pie> {
     let (mtu, ecn) = (table.value("mtu"), table.value("ecn"));
     table.finish();
     Some(Pie { target: target?, burst: burst?, mtu: mtu?, ecn: ecn? })
+}
+
+/// Reads the parameters of DualPI2.
+fn read_dualpi2(node: &Node, context: Context<'_>) -> Option<DualPi2> {
+    const EXPECTED: &str = "a table such as { target = \"15ms\", step-thresh = \"1ms\" }";
+    let mut table = TableReader::new(node, context, LINK_TABLE.table("queue.discipline.dualpi2"), EXPECTED)?;
+    let (target, tupdate, step_thresh) = (table.value("target"), table.value("tupdate"), table.value("step-thresh"));
+    let (alpha, beta) = (table.value("alpha"), table.value("beta"));
+    let factor: Option<u64> = table.value("coupling-factor");
+    let protection = table.value("classic-protection");
+    table.finish();
+    let coupling_factor = u8::try_from(factor?).ok().and_then(NonZeroU8::new).expect("the declaration of the key gives the range");
+    Some(DualPi2 {
+        target: target?,
+        tupdate: tupdate?,
+        alpha: alpha?,
+        beta: beta?,
+        coupling_factor,
+        step_thresh: step_thresh?,
+        classic_protection: protection?,
+    })
 }
 
 /// Reads RED without parameters, with the advice of Floyd: the upper threshold is three times the lower threshold, and a tenth of the packets is dropped at the

@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use cohaptic_realtime::Lateness;
 use cohaptic_realtime::udp::Ecn;
-use cohaptic_units::{Bytes, Instant};
+use cohaptic_units::{self as units, Bytes, Instant};
 use cohaptic_wan::{Fate, LinkModel, LinkStats, Network, NetworkConfig, NetworkError, NodeId, PacketEvent, PacketInfo, PacketRecord, Path};
 
 use crate::config::{Change, ConfigError, Form, Limits, RelayConfig};
@@ -203,7 +203,10 @@ impl Engine {
             }
             // Datagrams and changes of links due before the arrival come first.
             self.pass(at);
-            let info = PacketInfo { size: Bytes::new(packet.bytes.len() as u64), ecn_capable: packet.ecn.is_some() };
+            let info = PacketInfo {
+                size: Bytes::new(packet.bytes.len() as u64),
+                ecn: packet.ecn.map_or(units::Ecn::NotCapable, |ecn| units::Ecn::from_bits(ecn as u8)),
+            };
             self.counts.offered += 1;
             let offered = self.network.handle_packet(self.now, from, to, info, packet);
             debug_assert_eq!(offered, Ok(()), "time has not gone back, and the routes name no other links");

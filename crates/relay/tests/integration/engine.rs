@@ -5,7 +5,7 @@ use std::time::Duration;
 use cohaptic_linkfile::{LinkTable, RelayFile};
 use cohaptic_realtime::udp::Ecn;
 use cohaptic_relay::{Arrival, Change, ConfigError, Engine, Form, Intake, Limits, Mesh, Port, RelayConfig};
-use cohaptic_units::{Bytes, Instant};
+use cohaptic_units::{self as units, Bytes, Instant};
 use cohaptic_wan::{Fate, LinkModel, Network, NetworkConfig, NodeId, PacketInfo, Path};
 use proptest::prelude::*;
 
@@ -58,7 +58,8 @@ fn virtual_time(config: &RelayConfig, offers: &[Passing]) -> Vec<Passing> {
         }
     };
     for (when, from, to, bytes, ecn) in offers {
-        let info = PacketInfo { size: Bytes::new(bytes.len() as u64), ecn_capable: ecn.is_some() };
+        let info =
+            PacketInfo { size: Bytes::new(bytes.len() as u64), ecn: ecn.map_or(units::Ecn::NotCapable, |ecn| units::Ecn::from_bits(ecn as u8)) };
         network.handle_packet(*when, NodeId(*from), NodeId(*to), info, (bytes.clone(), *ecn)).unwrap();
         drain(&mut network);
     }

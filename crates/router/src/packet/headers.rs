@@ -3,6 +3,7 @@
 use core::net::{IpAddr, Ipv4Addr, Ipv6Addr};
 
 use cohaptic_linkfile::router::Protocol;
+use cohaptic_units::Ecn;
 use cohaptic_wan::flow_number;
 
 use super::checksum;
@@ -47,27 +48,6 @@ pub enum Malformed {
     Offload,
 }
 
-/// Congestion bits of a packet (RFC 3168).
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Ecn(u8);
-
-impl Ecn {
-    /// Codepoint "congestion experienced".
-    pub(crate) const CONGESTION: Self = Self(0b11);
-
-    /// Returns whether both ends understand congestion marks: any codepoint but 00.
-    #[must_use]
-    pub(crate) const fn is_capable(self) -> bool {
-        self.0 != 0
-    }
-
-    /// Returns the two bits.
-    #[must_use]
-    pub const fn bits(self) -> u8 {
-        self.0
-    }
-}
-
 impl Headers {
     /// Reads the headers. Bytes beyond the length given in the packet are padding.
     ///
@@ -104,13 +84,13 @@ impl Headers {
         match self.source {
             IpAddr::V4(_) => {
                 let before = [bytes[0], bytes[1]];
-                bytes[1] |= Ecn::CONGESTION.0;
+                bytes[1] |= Ecn::Congestion.bits();
                 checksum::change(bytes, V4_CHECKSUM, u16::from_be_bytes(before), u16::from_be_bytes([bytes[0], bytes[1]]));
             }
             // The traffic class of IPv6 spans two bytes; its two lowest bits are bits 4 and 5 of the second byte.
-            IpAddr::V6(_) => bytes[1] |= Ecn::CONGESTION.0 << 4,
+            IpAddr::V6(_) => bytes[1] |= Ecn::Congestion.bits() << 4,
         }
-        self.ecn = Ecn::CONGESTION;
+        self.ecn = Ecn::Congestion;
     }
 }
 
@@ -140,7 +120,7 @@ fn read_v4(bytes: &[u8]) -> Result<Headers, Malformed> {
         destination: Ipv4Addr::new(fixed[16], fixed[17], fixed[18], fixed[19]).into(),
         protocol,
         ports: transport.and_then(|at| ports(&bytes[..length], protocol, at)),
-        ecn: Ecn(fixed[1] & 0b11),
+        ecn: Ecn::from_bits(fixed[1]),
         covered: header,
         transport,
         is_whole: offset == 0 && !more,
@@ -164,7 +144,7 @@ fn read_v6(bytes: &[u8]) -> Result<Headers, Malformed> {
         destination: address(24),
         protocol: found.protocol,
         ports: found.at.and_then(|at| ports(&bytes[..length], found.protocol, at)),
-        ecn: Ecn(fixed[1] >> 4 & 0b11),
+        ecn: Ecn::from_bits(fixed[1] >> 4),
         covered: FIXED,
         transport: found.at,
         is_whole: found.whole,

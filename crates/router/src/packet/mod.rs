@@ -18,7 +18,8 @@ use cohaptic_wan::{Damage, PacketInfo};
 use checksum::{change, sum, transport_field};
 use headers::V4_CHECKSUM;
 
-pub use headers::{Ecn, Headers, Malformed};
+pub use cohaptic_units::Ecn;
+pub use headers::{Headers, Malformed};
 pub(crate) use segments::{Join, cut, join, slices};
 
 /// Framing of the bytes of a device.
@@ -92,7 +93,7 @@ impl Packet {
     #[must_use]
     pub fn info(&self) -> PacketInfo {
         match &self.content {
-            Content::Ip { headers, .. } => PacketInfo { size: Bytes::new(headers.length as u64), ecn_capable: headers.ecn.is_capable() },
+            Content::Ip { headers, .. } => PacketInfo { size: Bytes::new(headers.length as u64), ecn: headers.ecn },
             Content::NotIp | Content::Malformed(_) => Bytes::new(self.bytes.len() as u64).into(),
         }
     }

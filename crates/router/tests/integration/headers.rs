@@ -126,7 +126,7 @@ fn congestion_is_marked_and_the_checksum_follows() {
         header.header_checksum = header.calc_header_checksum();
         bytes[..20].copy_from_slice(&header.to_bytes());
         let mut packet = Packet::new(bytes, Framing::Ip);
-        assert_eq!(packet.info().ecn_capable, capable);
+        assert_eq!(packet.info().ecn.is_capable(), capable);
         packet.mark_congestion();
         let marked = Ipv4Header::from_slice(packet.bytes()).unwrap().0;
         assert_eq!((marked.ecn.value(), marked.dscp.value()), (0b11, 0b10_1110));
@@ -137,7 +137,7 @@ fn congestion_is_marked_and_the_checksum_follows() {
     bytes[0] |= 0x0a;
     bytes[1] |= 0b1010_0000 | 0x05;
     let mut packet = Packet::new(bytes.clone(), Framing::Ip);
-    assert!(packet.info().ecn_capable);
+    assert!(packet.info().ecn.is_capable());
     packet.mark_congestion();
     bytes[1] |= 0b0011_0000;
     assert_eq!(packet.bytes(), bytes, "only the two bits changed");

@@ -10,9 +10,9 @@ use cohaptic_units::{Bytes, Instant, Probability, Rate};
 use cohaptic_wan::law::DistTable;
 use cohaptic_wan::{
     Between, Bottleneck, Bursts, Cells, Chance, Checksum, CoDel, Correlation, Corruption, CrossRecording, CrossTraffic, Delay, DeliveryTrace,
-    Discipline, Displacement, Distribution, FateLog, Flips, FourState, FqCoDel, Framing, GilbertElliottInTime, IdleOutages, Jitter, LinkConfig,
-    LinkModel, Loss, MAHIMAHI_BYTES, Modulator, ModulatorState, OnOff, Outage, Outages, PathTrace, Pattern, Peak, Pie, Poisson, QueueLimit,
-    RandomOutages, Red, Reorder, Service, Slots, Sojourn, TokenBucket,
+    Discipline, Displacement, Distribution, DualPi2, FateLog, Flips, FourState, FqCoDel, Framing, GilbertElliottInTime, IdleOutages, Jitter,
+    LinkConfig, LinkModel, Loss, MAHIMAHI_BYTES, Modulator, ModulatorState, OnOff, Outage, Outages, PathTrace, Pattern, Peak, Pie, Poisson,
+    QueueLimit, RandomOutages, Red, Reorder, Service, Slots, Sojourn, TokenBucket,
 };
 
 const MS: Duration = Duration::from_millis(1);
@@ -173,6 +173,26 @@ fn lines_queues_and_limits_are_read() {
         queue("{ limit = \"10240 packets\", discipline.pie = { target = \"2ms\", burst = \"30ms\", mtu = \"100B\", ecn = true } }"),
         line(packets, Discipline::Pie(pie))
     );
+    assert_eq!(queue("{ limit = \"10240 packets\", discipline = \"dualpi2\" }"), line(packets, Discipline::DualPi2(DualPi2::default())));
+    let table =
+        "target = \"2ms\", tupdate = \"3ms\", alpha = 0.5, beta = 4, coupling-factor = 3, step-thresh = \"0ms\", classic-protection = \"20%\"";
+    let dualpi2 = DualPi2 {
+        target: 2 * MS,
+        tupdate: 3 * MS,
+        alpha: 0.5,
+        beta: 4.0,
+        coupling_factor: 3.try_into().unwrap(),
+        step_thresh: Duration::ZERO,
+        classic_protection: p(0.2),
+    };
+    assert_eq!(queue(&format!("{{ limit = \"10240 packets\", discipline.dualpi2 = {{ {table} }} }}")), line(packets, Discipline::DualPi2(dualpi2)));
+    for (key, said) in [
+        ("coupling-factor = 0", "coupling-factor: 0 is out of range: expected an integer from 1 to 255"),
+        ("beta = -1", "beta: -1 is out of range: expected a number of at least zero [Hz]"),
+    ] {
+        let error = refused(&format!("link = {{ rate = \"1Mbit\", queue = {{ limit = \"9 packets\", discipline.dualpi2 = {{ {key} }} }} }}"), &[]);
+        assert!(error.contains(said), "{error}");
+    }
     for (key, said) in [
         ("quantum = \"0B\"", "quantum: a queue cannot send 0B in its turn: expected a size from 1B to 4294967295B"),
         ("flows = 0", "flows: 0 is out of range: expected an integer from 1 to 65536"),

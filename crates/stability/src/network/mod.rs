@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use cohaptic_scene::Scene;
-use cohaptic_units::Bytes;
+use cohaptic_units::{Bytes, Ecn};
 use cohaptic_wan::{AccessLine, LinkConfig, Network, NetworkConfig, NodeId, PacketInfo};
 
 pub use timing::LinkTiming;
@@ -273,7 +273,7 @@ fn shared(scene: &Scene, lines: &Lines, known: &mut Known) -> Result<Places, Ana
 
 /// Returns the packet of a sample. Samples are capable of ECN, as in a simulation.
 const fn info(size: Bytes) -> PacketInfo {
-    PacketInfo { size, ecn_capable: true }
+    PacketInfo { size, ecn: Ecn::Capable0 }
 }
 
 fn rated(line: Option<&Nominal>, size: Bytes, name: String, paths: Vec<(usize, usize)>) -> Option<RatedLine> {

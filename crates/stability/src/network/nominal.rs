@@ -151,7 +151,7 @@ fn stripped(config: &LinkConfig, size: Bytes) -> Nominal {
         let what = match bottleneck.discipline {
             Discipline::Red(_) => Some("random early detection"),
             Discipline::Pie(_) => Some("PIE"),
-            Discipline::TailDrop | Discipline::HeadDrop | Discipline::CoDel(_) | Discipline::FqCoDel(_) => None,
+            Discipline::TailDrop | Discipline::HeadDrop | Discipline::CoDel(_) | Discipline::DualPi2(_) | Discipline::FqCoDel(_) => None,
         };
         if let Some(what) = what {
             replaced.chance(what, format!("{what} is replaced by the limit of the queue alone"));

@@ -10,47 +10,12 @@ mod reply;
 
 use core::net::SocketAddr;
 
+pub use cohaptic_units::Ecn;
 pub use flags::Flags;
 pub(crate) use options::TIMESTAMPS_LENGTH;
 pub use options::{Options, SackBlocks};
 pub use parse::ParseError;
 pub use payload::Payload;
-
-/// Value of the two ECN bits of the IP header (RFC 3168, section 5).
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Default, Debug)]
-pub enum Ecn {
-    /// The transport does not use ECN (Not-ECT).
-    #[default]
-    NotCapable,
-    /// The transport uses ECN, with the codepoint ECT(1).
-    Capable1,
-    /// The transport uses ECN, with the codepoint ECT(0).
-    Capable0,
-    /// A router marked the packet instead of dropping the packet (CE).
-    Congestion,
-}
-
-impl Ecn {
-    /// Returns the two bits, 0 to 3.
-    pub(crate) const fn bits(self) -> u8 {
-        match self {
-            Self::NotCapable => 0,
-            Self::Capable1 => 1,
-            Self::Capable0 => 2,
-            Self::Congestion => 3,
-        }
-    }
-
-    /// Returns the value of the low two bits. The other bits (the DSCP) are ignored.
-    pub(crate) const fn from_bits(bits: u8) -> Self {
-        match bits & 3 {
-            1 => Self::Capable1,
-            2 => Self::Capable0,
-            3 => Self::Congestion,
-            _ => Self::NotCapable,
-        }
-    }
-}
 
 /// TCP segment, with the fields of the IP header that a connection uses.
 #[derive(Clone, PartialEq, Eq, Debug)]

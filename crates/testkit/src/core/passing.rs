@@ -3,6 +3,7 @@
 use std::io;
 use std::net::SocketAddr;
 
+use cohaptic_units::Ecn;
 use cohaptic_wan::{NodeId, Path};
 
 use super::socket_state::SocketState;
@@ -21,8 +22,8 @@ pub(crate) struct Outgoing<'a> {
     /// Address of the receiver. `None`: the peer to which the socket is connected.
     pub(crate) to: Option<&'a SocketAddr>,
     pub(crate) bytes: &'a [u8],
-    /// `true` if the datagram is marked as ECN-capable.
-    pub(crate) ecn_capable: bool,
+    /// ECN codepoint of the datagram.
+    pub(crate) ecn: Ecn,
 }
 
 /// Receivers of a datagram.
@@ -51,7 +52,7 @@ impl Core {
     #[inline(always)]
     pub(crate) fn send(&mut self, id: SocketId, outgoing: Outgoing<'_>) -> io::Result<()> {
         self.note_call(|core| core.sockets.get(id).name());
-        let Outgoing { to, bytes, ecn_capable } = outgoing;
+        let Outgoing { to, bytes, ecn } = outgoing;
         let socket = self.sockets.get(id);
         if socket.has_error() {
             return Err(self.error_of(id));
@@ -72,7 +73,7 @@ impl Core {
         }
         let Route { from, to: number, receivers } = self.route(socket, &to)?;
         let addresses = Ends::of([from, number], [socket.port.number(), to.port()], to.is_ipv6(), Kind::Datagram);
-        let parcel = self.spare.copied(addresses, bytes, ecn_capable);
+        let parcel = self.spare.copied(addresses, bytes, ecn);
         match receivers {
             Receivers::One(receiver) if receiver == host => self.hand_over(host, parcel),
             Receivers::One(receiver) => self.offer(Path { from: host, to: receiver }, parcel),
@@ -283,7 +284,7 @@ impl Core {
         // The length is that of an ICMP message (RFC 792): IP header, ICMP header, and the header and the first eight bytes of the datagram. The content is not
         // needed, because the receiver of the message looks at the addresses only.
         let addresses = parcel.addresses.back(Kind::Unreachable);
-        let answer = self.spare.copied(addresses, &[0; 36], false);
+        let answer = self.spare.copied(addresses, &[0; 36], Ecn::NotCapable);
         let Path { from: sender, to: host } = path;
         if host == sender { self.hand_over(host, answer) } else { self.offer(Path { from: host, to: sender }, answer) }
     }

@@ -52,7 +52,7 @@ use std::net::SocketAddr;
 use std::time::Instant as StdInstant;
 
 use bytes::Bytes;
-use cohaptic_units::Instant;
+use cohaptic_units::{Ecn, Instant};
 
 pub use address::{address, place_of};
 pub use builder::Nodes;
@@ -96,7 +96,7 @@ impl Packet {
     /// Returns a packet back to the sender, from the port at which this packet arrived.
     #[must_use]
     pub fn answer(&self, bytes: impl Into<Bytes>) -> Transmit {
-        Transmit { to: self.from, from_port: self.to.port(), bytes: bytes.into(), ecn_capable: false }
+        Transmit { to: self.from, from_port: self.to.port(), bytes: bytes.into(), ecn: Ecn::NotCapable }
     }
 
     /// Returns the index of the sending node, from 0.
@@ -116,15 +116,15 @@ pub struct Transmit {
     pub from_port: u16,
     /// Content of the packet.
     pub bytes: Bytes,
-    /// `true` if both ends understand explicit congestion notification. An active queue then marks the packet in place of dropping it.
-    pub ecn_capable: bool,
+    /// ECN codepoint of the packet. An active queue marks a capable packet in place of dropping it.
+    pub ecn: Ecn,
 }
 
 impl Transmit {
     /// Returns a packet to the node with the index `place`, from 0. Both ports are 0.
     #[must_use]
     pub fn to(place: usize, bytes: impl Into<Bytes>) -> Self {
-        Self { to: address(place, 0), from_port: 0, bytes: bytes.into(), ecn_capable: false }
+        Self { to: address(place, 0), from_port: 0, bytes: bytes.into(), ecn: Ecn::NotCapable }
     }
 }
 

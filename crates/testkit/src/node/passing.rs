@@ -60,7 +60,7 @@ impl NodeRun {
 
     fn send(&mut self, from: NodeId, transmit: Transmit) {
         self.counts[from.index()].sent += 1;
-        let Transmit { to: address, from_port, bytes, ecn_capable } = transmit;
+        let Transmit { to: address, from_port, bytes, ecn } = transmit;
         let Some(to) = place_of(address.ip()).filter(|place| *place < self.names.len()).map(NodeId::new) else {
             self.counts[from.index()].unroutable += 1;
             if self.wire.recording().traces {
@@ -70,7 +70,7 @@ impl NodeRun {
             return;
         };
         let addresses = Ports { from: from_port, to: address.port(), is_six: address.is_ipv6() };
-        let parcel = Parcel::new(addresses, bytes.into(), ecn_capable);
+        let parcel = Parcel::new(addresses, bytes.into(), ecn);
         let path = Path { from, to };
         if to == from {
             // The packet does not leave the node, so it meets no link.

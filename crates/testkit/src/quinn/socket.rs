@@ -8,6 +8,7 @@ use std::task::{Context, Poll};
 
 use ::quinn::udp::{EcnCodepoint, RecvMeta, Transmit};
 use ::quinn::{AsyncUdpSocket, UdpPoller};
+use cohaptic_units::Ecn;
 
 use crate::core::Parcel;
 use crate::host::Host;
@@ -42,7 +43,7 @@ impl AsyncUdpSocket for VirtualSocket {
         if !self.may_send_from(transmit.src_ip) {
             return Ok(());
         }
-        match self.socket.send_now(Some(&transmit.destination), transmit.contents, transmit.ecn.is_some()) {
+        match self.socket.send_now(Some(&transmit.destination), transmit.contents, codepoint(transmit.ecn)) {
             // The host has crashed, so the endpoint must end.
             Err(error) if error.kind() == io::ErrorKind::ConnectionAborted => Err(error),
             // As with the sockets of quinn itself, a datagram that cannot be sent is lost, and the protocol notices the loss.
@@ -81,12 +82,13 @@ impl AsyncUdpSocket for VirtualSocket {
 /// Copies a datagram, cut to the length of the buffer, and returns its description.
 fn fill(buffer: &mut [u8], datagram: &Parcel) -> RecvMeta {
     let len = datagram.copy_to(buffer);
-    let ecn = match (datagram.arrival.marked, datagram.ecn_capable) {
-        (true, _) => Some(EcnCodepoint::Ce),
-        (false, true) => Some(EcnCodepoint::Ect0),
-        (false, false) => None,
-    };
+    let ecn = if datagram.arrival.marked { Some(EcnCodepoint::Ce) } else { EcnCodepoint::from_bits(datagram.ecn.bits()) };
     RecvMeta { addr: datagram.from(), len, stride: len, ecn, dst_ip: Some(datagram.to()) }
+}
+
+/// Returns the codepoint of a datagram of quinn.
+fn codepoint(ecn: Option<EcnCodepoint>) -> Ecn {
+    ecn.map_or(Ecn::NotCapable, |ecn| Ecn::from_bits(ecn as u8))
 }
 
 /// Poller of writability, which is always ready because sending never waits.

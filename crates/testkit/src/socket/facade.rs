@@ -5,6 +5,7 @@ use std::net::SocketAddr;
 use std::task::{Context, Poll};
 
 use cohaptic_sockets::{DatagramOption, Datagrams, Membership};
+use cohaptic_units::Ecn;
 
 use super::{KIND, UdpSocket};
 use crate::core::Parcel;
@@ -29,7 +30,7 @@ impl Datagrams for UdpSocket {
     }
 
     fn send(&self, bytes: &[u8], to: Option<SocketAddr>) -> io::Result<usize> {
-        self.send_now(to.as_ref(), bytes, false)
+        self.send_now(to.as_ref(), bytes, Ecn::NotCapable)
     }
 
     fn connect(&self, to: SocketAddr) -> io::Result<()> {

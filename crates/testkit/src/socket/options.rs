@@ -4,6 +4,8 @@ use std::io;
 use std::net::{Ipv4Addr, Ipv6Addr};
 use std::sync::atomic::{AtomicU32, Ordering};
 
+use cohaptic_units::Ecn;
+
 #[cfg(feature = "tokio-net")]
 use super::KIND;
 use super::UdpSocket;
@@ -31,9 +33,9 @@ impl Default for Options {
 }
 
 impl Options {
-    /// Returns whether sent datagrams may be marked in place of being dropped: at least one of the two bits of ECN is set (RFC 3168).
-    pub(super) fn is_ecn_capable(&self) -> bool {
-        self.type_of_service.load(Ordering::Relaxed) & 0b11 != 0
+    /// Returns the ECN codepoint of sent datagrams: the low two bits of the type of service (RFC 3168).
+    pub(super) fn ecn(&self) -> Ecn {
+        Ecn::from_bits(self.type_of_service.load(Ordering::Relaxed).to_le_bytes()[0])
     }
 }
 

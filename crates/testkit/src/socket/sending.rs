@@ -5,6 +5,8 @@ use std::io;
 use std::net::SocketAddr;
 use std::task::{Context, Poll};
 
+use cohaptic_units::Ecn;
+
 use super::{KIND, UdpSocket};
 use crate::core::Outgoing;
 use crate::resolve::ToSocketAddrs;
@@ -27,7 +29,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::send`].
     pub fn try_send(&self, bytes: &[u8]) -> io::Result<usize> {
-        self.send_now(None, bytes, false)
+        self.send_now(None, bytes, Ecn::NotCapable)
     }
 
     /// Sends a datagram to an address. Returns the number of bytes sent.
@@ -47,7 +49,7 @@ impl UdpSocket {
     ///
     /// As [`UdpSocket::send_to`].
     pub fn try_send_to(&self, bytes: &[u8], to: SocketAddr) -> io::Result<usize> {
-        self.send_now(Some(&to), bytes, false)
+        self.send_now(Some(&to), bytes, Ecn::NotCapable)
     }
 
     /// Sends a datagram to the peer. Always ready.
@@ -71,16 +73,16 @@ impl UdpSocket {
     #[inline]
     fn send_to_now(&self, to: &impl ToSocketAddrs, bytes: &[u8]) -> io::Result<usize> {
         match to.to_socket_addr() {
-            Ok(to) => self.send_now(Some(&to), bytes, false),
+            Ok(to) => self.send_now(Some(&to), bytes, Ecn::NotCapable),
             // A name cannot be looked up outside of the run. If the socket may not be used, that is the more useful error.
             Err(error) => self.shared.check_open(self.host, KIND).and(Err(error)),
         }
     }
 
     #[inline]
-    pub(crate) fn send_now(&self, to: Option<&SocketAddr>, bytes: &[u8], ecn_capable: bool) -> io::Result<usize> {
-        let ecn_capable = ecn_capable || self.options.is_ecn_capable();
-        let outgoing = Outgoing { to, bytes, ecn_capable };
+    pub(crate) fn send_now(&self, to: Option<&SocketAddr>, bytes: &[u8], ecn: Ecn) -> io::Result<usize> {
+        let ecn = if ecn.is_capable() { ecn } else { self.options.ecn() };
+        let outgoing = Outgoing { to, bytes, ecn };
         self.shared.open(self.host, KIND, |core| core.send(self.id, outgoing))??;
         Ok(bytes.len())
     }

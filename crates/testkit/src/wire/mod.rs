@@ -145,7 +145,7 @@ impl<A: Clone> Wire<A> {
             self.note_offer(path, &mut parcel)?;
         }
         self.held.add(Where::Links, Held::cost(parcel.bytes.len()));
-        let info = PacketInfo { size: cohaptic_units::Bytes::new(parcel.bytes.len() as u64), ecn_capable: parcel.ecn_capable };
+        let info = PacketInfo { size: cohaptic_units::Bytes::new(parcel.bytes.len() as u64), ecn: parcel.ecn };
         let offered = self.network.handle_packet_timed(self.now, path, info, parcel);
         debug_assert!(offered.is_ok(), "hosts are checked, and time does not go back");
         // Everything that was due before has been polled, so only this packet can have come out of its link.

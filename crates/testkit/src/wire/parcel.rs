@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 use bytes::Bytes;
 #[cfg(feature = "tcp")]
 use cohaptic_tcp::{Payload, Segment};
-use cohaptic_units::Instant;
+use cohaptic_units::{Ecn, Instant};
 use cohaptic_wan::{NodeId, Path};
 
 use crate::trace::PacketName;
@@ -18,8 +18,8 @@ use crate::trace::PacketName;
 pub(crate) struct Parcel<A> {
     pub(crate) addresses: A,
     pub(crate) bytes: Octets,
-    /// `true` if the sender understands congestion marks.
-    pub(crate) ecn_capable: bool,
+    /// ECN codepoint that the sender writes on the packet.
+    pub(crate) ecn: Ecn,
     /// `true` if a law drops the packet before its link. Set for every packet of a run with laws.
     pub(crate) is_hit: bool,
     /// Report of the link. Valid only for a parcel that its link has delivered.
@@ -44,9 +44,9 @@ pub(crate) struct Arrival {
 }
 
 impl<A> Parcel<A> {
-    pub(crate) const fn new(addresses: A, bytes: Octets, ecn_capable: bool) -> Self {
+    pub(crate) const fn new(addresses: A, bytes: Octets, ecn: Ecn) -> Self {
         let packet = PacketName { path: Path { from: NodeId(0), to: NodeId(0) }, sequence: 0, copy: 0 };
-        Self { addresses, bytes, ecn_capable, is_hit: false, arrival: Arrival { packet, at: Instant::ZERO, marked: false, is_cut: false } }
+        Self { addresses, bytes, ecn, is_hit: false, arrival: Arrival { packet, at: Instant::ZERO, marked: false, is_cut: false } }
     }
 }
 
@@ -179,19 +179,19 @@ impl<A: Default> Spare<A> {
 
     /// Returns a parcel with a copy of `bytes`.
     #[inline(always)]
-    pub(crate) fn copied(&mut self, addresses: A, bytes: &[u8], ecn_capable: bool) -> Box<Parcel<A>> {
+    pub(crate) fn copied(&mut self, addresses: A, bytes: &[u8], ecn: Ecn) -> Box<Parcel<A>> {
         // The addresses are stored directly, and passed to no further call, so that they are written only once.
         let mut parcel = self.0.pop().unwrap_or_else(empty);
-        (parcel.addresses, parcel.ecn_capable) = (addresses, ecn_capable);
+        (parcel.addresses, parcel.ecn) = (addresses, ecn);
         parcel.bytes.refill(bytes);
         parcel
     }
 
     /// Returns a parcel with `segment`.
     #[cfg(feature = "tcp")]
-    pub(crate) fn wrapped(&mut self, addresses: A, segment: Segment<'static>, ecn_capable: bool) -> Box<Parcel<A>> {
+    pub(crate) fn wrapped(&mut self, addresses: A, segment: Segment<'static>) -> Box<Parcel<A>> {
         let mut parcel = self.0.pop().unwrap_or_else(empty);
-        (parcel.addresses, parcel.ecn_capable) = (addresses, ecn_capable);
+        (parcel.addresses, parcel.ecn) = (addresses, segment.ecn);
         match &mut parcel.bytes {
             Octets::Segment(whole, length) => {
                 *length = segment.packet_length();
@@ -222,7 +222,7 @@ impl<A: Default> Spare<A> {
 /// Returns a new parcel, all of whose fields the caller sets.
 #[cold]
 fn empty<A: Default>() -> Box<Parcel<A>> {
-    Box::new(Parcel::new(A::default(), Octets::default(), false))
+    Box::new(Parcel::new(A::default(), Octets::default(), Ecn::NotCapable))
 }
 
 #[cfg(test)]
@@ -230,17 +230,17 @@ mod tests {
     use super::*;
 
     fn parcel_of(bytes: Octets) -> Box<Parcel<u8>> {
-        Box::new(Parcel::new(1, bytes, false))
+        Box::new(Parcel::new(1, bytes, Ecn::NotCapable))
     }
 
     #[test]
     fn memory_that_was_read_is_used_again() {
         let mut spare = Spare::default();
-        let parcel = spare.copied(1, b"longer than the next one", true);
+        let parcel = spare.copied(1, b"longer than the next one", Ecn::Capable0);
         let places = (std::ptr::from_ref(&*parcel), parcel.bytes.as_ptr());
         spare.put(parcel);
-        let next = spare.copied(2, b"next", false);
-        assert_eq!((&*next.bytes, next.ecn_capable, next.addresses), (&b"next"[..], false, 2));
+        let next = spare.copied(2, b"next", Ecn::NotCapable);
+        assert_eq!((&*next.bytes, next.ecn, next.addresses), (&b"next"[..], Ecn::NotCapable, 2));
         assert_eq!((std::ptr::from_ref(&*next), next.bytes.as_ptr()), places);
     }
 
@@ -251,7 +251,7 @@ mod tests {
             spare.put(parcel_of(bytes));
             let Some(Octets::Own(kept)) = spare.0.first().map(|parcel| &parcel.bytes) else { panic!("the box is kept") };
             assert_eq!(kept.capacity(), 0);
-            let filled = spare.copied(1, b"ours", false);
+            let filled = spare.copied(1, b"ours", Ecn::NotCapable);
             assert_eq!(&*filled.bytes, b"ours");
         }
         for _ in 0..2 * Spare::<u8>::MOST {
@@ -263,7 +263,7 @@ mod tests {
     #[cfg(feature = "tcp")]
     #[test]
     fn the_packet_of_a_segment_is_written_when_somebody_looks() {
-        use cohaptic_tcp::{Ecn, Flags, Options};
+        use cohaptic_tcp::{Flags, Options};
 
         let segment = |octets: &[u8]| Segment {
             source: "10.0.0.1:1".parse().unwrap(),
@@ -280,7 +280,7 @@ mod tests {
         let is_written = |parcel: &Parcel<u8>| matches!(&parcel.bytes, Octets::Segment(whole, _) if whole.packet.get().is_some());
         let mut spare = Spare::default();
         for octets in [&b"first"[..], b"", b"longer than the first"] {
-            let parcel = spare.wrapped(1, segment(octets), true);
+            let parcel = spare.wrapped(1, segment(octets));
             // 20 octets of each header, and 12 of timestamps.
             assert_eq!((parcel.bytes.len(), is_written(&parcel)), (52 + octets.len(), false));
             assert_eq!((Segment::parse(&parcel.bytes), parcel.bytes[..].len()), (Ok(segment(octets)), 52 + octets.len()));
@@ -289,6 +289,6 @@ mod tests {
             let Octets::Segment(kept, _) = &spare.0[0].bytes else { panic!("the box is kept") };
             assert!(kept.segment.payload.is_empty() && kept.packet.get().is_none());
         }
-        assert_eq!(&*spare.copied(1, b"a datagram", false).bytes, b"a datagram");
+        assert_eq!(&*spare.copied(1, b"a datagram", Ecn::NotCapable).bytes, b"a datagram");
     }
 }

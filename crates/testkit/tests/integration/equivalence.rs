@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use cohaptic_testkit::node::{Node, Nodes, Packet, Transmit, address};
+use cohaptic_testkit::units::Ecn;
 use cohaptic_testkit::{Instant, Record, Testbed, time};
 
 const COUNT: u32 = 60;
@@ -35,7 +36,7 @@ impl Node for Sender {
     fn poll_transmit(&mut self, now: Instant) -> Option<Transmit> {
         std::mem::take(&mut self.sends).then(|| {
             self.deadline = Some(now + WAIT);
-            Transmit { to: address(1, 7), from_port: 49_152, bytes: self.number.to_be_bytes().to_vec().into(), ecn_capable: false }
+            Transmit { to: address(1, 7), from_port: 49_152, bytes: self.number.to_be_bytes().to_vec().into(), ecn: Ecn::NotCapable }
         })
     }
 }

@@ -8,7 +8,7 @@ use bytes::Bytes;
 use cohaptic_testkit::node::{Node, NodeRun, Nodes, Packet, Transmit, address};
 use cohaptic_testkit::wan::{Chance, Checksum, Corruption, Flips, LinkConfig, NodeId, Path};
 use cohaptic_testkit::{Happening, Instant, Lost};
-use cohaptic_units::Probability;
+use cohaptic_units::{Ecn, Probability};
 use proptest::prelude::*;
 
 const fn ms(count: u64) -> Instant {
@@ -198,7 +198,7 @@ impl Node for Watch {
 
 #[test]
 fn at_one_instant_packets_come_before_timers_and_late_timers_go_off_now() {
-    let transmit = Transmit { to: "[fd00::2]:9".parse().unwrap(), from_port: 7, bytes: Bytes::from_static(b"six"), ecn_capable: false };
+    let transmit = Transmit { to: "[fd00::2]:9".parse().unwrap(), from_port: 7, bytes: Bytes::from_static(b"six"), ecn: Ecn::NotCapable };
     let a = Watch { sends: vec![transmit], ..Watch::default() };
     let b = Watch { wakes: [ms(5), ms(5), ms(2)].into(), ..Watch::default() };
     let mut run = Nodes::new().add("a", a).add("b", b).links("delay 5ms").start();
@@ -235,8 +235,8 @@ fn a_link_that_damages_packets_does_so() {
 
 #[test]
 fn what_would_be_lost_is_marked_if_the_ends_understand_it() {
-    let transmit = |ecn_capable| Transmit { ecn_capable, ..Transmit::to(1, "x") };
-    let sends = (0..40).map(|number| transmit(number % 2 == 0)).collect();
+    let transmit = |ecn| Transmit { ecn, ..Transmit::to(1, "x") };
+    let sends = (0..40).map(|number| transmit(if number % 2 == 0 { Ecn::Capable1 } else { Ecn::NotCapable })).collect();
     let mut run = Nodes::new().add("a", Watch { sends, ..Watch::default() }).add("b", Watch::default()).links("loss 100% ecn").start();
     run.run_until_idle();
     let seen = &run.node::<Watch>("b").seen;

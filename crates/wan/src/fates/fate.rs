@@ -23,6 +23,8 @@ pub enum DropCause {
     CoDel,
     /// The controller of PIE dropped the packet, because the delay of the queue exceeded the target.
     Pie,
+    /// DualPI2 dropped the packet: one without ECN, or any one under overload.
+    DualPi2,
     /// Bits of the packet were flipped, and the receiver's checksum detected the damage.
     Checksum,
     /// The replayed log has ended.
@@ -31,7 +33,7 @@ pub enum DropCause {
 
 impl DropCause {
     /// All causes in the order of the stages, indexed by the cause's number.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Filter,
         Self::Mtu,
         Self::Outage,
@@ -41,6 +43,7 @@ impl DropCause {
         Self::Red,
         Self::CoDel,
         Self::Pie,
+        Self::DualPi2,
         Self::Checksum,
         Self::EndOfLog,
     ];
@@ -58,6 +61,7 @@ impl DropCause {
             Self::Red => "red",
             Self::CoDel => "codel",
             Self::Pie => "pie",
+            Self::DualPi2 => "dualpi2",
             Self::Checksum => "checksum",
             Self::EndOfLog => "end-of-log",
         }

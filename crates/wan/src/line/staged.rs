@@ -498,7 +498,7 @@ impl<T: Clone> Staged<T> {
                 Stage::Loss => {
                     if self.loses(now, &packet) {
                         // An ECN-capable packet is marked in place of the loss, and goes on.
-                        if !(self.marks_instead_of_loss && packet.info.ecn_capable) {
+                        if !(self.marks_instead_of_loss && packet.info.ecn.is_capable()) {
                             return drop(outputs, now, DropCause::Loss, packet);
                         }
                         packet.marks.congestion = true;

@@ -23,7 +23,7 @@ impl<T: Clone> KernelStage<T> {
     pub(crate) fn offer(&mut self, now: Instant, packet: Carried<T>, outputs: &mut Outputs<T>) {
         let size = u32::try_from(packet.info.size.get()).unwrap_or(u32::MAX);
         let original = packet.clone();
-        self.qdisc.enqueue(now, size, packet.info.ecn_capable, packet, &mut |output| {
+        self.qdisc.enqueue(now, size, packet.info.ecn.is_capable(), packet, &mut |output| {
             outputs.push(match output {
                 QdiscOutput::Duplicated => Output { packet: original.clone().as_copy(1), exit: Exit::Copied(now) },
                 QdiscOutput::Dropped { item, copy, reason } => {

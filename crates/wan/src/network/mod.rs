@@ -239,7 +239,7 @@ impl<P: Clone> Network<P> {
         self
     }
 
-    /// Takes a packet between two nodes at `now`. A plain size means a packet without ECN; a size above 16,777,215 bytes counts as 16,777,215 bytes.
+    /// Takes a packet between two nodes at `now`. A plain size means a packet without ECN; a size above 8,388,607 bytes counts as 8,388,607 bytes.
     ///
     /// # Errors
     ///

@@ -2,7 +2,7 @@
 
 use core::num::NonZeroU32;
 
-use cohaptic_units::{Bytes, Instant};
+use cohaptic_units::{Bytes, Ecn, Instant};
 
 use super::id::{LinkId, NodeId, Path};
 use crate::event_queue::Event;
@@ -34,31 +34,30 @@ impl<P> InNetwork<P> {
     }
 }
 
-/// Size of a packet in bytes (upper 24 bits), its flags (bits 3 to 6) and its copy bits (bits 0 to 2, see [`LineId::copy_bit`]). Bit 7 is always set: the
-/// number is never zero, so an `Option` of a type with this field needs no extra space.
+/// Size of a packet in bytes (upper 23 bits), its ECN codepoint (bits 7 and 8), its flags (bits 4 to 6), its copy bits (bits 0 to 2, see
+/// [`LineId::copy_bit`]). Bit 3 is always set: the number is never zero, so an `Option` of a type with this field needs no extra space.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct SizeAndMarks(NonZeroU32);
 
 impl SizeAndMarks {
-    // The constant is made of safe operations only: 1 times (1 + 127) is bit 7.
-    pub(super) const NOTHING: Self = Self(NonZeroU32::MIN.saturating_mul(NonZeroU32::MIN.saturating_add((1 << 7) - 1)));
-    pub(super) const ECN_CAPABLE: u32 = 1 << 3;
+    // The constant is made of safe operations only: 1 + 7 is bit 3.
+    pub(super) const NOTHING: Self = Self(NonZeroU32::MIN.saturating_add((1 << 3) - 1));
     pub(super) const MARKED: u32 = 1 << 4;
     pub(super) const DAMAGED: u32 = 1 << 5;
     pub(super) const DISCARDED_ON_ARRIVAL: u32 = 1 << 6;
 
     pub(super) fn new(info: PacketInfo) -> Self {
-        // Sizes above 24 bits saturate, so the shift below loses no bit.
-        let size = u32::try_from(info.size.get().min((1 << 24) - 1)).unwrap_or(u32::MAX);
-        Self(Self::NOTHING.0 | size << 8).with(Self::ECN_CAPABLE, info.ecn_capable)
+        // Sizes above 23 bits saturate, so the shift below loses no bit.
+        let size = u32::try_from(info.size.get().min((1 << 23) - 1)).unwrap_or(u32::MAX);
+        Self(Self::NOTHING.0 | size << 9 | u32::from(info.ecn.bits()) << 7)
     }
 
     pub(super) fn size(self) -> Bytes {
-        Bytes::new((self.0.get() >> 8).into())
+        Bytes::new((self.0.get() >> 9).into())
     }
 
     pub(super) fn info(self) -> PacketInfo {
-        PacketInfo { size: self.size(), ecn_capable: self.has(Self::ECN_CAPABLE) }
+        PacketInfo { size: self.size(), ecn: Ecn::from_bits((self.0.get() >> 7).to_le_bytes()[0]) }
     }
 
     pub(super) fn copy(self) -> u8 {
@@ -70,7 +69,7 @@ impl SizeAndMarks {
     }
 
     pub(super) fn with(self, flag: u32, set: bool) -> Self {
-        // The complement may clear all bits as far as the type knows. Setting bit 7 again keeps the number nonzero without a check.
+        // The complement may clear all bits as far as the type knows. Setting bit 3 again keeps the number nonzero without a check.
         Self(if set { self.0 | flag } else { Self::NOTHING.0 | self.0.get() & !flag })
     }
 }

@@ -3,13 +3,13 @@
 use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
-use cohaptic_units::{Bytes, Instant, Probability};
+use cohaptic_units::{Bytes, Ecn, Instant, Probability};
 use cohaptic_wan::law::{DistTable, Empirical};
 use cohaptic_wan::netem::Netem;
 use cohaptic_wan::parameters::{Form, Table};
 use cohaptic_wan::{
     Between, Bottleneck, Cells, Chance, Checksum, CoDel, Correlation, Corruption, Counts, CrossRecording, CrossTraffic, Delay, DeliveryTrace,
-    Discipline, Displacement, Distribution, FateLog, Flips, FourState, FqCoDel, Framing, GilbertElliott, GilbertElliottInTime, IdleOutages,
+    Discipline, Displacement, Distribution, DualPi2, FateLog, Flips, FourState, FqCoDel, Framing, GilbertElliott, GilbertElliottInTime, IdleOutages,
     Impairments, Jitter, KernelNetem, Layout, Link, LinkConfig, LinkModel, LinkName, Loss, Modulated, Modulator, ModulatorState, OnOff, Order,
     Outages, PacketEvent, PacketInfo, PacketRecord, ParameterValue, PathTrace, Pattern, Peak, Poisson, QueueLimit, RandomOutages, Red, Reorder,
     Service, Slots, Sojourn, TokenBucket, Values,
@@ -58,7 +58,7 @@ pub(crate) fn all_records(model: impl Into<LinkModel>, offered: &[(Duration, Pac
 
 /// Packets of a few bytes, half of them with ECN.
 pub(crate) fn packet() -> impl Strategy<Value = PacketInfo> {
-    (size(), any::<bool>()).prop_map(|(size, ecn_capable)| PacketInfo { size, ecn_capable })
+    (size(), any::<u8>()).prop_map(|(size, bits)| PacketInfo { size, ecn: Ecn::from_bits(bits) })
 }
 
 pub(crate) fn packets() -> BoxedStrategy<Vec<(Duration, PacketInfo)>> {
@@ -185,6 +185,7 @@ pub(crate) fn discipline() -> BoxedStrategy<Discipline> {
         red().prop_map(Discipline::Red),
         codel().prop_map(Discipline::CoDel),
         fq_codel().prop_map(Discipline::FqCoDel),
+        dualpi2().prop_map(Discipline::DualPi2),
     ]
     .boxed()
 }
@@ -192,6 +193,21 @@ pub(crate) fn discipline() -> BoxedStrategy<Discipline> {
 pub(crate) fn fq_codel() -> BoxedStrategy<FqCoDel> {
     let number = |numbers: std::ops::Range<u32>| numbers.prop_map(|number| number.try_into().unwrap());
     (codel(), number(1..8), number(1..6)).prop_map(|(codel, quantum, flows)| FqCoDel { codel, quantum, flows }).boxed()
+}
+
+/// Gains that make something of waits of microseconds.
+pub(crate) fn dualpi2() -> BoxedStrategy<DualPi2> {
+    ((0..5u64, 6..30u64, 0..4u64), (0.0..3e4f64, 0.0..1e5f64, 1..5u8), select(vec![0.0, 0.1, 0.5, 1.0]))
+        .prop_map(|((target, tupdate, step_thresh), (alpha, beta, factor), share)| DualPi2 {
+            target: micros(target),
+            tupdate: micros(tupdate),
+            alpha,
+            beta,
+            coupling_factor: factor.try_into().unwrap(),
+            step_thresh: micros(step_thresh),
+            classic_protection: probability(share),
+        })
+        .boxed()
 }
 
 pub(crate) fn any_bottleneck() -> BoxedStrategy<Bottleneck> {

@@ -6,7 +6,7 @@ use std::time::Duration;
 use cohaptic_units::{Bytes, Instant};
 use cohaptic_wan::random::{Purpose, Stream};
 use cohaptic_wan::{
-    Bottleneck, CoDel, CrossCounts, CrossRecording, CrossTraffic, Delay, Discipline, Distribution, DropCause, Fate, FqCoDel, Jitter, Link,
+    Bottleneck, CoDel, CrossCounts, CrossRecording, CrossTraffic, Delay, Discipline, Distribution, DropCause, DualPi2, Fate, FqCoDel, Jitter, Link,
     LinkConfig, LinkName, Loss, Network, NetworkConfig, NodeId, PacketInfo, Pie, Poisson, QueueLimit,
 };
 use proptest::prelude::*;
@@ -169,15 +169,16 @@ fn cross_packets_have_a_queue_of_their_own() {
 }
 
 /// A driver that comes when a link asks for a wake and one that comes long after see the same, also if it catches up with the cross packets between two packets, and
-/// a link asks for a wake at the instant of each of its events: queues with a flow of their own for cross packets drop packets at any instant, and PIE counts every
-/// packet that is sent.
+/// a link asks for a wake at the instant of each of its events: queues with a flow of their own for cross packets drop packets at any instant, PIE counts every
+/// packet that is sent, and DualPI2 drops packets as they leave their queue.
 #[test]
 fn drivers_of_every_habit_see_the_same() {
     let millis = Duration::from_millis;
     let codel = CoDel { target: millis(5), interval: millis(30), mtu: Bytes::new(20), ecn: false };
     let fq_codel = Discipline::FqCoDel(FqCoDel { codel, quantum: 30.try_into().unwrap(), ..FqCoDel::default() });
     let pie = Discipline::Pie(Pie { target: millis(5), burst: Duration::ZERO, mtu: Bytes::new(20), ecn: false });
-    for (discipline, limit, cause) in [(fq_codel, 3, DropCause::CoDel), (pie, 8, DropCause::Pie)] {
+    let dualpi2 = Discipline::DualPi2(DualPi2 { target: millis(5), ..DualPi2::default() });
+    for (discipline, limit, cause) in [(fq_codel, 3, DropCause::CoDel), (pie, 8, DropCause::Pie), (dualpi2, 8, DropCause::DualPi2)] {
         // A byte takes 100 µs. Packets of the link alone need the whole line, and cross packets a quarter of it.
         let traffic = CrossTraffic::poisson(Poisson { rate: rate(20_000), size: Bytes::new(40) }).unwrap();
         let bottleneck = Some(Bottleneck { limit: Some(QueueLimit::Packets(limit)), discipline, ..Bottleneck::at_rate(rate(80_000)) });

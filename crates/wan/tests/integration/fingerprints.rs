@@ -10,13 +10,13 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use cohaptic_units::{Bytes, Instant};
+use cohaptic_units::{Bytes, Ecn, Instant};
 use cohaptic_wan::netem::Netem;
 use cohaptic_wan::{
     Between, Bottleneck, Bursts, Cells, Chance, Checksum, CoDel, Correlation, Corruption, CrossTraffic, Delay, DeliveryTrace, Discipline,
-    Displacement, FateLog, FateRow, Flips, FourState, FqCoDel, Framing, GilbertElliott, GilbertElliottInTime, IdleOutages, Jitter, KernelNetem,
-    Layout, LinkConfig, LinkModel, LinkName, Loss, Modulated, Modulator, OnOff, Order, Outage, Outages, PacketInfo, PathTrace, Pattern, Peak, Pie,
-    Poisson, QueueLimit, RandomOutages, Red, Reorder, Service, Slots, Sojourn, TokenBucket,
+    Displacement, DualPi2, FateLog, FateRow, Flips, FourState, FqCoDel, Framing, GilbertElliott, GilbertElliottInTime, IdleOutages, Jitter,
+    KernelNetem, Layout, LinkConfig, LinkModel, LinkName, Loss, Modulated, Modulator, OnOff, Order, Outage, Outages, PacketInfo, PathTrace, Pattern,
+    Peak, Pie, Poisson, QueueLimit, RandomOutages, Red, Reorder, Service, Slots, Sojourn, TokenBucket,
 };
 
 use crate::any_link::{JITTERS, KERNEL_WORDS, all_events, micros};
@@ -30,7 +30,12 @@ fn hash(bytes: &[u8]) -> u64 {
 /// 2,000 packets of 40 to 1,439 bytes, 100 µs to 700 µs apart: about 15 Mbit/s.
 fn traffic() -> Vec<(Duration, PacketInfo)> {
     (0..2_000)
-        .map(|n: u64| (micros(100 * (1 + n % 7)), PacketInfo { size: Bytes::new(40 + n * 37 % 1_400), ecn_capable: n.is_multiple_of(2) }))
+        .map(|n: u64| {
+            (
+                micros(100 * (1 + n % 7)),
+                PacketInfo { size: Bytes::new(40 + n * 37 % 1_400), ecn: if n.is_multiple_of(2) { Ecn::Capable0 } else { Ecn::NotCapable } },
+            )
+        })
         .collect()
 }
 
@@ -132,6 +137,7 @@ fn models() -> Vec<(String, LinkModel)> {
         ("codel, ecn", codel(true)),
         ("fq-codel", fq_codel),
         ("pie, ecn", pie),
+        ("dualpi2", Discipline::DualPi2(DualPi2 { target: Duration::from_millis(2), tupdate: Duration::from_millis(3), ..DualPi2::default() })),
     ] {
         add(&format!("bottleneck, {name}"), LinkConfig { bottleneck: Some(Bottleneck { discipline, ..line.clone() }), ..base() });
     }

@@ -13,6 +13,7 @@ mod conservation;
 mod cross_traffic;
 mod delay_laws;
 mod determinism;
+mod dualpi2_laws;
 mod edges;
 mod event_queue;
 mod every_stage;

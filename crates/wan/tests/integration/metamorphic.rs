@@ -6,9 +6,9 @@ use std::time::Duration;
 
 use cohaptic_units::{Bytes, Instant, Rate};
 use cohaptic_wan::{
-    Between, Bottleneck, Chance, Checksum, Corruption, Damage, Delay, Distribution, DropCause, Fate, FateLog, Flips, Framing, Impairments, Jitter,
-    Link, LinkConfig, LinkModel, Loss, Modulated, Modulator, ModulatorState, Outage, Outages, PacketEvent, PacketInfo, PathTrace, Pattern, Peak,
-    QueueLimit, Reorder, Service, Slots, TokenBucket,
+    Between, Bottleneck, Chance, Checksum, Corruption, Damage, Delay, Discipline, Distribution, DropCause, Fate, FateLog, Flips, Framing,
+    Impairments, Jitter, Link, LinkConfig, LinkModel, Loss, Modulated, Modulator, ModulatorState, Outage, Outages, PacketEvent, PacketInfo,
+    PathTrace, Pattern, Peak, QueueLimit, Reorder, Service, Slots, TokenBucket,
 };
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -201,6 +201,10 @@ proptest! {
         }
         if let Some(Bottleneck { service: service @ Service::Recorded(_), .. }) = &mut config.bottleneck {
             *service = Service::Rate(Rate::bits_per_sec(8_000_000).unwrap());
+        }
+        // The controller has a timer that runs from the start.
+        if let Some(Bottleneck { discipline: discipline @ Discipline::DualPi2(_), .. }) = &mut config.bottleneck {
+            *discipline = Discipline::TailDrop;
         }
         let mut shifted = offered.clone();
         shifted[0].0 += nanos(later);

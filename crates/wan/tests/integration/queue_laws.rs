@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cohaptic_units::{Bytes, Instant};
+use cohaptic_units::{Bytes, Ecn, Instant};
 use cohaptic_wan::random::{Purpose, Stream};
 use cohaptic_wan::{
     AccessLine, Bottleneck, CoDel, Discipline, DropCause, Fate, FqCoDel, Link, LinkConfig, LinkName, Network, NetworkConfig, NodeId, Path, QueueLimit,
@@ -112,7 +112,7 @@ fn under_constant_overload_codel_marks_what_is_capable() {
     let discipline = Discipline::CoDel(CoDel { mtu: Bytes::new(100), ecn: true, ..CoDel::default() });
     let bottleneck = Some(Bottleneck { discipline, ..Bottleneck::at_rate(rate(800_000)) });
     let mut link = Link::new(65, &LinkName::between("a", "b"), LinkConfig { bottleneck, ..LinkConfig::default() });
-    let info = cohaptic_wan::PacketInfo { size: Bytes::new(100), ecn_capable: true };
+    let info = cohaptic_wan::PacketInfo { size: Bytes::new(100), ecn: Ecn::Capable0 };
     (0..4_000).for_each(|number| link.handle_packet(Instant::from_nanos(number * 500_000), info, ()).unwrap());
     link.handle_timeout(Instant::MAX).unwrap();
     assert_eq!((link.stats().dropped_in_all(), link.stats().delivered()), (0, 4_000));
@@ -327,7 +327,7 @@ mod pie {
         let bottleneck = Some(Bottleneck { limit, discipline: Discipline::Pie(*pie), ..Bottleneck::at_rate(rate(8_000_000)) });
         let mut link = Link::new(67, &LinkName::between("a", "b"), LinkConfig { bottleneck, ..LinkConfig::default() });
         for (at, size, ecn_capable) in offered {
-            let info = PacketInfo { size: Bytes::new(*size), ecn_capable: *ecn_capable };
+            let info = PacketInfo { size: Bytes::new(*size), ecn: if *ecn_capable { Ecn::Capable0 } else { Ecn::NotCapable } };
             link.handle_packet(Instant::from_nanos(*at), info, ()).unwrap();
         }
         link.handle_timeout(Instant::MAX).unwrap();

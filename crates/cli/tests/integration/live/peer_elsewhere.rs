@@ -7,7 +7,7 @@ use std::time::{Duration, Instant as Wall};
 use cohaptic_live::Place;
 use cohaptic_live::client::{ClientConfig, SessionInfo};
 use cohaptic_scene::Scene;
-use cohaptic_units::{Bytes, Instant};
+use cohaptic_units::{Bytes, Ecn, Instant};
 use cohaptic_wan::{Fate, Network, NetworkConfig, NodeId, PacketInfo};
 use serde_json::{Value, json};
 
@@ -101,7 +101,7 @@ fn in_virtual_time(desk: &Desk, offers: &BTreeMap<usize, Vec<u64>>, end: u64) ->
     let mut order: Vec<(u64, usize)> = offers.iter().flat_map(|(from, sent)| sent.iter().map(|at| (*at, *from))).collect();
     order.sort_unstable();
     let mut seen = BTreeSet::new();
-    let info = PacketInfo { size: Bytes::new(64), ecn_capable: true };
+    let info = PacketInfo { size: Bytes::new(64), ecn: Ecn::Capable0 };
     let mut drain = |network: &mut Network<()>| {
         while let Some(event) = network.poll_event() {
             let link = format!("{}->{}", names[event.path.from.index()], names[event.path.to.index()]);

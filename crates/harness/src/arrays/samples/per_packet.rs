@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use cohaptic_peer::{EXACT_FROM, ExactMeans, Moving, State};
 use cohaptic_scene::Scene;
-use cohaptic_units::Instant;
+use cohaptic_units::{Ecn, Instant};
 use cohaptic_wan::{Arrivals, DirectLinks, LinkId, LinkModel, LinkName, LinkStats, PacketInfo, SteppedLinks};
 use pulp::NullaryFnOnce;
 
@@ -69,7 +69,7 @@ impl<const A: usize, const L: usize> PerPacket<A, L> {
     /// Returns the state before the first tick: receivers hold the initial states of the other peers, and nothing is in flight.
     pub(in crate::arrays) fn new(scenes: &[&Scene], initial: &[Sample<A, L>], shape: &Shape, receivers: Range<usize>) -> Self {
         let peers = scenes[0].peers.len();
-        let info = PacketInfo { size: shape.load.size, ecn_capable: true };
+        let info = PacketInfo { size: shape.load.size, ecn: Ecn::Capable0 };
         let mut links = match shape.way {
             Way::Direct => Links::Direct(DirectLinks::new(shape.end, shape.load)),
             Way::Stepped => {

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cohaptic_units::{Bytes, Probability};
+use cohaptic_units::{Bytes, Ecn, Probability};
 use cohaptic_wan::{Chance, Correlation, Delay, Distribution, GilbertElliott, Jitter, Link, LinkConfig, LinkName, Loss, PacketInfo};
 
 use super::{OF_BATCHES, OF_LIKELIHOOD, Tally};
@@ -14,7 +14,7 @@ use crate::tests::TestRng;
 
 const LINKS: u64 = 240;
 const STREAM: SteadyStream =
-    SteadyStream { packets: 3_000, every: Duration::from_millis(1), info: PacketInfo { size: Bytes::new(64), ecn_capable: false } };
+    SteadyStream { packets: 3_000, every: Duration::from_millis(1), info: PacketInfo { size: Bytes::new(64), ecn: Ecn::NotCapable } };
 
 fn probability(value: f64) -> Probability {
     Probability::new(value).unwrap()

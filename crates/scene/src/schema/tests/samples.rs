@@ -62,6 +62,7 @@ pub(super) const SCENES: [&str; 5] = [
         { from = "peer1", to = "peer2", queue = { limit = "64kB", discipline = { red = { min = "5kB", max = "15kB" } } } },
         { from = "peer4", to = "peer1", queue = { limit = "64kB", discipline = { fq-codel = { quantum = "300B" } } } },
         { from = "peer4", to = "peer2", queue = { limit = "64kB", discipline = { pie = { target = "20ms" } } } },
+        { from = "peer4", to = "peer3", queue = { limit = "64kB", discipline = { dualpi2 = { coupling-factor = 1 } } } },
         { from = "peer1", to = "peer3", token-bucket = { rate = "1Mbit", burst = "9kB", peak = { rate = "2Mbit", burst = "1500B" } } },
         { from = "peer1", to = "peer4", slots = { min = "10ms" }, jitter = { sd = "1ms" }, delay = "20ms" },
         { from = "peer1", to = "peer5", outage = { random = { up = "3s", down = { uniform = ["1s", "2s"] } }, idle = { after = "1s", down = "1s" } } },

@@ -78,8 +78,7 @@ impl Core {
         };
         let addresses = Ends::new(segment.source, segment.destination, Kind::Segment);
         let happening = self.wire.recording().traces.then(|| self.described(self.wire.next_packet(path), connection, &segment));
-        let is_capable = segment.ecn != Ecn::NotCapable;
-        let parcel = self.spare.wrapped(addresses, segment, is_capable);
+        let parcel = self.spare.wrapped(addresses, segment);
         // A segment over a path that is cut is lost like any other packet.
         let _ = self.wire.offer(path, parcel);
         happening.into_iter().for_each(|happening| self.wire.note(happening));

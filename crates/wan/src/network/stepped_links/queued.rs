@@ -7,7 +7,7 @@
 use alloc::boxed::Box;
 use core::time::Duration;
 
-use cohaptic_units::{Bytes, Instant, Rate};
+use cohaptic_units::{Bytes, Ecn, Instant, Rate};
 
 use super::ahead::Ahead;
 use super::{Other, Sent};
@@ -70,7 +70,7 @@ impl LineKind {
             Discipline::Pie(pie) if !pie.ecn => 0.0,
             Discipline::Red(red) if !red.ecn() => bottleneck.time_of_mean_packet(&red),
             // Marks would have to be carried with each waiting packet, but `Sent` has no field for marks.
-            Discipline::CoDel(_) | Discipline::FqCoDel(_) | Discipline::Pie(_) | Discipline::Red(_) => return None,
+            Discipline::CoDel(_) | Discipline::DualPi2(_) | Discipline::FqCoDel(_) | Discipline::Pie(_) | Discipline::Red(_) => return None,
         };
         // Framing is the same for all packets, because all packets have one size.
         let bits = giga_bits(bottleneck.framing.on_the_line(size));
@@ -108,9 +108,9 @@ impl<T> Rules<Sent<T>> for LineKind {
         Some(0)
     }
 
-    fn ecn_capable(&self, _packet: &Sent<T>) -> bool {
+    fn ecn(&self, _packet: &Sent<T>) -> Ecn {
         // `LineKind::new` refuses queues that mark packets, so no answer depends on this.
-        false
+        Ecn::NotCapable
     }
 
     fn mark(&self, _packet: &mut Sent<T>) {}

@@ -1,6 +1,6 @@
 use core::time::Duration;
 
-use cohaptic_units::{Bytes, Probability, Rate};
+use cohaptic_units::{Bytes, Ecn, Probability, Rate};
 use proptest::prelude::*;
 
 use super::*;
@@ -11,7 +11,7 @@ use crate::stages::delay::{Delay, Jitter};
 use crate::stages::loss::Loss;
 use crate::stages::outage::{Outage, Outages};
 use crate::stages::queue::limit::strategies::limits;
-use crate::stages::queue::{Bottleneck, CoDel, CrossTraffic, Discipline, FqCoDel, Framing, OnOff, Pie, Poisson, QueueLimit, Red};
+use crate::stages::queue::{Bottleneck, CoDel, CrossTraffic, Discipline, DualPi2, FqCoDel, Framing, OnOff, Pie, Poisson, QueueLimit, Red};
 
 const SIZE: Bytes = Bytes::new(64);
 
@@ -34,7 +34,7 @@ fn red(ecn: bool) -> Discipline {
 /// Compares the arrivals and the counters of a whole link with those of a stepped link. Packets are offered at `instants`, and each pair in `then` changes
 /// the model of both links right before the packet at that index.
 fn compare(model: &LinkModel, then: &[(usize, &LinkModel)], (instants, until): (&[Instant], Instant)) {
-    let (name, info) = (LinkName::between("a", "b"), PacketInfo { size: SIZE, ecn_capable: true });
+    let (name, info) = (LinkName::between("a", "b"), PacketInfo { size: SIZE, ecn: Ecn::Capable0 });
     let mut whole = Link::new(7, &name, model.clone());
     let mut stepped = SteppedLinks::new(until, info);
     stepped.add(7, &name, model);
@@ -97,7 +97,11 @@ fn pie(ecn: bool) -> Discipline {
     Discipline::Pie(Pie { target: Duration::from_millis(1), burst: Duration::ZERO, mtu: SIZE, ecn })
 }
 
-const DISCIPLINES: usize = 10;
+fn dualpi2() -> Discipline {
+    Discipline::DualPi2(DualPi2 { target: Duration::from_millis(1), ..DualPi2::default() })
+}
+
+const DISCIPLINES: usize = 11;
 
 fn discipline(place: usize) -> Discipline {
     [
@@ -111,6 +115,7 @@ fn discipline(place: usize) -> Discipline {
         fq_codel(true),
         pie(false),
         pie(true),
+        dualpi2(),
     ][place]
 }
 
@@ -120,7 +125,7 @@ fn they_decide_what_whole_links_decide() {
     for (discipline, bits, layout) in (0..DISCIPLINES).map(discipline).flat_map(|discipline| {
         [(discipline, 100_000, Layout::Physical), (discipline, 64_000, Layout::Physical), (discipline, 100_000, Layout::Netem)]
     }) {
-        let marks = [codel(30, 64, true), red(true), fq_codel(true), pie(true)].contains(&discipline);
+        let marks = [codel(30, 64, true), red(true), fq_codel(true), pie(true), dualpi2()].contains(&discipline);
         let queued = QueuedKind::new(&with(discipline, bits, layout), SIZE);
         assert_eq!(queued.is_some(), layout == Layout::Physical && !marks, "{discipline:?}");
         compare(&with(discipline, bits, layout), &[], (&bursts(), millis(2_900)));
@@ -150,7 +155,7 @@ fn they_decide_what_whole_links_decide_beside_cross_traffic() {
 /// for a later instant.
 #[test]
 fn what_is_ahead_of_a_driver_that_stops_is_taken_back() {
-    let (name, info, until) = (LinkName::between("a", "b"), PacketInfo { size: SIZE, ecn_capable: true }, millis(2_900));
+    let (name, info, until) = (LinkName::between("a", "b"), PacketInfo { size: SIZE, ecn: Ecn::Capable0 }, millis(2_900));
     let offered = bursts();
     let models = (0..DISCIPLINES).map(discipline).flat_map(|discipline| {
         let [physical, netem] = [Layout::Physical, Layout::Netem].map(|layout| with(discipline, 100_000, layout));

@@ -1,5 +1,5 @@
-//! Queue before a transmitter: choice of the packets to wait, to transmit, to mark and to drop. First in, first out, except with FQ-CoDel, which has a queue per
-//! flow.
+//! Queue before a transmitter: choice of the packets to wait, to transmit, to mark and to drop. First in, first out, except with FQ-CoDel, which has a queue
+//! per flow, and DualPI2, which has two queues.
 //!
 //! The queue serves packets of any type over any transmitter; [`Rules`] has the differences. A stage of a link keeps packets of any size, each boxed, over
 //! transmitters of constant rate or of recorded opportunities ([`BottleneckStage`](super::BottleneckStage)). A link of a large mesh keeps packets of one size
@@ -9,10 +9,11 @@ use alloc::boxed::Box;
 use alloc::collections::VecDeque;
 use core::time::Duration;
 
-use cohaptic_units::{Bytes, Instant};
+use cohaptic_units::{Bytes, Ecn, Instant};
 
 use super::bottleneck::{Bottleneck, Discipline, idle_packets};
 use super::codel::{self, CoDelState};
+use super::dualpi2::DualQueues;
 use super::fq_codel::FlowQueues;
 use super::limit::{QueueLimit, Waiting};
 use super::pie::{self, PieState};
@@ -38,8 +39,8 @@ pub(crate) trait Rules<P> {
     /// Returns the number of a packet's flow, or `None` for a packet of the cross-traffic: all these packets are one flow, which is no flow of the link.
     fn flow(&self, packet: &P) -> Option<u32>;
 
-    /// Returns whether a packet is marked in place of a drop.
-    fn ecn_capable(&self, packet: &P) -> bool;
+    /// Returns the ECN codepoint of a packet, with the marks that the packet has got so far.
+    fn ecn(&self, packet: &P) -> Ecn;
 
     fn mark(&self, packet: &mut P);
 
@@ -61,7 +62,7 @@ pub(crate) trait Rules<P> {
 /// Waiting packets, the packet in transmission, and the memory of the discipline.
 #[derive(Clone, Debug)]
 pub(crate) struct Fifo<P, S> {
-    /// Waiting packets, the oldest first. Empty with FQ-CoDel, whose queues are in `discipline`.
+    /// Waiting packets, the oldest first. Empty with FQ-CoDel and DualPI2, whose queues are in `discipline`.
     waiting: VecDeque<P>,
     sums: S,
     on_line: Option<OnLine<P>>,
@@ -89,6 +90,7 @@ pub(crate) struct OnLine<P> {
 enum DisciplineState<P> {
     Nothing,
     CoDel(CoDelState),
+    DualPi2(Box<DualQueues<P>>),
     FqCoDel(Box<FlowQueues<P>>),
     Pie(Box<PieState>),
     Red(RedState),
@@ -99,6 +101,7 @@ impl<P> DisciplineState<P> {
         match discipline {
             Discipline::TailDrop | Discipline::HeadDrop => Self::Nothing,
             Discipline::CoDel(_) => Self::CoDel(CoDelState::default()),
+            Discipline::DualPi2(_) => Self::DualPi2(Box::new(DualQueues::new())),
             Discipline::FqCoDel(_) => Self::FqCoDel(Box::new(FlowQueues::new())),
             Discipline::Pie(pie) => Self::Pie(Box::new(PieState::new(pie))),
             Discipline::Red(_) => Self::Red(RedState::default()),
@@ -109,9 +112,37 @@ impl<P> DisciplineState<P> {
         match self {
             Self::Nothing => DisciplineState::Nothing,
             Self::CoDel(state) => DisciplineState::CoDel(state),
+            Self::DualPi2(queues) => DisciplineState::DualPi2(Box::new(queues.converted(convert))),
             Self::FqCoDel(flows) => DisciplineState::FqCoDel(Box::new(flows.converted(convert))),
             Self::Pie(state) => DisciplineState::Pie(state),
             Self::Red(state) => DisciplineState::Red(state),
+        }
+    }
+
+    /// Returns the number of packets that wait in queues of the discipline, or `None` if the discipline has no queues of its own.
+    fn len(&self) -> Option<usize> {
+        match self {
+            Self::DualPi2(queues) => Some(queues.len()),
+            Self::FqCoDel(flows) => Some(flows.len()),
+            Self::Nothing | Self::CoDel(_) | Self::Pie(_) | Self::Red(_) => None,
+        }
+    }
+
+    /// Calls `take` for each packet that waits in a queue of the discipline, in the order of the queues.
+    fn for_each(&self, take: impl FnMut(&P)) {
+        match self {
+            Self::DualPi2(queues) => queues.packets().for_each(take),
+            Self::FqCoDel(flows) => flows.packets().for_each(take),
+            Self::Nothing | Self::CoDel(_) | Self::Pie(_) | Self::Red(_) => {}
+        }
+    }
+
+    /// Appends the packets that wait in queues of the discipline to `packets`, in the order of their offers.
+    fn empty_into(self, packets: &mut VecDeque<P>) {
+        match self {
+            Self::DualPi2(queues) => packets.extend(queues.into_packets()),
+            Self::FqCoDel(flows) => packets.extend(flows.into_packets()),
+            Self::Nothing | Self::CoDel(_) | Self::Pie(_) | Self::Red(_) => {}
         }
     }
 }
@@ -160,9 +191,11 @@ impl<P, S: Default> Fifo<P, S> {
                 red::Verdict::Drop => return dropped(DropCause::Red, packet),
             }
         }
-        // With a queue per flow, the packet to send next is chosen in turn, even if only one packet waits: its queue then has had a part of its turn.
-        if matches!(rules.bottleneck().discipline, Discipline::FqCoDel(_)) {
-            return self.offer_to_flow(now, rules, packet, dropped);
+        // With several queues, the next packet is chosen in turn, even if only one packet waits: its queue then has had a part of its turn.
+        match rules.bottleneck().discipline {
+            Discipline::FqCoDel(_) => return self.offer_to_flow(now, rules, packet, dropped),
+            Discipline::DualPi2(_) => return self.offer_to_dual(now, rules, packet, dropped),
+            Discipline::TailDrop | Discipline::HeadDrop | Discipline::CoDel(_) | Discipline::Pie(_) | Discipline::Red(_) => {}
         }
         // An idle transmitter implies an empty queue, so no limit applies.
         if self.on_line.is_none() {
@@ -211,8 +244,8 @@ impl<P, S: Default> Fifo<P, S> {
     /// Begins to send the oldest waiting packet, or notes that the transmitter is idle if no packet waits.
     #[inline(always)]
     pub(crate) fn serve_next<R: Rules<P, Sums = S>>(&mut self, now: Instant, rules: &R, dropped: impl FnMut(DropCause, P)) {
-        if matches!(self.discipline, DisciplineState::FqCoDel(_)) {
-            return self.serve_next_flow(now, rules, dropped);
+        if self.discipline.len().is_some() {
+            return self.serve_next_of_several(now, rules, dropped);
         }
         match self.take_head(rules) {
             Some(packet) => self.serve(now, rules, packet, dropped),
@@ -220,14 +253,32 @@ impl<P, S: Default> Fifo<P, S> {
         }
     }
 
-    /// Begins to send the next packet of the queues of flows.
+    /// Begins to send the next packet of a discipline with several queues.
     #[inline(never)]
-    fn serve_next_flow<R: Rules<P, Sums = S>>(&mut self, now: Instant, rules: &R, dropped: impl FnMut(DropCause, P)) {
+    fn serve_next_of_several<R: Rules<P, Sums = S>>(&mut self, now: Instant, rules: &R, dropped: impl FnMut(DropCause, P)) {
         let Self { sums, discipline, .. } = self;
-        if let (DisciplineState::FqCoDel(flows), Discipline::FqCoDel(fq_codel)) = (discipline, &rules.bottleneck().discipline)
-            && let Some(packet) = flows.take(now, rules, fq_codel, sums, dropped)
-        {
+        let packet = match (discipline, &rules.bottleneck().discipline) {
+            (DisciplineState::FqCoDel(flows), Discipline::FqCoDel(fq_codel)) => flows.take(now, rules, fq_codel, sums, dropped),
+            (DisciplineState::DualPi2(queues), Discipline::DualPi2(dualpi2)) => queues.take(now, rules, dualpi2, sums, dropped),
+            _ => None,
+        };
+        if let Some(packet) = packet {
             self.send(now, rules, packet);
+        }
+    }
+
+    /// Takes a packet into one of two queues, if the limit admits the packet.
+    #[inline(never)]
+    fn offer_to_dual<R: Rules<P, Sums = S>>(&mut self, now: Instant, rules: &R, packet: P, mut dropped: impl FnMut(DropCause, P)) {
+        let is_idle = self.on_line.is_none();
+        if !is_idle && !self.admits(now, rules, &packet) {
+            return dropped(DropCause::QueueFull, packet);
+        }
+        let (DisciplineState::DualPi2(queues), Discipline::DualPi2(dualpi2)) = (&mut self.discipline, &rules.bottleneck().discipline) else { return };
+        rules.add(&mut self.sums, &packet);
+        queues.push(now, rules, dualpi2, packet);
+        if is_idle {
+            self.serve_next_of_several(now, rules, dropped);
         }
     }
 
@@ -239,7 +290,7 @@ impl<P, S: Default> Fifo<P, S> {
         rules.add(&mut self.sums, &packet);
         let newest = flows.push(rules, fq_codel, packet);
         if self.on_line.is_none() {
-            return self.serve_next_flow(now, rules, dropped);
+            return self.serve_next_of_several(now, rules, dropped);
         }
         // The newest packet counts from the beginning, so the longest queue may be its own. Without the newest packet the others are within the limit, or as
         // far beyond a limit that was made smaller as before.
@@ -260,7 +311,7 @@ impl<P, S: Default> Fifo<P, S> {
         if let Discipline::CoDel(codel) = &rules.bottleneck().discipline {
             while let DisciplineState::CoDel(state) = &mut self.discipline {
                 let (sojourn, left) = (now.saturating_duration_since(rules.offered(&packet)), rules.waiting(&self.sums, self.waiting.len()).0);
-                match state.verdict(codel, now, sojourn, left, rules.ecn_capable(&packet)) {
+                match state.verdict(codel, now, sojourn, left, rules.ecn(&packet).is_capable()) {
                     codel::Verdict::Send => break,
                     codel::Verdict::Mark => {
                         rules.mark(&mut packet);
@@ -311,32 +362,41 @@ impl<P, S: Default> Fifo<P, S> {
             (Discipline::FqCoDel(old), Discipline::FqCoDel(new)) => old.flows == new.flows,
             (old, new) => core::mem::discriminant(old) == core::mem::discriminant(new),
         };
-        if let (DisciplineState::Pie(state), Discipline::Pie(pie)) = (&mut self.discipline, old) {
-            // The old parameters apply up to `now`.
-            state.pass(pie, now);
+        // The old parameters apply up to `now`.
+        match (&mut self.discipline, old) {
+            (DisciplineState::Pie(state), Discipline::Pie(pie)) => state.pass(pie, now),
+            (DisciplineState::DualPi2(queues), Discipline::DualPi2(dualpi2)) => queues.pass(now, before, dualpi2),
+            _ => {}
         }
-        if !is_same && let DisciplineState::FqCoDel(flows) = core::mem::replace(&mut self.discipline, DisciplineState::new(new)) {
-            self.waiting.extend(flows.into_packets());
+        if !is_same {
+            core::mem::replace(&mut self.discipline, DisciplineState::new(new)).empty_into(&mut self.waiting);
         }
         // The sums are made anew, because the new framing changes the bits of every waiting packet.
         self.sums = S::default();
-        let Self { waiting, sums, discipline, .. } = self;
+        let Self { waiting, discipline, .. } = self;
         match (discipline, new) {
             (DisciplineState::FqCoDel(flows), Discipline::FqCoDel(fq_codel)) => {
                 for packet in waiting.drain(..) {
                     flows.push(rules, fq_codel, packet);
                 }
-                flows.packets().for_each(|packet| rules.add(sums, packet));
             }
-            _ => waiting.iter().for_each(|packet| rules.add(sums, packet)),
+            (DisciplineState::DualPi2(queues), Discipline::DualPi2(dualpi2)) => {
+                queues.retime(now, dualpi2);
+                for packet in waiting.drain(..) {
+                    queues.push(now, rules, dualpi2, packet);
+                }
+            }
+            _ => {}
         }
+        self.waiting.iter().for_each(|packet| rules.add(&mut self.sums, packet));
+        self.discipline.for_each(|packet| rules.add(&mut self.sums, packet));
         self.announce(now, rules);
     }
 
     /// Returns the packet in transmission and all waiting packets, in order, when a link loses its bottleneck.
-    pub(crate) fn dismantle(self) -> impl Iterator<Item = P> {
-        let of_flows = if let DisciplineState::FqCoDel(flows) = self.discipline { Some(flows.into_packets()) } else { None };
-        self.on_line.into_iter().map(|on_line| on_line.packet).chain(self.waiting).chain(of_flows.into_iter().flatten())
+    pub(crate) fn dismantle(mut self) -> impl Iterator<Item = P> {
+        self.discipline.empty_into(&mut self.waiting);
+        self.on_line.into_iter().map(|on_line| on_line.packet).chain(self.waiting)
     }
 
     /// Returns the queue with each packet converted to another type, under other rules.
@@ -349,18 +409,13 @@ impl<P, S: Default> Fifo<P, S> {
         // The new rules may need no sums, or different sums.
         let mut sums = R::Sums::default();
         waiting.iter().for_each(|packet| rules.add(&mut sums, packet));
-        if let DisciplineState::FqCoDel(flows) = &discipline {
-            flows.packets().for_each(|packet| rules.add(&mut sums, packet));
-        }
+        discipline.for_each(|packet| rules.add(&mut sums, packet));
         Fifo { waiting, sums, on_line, idle_since, discipline }
     }
 
     /// Returns the number of waiting packets.
     fn len(&self) -> usize {
-        match &self.discipline {
-            DisciplineState::FqCoDel(flows) => flows.len(),
-            DisciplineState::Nothing | DisciplineState::CoDel(_) | DisciplineState::Pie(_) | DisciplineState::Red(_) => self.waiting.len(),
-        }
+        self.discipline.len().unwrap_or(self.waiting.len())
     }
 
     /// Returns whether the queue is within its limit, the newest packet with `newest` bits (10⁻⁹ bit) included.
@@ -374,9 +429,9 @@ impl<P, S: Default> Fifo<P, S> {
     /// Returns whether the limit admits another packet.
     fn admits<R: Rules<P, Sums = S>>(&self, now: Instant, rules: &R, packet: &P) -> bool {
         let Some(limit) = rules.bottleneck().limit else { return true };
-        let (bytes, bits) = rules.waiting(&self.sums, self.waiting.len());
+        let (bytes, bits) = rules.waiting(&self.sums, self.len());
         let time = self.time_to_send(now, rules, limit, bits);
-        limit.admits(Waiting { packets: self.waiting.len() as u64, bytes, time }, rules.size(packet))
+        limit.admits(Waiting { packets: self.len() as u64, bytes, time }, rules.size(packet))
     }
 
     /// Returns the time of the rest of the packet in transmission and of `bits` (10⁻⁹ bit) after it, or zero if the limit is no time.
@@ -394,7 +449,7 @@ impl<P, S: Default> Fifo<P, S> {
         let (DisciplineState::Pie(state), Discipline::Pie(pie)) = (&mut self.discipline, &rules.bottleneck().discipline) else {
             return pie::Verdict::Pass;
         };
-        state.verdict(pie, now, bytes, rules.ecn_capable(packet), word)
+        state.verdict(pie, now, bytes, rules.ecn(packet).is_capable(), word)
     }
 
     /// Returns RED's verdict about an offered packet.
@@ -404,7 +459,7 @@ impl<P, S: Default> Fifo<P, S> {
         self.idle_since = now;
         let (bytes, _) = rules.waiting(&self.sums, self.waiting.len());
         let DisciplineState::Red(state) = &mut self.discipline else { return red::Verdict::Pass };
-        state.verdict(red, bytes, idle_packets(idle, rules.mean_packet(red)), rules.ecn_capable(packet), word)
+        state.verdict(red, bytes, idle_packets(idle, rules.mean_packet(red)), rules.ecn(packet).is_capable(), word)
     }
 
     /// Removes the oldest waiting packet.

@@ -130,7 +130,7 @@ impl<P> FlowQueues<P> {
                 rules.remove(sums, &packet);
                 *count -= 1;
                 let sojourn = now.saturating_duration_since(rules.offered(&packet));
-                match queue.codel.verdict(&fq_codel.codel, now, sojourn, rules.waiting(sums, *count).0, rules.ecn_capable(&packet)) {
+                match queue.codel.verdict(&fq_codel.codel, now, sojourn, rules.waiting(sums, *count).0, rules.ecn(&packet).is_capable()) {
                     Verdict::Drop => {
                         dropped(DropCause::CoDel, packet);
                         continue;

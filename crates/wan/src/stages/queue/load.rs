@@ -54,7 +54,7 @@ mod tests {
     use cohaptic_units::{Probability, Rate};
 
     use super::*;
-    use crate::stages::queue::{CoDel, FqCoDel, Framing, Peak, Pie, QueueLimit, Red};
+    use crate::stages::queue::{CoDel, DualPi2, FqCoDel, Framing, Peak, Pie, QueueLimit, Red};
 
     /// Returns a load of 64 bytes, which take 512 µs at 1 Mbit/s.
     fn load(micros: u64) -> Load {
@@ -75,6 +75,7 @@ mod tests {
             Discipline::CoDel(CoDel::default()),
             Discipline::FqCoDel(FqCoDel::default()),
             Discipline::Pie(Pie::default()),
+            Discipline::DualPi2(DualPi2::default()),
             red(1),
         ] {
             assert_eq!(line(discipline).time_without_wait(load(512)), Some(Duration::from_micros(512)), "{discipline:?}");

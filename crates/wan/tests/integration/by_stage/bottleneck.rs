@@ -1,16 +1,21 @@
 //! The bottleneck: a line that takes bit after bit, or on a recorded line byte after byte, and a queue whose rules are those of the papers: RED by the
-//! text of Floyd & Jacobson (1993), CoDel by the pseudocode of RFC 8289, FQ-CoDel by the text of RFC 8290. PIE does nothing in the microseconds of these
-//! scripts; [`queue_laws`](crate::queue_laws) has its model.
+//! text of Floyd & Jacobson (1993), CoDel by the pseudocode of RFC 8289, FQ-CoDel by the text of RFC 8290, DualPI2 by the pseudocode of RFC 9332. PIE does
+//! nothing in the microseconds of these scripts; [`queue_laws`](crate::queue_laws) has its model.
+
+mod codel;
+mod dualpi2;
 
 use std::collections::BTreeMap;
 
 use cohaptic_units::Bytes;
 use cohaptic_wan::random::Purpose;
-use cohaptic_wan::{Bottleneck, CoDel, DeliveryTrace, Discipline, DropCause, FqCoDel, Framing, LinkConfig, Pie, QueueLimit, Red, Service};
+use cohaptic_wan::{Bottleneck, DeliveryTrace, Discipline, DropCause, Framing, LinkConfig, Pie, QueueLimit, Red, Service};
 use proptest::prelude::*;
 
-use super::{Act, Packet, Said, Script, delivered, draws, dropped, flow, said, script, sorted};
-use crate::any_link::{codel, fq_codel, framing, limit};
+use self::codel::Control;
+use self::dualpi2::Coupled;
+use super::{Act, Packet, Said, Script, delivered, draws, dropped, said, script, sorted};
+use crate::any_link::{codel, dualpi2, fq_codel, framing, limit};
 use crate::random_links::{BYTE_A_MICROSECOND, cases, rate};
 
 /// 10⁻⁹ bit.
@@ -92,16 +97,7 @@ struct Line {
     /// FQ-CoDel: the two lists of queues with their rest of the turn \[bytes\].
     new: Vec<(u32, i64)>,
     old: Vec<(u32, i64)>,
-}
-
-/// CoDel, in the names of RFC 8289.
-#[derive(Clone, Copy, Default)]
-struct Control {
-    first_above_time: Option<u64>,
-    drop_next: u64,
-    count: u64,
-    lastcount: u64,
-    dropping: bool,
+    coupled: Coupled,
 }
 
 fn on_the_line(framing: Framing, size: u64) -> u128 {
@@ -130,16 +126,8 @@ impl Line {
             controls: BTreeMap::new(),
             new: Vec::new(),
             old: Vec::new(),
+            coupled: Coupled::default(),
         }
-    }
-
-    /// Number of the queue of a packet.
-    fn number(&self, packet: Packet) -> u32 {
-        if let Discipline::FqCoDel(fq_codel) = self.config.bottleneck.discipline { flow(packet.number) % fq_codel.flows.get() } else { 0 }
-    }
-
-    fn control(&mut self, number: u32) -> &mut Control {
-        self.controls.entry(number).or_default()
     }
 
     fn bytes(&self) -> u64 {
@@ -201,6 +189,7 @@ impl Line {
         let next = match self.config.bottleneck.discipline {
             Discipline::CoDel(codel) => self.deque(&codel, 0, now),
             Discipline::FqCoDel(fq_codel) => self.deque_in_turn(&fq_codel, now),
+            Discipline::DualPi2(dualpi2) => self.dualpi2_dequeue(&dualpi2, now),
             _ => self.pop(0),
         };
         match next {
@@ -210,159 +199,6 @@ impl Line {
                 self.sending = Some(Sending { queued, left, since: now });
             }
         }
-    }
-
-    /// The oldest packet of a queue.
-    fn pop(&mut self, number: u32) -> Option<Queued> {
-        let place = self.queue.iter().position(|queued| self.number(queued.packet) == number)?;
-        Some(self.queue.remove(place))
-    }
-
-    /// RFC 8290, section 4.2.
-    fn deque_in_turn(&mut self, fq_codel: &FqCoDel, now: u64) -> Option<Queued> {
-        loop {
-            let is_new = !self.new.is_empty();
-            let list = if is_new { &mut self.new } else { &mut self.old };
-            let (number, credit) = *list.first()?;
-            if credit <= 0 {
-                list.remove(0);
-                self.old.push((number, credit + i64::from(fq_codel.quantum.get())));
-                continue;
-            }
-            let packet = self.deque(&fq_codel.codel, number, now);
-            let list = if is_new { &mut self.new } else { &mut self.old };
-            match packet {
-                Some(queued) => {
-                    list[0].1 -= i64::try_from(queued.packet.size).unwrap();
-                    return Some(queued);
-                }
-                None => {
-                    list.remove(0);
-                    if is_new && !self.old.is_empty() {
-                        self.old.push((number, credit));
-                    }
-                }
-            }
-        }
-    }
-
-    /// Puts the queue of a packet into the list of new ones, unless it is in a list.
-    fn lists(&mut self, fq_codel: &FqCoDel, packet: Packet) {
-        let number = self.number(packet);
-        if self.new.iter().chain(&self.old).all(|(listed, _)| *listed != number) {
-            self.new.push((number, fq_codel.quantum.get().into()));
-        }
-    }
-
-    /// RFC 8290, section 4.1, and Linux: drops half of the bytes of the longest queue from its head. Scripts are too short for the 64 packets.
-    fn drop_from_longest(&mut self, now: u64) {
-        let mut bytes: BTreeMap<u32, u64> = BTreeMap::new();
-        for queued in &self.queue {
-            *bytes.entry(self.number(queued.packet)).or_default() += queued.packet.size;
-        }
-        let most = *bytes.values().max().unwrap();
-        let number = *bytes.iter().find(|(_, bytes)| **bytes == most).unwrap().0;
-        let mut gone = 0;
-        while let Some(queued) = self.pop(number) {
-            self.control(number).count += 1;
-            self.said.push(dropped(queued.packet, now, DropCause::QueueFull, queued.marked));
-            gone += queued.packet.size;
-            if gone >= most / 2 {
-                return;
-            }
-        }
-    }
-
-    fn offer_to_flow(&mut self, fq_codel: &FqCoDel, now: u64, packet: Packet) {
-        self.lists(fq_codel, packet);
-        self.queue.push(Queued { packet, came: now, marked: false });
-        if self.sending.is_none() {
-            return self.send_next(now);
-        }
-        loop {
-            let Some(place) = self.queue.iter().position(|queued| queued.packet.number == packet.number) else { return };
-            // As full as it is for the newest packet, which is not one of those before it.
-            let newest = self.queue.remove(place);
-            let is_full = self.is_full(now, packet.size);
-            self.queue.insert(place, newest);
-            if !is_full {
-                return;
-            }
-            self.drop_from_longest(now);
-        }
-    }
-
-    /// RFC 8289, section 5.5: the packet, and whether it may be dropped.
-    fn dodequeue(&mut self, codel: &CoDel, number: u32, now: u64) -> Option<(Queued, bool)> {
-        let Some(p) = self.pop(number) else {
-            self.control(number).first_above_time = None;
-            return None;
-        };
-        let bytes = self.bytes();
-        let control = self.control(number);
-        let mut ok_to_drop = false;
-        let sojourn_time = now - p.came;
-        if u128::from(sojourn_time) < codel.target.as_nanos() || bytes <= codel.mtu.get() {
-            control.first_above_time = None;
-        } else {
-            match control.first_above_time {
-                None => control.first_above_time = Some(now + u64::try_from(codel.interval.as_nanos()).unwrap()),
-                Some(first_above_time) => ok_to_drop = now >= first_above_time,
-            }
-        }
-        Some((p, ok_to_drop))
-    }
-
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "microseconds")]
-    fn control_law(codel: &CoDel, t: u64, count: u64) -> u64 {
-        t + (codel.interval.as_nanos() as f64 / (count as f64).sqrt()).round_ties_even() as u64
-    }
-
-    /// Pseudo-code of RFC 8289, section 5.6. An ECN-capable packet that would be dropped is marked and sent, as in Linux.
-    fn deque(&mut self, codel: &CoDel, number: u32, now: u64) -> Option<Queued> {
-        let mut r = self.dodequeue(codel, number, now);
-        let marks = |p: &Queued| codel.ecn && p.packet.ecn_capable;
-        if self.control(number).dropping {
-            if !r.is_some_and(|(_, ok_to_drop)| ok_to_drop) {
-                self.control(number).dropping = false;
-            }
-            while now >= self.control(number).drop_next && self.control(number).dropping {
-                let (mut p, _) = r.unwrap();
-                self.control(number).count += 1;
-                if marks(&p) {
-                    p.marked = true;
-                    let control = self.control(number);
-                    control.drop_next = Self::control_law(codel, control.drop_next, control.count);
-                    return Some(p);
-                }
-                self.said.push(dropped(p.packet, now, DropCause::CoDel, p.marked));
-                r = self.dodequeue(codel, number, now);
-                if r.is_some_and(|(_, ok_to_drop)| ok_to_drop) {
-                    let control = self.control(number);
-                    control.drop_next = Self::control_law(codel, control.drop_next, control.count);
-                } else {
-                    self.control(number).dropping = false;
-                }
-            }
-        } else if let Some((mut p, true)) = r {
-            if marks(&p) {
-                p.marked = true;
-                r = Some((p, true));
-            } else {
-                self.said.push(dropped(p.packet, now, DropCause::CoDel, p.marked));
-                r = self.dodequeue(codel, number, now);
-            }
-            self.control(number).dropping = true;
-            let control = self.control(number);
-            let delta = control.count - control.lastcount;
-            // Before the first drop there is no control that it could go on with.
-            let recently =
-                control.lastcount > 0 && i128::from(now) - i128::from(control.drop_next) < 16 * i128::try_from(codel.interval.as_nanos()).unwrap();
-            control.count = if delta > 1 && recently { delta } else { 1 };
-            control.drop_next = Self::control_law(codel, now, control.count);
-            control.lastcount = control.count;
-        }
-        r.map(|(p, _)| p)
     }
 
     /// Floyd & Jacobson, sections 4 and 7 (method 2); after an idle time the average is what it would be after so many empty packets' times, and
@@ -399,7 +235,7 @@ impl Line {
         let pa = if self.unhit * pb < 1.0 { (pb / (1.0 - self.unhit * pb)).min(1.0) } else { 1.0 };
         if draws(packet.number, 0).draws(Purpose::Queue).next_unit() < pa {
             self.unhit = 0.0;
-            Some(words.ecn && packet.ecn_capable)
+            Some(words.ecn && packet.ecn.is_capable())
         } else {
             self.unhit += 1.0;
             None
@@ -444,6 +280,9 @@ impl Line {
         if let Discipline::FqCoDel(fq_codel) = self.config.bottleneck.discipline {
             return self.offer_to_flow(&fq_codel, now, packet);
         }
+        if let Discipline::DualPi2(dualpi2) = self.config.bottleneck.discipline {
+            self.dualpi2_update(&dualpi2, now);
+        }
         let mut queued = Queued { packet, came: now, marked: false };
         if let Some(words) = words {
             match self.red(words, now, packet) {
@@ -481,12 +320,16 @@ impl Line {
             (std::mem::discriminant(&config.bottleneck.discipline), flows)
         };
         let is_same = kind(&self.config) == kind(&config);
+        if let Discipline::DualPi2(dualpi2) = self.config.bottleneck.discipline {
+            self.dualpi2_update(&dualpi2, now);
+        }
         self.config = config;
         if !is_same {
             (self.avg, self.unhit) = (0.0, 0.0);
             self.controls.clear();
             self.new.clear();
             self.old.clear();
+            self.coupled = Coupled::begun(now);
             if let Discipline::FqCoDel(fq_codel) = self.config.bottleneck.discipline {
                 self.queue.clone().into_iter().for_each(|queued| self.lists(&fq_codel, queued.packet));
             }
@@ -588,6 +431,13 @@ proptest! {
     }
 
     #[test]
+    fn dualpi2_by_the_pseudocode_of_the_rfc(
+        script in script(plain(config(prop_oneof![5 => rates(), 1 => recorded()].boxed(), dualpi2().prop_map(Discipline::DualPi2).boxed()))),
+    ) {
+        prop_assert_eq!(said(&script, link), model(&script));
+    }
+
+    #[test]
     fn red_by_the_text_of_the_paper(script in script(with_red())) {
         prop_assert_eq!(said(&script, link), model(&script));
     }
@@ -597,6 +447,7 @@ proptest! {
         plain(config(rates(), queues())),
         plain(config(rates(), codel().prop_map(Discipline::CoDel).boxed())),
         plain(config(rates(), fq_codel().prop_map(Discipline::FqCoDel).boxed())),
+        plain(config(rates(), dualpi2().prop_map(Discipline::DualPi2).boxed())),
         with_red(),
     ].boxed())) {
         prop_assert_eq!(said(&script, link), model(&script));

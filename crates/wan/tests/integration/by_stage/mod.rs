@@ -13,7 +13,7 @@ mod token_bucket;
 
 use std::time::Duration;
 
-use cohaptic_units::Instant;
+use cohaptic_units::{Ecn, Instant};
 use cohaptic_wan::random::{PacketDraws, Stream};
 use cohaptic_wan::{Chance, DropCause, Fate, FateLog, LinkConfig, PacketEvent, PacketInfo};
 use proptest::collection::vec;
@@ -38,7 +38,7 @@ struct Packet {
     number: u64,
     /// Size \[bytes\].
     size: u64,
-    ecn_capable: bool,
+    ecn: Ecn,
 }
 
 /// Operations with their instants \[ns\].
@@ -59,9 +59,9 @@ fn script<C: Clone + std::fmt::Debug + 'static>(config: BoxedStrategy<C>) -> Box
                 now += gap;
                 let act = match act {
                     Err(config) => Act::Change(config),
-                    Ok(PacketInfo { size, ecn_capable }) => {
+                    Ok(PacketInfo { size, ecn }) => {
                         number += 1;
-                        Act::Offer(Packet { number: number - 1, size: size.get(), ecn_capable })
+                        Act::Offer(Packet { number: number - 1, size: size.get(), ecn })
                     }
                 };
                 script.push((u64::try_from(now.as_nanos()).unwrap(), act));
@@ -78,7 +78,7 @@ fn events<C: Clone>(script: &Script<C>, link: impl Fn(C) -> LinkConfig) -> Vec<P
     for (now, act) in &script[1..] {
         match act {
             Act::Offer(packet) => {
-                let info = PacketInfo { size: cohaptic_units::Bytes::new(packet.size), ecn_capable: packet.ecn_capable };
+                let info = PacketInfo { size: cohaptic_units::Bytes::new(packet.size), ecn: packet.ecn };
                 subject.handle_packet(at(*now), info, packet.number).unwrap();
             }
             Act::Change(config) => subject.set_model(at(*now), link(config.clone())).unwrap(),
