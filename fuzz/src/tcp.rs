@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 use std::time::Duration;
 
-use cohaptic_tcp::{Connection, Ecn, Error, Flags, Keepalive, Segment, TcpConfig};
+use cohaptic_tcp::{CongestionControl, Connection, Ecn, Error, Flags, Keepalive, Segment, TcpConfig};
 use cohaptic_units::Instant;
 
 use crate::Input;
@@ -54,7 +54,9 @@ fn config(setup: u8) -> TcpConfig {
     let base = if setup & 1 == 0 { TcpConfig::default() } else { TcpConfig::textbook() };
     let keepalive = (setup & 2 == 2).then(Keepalive::default);
     let receive_buffer = [None, Some(5000), Some(100_000), Some(1)][usize::from(setup >> 2 & 3)];
-    TcpConfig { keepalive, receive_buffer, ecn: setup & 16 == 16, nodelay: setup & 32 == 32, mtu: if setup & 64 == 64 { 300 } else { 1500 }, ..base }
+    let congestion = if setup & 128 == 128 { CongestionControl::Dctcp } else { base.congestion };
+    let mtu = if setup & 64 == 64 { 300 } else { 1500 };
+    TcpConfig { keepalive, receive_buffer, ecn: setup & 16 == 16, nodelay: setup & 32 == 32, mtu, congestion, ..base }
 }
 
 /// The first two bytes choose the configuration of the ends, and the rest are what happens to them.

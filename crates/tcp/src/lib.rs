@@ -9,7 +9,8 @@
 //! and [`Connection::close`]. [`Segment::to_packet`] writes a real IP packet, [`Segment::parse`] reads a real IP packet. [`TcpConfig`] holds every constant.
 //!
 //! The crate implements RFC 9293 (TCP), 5961 (resets with an inexact sequence number), 7323 (timestamps, large windows), 6298 (timeouts), 5681 and 6582
-//! (Reno, NewReno), 2018, 2883 and 6675 (selective acknowledgements), 6937 (rate reduction), 8985 (RACK-TLP), 9438 (CUBIC, with `HyStart`) and 3168 (ECN).
+//! (Reno, NewReno), 2018, 2883 and 6675 (selective acknowledgements), 6937 (rate reduction), 8985 (RACK-TLP), 9438 (CUBIC, with `HyStart`), 3168 (ECN) and 8257
+//! (DCTCP, with differences from Linux that [`CongestionControl::Dctcp`] names).
 //! Where an RFC leaves a choice, the crate chooses as Linux does. The crate leaves out urgent data, ICMP, path MTU discovery, Fast Open, pacing and F-RTO.
 //! Listeners belong to the owner of the connections, because the owner knows the ports: the owner makes a connection of a SYN with
 //! [`Connection::accept`], and counts the connections that no program has accepted yet.

@@ -27,7 +27,7 @@ pub struct TcpConfig {
     pub tail_loss_probe: bool,
     /// `true` if the SYN offers timestamps (RFC 7323). Default on.
     pub timestamps: bool,
-    /// `true` if the SYN asks for explicit congestion notification (RFC 3168), and an answer to a SYN grants it. Default off.
+    /// `true` if the SYN asks for explicit congestion notification (RFC 3168), and an answer to a SYN grants it. Default off. DCTCP always asks.
     pub ecn: bool,
     /// Condition under which a connection with `ecn` continues without ECN, because a middlebox may drop or refuse a SYN with ECN. Default: when a SYN
     /// is lost.
@@ -94,6 +94,16 @@ pub enum CongestionControl {
     Cubic,
     /// Reno (RFC 5681). Without selective acknowledgements, recovery follows NewReno (RFC 6582).
     Reno,
+    /// DCTCP (RFC 8257), a scalable congestion control: the window shrinks by half of the share of marked segments, once a round. Losses and growth are
+    /// those of Reno. Needs ECN, and asks for ECN whatever [`TcpConfig::ecn`] says; without ECN it is Reno.
+    ///
+    /// All segments carry ECT(1), as TCP Prague sends, so that a queue with two classes knows the sender as scalable (RFC 9331); `dctcp` of Linux sends ECT(0).
+    /// The window grows with unmarked segments in the round of a reduction too, as with TCP Prague; `dctcp` of Linux lets it rest for this round.
+    ///
+    /// The receiver of the data must have DCTCP as well. It then reports the mark of each segment (RFC 8257, section 3.2): ECE is set while arriving segments
+    /// are marked, and each change is acknowledged at once. A receiver of RFC 3168 repeats ECE until the sender has answered, so the sender would see a whole round
+    /// as marked. Accurate ECN (RFC 9768) is not implemented.
+    Dctcp,
 }
 
 /// Condition under which a SYN without ECN follows a SYN with ECN (RFC 3168, section 6.1.1.1).
@@ -185,6 +195,11 @@ impl TcpConfig {
             receive_buffer: Some(6 << 20),
             ..Self::default()
         }
+    }
+
+    /// Returns whether a SYN asks for ECN, and an answer to a SYN grants it.
+    pub(crate) fn wants_ecn(&self) -> bool {
+        self.ecn || self.congestion == CongestionControl::Dctcp
     }
 
     /// Returns the octets that an IP packet of the MTU leaves for TCP options and payload together.

@@ -2,6 +2,7 @@
 //! the next flight.
 
 mod cubic;
+mod dctcp;
 mod hystart;
 mod reduction;
 
@@ -12,6 +13,7 @@ use cohaptic_units::Instant;
 use crate::config::{CongestionControl, TcpConfig};
 use crate::sequence::Position;
 use cubic::Cubic;
+use dctcp::Dctcp;
 pub(crate) use hystart::RoundTrip;
 pub(crate) use reduction::Reduction;
 
@@ -27,8 +29,10 @@ pub(crate) struct Congestion {
     pub(crate) threshold: u32,
     /// Number of segments acknowledged since the last increase in congestion avoidance.
     count: u32,
-    /// State of CUBIC. `None` with Reno.
+    /// State of CUBIC. `None` with Reno and DCTCP.
     cubic: Option<Cubic>,
+    /// State of DCTCP. `None` with Reno and CUBIC.
+    dctcp: Option<Dctcp>,
     /// Initial window \[segments\].
     initial: u32,
     /// `true` if the window, and not the program, held back data in the last flight.
@@ -42,8 +46,9 @@ pub(crate) struct Congestion {
 impl Congestion {
     pub(crate) fn new(config: &TcpConfig) -> Self {
         let cubic = (config.congestion == CongestionControl::Cubic).then(|| Cubic::new(config.hystart));
+        let dctcp = (config.congestion == CongestionControl::Dctcp).then(Dctcp::new);
         let window = config.initial_window;
-        Self { window, threshold: UNBOUNDED, count: 0, cubic, initial: window, is_limiting: false, most_out: 0, usage_end: 0 }
+        Self { window, threshold: UNBOUNDED, count: 0, cubic, dctcp, initial: window, is_limiting: false, most_out: 0, usage_end: 0 }
     }
 
     pub(crate) const fn is_slow_start(&self) -> bool {
@@ -57,6 +62,25 @@ impl Congestion {
             Some(cubic) => cubic.reduced(self.window),
             None => (self.window / 2).max(2),
         }
+    }
+
+    /// Returns whether the window answers to the share of marked segments (DCTCP), and not to the first mark of a round as to a loss.
+    pub(crate) const fn is_scalable(&self) -> bool {
+        self.dctcp.is_some()
+    }
+
+    /// Takes an acknowledgement for the estimate of the share of marked segments; see [`Dctcp::hear`].
+    pub(crate) fn hear(&mut self, una: Position, next: Position, delivered: u32, is_marked: bool) {
+        if let Some(dctcp) = &mut self.dctcp {
+            dctcp.hear(una, next, delivered, is_marked);
+        }
+    }
+
+    /// Shrinks the window by the share of marked segments, and ends slow start. Returns whether this is the first mark of its round; later ones change nothing.
+    pub(crate) fn shrink_by_share(&mut self, una: Position, next: Position) -> bool {
+        let Some(window) = self.dctcp.as_mut().and_then(|dctcp| dctcp.reduced(self.window, una, next)) else { return false };
+        (self.window, self.threshold) = (window, window);
+        true
     }
 
     /// Sets the window after a timeout, to at least one segment, and drops the state of CUBIC.

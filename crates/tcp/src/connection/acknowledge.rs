@@ -83,8 +83,12 @@ impl Connection {
         if has_advanced {
             (self.counters.retries, self.counters.stalled_since) = (0, None);
         }
+        let arrived = |end: &Self| u32::try_from(end.send.delivered - delivered).unwrap_or(u32::MAX);
+        // The estimate comes first, because a reduction uses the share of marks with this acknowledgement.
+        let (una, next, heard) = (self.send.una, self.send.next, arrived(self));
+        self.congestion.hear(una, next, heard, ack.tells_mark);
         self.recover(now, &ack, has_widened, segment.sequence_length() > 0);
-        let delivered = u32::try_from(self.send.delivered - delivered).unwrap_or(u32::MAX);
+        let delivered = arrived(self);
         self.adapt_window(now, &ack, delivered, self.send.board.losses > losses);
         self.expand_send_buffer();
         true
@@ -191,9 +195,11 @@ impl Connection {
 
     /// Changes the congestion window after an acknowledgement with which `delivered` segments arrived. `has_lost` says that a segment was found lost.
     fn adapt_window(&mut self, now: Instant, ack: &Ack, delivered: u32, has_lost: bool) {
+        // Marked segments do not let the window grow. With other algorithms than DCTCP a mark begins a reduction, in which nothing grows.
+        let is_held = ack.tells_mark && self.is_scalable();
         if matches!(self.recovery.phase, CaState::Cwr | CaState::Recovery) {
             self.reduce_window(delivered, ack.has_advanced, has_lost);
-        } else if ack.has_advanced || (ack.news.has_sacked && self.rack.degree > DUPLICATES) {
+        } else if !is_held && (ack.has_advanced || (ack.news.has_sacked && self.rack.degree > DUPLICATES)) {
             // On a path with strong reordering, segments that arrive out of order are no sign of loss, so the window grows with them as well.
             self.congestion.grow(now, delivered);
         }

@@ -27,13 +27,20 @@ impl Connection {
             Flags::SYN.with_if(Flags::ECE | Flags::CWR, self.asks_for_ecn())
         };
         let acknowledgement = if has_come { on_wire(self.receive.next) } else { 0 };
-        Segment { sequence: on_wire(self.send.first), acknowledgement, window: self.receive.first_window, options, ..self.empty(flags) }
+        let syn = Segment { sequence: on_wire(self.send.first), acknowledgement, window: self.receive.first_window, options, ..self.empty(flags) };
+        // A SYN without ECN, after a lost SYN, has no codepoint either.
+        if flags.has(Flags::ECE) { syn } else { Segment { ecn: Ecn::NotCapable, ..syn } }
     }
 
     /// Returns whether the next SYN asks for ECN. If the next SYN does not ask but the answer grants ECN, the answer belongs to an earlier SYN. The connection
     /// then uses ECN, as in Linux.
     pub(super) fn asks_for_ecn(&self) -> bool {
         self.send.has_ecn && (self.counters.retries == 0 || self.config.ecn_fallback == EcnFallback::Never)
+    }
+
+    /// Returns whether this end answers to the share of marked segments, and reports the mark of each segment.
+    pub(super) const fn is_scalable(&self) -> bool {
+        self.send.has_ecn && self.congestion.is_scalable()
     }
 
     /// Returns a segment at the next position without data and options, and with a window of zero.
@@ -46,7 +53,7 @@ impl Connection {
             flags,
             window: 0,
             options: Options::default(),
-            ecn: Ecn::NotCapable,
+            ecn: if self.is_scalable() { Ecn::Capable1 } else { Ecn::NotCapable },
             ttl: self.config.ttl,
             payload: Payload::default(),
         }

@@ -24,7 +24,7 @@ impl Connection {
             self.replies.extend(segment.refusal(self.config.ttl));
             return;
         }
-        self.note_marks(segment);
+        self.note_marks(now, segment);
         self.hear_echo(now, segment);
         // The whole segment has arrived before: the acknowledgement was lost, or the segment was sent again too early.
         let segment_end = data_end + u64::from(has_fin);
@@ -112,9 +112,12 @@ impl Connection {
     }
 
     /// Notes marks of congestion on arriving data, and the peer's answer to reported marks (RFC 3168, section 6.1.3).
-    fn note_marks(&mut self, segment: &Segment<'_>) {
+    fn note_marks(&mut self, now: Instant, segment: &Segment<'_>) {
         if !self.send.has_ecn {
             return;
+        }
+        if self.is_scalable() {
+            return self.mirror_mark(now, segment.ecn == Ecn::Congestion);
         }
         // CWR comes first: a segment may have CWR and a new mark, which must be reported again.
         if segment.flags.has(Flags::CWR) {
@@ -124,6 +127,21 @@ impl Connection {
             self.send.tells_mark = true;
             self.receive.ack_now = true;
         }
+    }
+
+    /// Lets acknowledgements report the mark of the arriving segment (RFC 8257, section 3.2). A change is reported at once, so that each acknowledgement covers
+    /// segments that are all marked or all unmarked.
+    fn mirror_mark(&mut self, now: Instant, is_marked: bool) {
+        if is_marked == self.send.tells_mark {
+            return;
+        }
+        // A delayed acknowledgement is due for segments of the state before. It leaves first, without the arriving segment.
+        if self.receive.ack_at.is_some() {
+            let acknowledgement = self.build(now, self.send.next, self.send.next);
+            self.replies.push_back(acknowledgement);
+        }
+        self.send.tells_mark = is_marked;
+        self.receive.ack_now = true;
     }
 
     /// Handles the peer's FIN, now that all data before it has arrived.

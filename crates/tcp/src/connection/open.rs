@@ -82,7 +82,7 @@ impl Connection {
             is_shut: false,
             last_data_at: now,
             delivered: 0,
-            has_ecn: config.ecn,
+            has_ecn: config.wants_ecn(),
             tells_mark: false,
             tells_reduction: false,
         };

@@ -147,7 +147,7 @@ impl Connection {
             self.recovery.again_at = None;
         }
         if ack.tells_mark {
-            self.enter_reduced();
+            self.answer_mark();
         }
         if self.recovery.phase == CaState::Cwr {
             return;
@@ -186,6 +186,16 @@ impl Connection {
             self.recovery.undo_from = None;
             self.begin_reduction();
             self.recovery.phase = CaState::Cwr;
+        }
+    }
+
+    /// Reduces the window because of a mark. With a scalable congestion control the window shrinks by the share of marked segments, in no phase of its own, and
+    /// goes on to grow with the unmarked ones.
+    fn answer_mark(&mut self) {
+        if !self.is_scalable() {
+            self.enter_reduced();
+        } else if self.recovery.phase < CaState::Cwr && self.congestion.shrink_by_share(self.send.una, self.send.next) {
+            self.send.tells_reduction = true;
         }
     }
 

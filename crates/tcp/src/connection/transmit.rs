@@ -148,7 +148,8 @@ impl Connection {
             self.set_retransmission_timer(now, was_empty);
         }
         self.set_tail_timer(now, false);
-        if self.send.has_ecn && has_data {
+        // With a scalable congestion control, every segment has a codepoint already.
+        if self.send.has_ecn && has_data && !segment.ecn.is_capable() {
             segment.ecn = Ecn::Capable0;
         }
         segment.flags = segment.flags.with_if(Flags::PSH, pushes || (has_data && is_last && has_several));

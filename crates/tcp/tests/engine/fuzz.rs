@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cohaptic_tcp::{Connection, Ecn, Error, Flags, Options, SackBlocks, Segment, TcpConfig};
+use cohaptic_tcp::{CongestionControl, Connection, Ecn, Error, Flags, Options, SackBlocks, Segment, TcpConfig};
 use cohaptic_units::Instant;
 use proptest::prelude::*;
 
@@ -210,12 +210,13 @@ proptest! {
     }
 
     #[test]
-    fn any_segments_do_no_harm(shots in prop::collection::vec(any_shot(), 1..60), kind in 0usize..4) {
+    fn any_segments_do_no_harm(shots in prop::collection::vec(any_shot(), 1..60), kind in 0usize..5) {
         let configs = [
             TcpConfig::default(),
             TcpConfig::textbook(),
             TcpConfig { ecn: true, rack: false, receive_buffer: Some(5000), ..TcpConfig::default() },
             TcpConfig { receive_buffer: Some(100_000), timestamps: false, keepalive: Some(Default::default()), ..TcpConfig::default() },
+            TcpConfig { congestion: CongestionControl::Dctcp, ..TcpConfig::default() },
         ];
         fire(configs[kind].clone(), shots);
     }
@@ -225,7 +226,7 @@ proptest! {
         (delay, jitter, loss, duplicate) in (0u32..80, 0u32..30, 0u32..25, 0u32..20),
         seed in any::<u64>(),
         (there, back) in (0u64..60_000, 0u64..60_000),
-        kind in 0usize..4,
+        kind in 0usize..5,
     ) {
         let jitter = jitter.min(delay);
         let words = format!("delay {delay}ms {jitter}ms loss {loss}% duplicate {duplicate}%");
@@ -234,11 +235,18 @@ proptest! {
             TcpConfig::textbook(),
             TcpConfig { rack: false, receive_buffer: Some(8000), nodelay: true, ..TcpConfig::default() },
             TcpConfig { sack: false, ecn: true, ..TcpConfig::default() },
+            TcpConfig { congestion: CongestionControl::Dctcp, ..TcpConfig::default() },
         ];
         let mut world = World::new(&words, seed)
             .config(&configs[kind])
-            .programs(Program::writes(there).and_shuts(), Program::writes(back).and_shuts())
-            .connect();
+            .programs(Program::writes(there).and_shuts(), Program::writes(back).and_shuts());
+        // Marks at random places, by a generator that needs no state but a number.
+        let mut state = seed;
+        world.marks = Box::new(move |_, _| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            state >> 62 == 0
+        });
+        let mut world = world.connect();
         world.run_until(Instant::from_nanos(1_000_000_000_000_000));
         let failures: Vec<(usize, Error)> = (0..2).filter_map(|side| Some((side, world.failure(side)?))).collect();
         for (side, error) in &failures {

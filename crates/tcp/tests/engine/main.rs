@@ -8,6 +8,8 @@
 )]
 
 mod buffers;
+mod dctcp;
+mod dualpi2;
 mod fuzz;
 mod recovery;
 mod rows;

@@ -135,7 +135,8 @@ fn a_mark_halves_the_window_and_loses_nothing() {
     let config = TcpConfig { ecn: true, ..TcpConfig::default() };
     let mut world = World::new("delay 50ms", 1).config(&config).programs(Program::default(), Program::writes(500_000)).logged().connect();
     world.run_until(millis(480));
-    world.marks = true;
+    let mut is_first = true;
+    world.marks = Box::new(move |_, _| std::mem::take(&mut is_first));
     world.run_to_the_last_octet(Duration::from_secs(60));
     let info = world.ends[1].as_ref().unwrap().info();
     assert_eq!((info.retransmissions, info.recoveries), (0, 0));

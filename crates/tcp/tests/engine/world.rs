@@ -76,7 +76,8 @@ pub(crate) struct World {
     pub(crate) is_encoded: bool,
     /// `true` if every octet read is compared with [`octet`], and every packet with its parsed segment.
     pub(crate) is_checked: bool,
-    pub(crate) marks: bool,
+    /// Returns `true` for a segment with ECN that is marked on the way, given its sending end.
+    pub(crate) marks: Filter,
     links: [Link<Packet>; 2],
     chunk: Vec<u8>,
 }
@@ -113,7 +114,7 @@ impl World {
             drops: Box::new(|_, _| false),
             is_encoded: true,
             is_checked: true,
-            marks: false,
+            marks: Box::new(|_, _| false),
             chunk: vec![0; 16_384],
             links: [Link::new(seed, &LinkName::between("client", "server"), there), Link::new(seed, &LinkName::between("server", "client"), back)],
         }
@@ -176,9 +177,8 @@ impl World {
         if (self.drops)(side, &segment) {
             return;
         }
-        if self.marks && segment.ecn == Ecn::Capable0 {
+        if segment.ecn.is_capable() && (self.marks)(side, &segment) {
             segment.ecn = Ecn::Congestion;
-            self.marks = false;
         }
         let size = segment.packet_length();
         let packet = if self.is_encoded {

@@ -185,6 +185,7 @@ impl Stage {
         let config = &mut self.config;
         match (name, value) {
             ("tcp_congestion_control", "cubic") => config.congestion = cohaptic_tcp::CongestionControl::Cubic,
+            ("tcp_congestion_control", "dctcp") => config.congestion = cohaptic_tcp::CongestionControl::Dctcp,
             ("tcp_congestion_control", "reno") => config.congestion = cohaptic_tcp::CongestionControl::Reno,
             _ if value.parse::<u32>().is_err() => return None,
             ("tcp_sack", _) => config.sack = number > 0,

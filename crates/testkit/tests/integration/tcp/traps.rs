@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use cohaptic_testkit::tcp::TcpConfig;
-use cohaptic_testkit::units::Probability;
-use cohaptic_testkit::wan::{Chance, Checksum, Corruption, Flips, LinkConfig};
+use cohaptic_testkit::tcp::{CongestionControl, TcpConfig};
+use cohaptic_testkit::units::{Probability, Rate};
+use cohaptic_testkit::wan::{Bottleneck, Chance, Checksum, Corruption, Delay, Discipline, DualPi2, Flips, LinkConfig};
 use cohaptic_testkit::{Bed, Happening, Lost, Testbed, time};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 
@@ -83,6 +83,31 @@ fn marks_slow_a_sender_down_that_asks_for_them() {
     let (with, without) = (marked(true), marked(false));
     assert!(with.0 > 0 && with.1, "{with:?}");
     assert_eq!(without.0, 0);
+}
+
+/// The queue of DualPI2 for scalable senders marks what has waited a millisecond, and the sender keeps its round trip at 20 ms and a little more.
+#[test]
+fn a_scalable_sender_keeps_the_queue_short_and_loses_nothing() {
+    let rate = Rate::bits_per_sec(40_000_000).unwrap();
+    let bottleneck = Some(Bottleneck { discipline: Discipline::DualPi2(DualPi2::default()), ..Bottleneck::at_rate(rate) });
+    let line = LinkConfig { bottleneck, delay: Delay::constant(Duration::from_millis(10)), ..LinkConfig::default() };
+    let round_trip = |congestion| {
+        let config = TcpConfig { congestion, ..TcpConfig::default() };
+        let bed = Testbed::new(["a", "b"]).links("delay 10ms").link("a", "b", line.clone()).tcp(config).seed(1);
+        bed.run_twice(|bed| async move {
+            let (mut client, mut server, _listener) = pair(&bed).await;
+            let writing = bed.host("a").spawn(async move {
+                send_all(&mut client, 20_000_000).await;
+                client.info()
+            });
+            read_all(&mut server, 20_000_000).await;
+            let (stats, info) = (bed.link_stats("a", "b"), writing.await.unwrap());
+            (stats.marked() > 0, info.retransmissions > 0, info.srtt.unwrap())
+        })
+    };
+    let (scalable, classic) = (round_trip(CongestionControl::Dctcp), round_trip(CongestionControl::Cubic));
+    assert!(matches!(scalable, (true, false, srtt) if srtt < Duration::from_millis(22)), "{scalable:?}");
+    assert!(matches!(classic, (false, true, srtt) if srtt > Duration::from_millis(28)), "{classic:?}");
 }
 
 #[test]
