@@ -6,6 +6,8 @@
 //! [`Bytes`] bytes. [`Probability`] is a checked `f64`. [`Hertz`] and [`RadPerSec`] keep the factor 2π in a single place. Mechanical quantities (masses,
 //! stiffnesses, forces) are plain `f64` in SI units in the other crates, because matrices are made of them.
 //!
+//! An [`Ecn`] is no quantity, but the codepoint of a packet that the emulator, TCP and the router have in common.
+//!
 //! This crate does not know the use of the quantities. Read [`Instant`] first.
 //!
 //! ```

@@ -44,7 +44,7 @@ impl Default for FqCoDel {
 /// Packets dropped at once from the longest queue, at most.
 const MOST_DROPPED: u64 = 64;
 
-/// Bytes that a packet counts in the turns of queues, at most: the largest size in a network. Keeps the number of turns for one packet small.
+/// Bytes that a packet counts in the turns of queues, at most: above the largest size in a network. Keeps the number of turns for one packet small.
 const MOST_BYTES: u64 = 1 << 24;
 
 /// The queues of all flows.
