@@ -13,11 +13,14 @@ use cohaptic_wan::LinkModel;
 
 use crate::access::AccessLines;
 
-/// A link of the library, such as `starlink`, `starlink@1/up` or `lte-driving delay*1.4`.
+/// A link of the library, such as `starlink`, `starlink@1/up`, `lte-driving delay*1.4` or `starlink queue.discipline=codel`.
 ///
 /// Links of one kind differ: the delay of a phone in a car is not that of another phone in another car. A factor such as `delay*1.4` says where between them
 /// a link is. It multiplies the number of the key in both directions, or in the only direction for which the library knows how links differ, and has at most
 /// three decimal places. The strategy [`links_like`](crate::strategies::links_like) draws factors (feature `strategies`).
+///
+/// A key with a value, such as `rate=2Mbit` or `queue={ limit = '250 packets', discipline = 'fq-codel' }`, is laid over the link in both directions and at any
+/// time, with the meaning of `[link]` in a scene. A value may have white space within quotes, braces and brackets.
 ///
 /// `Display` prints the name with its version. `Debug` prints the same text as a literal, because [`Testbed::access`](crate::Testbed::access) and
 /// [`Testbed::links`](crate::Testbed::links) take such a text.
@@ -28,6 +31,8 @@ pub struct LibraryLink {
     direction: Option<Direction>,
     /// Factors in thousandths, by key. The factor 1 is not stored.
     factors: BTreeMap<String, u64>,
+    /// Keys with their values, `KEY=VALUE`, in the order in which they are laid over the link.
+    laid: Vec<String>,
     /// Text of the name.
     text: String,
 }
@@ -38,27 +43,36 @@ pub(crate) const ONE: u64 = 1000;
 impl LibraryLink {
     /// Parses a name. Returns `None` if the text does not begin with the name of a link of the library, and an error if the text goes on wrongly.
     pub(crate) fn parse(text: &str) -> Option<Result<Self, String>> {
-        let mut words = text.split_whitespace();
-        let name = words.next()?.parse::<ProfileName>().ok()?;
-        Some(Self::with_words(name, words))
+        let words = words(text);
+        let name = words.first()?.parse::<ProfileName>().ok()?;
+        Some(Self::with_words(name, &words[1..]))
     }
 
     /// Parses a name, and refuses every other text.
     pub(crate) fn expect(text: &str) -> Result<Self, String> {
-        let first = text.split_whitespace().next().unwrap_or_default();
+        let words = words(text);
+        let (first, rest) = words.split_first().unwrap_or((&"", &[]));
         let name = first.parse::<ProfileName>().map_err(|error| error.to_string())?;
-        Self::with_words(name, text.split_whitespace().skip(1))
+        Self::with_words(name, rest)
     }
 
-    fn with_words<'a>(name: ProfileName, words: impl Iterator<Item = &'a str>) -> Result<Self, String> {
-        let mut link = Self { profile: Arc::new(name.profile), direction: name.direction, factors: BTreeMap::new(), text: String::new() };
-        for word in words {
+    fn with_words(name: ProfileName, words: &[&str]) -> Result<Self, String> {
+        let (profile, direction) = (Arc::new(name.profile), name.direction);
+        let mut link = Self { profile, direction, factors: BTreeMap::new(), laid: Vec::new(), text: String::new() };
+        // Keys come first, because a key that has a value has no factor.
+        let (laid, factors): (Vec<&str>, Vec<&str>) = words.iter().copied().partition(|word| key_with_value(word).is_some());
+        link.laid = laid.into_iter().map(str::to_owned).collect();
+        for word in factors {
             let factor = word.split_once('*').and_then(|(key, factor)| Some((key, thousandths(factor)?)));
             let Some((key, factor)) = factor else {
                 return Err(format!(
-                    "`{word}` is no factor: expected a key and a number above 0 with at most three decimal places, such as delay*1.4"
+                    "`{word}` is no factor: expected a key and a number above 0 with at most three decimal places, such as delay*1.4, or a key with its value, \
+                     such as rate=2Mbit"
                 ));
             };
+            if link.is_laid(key) {
+                return Err(format!("{key} has a factor and a value: expected one of them"));
+            }
             if link.directions(key).next().is_none() {
                 let known: Vec<&str> = link.keys().collect();
                 let expected = if known.is_empty() { "the name alone".to_owned() } else { format!("a factor of {}", known.join(" or ")) };
@@ -85,7 +99,15 @@ impl LibraryLink {
             let factor = *factor as f64 / ONE as f64;
             let _ = write!(self.text, " {key}*{factor}");
         }
+        for word in &self.laid {
+            let _ = write!(self.text, " {word}");
+        }
         self
+    }
+
+    /// Returns whether the key has a value that is laid over the link.
+    fn is_laid(&self, key: &str) -> bool {
+        self.laid.iter().any(|word| key_with_value(word).is_some_and(|laid| laid == key))
     }
 
     /// Returns the directions in which the key differs from link to link, each with the bounds of the key.
@@ -93,18 +115,18 @@ impl LibraryLink {
         Direction::BOTH.into_iter().filter_map(move |direction| Some((direction, self.profile.line(direction).between.get(key)?)))
     }
 
-    /// Returns the keys that differ from link to link, sorted.
+    /// Returns the keys that differ from link to link, sorted, without the keys whose value is laid over the link.
     fn keys(&self) -> impl Iterator<Item = &str> {
         let keys: std::collections::BTreeSet<&str> =
             Direction::BOTH.iter().flat_map(|direction| self.profile.line(*direction).between.keys()).map(String::as_str).collect();
-        keys.into_iter()
+        keys.into_iter().filter(|key| !self.is_laid(key))
     }
 
     /// Returns the model of the link in one direction.
     ///
     /// # Errors
     ///
-    /// If a factor makes a number too large for its key.
+    /// If a factor makes a number too large for its key, or a key or a value that is laid over the link means nothing.
     fn model(&self, direction: Direction) -> Result<LinkModel, String> {
         let mut keys = vec![format!("profile={}/{}", self.profile.title(), direction.word())];
         for (key, factor) in &self.factors {
@@ -113,6 +135,7 @@ impl LibraryLink {
                 keys.push(format!("{key}={scaled}"));
             }
         }
+        keys.extend(self.laid.iter().cloned());
         link_from_keys(&keys).map_err(|error| error.to_string())
     }
 
@@ -197,6 +220,29 @@ impl Quantity {
     }
 }
 
+/// Splits a text at white space outside of quotes, braces and brackets, so that a value such as `{ limit = "9 packets" }` stays whole.
+fn words(text: &str) -> Vec<&str> {
+    let (mut quote, mut depth) = (None, 0_usize);
+    let parts = text.split(|letter: char| {
+        match (quote, letter) {
+            (None, '"' | '\'') => quote = Some(letter),
+            (None, '{' | '[') => depth += 1,
+            (None, '}' | ']') => depth = depth.saturating_sub(1),
+            (Some(open), _) if open == letter => quote = None,
+            _ => {}
+        }
+        letter.is_whitespace() && quote.is_none() && depth == 0
+    });
+    parts.filter(|part| !part.is_empty()).collect()
+}
+
+/// Returns the key of a word `KEY=VALUE`, without the keys within it: `queue` of `queue.limit=20ms`. Returns `None` for any other word.
+fn key_with_value(word: &str) -> Option<&str> {
+    let (key, _) = word.split_once('=')?;
+    let is_key = !key.is_empty() && key.chars().all(|letter| letter.is_ascii_alphanumeric() || "-.".contains(letter));
+    is_key.then(|| key.split('.').next().unwrap_or(key))
+}
+
 /// Reads a factor. Returns `None` unless it is above zero and has at most three decimal places.
 fn thousandths(text: &str) -> Option<u64> {
     let (whole, decimals) = text.split_once('.').unwrap_or((text, "0"));
@@ -266,6 +312,23 @@ mod tests {
     }
 
     #[test]
+    fn a_key_with_its_value_is_laid_over_both_directions() {
+        let text = "dsl queue={ limit = '250 packets', discipline = 'fq-codel' }";
+        let home = link(text);
+        assert_eq!(home.to_string(), text.replace("dsl", "dsl@1"));
+        let lines = home.both_ways("home").unwrap();
+        for (direction, line) in [("up", lines.uplink), ("down", lines.downlink)] {
+            let keys = [format!("profile=dsl/{direction}"), "queue.limit=250 packets".to_owned(), "queue.discipline=fq-codel".to_owned()];
+            assert_eq!(line, Some(link_from_keys(&keys).unwrap()), "{direction}");
+        }
+        // A factor stands before the keys, in whatever order they are written.
+        let phone = link("lte-driving  queue.limit='9 packets' delay*1.4\trate=2Mbit");
+        assert_eq!(phone.to_string(), "lte-driving@1 delay*1.4 queue.limit='9 packets' rate=2Mbit");
+        // What has a value is the same for all links of the kind.
+        assert_eq!(link("5g-walking rate=9Mbit").keys().collect::<Vec<_>>(), ["delay"]);
+    }
+
+    #[test]
     fn what_is_no_link_is_refused_with_the_way_out() {
         for (text, expected) in [
             ("", "no link of the library is called \"\""),
@@ -277,6 +340,8 @@ mod tests {
             ("lte-driving delay*-1", "`delay*-1` is no factor"),
             ("lte-driving rate*2", "does not say how the rate of lte-driving@1 differs from link to link: expected a factor of delay"),
             ("starlink delay*2", "expected the name alone"),
+            ("cable delay*2 delay=4ms", "delay has a factor and a value: expected one of them"),
+            ("cable =4ms", "`=4ms` is no factor"),
         ] {
             let error = LibraryLink::expect(text).expect_err(text);
             assert!(error.contains(expected), "{text}: {error}");
@@ -285,6 +350,12 @@ mod tests {
         assert!(link("starlink/up").both_ways("phone").unwrap_err().contains("an access line has both directions: expected starlink@1"));
         assert!(link("starlink").one_way().unwrap_err().contains("starlink differs by direction: expected starlink/down"));
         assert!(link("cable delay*9999999999999").one_way().is_err());
+        for (text, expected) in
+            [("dsl/up queue.discipline=codl", "one of tail-drop, head-drop, codel"), ("cable que.limit=4ms", "link.que: unknown key")]
+        {
+            let error = link(text).one_way().expect_err(text);
+            assert!(error.contains(expected), "{text}: {error}");
+        }
     }
 
     /// A factor belongs to a key that is a time or a rate and holds in every state, and one range serves both directions.

@@ -138,7 +138,7 @@ impl Testbed {
         self.link(one, other, &link).link(other, one, &link)
     }
 
-    /// Gives a host the access lines of a link of the library, such as `starlink` or `lte-driving delay*1.4` (feature `files`): see
+    /// Gives a host the access lines of a link of the library, such as `starlink`, `lte-driving delay*1.4` or `dsl queue.limit=60ms` (feature `files`): see
     /// [`LibraryLink`](crate::LibraryLink). Every packet of the host first passes the *uplink*, the link of the library away from the user; every packet to the
     /// host last passes the *downlink*, towards the user. In between is the link from host to host, ideal unless the test says otherwise. Packets to all other
     /// hosts share the uplink and wait for each other there.
