@@ -70,9 +70,16 @@ pub enum NetemErrorKind {
     Contradiction(Contradiction),
 }
 
+/// Disciplines of a queue that are qdiscs of their own in `tc` and keys of a link here.
+const DISCIPLINES: [&str; 4] = ["codel", "fq_codel", "pie", "red"];
+
 impl fmt::Display for NetemErrorKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::UnknownWord { word } if DISCIPLINES.contains(&word.as_str()) => write!(
+                f,
+                "{word} is a qdisc of its own and no option of netem, below which it would see no queue: expected a link of keys with rate and queue.discipline"
+            ),
             Self::UnknownWord { word } => write!(
                 f,
                 "unknown word \"{word}\": expected limit, delay, distribution, loss, ecn, corrupt, duplicate, reorder, gap, rate, cross, slot, seed or the end"
