@@ -94,6 +94,7 @@ shipped![
     "network/push-contact",
     "network/queue-codel",
     "network/queue-disciplines",
+    "network/queue-fq-codel",
     "network/queue-red",
     "network/rate-and-queue",
     "network/reorder",
