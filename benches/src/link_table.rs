@@ -2,6 +2,8 @@
 #![allow(clippy::print_stdout, reason = "printing the page is what this program is for")]
 #![allow(clippy::cast_precision_loss, reason = "counts of packets")]
 
+mod queues;
+
 use std::time::Duration;
 
 use cohaptic_benches::effort::Effort;
@@ -30,6 +32,7 @@ fn main() -> Result<(), String> {
     println!("{rounds} rounds of {packets} packets, in each of which all rows of a table are run one after the other.\n");
     beside_others(work);
     stage_by_stage(work);
+    println!("\n{}", queues::section().trim_end());
     Ok(())
 }
 

@@ -64,7 +64,11 @@ impl Foreign {
     #[must_use]
     pub fn run(self, scene: &Path) -> Ran<Answer> {
         let mut command = match self {
-            Self::Ns3Scheduler | Self::Ns3Sockets => Command::new(scripts().join("ns3.sh")),
+            Self::Ns3Scheduler | Self::Ns3Sockets => {
+                let mut command = Command::new(scripts().join("ns3.sh"));
+                command.arg("mesh");
+                command
+            }
             Self::SimPy => python("simpy_mesh.py"),
         };
         command.arg(scene);
