@@ -8,8 +8,9 @@ use crate::pages::prose::links;
 use crate::pages::{PAGES, markdown, root};
 
 /// Pictures that no page draws, each with its origin. A name that ends in `/` is a folder.
-const DRAWN_ELSEWHERE: [(&str, &str); 5] = [
+const DRAWN_ELSEWHERE: [(&str, &str); 6] = [
     ("docs/images/campaign.svg", "crates/cli/tests/integration/page_pictures.rs, with more runs than its page has time for"),
+    ("docs/images/gallery/bufferbloat.svg", "tests/examples/bufferbloat.rs, whose test compares the picture"),
     ("docs/images/live-control.png", "a browser, by hand"),
     ("docs/images/matplotlib.svg", "python/examples/paper_figure.py with coordination/n3.toml; the bytes depend on the version of matplotlib"),
     ("docs/images/play.png", "crates/cli/tests/integration/live/play_page.rs, with COHAPTIC_SCREENSHOTS"),

@@ -10,14 +10,15 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 const CHAPTER: &str = include_str!("../../../../../docs/testing.md");
 
 /// Files of code in which the blocks must stand word for word. Blocks that use axum are among the tests of programs of others, a workspace of its own: they are compared
-/// here, and compiled and run there. Blocks that need the feature `scenes` are among the tests across crates, which always have it.
-const CODE: [&str; 6] = [
+/// here, and compiled and run there. Blocks that need the feature `files` or `scenes` are among the tests across crates, which always have both.
+const CODE: [&str; 7] = [
     include_str!("programs.rs"),
     include_str!("files.rs"),
     include_str!("nodes.rs"),
     include_str!("../../../../../tests/programs/tests/phone/each_part.rs"),
     include_str!("../../../../../tests/programs/tests/phone/whole_photo.rs"),
     include_str!("../../../../../tests/testkit/chapter.rs"),
+    include_str!("../../../../../tests/examples/bufferbloat.rs"),
 ];
 
 /// Test with which the page begins.
