@@ -227,8 +227,8 @@ impl<const A: usize> Held<A> {
         }
     }
 
-    #[inline]
     /// Replaces a held sample, and updates the exact sums.
+    #[inline]
     fn replace(&mut self, place: usize, sample: HeldSample<A>) {
         if let Some(sums) = &mut self.sums {
             sums.replace(&self.samples[place].state, &sample.state);

@@ -20,37 +20,37 @@ pub enum DatagramOption {
     TrafficClass,
     /// Time to live of multicast over IPv4.
     MulticastTtl,
-    /// Whether the socket receives the socket's own multicast over IPv4, a flag.
+    /// Reception of the socket's own multicast over IPv4, a flag.
     MulticastLoop4,
-    /// Whether the socket receives the socket's own multicast over IPv6, a flag.
+    /// Reception of the socket's own multicast over IPv6, a flag.
     MulticastLoop6,
 }
 
 /// Change of the membership in a multicast group.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Membership {
-    /// Join a group of IPv4.
+    /// Joins a multicast group of IPv4.
     Join4 {
         /// Address of the group.
         group: Ipv4Addr,
         /// Address of the interface.
         interface: Ipv4Addr,
     },
-    /// Leave a group of IPv4.
+    /// Leaves a multicast group of IPv4.
     Leave4 {
         /// Address of the group.
         group: Ipv4Addr,
         /// Address of the interface.
         interface: Ipv4Addr,
     },
-    /// Join a group of IPv6.
+    /// Joins a multicast group of IPv6.
     Join6 {
         /// Address of the group.
         group: Ipv6Addr,
         /// Number of the interface; 0 for any.
         interface: u32,
     },
-    /// Leave a group of IPv6.
+    /// Leaves a multicast group of IPv6.
     Leave6 {
         /// Address of the group.
         group: Ipv6Addr,
@@ -82,11 +82,11 @@ pub trait Datagrams: Configured + fmt::Debug + Send + Sync {
     fn local_addr(&self) -> io::Result<SocketAddr>;
     /// Returns the peer of a connected socket.
     fn peer_addr(&self) -> io::Result<SocketAddr>;
-    /// Takes the error of the next call.
+    /// Takes the pending error, with which the next call would fail.
     fn take_error(&self) -> io::Result<Option<io::Error>>;
-    /// Returns an option.
+    /// Returns the value of an option.
     fn option(&self, option: DatagramOption) -> io::Result<u32>;
-    /// Sets an option.
+    /// Sets the value of an option.
     fn set_option(&self, option: DatagramOption, value: u32) -> io::Result<()>;
     /// Joins or leaves a multicast group.
     fn change_membership(&self, membership: Membership) -> io::Result<()>;

@@ -1,6 +1,7 @@
 //! Sockets and tasks of a test bed, as traits, and the test bed of the present thread.
 //!
-//! Use this crate if you write a package that stands in for a runtime or for sockets, and want it to have the sockets of the test kit wherever a test bed runs.
+//! Use this crate if you write a package that stands in for a runtime or for sockets, and the package should use the sockets of the test kit wherever a test
+//! bed runs.
 //!
 //! A package `tokio` made by `cohaptic tokio` stands in for tokio in existing programs. Each of its sockets holds a real socket, or a socket of the test bed
 //! that runs on the thread. That package asks [`bed`] which of the two a program gets. The test kit implements the traits of this crate with its own sockets,
@@ -80,8 +81,8 @@ pub enum Version {
 
 /// A running test bed.
 ///
-/// Methods that make a socket make the socket on the host of the task that is being polled. They panic if that task lives on no host: an error would be
-/// swallowed by a program that tries again.
+/// Methods that make a socket make the socket on the host of the task that is being polled. Such a method panics if that task lives on no host: a program that
+/// tries again would swallow an error.
 pub trait Bed: Send + Sync {
     /// Returns the addresses of `name`, a host's name or a literal address without port.
     ///
@@ -149,19 +150,19 @@ pub trait Bed: Send + Sync {
     fn unix_socket(&self, call: Call) -> io::Result<Box<dyn UnixSocket>>;
 
     /// Creates two Unix sockets of streams that are connected to each other. Errors and panics are those of [`Bed::unix_socket`].
-    #[expect(clippy::missing_errors_doc, reason = "those of another method")]
+    #[expect(clippy::missing_errors_doc, reason = "the errors of another method")]
     fn unix_pair(&self, call: Call) -> io::Result<[Box<dyn UnixStream>; 2]>;
 
     /// Creates a Unix socket of datagrams that is neither bound nor connected. Errors and panics are those of [`Bed::unix_socket`].
-    #[expect(clippy::missing_errors_doc, reason = "those of another method")]
+    #[expect(clippy::missing_errors_doc, reason = "the errors of another method")]
     fn unix_datagrams(&self, call: Call) -> io::Result<Box<dyn UnixDatagrams>>;
 
     /// Creates two Unix sockets of datagrams that are connected to each other. Errors and panics are those of [`Bed::unix_socket`].
-    #[expect(clippy::missing_errors_doc, reason = "those of another method")]
+    #[expect(clippy::missing_errors_doc, reason = "the errors of another method")]
     fn unix_datagram_pair(&self, call: Call) -> io::Result<[Box<dyn UnixDatagrams>; 2]>;
 
     /// Creates a pipe: the end that writes, and the end that reads. Errors and panics are those of [`Bed::unix_socket`].
-    #[expect(clippy::missing_errors_doc, reason = "those of another method")]
+    #[expect(clippy::missing_errors_doc, reason = "the errors of another method")]
     fn pipe(&self, call: Call) -> io::Result<[Box<dyn ByteStream>; 2]>;
 
     /// Returns the host of the task that is being polled, or `None` if that task lives on no host.

@@ -52,7 +52,7 @@ pub trait Configured {
     fn version(&self) -> Version;
     /// Returns the options that a new socket of the system would not have. Fails as all methods of the socket do.
     fn settings(&self) -> io::Result<Vec<Setting>>;
-    /// Sets an option. An option that this kind of socket does not have, or that has no effect in a test bed, is accepted. Fails as all methods of the socket do,
-    /// and if the value is out of range.
+    /// Sets an option. An option that this kind of socket does not have, or that has no effect in a test bed, is accepted. Fails as all methods of the socket
+    /// do, and if the value is out of range.
     fn set(&self, setting: Setting) -> io::Result<()>;
 }

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use crate::Configured;
 
-/// Future of a connection that is being opened. `Sync`, as that of tokio's `TcpStream::connect` is.
+/// Future of a connection that is being opened. `Sync`, because the future of tokio's `TcpStream::connect` is `Sync`.
 pub type Connecting = Pin<Box<dyn Future<Output = io::Result<Box<dyn Stream>>> + Send + Sync>>;
 
 /// Readiness of a socket.
@@ -48,9 +48,9 @@ pub trait ByteStream: fmt::Debug + Send + Sync {
     fn try_write(&self, buffers: &[IoSlice<'_>]) -> io::Result<usize>;
     /// Ends the stream for the reader after the bytes written so far. TCP sends FIN.
     fn shut_down(&self) -> io::Result<()>;
-    /// Like [`ByteStream::shut_down`], for a dropped half. Also works on another thread.
+    /// Like [`ByteStream::shut_down`], for a write half that is dropped. Never fails, and works on every thread: a destructor cannot return an error.
     fn let_write_half_go(&self);
-    /// Takes the error of the next call.
+    /// Takes the pending error, with which the next call would fail.
     fn take_error(&self) -> io::Result<Option<io::Error>>;
 }
 
@@ -84,7 +84,7 @@ pub trait Stream: ByteStream + Configured {
 /// TCP listener. All methods fail as the methods of [`ByteStream`] do.
 #[expect(clippy::missing_errors_doc, reason = "the documentation of the trait names the errors of all methods")]
 pub trait Listener: Configured + fmt::Debug + Send + Sync {
-    /// Accepts a connection, and returns the address of its other end.
+    /// Accepts a connection, and returns the address of the connection's other end.
     fn poll_accept(&self, cx: &mut Context<'_>) -> Poll<io::Result<(Box<dyn Stream>, SocketAddr)>>;
     /// Returns the address at which the listener listens.
     fn local_addr(&self) -> io::Result<SocketAddr>;
@@ -107,7 +107,7 @@ pub enum Flag {
     NoDelay,
 }
 
-/// Option of a [`Socket`] with a number.
+/// Option of a [`Socket`] whose value is a number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Number {
     /// Size of the send buffer \[byte\].
@@ -121,7 +121,7 @@ pub enum Number {
 /// TCP socket, neither connected nor listening. All methods fail as the methods of [`ByteStream`] do.
 #[expect(clippy::missing_errors_doc, reason = "the documentation of the trait names the errors of all methods")]
 pub trait Socket: Configured + fmt::Debug + Send + Sync {
-    /// Binds the socket.
+    /// Binds the socket to a local address.
     fn bind(&self, at: SocketAddr) -> io::Result<()>;
     /// Opens a connection.
     fn connect(self: Box<Self>, to: SocketAddr) -> Connecting;
@@ -133,9 +133,9 @@ pub trait Socket: Configured + fmt::Debug + Send + Sync {
     fn flag(&self, flag: Flag) -> io::Result<bool>;
     /// Switches an option on or off.
     fn set_flag(&self, flag: Flag, on: bool) -> io::Result<()>;
-    /// Returns the value of an option with a number.
+    /// Returns the value of an option that is a number.
     fn number(&self, number: Number) -> io::Result<u32>;
-    /// Sets an option with a number.
+    /// Sets the value of an option that is a number.
     fn set_number(&self, number: Number, value: u32) -> io::Result<()>;
     /// Returns the time for which closing waits for unsent bytes (`SO_LINGER`), or `None` if closing does not wait.
     fn linger(&self) -> io::Result<Option<Duration>>;

@@ -15,10 +15,10 @@ pub trait Host: Send + Sync {
     /// Calls `act` as a task of this host: sockets made by `act` belong to this host.
     fn within(&self, act: &mut dyn FnMut());
 
-    /// Keeps `stop`, and calls it when the program of the host ends: by a crash, or because the program is killed.
+    /// Keeps `stop`, and calls `stop` when the program of the host ends: by a crash, or because the program is killed.
     fn keep(&self, stop: Box<dyn Stop>);
 
-    /// Listens for the signal `number`, such as 15 for `SIGTERM`, which is then handled by the program: it does not end the program any more.
+    /// Listens for the signal `number`, such as 15 for `SIGTERM`. From then on the program handles the signal, and the signal does not end the program.
     fn listen_for(&self, number: i32) -> Box<dyn Signals>;
 }
 

@@ -1,4 +1,4 @@
-//! Unix sockets and pipes. In a test bed they live in memory, and their names belong to one host.
+//! Unix sockets and pipes. In a test bed, sockets and pipes live in memory, and the names of sockets belong to one host.
 
 use std::fmt;
 use std::io;
@@ -42,7 +42,7 @@ pub trait UnixStream: ByteStream {
 /// Listener of a Unix socket. All methods fail as the methods of [`ByteStream`] do.
 #[expect(clippy::missing_errors_doc, reason = "the documentation of the trait names the errors of all methods")]
 pub trait UnixListener: fmt::Debug + Send + Sync {
-    /// Accepts a connection, and returns the name of its other end.
+    /// Accepts a connection, and returns the name of the connection's other end.
     fn poll_accept(&self, cx: &mut Context<'_>) -> Poll<io::Result<(Box<dyn UnixStream>, UnixName)>>;
     /// Returns the name at which the listener listens.
     fn local_name(&self) -> io::Result<UnixName>;
@@ -51,7 +51,7 @@ pub trait UnixListener: fmt::Debug + Send + Sync {
 /// Unix socket of streams, neither connected nor listening. All methods fail as the methods of [`ByteStream`] do.
 #[expect(clippy::missing_errors_doc, reason = "the documentation of the trait names the errors of all methods")]
 pub trait UnixSocket: fmt::Debug + Send + Sync {
-    /// Binds the socket.
+    /// Binds the socket to a name.
     fn bind(&self, name: &UnixName) -> io::Result<()>;
     /// Connects to the listener at `name`. Nothing waits: the connection is established at once, or not at all.
     fn connect(self: Box<Self>, name: &UnixName) -> io::Result<Box<dyn UnixStream>>;
@@ -61,11 +61,11 @@ pub trait UnixSocket: fmt::Debug + Send + Sync {
 
 /// Unix socket of datagrams.
 ///
-/// Sending and receiving return [`io::ErrorKind::WouldBlock`] in place of waiting, and then wake `waker` when another attempt is worth its while. All methods fail
-/// as the methods of [`ByteStream`] do.
+/// Sending and receiving return [`io::ErrorKind::WouldBlock`] in place of waiting, and then wake `waker` when another attempt is worth its while. All methods
+/// fail as the methods of [`ByteStream`] do.
 #[expect(clippy::missing_errors_doc, reason = "the documentation of the trait names the errors of all methods")]
 pub trait UnixDatagrams: fmt::Debug + Send + Sync {
-    /// Binds the socket.
+    /// Binds the socket to a name.
     fn bind(&self, name: &UnixName) -> io::Result<()>;
     /// Connects the socket to the socket at `name`.
     fn connect(&self, name: &UnixName) -> io::Result<()>;

@@ -38,7 +38,7 @@ pub(crate) struct Assembler {
 /// Memory of unread octets in order.
 #[derive(Clone, Copy, Debug)]
 struct Held {
-    /// Octets that were not read.
+    /// Number of unread octets.
     octets: usize,
     /// Memory that is free once all octets were read \[byte\].
     memory: usize,

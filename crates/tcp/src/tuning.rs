@@ -35,7 +35,8 @@ pub(crate) struct Tuning {
     rtt_8: u64,
     /// Last echo of a timestamp that gave a sample of the round trip.
     echo: u32,
-    /// Instant at which the position began to be awaited whose arrival takes at least a round trip. For connections without timestamps.
+    /// Instant of a measurement's beginning, and the end of the window offered at that instant. Data from beyond this end arrives at least a round trip later.
+    /// For connections without timestamps.
     awaited: Option<(Instant, Position)>,
 }
 
@@ -119,8 +120,8 @@ impl Tuning {
         0
     }
 
-    /// Takes the echo of a timestamp on data. `ticks` are the milliseconds since this end sent the timestamp, `None` if the segment is not full: the peer may
-    /// have waited with it.
+    /// Takes the echo of a timestamp on data. `ticks` are the milliseconds since this end sent the timestamp. `None` if the segment is not full, because the
+    /// peer may have held such a segment back.
     pub(crate) fn hear_echo(&mut self, echo: u32, ticks: Option<u32>) {
         if core::mem::replace(&mut self.echo, echo) != echo
             && let Some(ticks) = ticks.filter(|ticks| *ticks < 1 << 31)
@@ -141,7 +142,8 @@ impl Tuning {
         self.awaited = Some((now, edge));
     }
 
-    /// Takes a round trip. Samples without timestamps are too long rather than too short, so only the least of them counts.
+    /// Takes a sample of the round trip into the estimate. A sample without timestamps (`is_exact` is `false`) is rather too long than too short, and counts
+    /// only if the sample is shorter than the estimate.
     fn sample(&mut self, round_trip: Duration, is_exact: bool) {
         let nanos = u64::try_from(round_trip.as_nanos()).unwrap_or(u64::MAX / 16).clamp(1, u64::MAX / 16);
         if self.rtt_8 == 0 || nanos * 8 < self.rtt_8 {

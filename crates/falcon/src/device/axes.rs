@@ -16,7 +16,7 @@ pub enum Axis {
 }
 
 impl Axis {
-    /// Returns the index in a triple.
+    /// Returns the index of the axis in a triple: 0 for x, 1 for y, 2 for z.
     #[must_use]
     pub(crate) const fn index(self) -> usize {
         self as usize

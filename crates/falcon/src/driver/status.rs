@@ -23,7 +23,7 @@ pub enum Phase {
 }
 
 impl Phase {
-    /// Returns the name in a word.
+    /// Returns the name of the phase, a single word, as in messages and files.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {

@@ -109,9 +109,9 @@ pub enum CongestionControl {
 /// Condition under which a SYN without ECN follows a SYN with ECN (RFC 3168, section 6.1.1.1).
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
 pub enum EcnFallback {
-    /// Every SYN asks.
+    /// Every SYN asks for ECN.
     Never,
-    /// The first SYN asks, and no later SYN asks. Linux does so with `tcp_ecn_fallback`.
+    /// The first SYN asks for ECN, and no later SYN does. Linux does so with `tcp_ecn_fallback`.
     #[default]
     Lost,
     /// Like [`Lost`](Self::Lost). In addition, a reset in answer to a SYN with ECN does not end the connection: a SYN without ECN follows at once.

@@ -71,7 +71,7 @@ impl Cubic {
         Self { hystart: has_hystart.then(HyStart::default), ..Self::default() }
     }
 
-    /// Drops the state after a timeout.
+    /// Drops epoch, `W_max` and least round trip after a timeout, and begins the search for the end of slow start anew.
     pub(crate) fn restart(&mut self) {
         *self = Self::new(self.hystart.is_some());
     }

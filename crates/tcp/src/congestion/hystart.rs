@@ -23,7 +23,7 @@ const MOST_GROWTH: Duration = Duration::from_millis(16);
 /// Search for the end of slow start. A round lasts from the acknowledgement of one flight to the acknowledgement of the next flight.
 #[derive(Clone, Default, Debug)]
 pub(super) struct HyStart {
-    /// Slow start was left. The search does not begin anew before a timeout.
+    /// `true` once slow start was left. A timeout begins the search anew.
     found: bool,
     /// Present round. `None` before the first.
     round: Option<Round>,
@@ -42,7 +42,7 @@ struct Round {
     samples: u8,
 }
 
-/// Round trip as an acknowledgement tells it.
+/// Sample of the round trip from an acknowledgement, with the positions that tell rounds apart and the time that tells trains apart.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RoundTrip {
     /// Time since the last acknowledged segment was sent.

@@ -94,8 +94,8 @@ impl Connection {
         true
     }
 
-    /// Takes over the timestamp to echo. Only a segment that contains the last acknowledged position sets it, so that a delayed acknowledgement counts into
-    /// the round trip (RFC 7323, section 4.3), and only if its acknowledgement is valid and not overtaken: a forged value would make all later segments old.
+    /// Takes over the timestamp to echo from a segment that contains the last acknowledged position, so that a delayed acknowledgement counts into the round
+    /// trip (RFC 7323, section 4.3). The acknowledgement of the segment must be valid and not overtaken: a forged timestamp would make all later segments old.
     fn learn_timestamp(&mut self, now: Instant, segment: &Segment<'_>, start: Position, position: Position) {
         if let (Some((value, _)), true) = (segment.options.timestamps, self.receive.has_timestamps)
             && start <= self.receive.acked

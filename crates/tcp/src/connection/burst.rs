@@ -32,7 +32,7 @@ impl Burst {
         self.left == 0 || self.next != start || self.at != now
     }
 
-    /// Begins a burst of `length` segments, at least one.
+    /// Returns the burst of `length` segments, at least one, whose first segment begins at `start` and leaves at `now`.
     const fn begin(now: Instant, start: Position, length: u32) -> Self {
         Self { at: now, next: start, left: length, has_several: length > 1 }
     }

@@ -63,7 +63,7 @@ pub struct Connection {
     probe: Option<Probe>,
     /// SYNs and answers to segments that are refused, which leave before all other segments.
     replies: VecDeque<Segment<'static>>,
-    /// The peer is told by a reset that this end has given the connection up.
+    /// A reset is due, which tells the peer that this end has given the connection up.
     is_reset_due: bool,
     counters: Counters,
     /// Calls of the program since `poll_transmit` was last called.

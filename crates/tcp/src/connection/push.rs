@@ -10,7 +10,7 @@ use crate::sequence::Position;
 /// Ends of marked buffers whose octets were not sent.
 #[derive(Clone, Debug)]
 pub(super) struct Pushes {
-    /// Segments that leave now leave within the program's call.
+    /// `true` from a write of the program until `poll_transmit` has returned all segments that may leave: Linux sends these segments within the call.
     pub(super) is_writing: bool,
     /// Position at which the last buffer begins. Octets that were sent have left their buffer.
     begin: Position,

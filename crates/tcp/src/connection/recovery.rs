@@ -76,7 +76,8 @@ impl Connection {
         }
     }
 
-    /// Enters recovery if a segment is lost, and chooses between Open and Disorder otherwise. Returns `waits`.
+    /// Enters recovery if a segment is lost, and chooses between Open and Disorder otherwise. Returns `waits`, so that callers can end with this
+    /// call.
     fn enter_if_lost(&mut self, ack: &Ack, waits: bool) -> bool {
         if self.send.board.lost_out == 0 {
             self.stay_open(ack);

@@ -163,7 +163,7 @@ impl Connection {
         }
     }
 
-    /// Returns the segment for `probe`, or `None` if there is nothing to send again.
+    /// Returns the segment for `probe`, or `None` if there is neither new data nor an earlier segment to send again.
     fn forced(&mut self, now: Instant, probe: Probe) -> Option<Segment<'static>> {
         match probe {
             // New data is the better probe, because new data must be sent anyway. Without new data, the last segment is repeated.

@@ -20,11 +20,11 @@ pub(crate) struct News {
     pub(crate) has_acked_again: bool,
     /// Instant at which the first acknowledged segment that was neither sacked before nor ever sent again was sent.
     pub(crate) first_acked: Option<Instant>,
-    /// Instant at which the last such segment was sent.
+    /// Instant at which the last acknowledged segment that was neither sacked before nor ever sent again was sent.
     pub(crate) last_acked: Option<Instant>,
     /// Instant at which the first newly sacked segment that was never sent again was sent.
     pub(crate) first_sacked: Option<Instant>,
-    /// Instant at which the last such segment was sent.
+    /// Instant at which the last newly sacked segment that was never sent again was sent.
     pub(crate) last_sacked: Option<Instant>,
     /// Latest transmission among the segments that arrived, and whether its segment was ever sent again.
     pub(crate) latest: Option<(SentAt, bool)>,
@@ -40,7 +40,7 @@ impl News {
         }
     }
 
-    /// Notes the last transmission of the arrived segment `sent`.
+    /// Compares the last transmission of `sent`, a segment that has arrived, with `latest`, and keeps the later transmission.
     pub(super) fn hear(&mut self, sent: &Sent) {
         let sent_at = (sent.at, sent.order);
         if self.latest.is_none_or(|(latest, _)| sent_at > latest) {
