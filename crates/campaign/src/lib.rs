@@ -66,7 +66,7 @@ pub use judgement::{Judgement, Verdict};
 pub use plan::{CampaignPlan, MOST_COMBINATIONS, PlanSpec, Refused};
 pub use report::{CombinationReport, MOST_COMBINATIONS_OF_QUANTILES, MOST_RUNS_OF_QUANTILES, Quantiles, Report};
 pub use shard::{Missing, Shard, ShardError, is_log, worker_log};
-pub use shared::{PartState, ShardReport, SharedCampaign};
+pub use shared::{FolderState, PartState, ShardReport, SharedCampaign};
 pub use spread::SpreadCampaign;
 pub use table::{Column, Format, Row};
 pub use value::{Kind, Value};

@@ -49,6 +49,15 @@ pub struct PartState {
     pub is_done: bool,
 }
 
+/// State of the campaign in a folder.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct FolderState {
+    /// States of the parts, indexed by part.
+    pub parts: Vec<PartState>,
+    /// `true` if the parts are merged: the folder has the table.
+    pub is_merged: bool,
+}
+
 impl SharedCampaign {
     /// Begins a campaign in a folder, or continues the campaign found in the folder if the plans are equal. `worker`: a name different from the names of all
     /// other workers, used in names of files.
@@ -61,22 +70,23 @@ impl SharedCampaign {
         Ok(Self { campaign, worker: worker.to_owned(), judgements: Vec::new(), judged: BTreeSet::new() })
     }
 
-    /// Returns the states of the parts of the campaign in a folder, indexed by part. Nothing is written.
+    /// Returns the state of the campaign in a folder. Nothing is written.
     ///
     /// # Errors
     ///
     /// [`CampaignError::NoCampaign`] if the folder has no campaign; [`CampaignError::Other`] if the folder has another campaign.
-    pub fn parts_in(plan: CampaignPlan, folder: &Path) -> Result<Vec<PartState>, CampaignError> {
+    pub fn state_in(plan: CampaignPlan, folder: &Path) -> Result<FolderState, CampaignError> {
         if !Folder::has_campaign(folder)? {
             return Err(CampaignError::NoCampaign { path: folder.to_path_buf() });
         }
         let folder = Folder::share(folder)?;
         let manifest = Campaign::same_manifest(&plan, &folder)?;
         let campaign = Campaign::of(plan, manifest, folder);
-        let is_finished = campaign.is_finished();
-        let missing = if is_finished { Vec::new() } else { campaign.absent()? };
+        let is_merged = campaign.is_finished();
+        // A merge removes the files of the parts, whose runs are then in the table.
+        let missing = if is_merged { Vec::new() } else { campaign.absent()? };
         let state = |part| PartState { runs: campaign.parts.len(part), is_done: missing.binary_search(&part).is_err() };
-        Ok((0..campaign.parts.count()).map(state).collect())
+        Ok(FolderState { parts: (0..campaign.parts.count()).map(state).collect(), is_merged })
     }
 
     /// Judges the combinations of the shard without a judgement, if the plan has verdicts. Returns the number of combinations still without a judgement: above

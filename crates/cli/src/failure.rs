@@ -118,10 +118,11 @@ impl Failure {
     }
 }
 
-/// Returns the failure for a variant of a valid scene. If the fault lies in one of the `overrides` of the variant, the failure names `option`.
+/// Returns the failure of a scene with the `overrides` of an option other than `--set`. If the fault lies in one of these overrides, the failure names
+/// `option`.
 pub(crate) fn of_variant(error: SceneError, option: &'static str, overrides: &[String]) -> Failure {
     let text = error.diagnostic().and_then(Diagnostic::override_text);
-    // The overrides of the variant stand on top of `--set`. A fault in a `--set` would also have refused the scene without the variant.
+    // The overrides of the option stand on top of `--set`, so that of two equal texts the one of the option counts.
     if text.is_some_and(|text| overrides.iter().any(|given| given == text)) { Failure::Override { option, error } } else { Failure::Scene(error) }
 }
 

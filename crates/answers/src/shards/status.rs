@@ -20,6 +20,8 @@ pub struct Status<'a> {
     pub pieces: &'a [Piece],
     /// Present and past workers of the folder, in the order of their shards.
     pub workers: Vec<Worker>,
+    /// `true` if the folder has the merged result, so that nothing is left to merge.
+    pub is_merged: bool,
 }
 
 impl Status<'_> {
@@ -126,6 +128,8 @@ pub fn status_words(status: &Status<'_>) -> String {
         // The largest number of shards among the workers is most likely the split in use.
         let missing = Missing { piece, count: all.0, pieces: unassigned };
         let _ = writeln!(text, "nobody works on these: {}", missing.words(workers.iter().map(|worker| worker.shard.count()).max()));
+    } else if status.is_merged {
+        let _ = writeln!(text, "all is done and put together");
     } else if done.0 == all.0 {
         let _ = writeln!(text, "all is done: put it together with --merge");
     } else if let Some(end) = end {

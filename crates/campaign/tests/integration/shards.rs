@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use cohaptic_campaign::{CampaignError, Format, Judge, Judgement, NoWatch, Outcome, Shard, SharedCampaign, Verdict, worker_log};
+use cohaptic_campaign::{CampaignError, FolderState, Format, Judge, Judgement, NoWatch, Outcome, Shard, SharedCampaign, Verdict, worker_log};
 use cohaptic_scene::Scene;
 use proptest::prelude::*;
 
@@ -109,16 +109,17 @@ fn a_merge_says_what_is_missing_and_computes_nothing() {
     let error = merged("out");
     assert!(error.to_string().contains("4 of 6 parts are missing, counted from 0: 0, 2 to 3, 5") && error.is_io(), "{error}");
     assert_eq!(bench.files("out"), before);
-    let state = SharedCampaign::parts_in(bench.plan().unwrap(), &bench.path("out")).unwrap();
-    assert_eq!(
-        state.iter().map(|part| (part.runs, part.is_done)).collect::<Vec<_>>(),
-        [false, true, false, false, true, false].map(|done| (4, done))
-    );
+    let state = || {
+        let FolderState { parts, is_merged } = SharedCampaign::state_in(bench.plan().unwrap(), &bench.path("out")).unwrap();
+        (parts.iter().map(|part| (part.runs, part.is_done)).collect::<Vec<_>>(), is_merged)
+    };
+    assert_eq!(state(), ([false, true, false, false, true, false].map(|done| (4, done)).to_vec(), false));
     // A shard done again computes nothing, and a process alone does the remaining shards.
     assert_eq!(bench.shard("out", shard(2, 3), "b", 1, &NoWatch).unwrap().computed, 0);
     assert_eq!(bench.finish("out", 1).computed, 16);
     assert_eq!(bench.shard("out", shard(1, 3), "c", 1, &NoWatch).unwrap().computed, 0);
     assert_eq!(bench.files("out"), ["campaign.json", "runs.parquet"]);
+    assert_eq!(state(), (vec![(4, true); 6], true));
 }
 
 #[test]

@@ -36,7 +36,8 @@ pub(crate) fn campaign(arguments: &CampaignArguments) -> Result<ExitCode, Failur
     let sharing = Sharing::of(&arguments.shards, arguments.out.as_deref())?;
     let plan = plan(arguments, sharing)?;
     let scene = scene_file(arguments);
-    let refused = |error: CampaignError| failure(error, scene, &[]);
+    let measures = arguments.measure.override_text();
+    let refused = |error: CampaignError| failure(error, scene, ("--measure", measures.as_slice()));
     match sharing {
         Sharing::Whole(_) | Sharing::Merge(_) => {}
         Sharing::Shard(shard, out) => {
@@ -127,7 +128,8 @@ fn scene_file(arguments: &CampaignArguments) -> &Path {
 }
 
 fn plan(arguments: &CampaignArguments, sharing: Sharing<'_>) -> Result<CampaignPlan, Failure> {
-    let refused = |error: CampaignError| failure(error, scene_file(arguments), &[]);
+    let measures = arguments.measure.override_text();
+    let refused = |error: CampaignError| failure(error, scene_file(arguments), ("--measure", measures.as_slice()));
     let Some(file) = &arguments.scene else {
         // Without a scene, the command continues the campaign recorded in the folder. Options of a new campaign could contradict the record.
         let CampaignArguments { overrides, vary, measure, verdicts, .. } = arguments;
@@ -139,7 +141,7 @@ fn plan(arguments: &CampaignArguments, sharing: Sharing<'_>) -> Result<CampaignP
     let variations =
         arguments.vary.iter().map(|text| Variation::parse(text)).collect::<Result<Vec<Variation>, _>>().map_err(|error| refused(error.into()))?;
     // `--measure` joins the overrides of `--set`, so that the folder records measures with all other keys.
-    let set: Vec<String> = arguments.overrides.set.iter().cloned().chain(arguments.measure.override_text()).collect();
+    let set: Vec<String> = arguments.overrides.set.iter().chain(&measures).cloned().collect();
     let (text, file) = (input::text(file)?, input::named(file));
     let format = match arguments.format {
         TableFormat::Parquet => Format::Parquet,
@@ -244,15 +246,15 @@ pub(crate) fn run_to_end(campaign: &mut Campaign, out: &Path) -> Result<Report, 
     }
 }
 
-/// Converts an error of a campaign into a failure with the name of the option at fault. `strategies` holds the overrides of `--strategies`.
-pub(crate) fn failure(error: CampaignError, scene: &Path, strategies: &[String]) -> Failure {
+/// Converts an error of a campaign into a failure with the name of the option at fault. `given`: an option of the command, with the overrides of that option.
+pub(crate) fn failure(error: CampaignError, scene: &Path, (given, overrides): (&'static str, &[String])) -> Failure {
     match error {
         CampaignError::Scene { error, varied } => {
-            // The override at fault is looked for among the overrides of each option. A strategy is a variation too, so `--strategies` is asked first.
+            // The override at fault is looked for among the overrides of each option. A strategy is a variation too, so `given` is asked first.
             let culprit = error.diagnostic().and_then(Diagnostic::override_text).unwrap_or_default();
             let among = |texts: &[String]| texts.iter().any(|text| text == culprit);
-            let option = match (among(strategies), among(&varied)) {
-                (true, _) => "--strategies",
+            let option = match (among(overrides), among(&varied)) {
+                (true, _) => given,
                 (false, true) => "--vary",
                 (false, false) => "--set",
             };

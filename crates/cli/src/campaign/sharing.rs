@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use cohaptic_campaign::{CampaignError, CampaignPlan, Shard, SharedCampaign, Watch};
+use cohaptic_campaign::{CampaignError, CampaignPlan, FolderState, Shard, SharedCampaign, Watch};
 
 use super::{Ended, Shown};
 use crate::failure::Failure;
@@ -101,7 +101,7 @@ impl Watch for Working<'_> {
 
 /// Prints the state of each part of the campaign in a folder: done or missing.
 pub(crate) fn status(json: bool, plan: CampaignPlan, folder: &Path) -> Result<ExitCode, Ended> {
-    let parts = SharedCampaign::parts_in(plan, folder).map_err(Ended::Error)?;
+    let FolderState { parts, is_merged } = SharedCampaign::state_in(plan, folder).map_err(Ended::Error)?;
     let pieces: Vec<Piece> = parts.iter().map(|part| Piece { units: part.runs, is_done: part.is_done }).collect();
-    show(json, folder, NAMES, &pieces).map_err(Ended::Said)
+    show(json, folder, NAMES, &pieces, is_merged).map_err(Ended::Said)
 }

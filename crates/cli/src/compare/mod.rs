@@ -30,7 +30,7 @@ pub(crate) fn compare(arguments: &CompareArguments) -> Result<ExitCode, Failure>
     let asked = Asked::of(arguments).map_err(|error| Failure::Input(format!("--strategies: {error}")))?;
     // These overrides tell a failure of a strategy from a failure of `--set`, so that the message names `--strategies`.
     let settings: Vec<String> = overrides(&asked.strategies);
-    let refused = |error: CampaignError| campaign::failure(error, &arguments.scene.scene, &settings);
+    let refused = |error: CampaignError| campaign::failure(error, &arguments.scene.scene, ("--strategies", &settings));
     let plan = plan(arguments, &asked).map_err(|error| error.unwrap_or_else(refused))?;
     let sharing = Sharing::of(&arguments.shards, arguments.out.as_deref())?;
     match sharing {

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use cohaptic_falcon::driver::{DriverConfig, Phase, Status};
+use cohaptic_falcon::driver::{DriverConfig, Phase, Reading, Status};
 use cohaptic_falcon::kinematics::Triple;
 use cohaptic_falcon::safety::Limits;
 use cohaptic_files::WholeFile;
@@ -225,7 +225,7 @@ impl Task for Watching {
             // Counted from the present exchange, not from the last due time: no burst of rows follows a pause.
             self.next_look = at + READABLE;
             if self.prints_rows {
-                print_row(&row(at, status))?;
+                print_row(&row(at, &rounded(status)))?;
             } else if self.line.is_seen() {
                 self.line.show(shown(at, status));
             }
@@ -294,6 +294,15 @@ pub(super) fn row(at: Duration, status: &Status) -> String {
     format!("{:.6},{},{homed},{top},{right},{left},{place},{fx},{fy},{fz},{pressed}", at.as_secs_f64(), phase.name())
 }
 
+/// Returns the status for a row that people may read too: position to 1 µm, velocity to 1 µm/s, force to 1 µN. The device is coarser: an encoder count is at
+/// least 20 µm. Without the rounding an axis at rest shows the rounding errors of the kinematics, such as -0.00000000000000000043.
+fn rounded(status: &Status) -> Status {
+    // -0.0 + 0.0 is 0.0, so that no cell is a negative zero.
+    let millionths = |values: Triple| values.map(|value| (1e6 * value).round() / 1e6 + 0.0);
+    let reading = status.reading.map(|reading| Reading { position: millionths(reading.position), velocity: millionths(reading.velocity), ..reading });
+    Status { reading, force: millionths(status.force), ..*status }
+}
+
 /// A CSV file of rows, which appears under its name only when [`finish`](Self::finish) is called.
 pub(super) struct SamplesFile {
     file: WholeFile,
@@ -329,7 +338,7 @@ pub(super) fn print_row(row: &str) -> Result<(), Failure> {
 
 #[cfg(test)]
 mod tests {
-    use cohaptic_falcon::driver::{Driver, DriverConfig, Reading};
+    use cohaptic_falcon::driver::{Driver, DriverConfig};
     use cohaptic_falcon::simulator::{SimulatedTransport, Simulator, SimulatorConfig, StillHand};
     use cohaptic_units::Instant;
 
@@ -361,6 +370,17 @@ mod tests {
                 "  speed 0.500 m/s"
             ]
         );
+    }
+
+    #[test]
+    fn rows_for_people_lose_the_digits_that_the_file_keeps() {
+        let simulator = Simulator::new(SimulatorConfig { running: true, ..SimulatorConfig::default() }, StillHand);
+        let driver = Driver::open(SimulatedTransport::in_virtual_time(simulator), DriverConfig::DEFAULT).unwrap();
+        let reading = Reading { at: Instant::ZERO, position: [-4.3e-19, 0.049_242_688, -2e-7], velocity: [-1.2e-18, 0.0, 0.071_598_6] };
+        let status = Status { reading: Some(reading), force: [4.4e-18, -0.25, -0.5], ..*driver.status() };
+        let [kept, shown] = [row(Duration::ZERO, &status), row(Duration::ZERO, &rounded(&status))];
+        assert!(kept.contains("0.049242688,-0.0000002,") && kept.contains(",0.0715986,"), "{kept}");
+        assert!(shown.ends_with(",0,0.049243,0,0,0,0.071599,0,-0.25,-0.5,"), "{shown}");
     }
 
     #[test]

@@ -28,7 +28,7 @@ const NOT_PROPOSED: [&str; 8] = ["count", "substeps", "netem-profile", "name", "
 pub(super) fn scene(scene: &toml::Table, name: &str, other_number: Option<usize>) -> String {
     let mut text = format!(
         "# A scene to begin with, written by cohaptic init --from {name}.\n\
-         # Keys behind a # are not in force: they show what else can be said, most of them with the value that holds without them.\n\
+         # Keys after a # have no effect. They are proposals, most of them with the default value.\n\
          # All keys: docs/reference-keys.md. To run it: cohaptic run FILE. To vary it: --set link.delay=40ms.\n\
          # An editor for TOML explains and completes keys with the file that cohaptic schema prints.\n"
     );
@@ -37,8 +37,8 @@ pub(super) fn scene(scene: &toml::Table, name: &str, other_number: Option<usize>
     }
     // Writing to a string does not fail.
     let _ = match other_number {
-        Some(number) => writeln!(text, "\n# What scenarios/{name}.toml expects holds for its {number} peers, and is left out."),
-        None => writeln!(text, "\n# Where the numbers of this scene come from stands in scenarios/{name}.toml."),
+        Some(number) => writeln!(text, "\n# The expectations of scenarios/{name}.toml hold for its {number} peers, and are left out here."),
+        None => writeln!(text, "\n# scenarios/{name}.toml says where the numbers of this scene come from."),
     };
     text
 }

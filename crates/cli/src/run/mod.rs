@@ -39,10 +39,11 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     let path = &arguments.scene.scene;
     let overrides = &overrides(arguments);
     let scene = match &arguments.inputs {
-        None => input::with(path, |text, file| Scene::parse(text, file, overrides))?,
+        None => input::with(path, |text, file| Scene::parse(text, file, overrides)),
         // The scene is read as the live session read it, because a replay has to begin with the same scene.
-        Some(_) => input::with(path, |text, file| Scene::parse_live(text, file, overrides))?,
+        Some(_) => input::with(path, |text, file| Scene::parse_live(text, file, overrides)),
     };
+    let scene = scene.map_err(|error| failure::of_variant(error, "--measure", arguments.measure.override_text().as_slice()))?;
     if let Some(error) = failure::too_large(&scene, overrides, model(arguments), is_watched(arguments, &scene)) {
         return Err(error.into());
     }

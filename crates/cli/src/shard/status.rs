@@ -61,9 +61,9 @@ pub(crate) fn all_done(folder: &Path, names: Names, pieces: &[Piece]) -> Result<
     if undone.is_empty() { Ok(()) } else { Err(missing(folder, &Missing { piece: names.piece, count: pieces.len() as u64, pieces: undone })) }
 }
 
-/// Prints the done pieces of a folder, and the workers.
-pub(crate) fn show(json: bool, folder: &Path, names: Names, pieces: &[Piece]) -> Result<ExitCode, Failure> {
-    let status = Status { folder: output::path(folder), names, pieces, workers: workers(folder)? };
+/// Prints the done pieces of a folder, and the workers. `is_merged`: the folder has the merged result.
+pub(crate) fn show(json: bool, folder: &Path, names: Names, pieces: &[Piece], is_merged: bool) -> Result<ExitCode, Failure> {
+    let status = Status { folder: output::path(folder), names, pieces, workers: workers(folder)?, is_merged };
     output::answer(json, DocumentSchema::STATUS, &status_document(&status), || status_words(&status), NO_FILES)?;
     Ok(ExitCode::SUCCESS)
 }

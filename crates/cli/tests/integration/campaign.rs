@@ -47,7 +47,10 @@ fn measures_of_a_campaign_are_those_of_the_runs_alone() {
         }
         assert!(measures["viscosity_n_s_m"].is_f64() && measures["peers.third.energy_j"].is_f64());
     }
-    desk.cohaptic(&format!("{SIX} --measure energy --format csv --out other")).assert_refused(2, &["unknown measure \"energy\""]);
+    // The message names the option of the user, not the `--set` that stands for it.
+    for line in [format!("{SIX} --measure energy --format csv --out other"), "run random.toml --measure energy".to_owned()] {
+        desk.cohaptic(&line).assert_refused(2, &["error: --measure measure.names=", "unknown measure \"energy\""]);
+    }
     assert!(!desk.json("run random.toml --json").as_object().unwrap().contains_key("measures"), "nothing is measured that is not asked for");
 }
 

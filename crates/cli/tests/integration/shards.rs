@@ -83,6 +83,7 @@ fn a_folder_knows_its_campaign() {
         }
         let status = desk.text(&format!("campaign --status {out}"));
         assert_eq!(status, desk.text(&format!("{line} --status {out}")));
+        assert!(status.ends_with("all is done: put it together with --merge\n"), "{status}");
         let merged = desk.text(&format!("campaign --merge {out}"));
         assert!(merged.contains("12 runs of 2 combinations"), "{merged}");
         assert_same(&desk, out, &format!("{out}-whole"));
@@ -117,6 +118,11 @@ fn while_anything_is_missing_a_merge_says_what_and_by_which_shard_it_is_done() {
         assert_eq!((&document["workers"][0]["shard"], &document["workers"][0]["state"]), (&"2/4".into(), &"done".into()));
         // One process may do the rest, and tidies up.
         desk.text(&format!("{line} --out {out}"));
+        if piece == "part" {
+            // A merge of a merged campaign would do nothing, so that the status does not advise it.
+            let status = desk.text(&format!("{line} --status {out}"));
+            assert!(status.ends_with("all is done and put together\n"), "{status}");
+        }
         assert!(desk.files(out).iter().all(|name| !name.contains("worker") && !name.contains("partial")), "{:?}", desk.files(out));
     }
 }

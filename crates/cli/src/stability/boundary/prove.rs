@@ -45,7 +45,7 @@ pub(super) fn prove(order: &Order, arguments: &BoundaryArguments, sharing: Shari
         (Sharing::Shard(shard, _), Some(proofs)) => {
             return shard::answer(arguments.scene.json, &proofs.shard(shard, |_, error| failure(order, arguments, error))?);
         }
-        (Sharing::Status(folder), Some(proofs)) => return shard::show(arguments.scene.json, folder, proof_blocks::NAMES, &proofs.pieces()?),
+        (Sharing::Status(folder), Some(proofs)) => return shard::show(arguments.scene.json, folder, proof_blocks::NAMES, &proofs.pieces()?, false),
         (Sharing::Merge(_) | Sharing::Whole(_), _) | (_, None) => {}
     }
     let (_own, rows) = proofs.map_or(Ok((None, Vec::new())), |proofs| proofs.rows(sharing))?;

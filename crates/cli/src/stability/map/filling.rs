@@ -150,7 +150,7 @@ fn are_all_there(order: &Order, kept: Kept<'_>) -> Result<(), Failure> {
 pub(super) fn status(order: &Order, arguments: &MapArguments, folder: &Path) -> Result<ExitCode, Failure> {
     let header = header(order, arguments, WHAT)?;
     let kept = Kept { folder, name: ROWS, header: &header };
-    show(arguments.scene.json, folder, NAMES, &pieces(order, kept)?)
+    show(arguments.scene.json, folder, NAMES, &pieces(order, kept)?, false)
 }
 
 /// Destination of finished rows, with the first failure to write. Shared by all threads of the computation.

@@ -102,7 +102,7 @@ fn reason(from: u64, why: Openness) -> String {
     match why {
         Openness::Ended => "the proof was stopped".to_owned(),
         Openness::Exhausted => "too many pieces were looked at".to_owned(),
-        Openness::Beyond => format!("numbers were followed to {MOST_FOLLOWED}"),
+        Openness::Beyond => format!("no proof was found beyond N = {MOST_FOLLOWED}"),
         Openness::Moment => format!("no second moment was found that decides N = {from}"),
         Openness::Near(near) => format!("at N = {from} {}", too_near(near)),
         Openness::Limit(near) => format!("as N grows, {}", too_near(near)),
@@ -143,8 +143,8 @@ pub(super) fn words(scene: &Scene, Proof { every, certificate }: &Proof) -> Stri
         let _ = writeln!(text, "    {:<10}for {}{reason}", guarantee.word(), numbers(from, to));
     }
     if let Some(what) = &every.without_limit {
-        let beyond = if every.is_mean_square { "" } else { ", and beyond as multiples of that" };
-        let _ = writeln!(text, "  note: as N grows, {what}: numbers were followed to {MOST_FOLLOWED}{beyond}");
+        let beyond = if every.is_mean_square { "nothing can be proven" } else { "only instability can be proven" };
+        let _ = writeln!(text, "  note: as N grows, {what}: beyond N = {MOST_FOLLOWED} {beyond}");
     }
     let uncertified = certificate.iter().flat_map(|certificate| &certificate.uncertified);
     let uncertified: Vec<String> = uncertified.map(|(from, to)| numbers(*from, *to)).collect();

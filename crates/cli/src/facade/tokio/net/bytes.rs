@@ -1,4 +1,5 @@
-//! Methods that all streams of bytes have: TCP, Unix streams, and the ends of pipes. Each type has one field, an `Either` of a real stream and one of a test bed.
+//! Methods that all streams of bytes have: TCP, Unix streams, and the ends of pipes. Each type has one field, an `Either` of a real stream and one of a test
+//! bed.
 
 /// Methods of what can be read.
 macro_rules! reads {
@@ -106,6 +107,7 @@ macro_rules! byte_stream {
                     $crate::net::Either::Bed(_) => loop {
                         self.ready(interest).await?;
                         match operation() {
+                            // Another task has read the bytes, or taken the room, since the stream was ready.
                             Err(error) if error.kind() == std::io::ErrorKind::WouldBlock => {}
                             outcome => return outcome,
                         }

@@ -99,11 +99,12 @@ impl Builder {
         }
     }
 
-    /// Refuses a runtime inside a test bed, and gives the runtime that is built for a test bed the seed of the test bed, which decides where `select!` begins. If
-    /// the environment asks for a loopback, returns the loopback, and the builder of a runtime for it: with one thread, and virtual time.
+    /// Refuses a runtime inside a test bed, and gives the runtime that is built for a test bed the seed of the test bed, which decides where `select!` begins.
+    /// If the environment asks for a loopback, returns the loopback, and the builder of a runtime for it: with one thread, and virtual time.
     #[track_caller]
     fn prepare(&mut self) -> Option<(real::runtime::Builder, Loopback)> {
         super::refuse_in_bed();
+        // A seed is left by the test kit, which builds this runtime for a run. Such a runtime has the links of its test bed and no loopback of its own.
         if let Some(seed) = cohaptic_sockets::take_runtime_seed() {
             self.0.cohaptic_seed(seed);
             return None;

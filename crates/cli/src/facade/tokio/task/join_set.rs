@@ -88,6 +88,7 @@ impl<T: 'static> JoinSet<T> {
         match cohaptic_sockets::bed() {
             None => self.0.spawn_blocking(hosted::with_host(function)),
             Some(_) => {
+                // The set has a task that awaits the work, because the function `spawn_blocking` holds the time of the test bed during the work.
                 let work = super::spawn_blocking(function);
                 self.spawn(hosted::outcome_of(work))
             }

@@ -80,6 +80,7 @@ impl UnixDatagram {
 
     /// See `tokio::net::UnixDatagram::take_error`. In a test bed each error is that of a call.
     pub fn take_error(&self) -> io::Result<Option<io::Error>> {
+        // A Unix socket of datagrams keeps no error. The call for the name fails if the socket does not live any more.
         either!(&self.0, |socket| socket.take_error(), socket.local_name().map(|_| None))
     }
 
