@@ -227,6 +227,7 @@ impl Judge {
         let Self { spec, targets, copies, groups, axes, .. } = self;
         let mut decided = None;
         match &spec.kind {
+            // The first group that is done, or fails, ends the task. Peers judged alone are groups of their own, in the order of the scene.
             TaskKind::Reach(reach) | TaskKind::Carry(Carry { reach, .. }) => {
                 for group in groups {
                     if group.reach(at, (reach, targets, spec.start), copies, *axes, on_row) {

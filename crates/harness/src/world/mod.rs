@@ -387,6 +387,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         let mut finite = true;
         for (member, latest) in self.members.iter_mut().zip(&mut self.latest) {
             member.peer.compute_over(now, span);
+            // Taken before the motion: the latest position is that of the tick, as in the general loop.
             *latest = member.peer.object().state().position;
             member.tick += 1;
             member.peer.advance(now, span);

@@ -207,6 +207,7 @@ fn read_task(node: &Node, has_task: bool, context: Context<'_>) -> Option<Expect
         Some(Bounds { min: min.map(|min| min.as_secs_f64()), max: max.map(|max| max.as_secs_f64()) })
     });
     table.finish();
+    // Both keys are read before a missing task is reported, so that faults in the keys are reported with it.
     if !has_task {
         context.fault_at(node, "the scene has no task: expected a table [task] too");
         return None;
