@@ -65,7 +65,7 @@ impl Injected {
     pub(crate) fn is_measured(&self, scene: &Scene) -> Result<(), TestCaseError> {
         let names = [Measure::Energy, Measure::EnergyPeak].map(|measure| MeasureName { measure, peer: None }).to_vec();
         let scene = Scene { measure: Some(MeasureSpec { names, settings: MeasureSettings::default() }), ..scene.clone() };
-        let values = Measures::run(&scene, Model::Least).1;
+        let values = Measures::run(&scene, Model::Least).values;
         let (energy, peak) = (values[0].value.unwrap(), values[1].value.unwrap());
         prop_assert!((energy - self.energy.last().unwrap()).abs() <= self.rounding, "{energy} J are measured");
         prop_assert!(peak >= energy && peak <= self.peak().max(0.0) + self.rounding, "{peak} J are measured of {} J", self.peak());

@@ -51,7 +51,7 @@ proptest! {
         let frames = i32::try_from(1000 * WINDOW / draft.update).unwrap();
         let left = analyse(&scene, Method::Reduced).unwrap().radius.value.powi(frames);
         prop_assume!(left < 1e-7);
-        let measured = Measures::run(&scene, Model::Least).1;
+        let measured = Measures::run(&scene, Model::Least).values;
         let point = admittance(&scene, 0, &[frequency]).unwrap().points[0];
         let impedance = point.value.inv();
         let omega = std::f64::consts::TAU * frequency;
@@ -76,7 +76,7 @@ fn a_free_device_has_its_own_mass_and_damping() {
     draft.peers[0].device.damping = 5.0;
     let amplitude = [1.0, 0.0, 0.0];
     draft.peers[0].hand = DraftHand::Sine { amplitude, frequency: 2.0, phase: 0.3 };
-    let measured = Measures::run(&probed(&draft), Model::Least).1;
+    let measured = Measures::run(&probed(&draft), Model::Least).values;
     let (viscosity, mass) = (measured[0].value.unwrap(), measured[1].value.unwrap());
     let (omega, kept) = (std::f64::consts::TAU * 2.0, libm::exp(-5.0 * 1e-3 / 0.1));
     let share = 5.0 / (1.0 - kept);

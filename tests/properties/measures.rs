@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use cohaptic_harness::measures::Measures;
+use cohaptic_harness::measures::{MeasuredRun, Measures};
 use cohaptic_harness::{Model, NoObserver, Simulation};
 use cohaptic_peer::State;
 use cohaptic_peer::wire::SampleKind;
@@ -22,7 +22,7 @@ fn measuring(mut scene: Scene, settings: MeasureSettings) -> Scene {
 }
 
 fn values(scene: &Scene, model: Model) -> BTreeMap<MeasureName, Option<f64>> {
-    Measures::run(scene, model).1.into_iter().map(|measured| (measured.name, measured.value)).collect()
+    Measures::run(scene, model).values.into_iter().map(|measured| (measured.name, measured.value)).collect()
 }
 
 /// The rows of a run by instant: of each, the ticks in it.
@@ -279,11 +279,11 @@ proptest! {
         let scene = draft.scene();
         let Ok(unseen) = Simulation::new(&scene, Model::Least).run(&mut NoObserver);
         let mut measured = measuring(scene, MeasureSettings::default());
-        let (summary, all) = Measures::run(&measured, Model::Least);
+        let MeasuredRun { summary, values: all, .. } = Measures::run(&measured, Model::Least);
         prop_assert_eq!(format!("{summary:?}"), format!("{unseen:?}"));
         let one = all[which.index(all.len())];
         measured.measure.as_mut().unwrap().names = vec![one.name];
-        let alone = Measures::run(&measured, Model::Least).1;
+        let alone = Measures::run(&measured, Model::Least).values;
         prop_assert_eq!(alone.len(), 1);
         prop_assert_eq!((alone[0].name, alone[0].value.map(f64::to_bits)), (one.name, one.value.map(f64::to_bits)));
     }

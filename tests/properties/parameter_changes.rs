@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use cohaptic_harness::Model;
-use cohaptic_harness::measures::Measures;
+use cohaptic_harness::measures::{MeasuredRun, Measures};
 use cohaptic_peer::coordination::{LawForm, LawSettings, LawValue};
 use cohaptic_peer::{Coordination, SendWhen};
 use cohaptic_scene::{Change, ChangeKind, Scene};
@@ -94,7 +94,7 @@ fn a_copy_slides_by_the_damping_of_each_time() {
         measure = { names = ["energy_j"] }
     "#;
     let scene = Scene::parse(text, "slide.toml".as_ref(), &[]).unwrap();
-    let (summary, measured) = Measures::run(&scene, Model::Least);
+    let MeasuredRun { summary, values: measured, .. } = Measures::run(&scene, Model::Least);
     let (mass, v0) = (0.225_f64, 0.2_f64);
     let v1 = v0 * (-11.0 * 0.05 / mass).exp();
     let v2 = v1 * (-41.0 * 0.05 / mass).exp();
