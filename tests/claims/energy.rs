@@ -126,7 +126,7 @@ impl Ledger {
 fn force(hand: Option<&Hand>, at: Instant) -> f64 {
     match hand {
         Some(Hand::Force(signal)) => signal.value::<1>(at)[0],
-        Some(Hand::Arm { .. }) | None => 0.0,
+        Some(Hand::Arm { .. } | Hand::Operator { .. }) | None => 0.0,
     }
 }
 

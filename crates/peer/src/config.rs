@@ -1,7 +1,10 @@
 //! Parameters of a peer. Every number is finite and not negative, and masses are above zero. The caller that makes a parameter checks this.
 
+use alloc::boxed::Box;
+
 use crate::gains::{Gains, grasp};
-use crate::{Motion, Signal};
+use crate::operator::OperatorConfig;
+use crate::{Motion, Signal, State};
 
 /// A haptic device: a mass with viscous damping.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -32,6 +35,15 @@ pub struct ArmConfig {
     pub stiffness: f64,
 }
 
+impl ArmConfig {
+    /// Returns the force of the arm's spring and damper at the wanted motion \[N\], on a device whose plant has the same spring and damper to ground.
+    #[must_use]
+    #[inline]
+    pub fn force<const A: usize>(&self, wanted: &State<A>) -> [f64; A] {
+        core::array::from_fn(|axis| self.stiffness * wanted.position[axis] + self.damping * wanted.velocity[axis])
+    }
+}
+
 /// Action of the user's hand on the device.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Hand {
@@ -44,6 +56,13 @@ pub enum Hand {
         /// Wanted motion \[m\].
         follows: Signal,
     },
+    /// An arm with an impedance around the wanted motion of a modelled person. The driver computes this motion at each tick.
+    Operator {
+        /// Impedance of the arm.
+        arm: ArmConfig,
+        /// Model of the person.
+        operator: Box<OperatorConfig>,
+    },
 }
 
 impl Hand {
@@ -51,9 +70,15 @@ impl Hand {
     #[must_use]
     pub const fn arm(&self) -> Option<ArmConfig> {
         match self {
-            Self::Arm { arm, .. } => Some(*arm),
+            Self::Arm { arm, .. } | Self::Operator { arm, .. } => Some(*arm),
             Self::Force(_) => None,
         }
+    }
+
+    /// Returns the model of a person; `None` for any other hand.
+    #[must_use]
+    pub fn operator(&self) -> Option<&OperatorConfig> {
+        if let Self::Operator { operator, .. } = self { Some(operator) } else { None }
     }
 }
 

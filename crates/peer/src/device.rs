@@ -90,6 +90,11 @@ impl<const A: usize> SimulatedDevice<A> {
         self.state = state;
     }
 
+    /// Lets the arm of an operator want the motion `wanted`, from now until the next call. Before the first call the operator exerts no force.
+    pub fn want(&mut self, arm: &ArmConfig, wanted: &State<A>) {
+        self.hand = HandForce(Kind::Constant(arm.force(wanted)));
+    }
+
     /// Sets the hand. An arm stays the arm with which the device was made; only its wanted motion changes.
     pub fn set_hand(&mut self, hand: Option<&Hand>) {
         self.hand = HandForce::of(hand);
@@ -97,11 +102,11 @@ impl<const A: usize> SimulatedDevice<A> {
 }
 
 impl<const A: usize> HandForce<A> {
-    /// Returns the force of a hand; zero for `None`.
+    /// Returns the force of a hand; zero for `None`, and for an operator, whose force the driver sets at each tick: see [`SimulatedDevice::want`].
     #[must_use]
     pub fn of(hand: Option<&Hand>) -> Self {
         Self(match hand {
-            None => Kind::Constant([0.0; A]),
+            None | Some(Hand::Operator { .. }) => Kind::Constant([0.0; A]),
             // A constant signal is evaluated here once, and costs nothing at the ticks.
             Some(Hand::Force(signal)) if signal.is_constant() => Kind::Constant(signal.value(Instant::ZERO)),
             Some(Hand::Force(signal)) => Kind::Force(signal.clone()),
@@ -133,8 +138,7 @@ impl<const A: usize> HandForce<A> {
             Kind::Force(signal) => signal.value(now),
             Kind::Arm { arm, follows } => {
                 // Stiffness and damping of the arm already act in the plant, so only the wanted motion is left here.
-                let (wanted, speed) = (follows.value::<A>(now), follows.slope::<A>(now));
-                core::array::from_fn(|axis| arm.stiffness * wanted[axis] + arm.damping * speed[axis])
+                arm.force(&State { position: follows.value(now), velocity: follows.slope(now) })
             }
         }
     }

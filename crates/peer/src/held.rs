@@ -149,6 +149,13 @@ impl<const A: usize> Held<A> {
         self.samples.get(place).map(|sample| &sample.state)
     }
 
+    /// Returns the state that the sender with index `place` has sent, without its weight; `None` beyond the last sender.
+    #[must_use]
+    pub fn sent_state(&self, place: usize) -> Option<State<A>> {
+        let weight = self.heard.as_ref().and_then(|heard| heard.weights.get(place));
+        self.state(place).map(|state| weight.map_or(*state, |weight| state.times(weight.recip())))
+    }
+
     /// Returns the mean of the held states, as of the last [`Held::refresh`]; [`State::REST`] without other peers.
     #[must_use]
     pub fn mean(&self) -> &State<A> {

@@ -86,6 +86,7 @@ mod lead;
 mod motion;
 mod number;
 mod object;
+pub mod operator;
 mod peer;
 mod plant;
 pub mod rotation;

@@ -9,6 +9,7 @@ use core::time::Duration;
 use cohaptic_units::Instant;
 
 use crate::coordination::{LawValues, Prediction, Role};
+use crate::operator::Seen;
 use crate::rotation::{Attitude, Rotation};
 use crate::tick::on_object;
 use crate::wire::{DecodeError, Extra, MAX_LEN, Sample, SampleKind};
@@ -384,6 +385,21 @@ impl<const A: usize, D: Device<A>, S: Strategy<A>> Peer<A, D, S> {
     /// Returns the copy of the object, for a change of its state.
     pub const fn object_mut(&mut self) -> &mut ObjectCopy<A> {
         &mut self.object
+    }
+
+    /// Returns the position at which the user of this peer sees the object at a tick, after the packets of the tick were taken in \[m\]. `None` if the user
+    /// sees a peer that this peer does not hear.
+    #[must_use]
+    pub fn seen(&self, of: Seen) -> Option<[f64; A]> {
+        match (of, self.asked.role) {
+            (Seen::Own, Role::Copy) => Some(self.object.state().position),
+            // The copy of a client takes this state when the forces of the tick are computed.
+            (Seen::Own, Role::Client { server }) => self.held.state(server).map(|state| state.position),
+            (Seen::Peer(sender), _) => {
+                let place = self.place_of(u32::try_from(sender).ok()?)?;
+                self.held.sent_state(place).map(|state| state.position)
+            }
+        }
     }
 
     /// Returns the rotation of copy and device; `None` for an object without inertia.

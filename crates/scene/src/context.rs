@@ -18,6 +18,8 @@ pub(crate) struct SceneContext<'a> {
     pub(crate) live: bool,
     /// True if the object has an inertia.
     pub(crate) turns: bool,
+    /// Kind of the task as written, empty if none is written; `None` for a scene without a task.
+    pub(crate) task: Option<&'a str>,
 }
 
 impl<'a> SceneContext<'a> {

@@ -38,6 +38,7 @@ mod link_keys;
 mod measures;
 mod model;
 mod oldest_sample;
+mod operators;
 mod path;
 mod quantities;
 mod read;

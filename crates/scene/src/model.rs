@@ -280,7 +280,7 @@ pub struct PeerSpec {
     pub coupling: Gains,
     /// Dependence of KC and BC on the number of peers.
     pub coupling_scaling: Scaling,
-    /// Force or arm of the hand; `None` if the hand does nothing.
+    /// Force, arm or operator of the hand; `None` if the hand does nothing.
     pub hand: Option<Hand>,
     /// Initial position of the copy, and of the device unless `device_position` is given \[m\].
     pub position: [f64; 3],

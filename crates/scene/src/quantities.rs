@@ -38,6 +38,10 @@ pub(crate) const FORCE: Quantity = Quantity::any("N");
 pub(crate) const POSITIVE_FORCE: Quantity = Quantity::positive("N");
 /// Motor counts per torque [counts/(N·m)], above zero.
 pub(crate) const POSITIVE_COUNTS: Quantity = Quantity::positive("counts/(N·m)");
+/// Factor without a unit, at least zero.
+pub(crate) const FACTOR: Quantity = Quantity::not_negative("");
+/// Angular frequency \[rad/s\], above zero.
+pub(crate) const FREQUENCY_LIMIT: Quantity = Quantity::positive("rad/s");
 /// Frequency \[Hz\], at least zero.
 pub(crate) const FREQUENCY: Quantity = Quantity::not_negative("Hz");
 /// Moment of inertia [kg·m²], above zero.

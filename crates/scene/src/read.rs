@@ -34,7 +34,7 @@ pub(crate) static ROOT: Table = Table::of(&[&[
     optional("link", Form::Table(&LINK_TABLE), "Keys of every link that does not have them in its own table; links are ideal by default"),
     optional("links", Form::List(&Form::Table(&LINK_ENTRY)), "One direction between two peers per entry: its own keys are laid over those of [link]"),
     optional("timeline", Form::List(&Form::Table(&TIMELINE)), "Changes while the scene runs"),
-    optional("task", Form::Table(&TASK), "What the users are asked to do with the object; a task changes no motion"),
+    optional("task", Form::Table(&TASK), "What the users are asked to do with the object; a task moves nothing but operators"),
     optional("measure", Form::Table(&MEASURE), "Measures of a run, computed while it runs"),
     optional("expect", Form::Table(&EXPECT), "Expected results, which cohaptic check compares with those of a run"),
 ]]);
@@ -133,7 +133,10 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
     let file = file.with_modulators(modulators.as_ref());
     // Looked up in the document, because the object may be refused and readers of other parts depend on the answer.
     let turns = root.get("object").and_then(Node::as_table).is_some_and(|object| object.get("inertia").is_some());
-    let context = SceneContext { file, axes, live, turns };
+    // Looked up in the document too: operators of peers need the kind of the task.
+    let task_node = root.get("task");
+    let task = task_node.map(|task| task.as_table().and_then(|task| task.get("kind")?.node.as_text()).unwrap_or_default());
+    let context = SceneContext { file, axes, live, turns, task };
     // From here on the context holds axes, names and modulators, on which the readers below depend.
     let object = root.read("object", |node, _| read_object(node, context));
     let (object, object_rotation) = object.unzip();
@@ -157,7 +160,8 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
         (Some(object), Some(gains), Some(stepping), Some(peers)) => rotation(object, gains, stepping.rotation_steps, peers, file),
         _ => None,
     };
-    let peers: Option<Vec<_>> = peers.map(|peers| peers.into_iter().map(|peer| peer.spec).collect());
+    let (peers, places): (Option<Vec<_>>, Option<Vec<_>>) =
+        peers.map(|peers| peers.into_iter().map(|peer| (peer.spec, peer.place)).collect::<(Vec<_>, Vec<_>)>()).unzip();
     let (link, links) = (root.get("link"), root.get("links"));
     // Changes of links in the timeline are laid over the links of the beginning, so that links are read before the timeline.
     let links = read_links(link, links, file);
@@ -171,7 +175,6 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
             changes.retain(|change| turns || !matches!(change.what, ChangeKind::HandTorque { .. }));
             changes
         });
-    let task_node = root.get("task");
     // The probe is known after the measures only, which have the key.
     let offered = Offered { probe: false, task: task_node.is_some() };
     let of = Measured { peers: peers.as_deref(), timeline: timeline.as_deref(), offered };
@@ -227,6 +230,10 @@ fn read_document(document: &Node, file: Context<'_>, live: bool, on_links: OnLin
         && task.judged(&scene).is_empty()
     {
         file.fault_at(node, "no device touches the object, so no copy is judged: expected who = the name of a peer, or a peer that touches");
+        return None;
+    }
+    if let (Some((peer, refused)), Some(places)) = (scene.refused_operator(), places) {
+        file.fault(places[peer], "peers", refused);
         return None;
     }
     if let Some(refused) = scene.refused_topology() {

@@ -8,7 +8,7 @@ use cohaptic_wan::random::{Purpose, Stream};
 
 use crate::path::PathTask;
 
-/// A task of a run. A task observes the run and changes no motion, packet or random number.
+/// A task of a run. A task observes the run. It changes no motion, packet or random number of a scene without operators, who move towards its target.
 #[derive(Clone, PartialEq, Debug)]
 pub struct TaskSpec {
     /// Kind of the task, with the keys of this kind.
@@ -188,6 +188,18 @@ impl Reach {
             }
         }
         targets
+    }
+}
+
+impl TaskKind {
+    /// Returns the largest distance from a target that counts as at the target, or half the width of a lane \[m\]; `None` for a kind without such a distance.
+    #[must_use]
+    pub const fn radius(&self) -> Option<f64> {
+        match self {
+            Self::Reach(Reach { radius, .. }) | Self::Hold(Hold { radius, .. }) | Self::Carry(Carry { reach: Reach { radius, .. }, .. }) => Some(*radius),
+            Self::Path(path) => Some(0.5 * path.width),
+            Self::Track(_) => None,
+        }
     }
 }
 

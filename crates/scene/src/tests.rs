@@ -2,6 +2,7 @@
 
 mod access;
 mod form;
+mod operators;
 mod strategies;
 mod task;
 mod topologies;

@@ -110,7 +110,17 @@ pub fn notes(said: &[String], combines: bool, scene: &Scene) -> Vec<String> {
     if scene.rotation.is_some() {
         notes.push(UNLOADED.to_owned());
     }
+    notes.extend(arms_alone(scene));
     notes
+}
+
+/// Note for operators who make movements: what follows from a look at a seen copy is no part of the analysis.
+pub const ARMS_ALONE: &str =
+    "of operators who make movements the arms alone are analysed: a movement is a wanted motion, and depends on what is seen only at its plan";
+
+/// Returns [`ARMS_ALONE`] for a scene with an operator; `None` without one.
+pub(crate) fn arms_alone(scene: &Scene) -> Option<String> {
+    (0..scene.peers.len()).any(|peer| scene.operator(peer).is_some()).then(|| ARMS_ALONE.to_owned())
 }
 
 /// Note for an object that turns: its equations are linearised for small motions.

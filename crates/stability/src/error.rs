@@ -115,6 +115,15 @@ pub enum AnalysisError {
          `cohaptic check`; or expected a scene without it"
     )]
     DeadBands,
+    /// The hand of an operator follows what the operator sees, continuously, and this analysis does not follow such hands.
+    #[error(
+        "peer {peer} has an operator of the law crossover, whose hand follows what it sees: no analysis contains it; simulations tell whether the scene is \
+         stable, as in `cohaptic check`, or expected an operator of the law moves, or an arm"
+    )]
+    Operator {
+        /// Name of the peer with the operator.
+        peer: String,
+    },
     /// The strategy uses the ages of samples, and the clocks drift apart.
     #[error("{strategy} coordination uses the ages of samples, which do not repeat where clocks drift apart: expected one drift for all peers")]
     AgesByClocks {

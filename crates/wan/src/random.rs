@@ -44,6 +44,8 @@ pub enum Purpose {
     Slot,
     /// Order of the targets of a task, in a stream of its own. The n-th exchange of two targets has the draws of packet n.
     TargetOrder,
+    /// Noise of a movement of an operator, in a stream of its own. The n-th movement has the draws of packet n; its axes are copies.
+    Movement,
     /// Process of an impairment of [the list](crate::Impairments), by its code. The n-th event has the draws of packet n.
     Listed(u8),
 }
@@ -65,6 +67,7 @@ impl Purpose {
             Self::Modulation => 10,
             Self::Slot => 12,
             Self::TargetOrder => 18,
+            Self::Movement => 20,
             Self::Listed(code) => code as u64,
         }
     }
@@ -298,7 +301,8 @@ mod tests {
     #[test]
     fn no_two_draws_share_an_address() {
         use Purpose::{
-            Corruption, CrossTraffic, Duplication, InitialState, Jitter, Listed, Loss, Modulation, Outage, Queue, Reordering, Slot, TargetOrder,
+            Corruption, CrossTraffic, Duplication, InitialState, Jitter, Listed, Loss, Modulation, Movement, Outage, Queue, Reordering, Slot,
+            TargetOrder,
             TraceLoss,
         };
         let mut words = std::collections::BTreeSet::new();
@@ -320,6 +324,7 @@ mod tests {
                     Modulation,
                     Slot,
                     TargetOrder,
+                    Movement,
                     Listed(14),
                     Listed(16),
                 ] {

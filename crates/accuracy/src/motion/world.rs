@@ -43,7 +43,7 @@ impl Pair {
         // Arms of these scenes are at rest at the wanted position, and exert no held force.
         let force = |peer: usize, at: Instant| match &scene.peers[peer].hand {
             Some(Hand::Force(signal)) => Signal::value::<1>(signal, at)[0],
-            Some(Hand::Arm { .. }) | None => 0.0,
+            Some(Hand::Arm { .. } | Hand::Operator { .. }) | None => 0.0,
         };
         let touch = |peer: usize| match scene.peers[peer].contact {
             Contact::None => Touch::Nothing,

@@ -114,6 +114,8 @@ shipped![
     "rigid/precession",
     "rigid/tray",
     "tasks/hold",
+    "tasks/operator-reach",
+    "tasks/operator-track",
     "tasks/reach",
     "tasks/stop",
     "tasks/track",

@@ -142,6 +142,7 @@ impl Shape {
             (!plan.general_links, "everything is modelled"),
             (scene.peers.iter().all(|peer| peer.clock.tick == clock.tick), "the ticks of peers differ in length"),
             (scene.rotation.is_none(), "the object turns"),
+            (!(0..scene.peers.len()).any(|peer| scene.operator(peer).is_some()), "an operator sees and moves at each tick"),
             (plan.ticking == Ticking::Lockstep, "peers tick at instants of their own, by offsets or drifts"),
             (links.iter().all(|(link, _)| !link.may_damage()), "a link damages packets"),
             (models_to_come(scene).all(|link| !link.may_damage()), "the timeline makes a link damage packets"),
@@ -296,6 +297,11 @@ coordination = { strategy = "average-position", stiffness = 1, update = "8ms" }
             ("coordination.send-when={ position = 0.001 }".to_owned(), "dead bands"),
             (change("coordination = { send-when = { position = 0.001 } }"), "dead bands"),
             ("scene.axes=3\nobject.inertia=[1, 1, 1]".to_owned(), "the object turns"),
+            (
+                "peer={ device.mass = 1, coupling.stiffness = 1, hand.operator = {} }\ntask={ kind = \"reach\", targets = [0], radius = 1 }"
+                    .to_owned(),
+                "an operator sees and moves",
+            ),
             ("coordination.strategy=\"wave\"\ncoordination.wave.impedance=1".to_owned(), "not a law"),
             (
                 "peer.contact=\"grasp\"\npeer.coupling.stiffness=1\ntask={ kind = \"hold\", target = 0, radius = 1, end = \"stop\" }".to_owned(),

@@ -1,5 +1,6 @@
 //! Explanation of a scene: which parts the program models, which parts the program leaves out, and why.
 
+mod operators;
 #[cfg(test)]
 mod tests;
 
@@ -197,6 +198,7 @@ impl Rows {
                 }
             }
         }
+        self.operators(scene);
         if scene.peers.iter().all(|peer| !peer.compute_delay) {
             self.leave_out("computed forces from the last tick: no peer has a compute-delay");
         }
@@ -384,6 +386,7 @@ fn describe(peer: &PeerSpec) -> String {
         Some(Hand::Force(force)) if force.is_constant() => "a constant hand force",
         Some(Hand::Force(_)) => "a hand force sampled at each tick",
         Some(Hand::Arm { .. }) => "an arm, its spring and damper part of the plant",
+        Some(Hand::Operator { .. }) => "the arm of an operator, its spring and damper part of the plant",
     };
     format!("device of {} kg that {contact}, {hand}", Number(peer.device.mass))
 }

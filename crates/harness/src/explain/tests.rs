@@ -135,3 +135,36 @@ fn lockstep_costs_less_than_events() {
         assert!((found - nanos * 1e-6).abs() < 1e-9, "{link}, {clock}: {found} ms");
     }
 }
+
+/// A person is described with all parameters, and equal persons share a row.
+#[test]
+fn operators_are_described_with_their_parameters() {
+    let found = |overrides: &[&str]| {
+        let text = "scene = { duration = \"1s\", count = 2 }\nobject.mass = 1\nlink.delay = \"24ms\"\n\
+                    coordination = { strategy = \"average-position\", stiffness = 1, update = \"8ms\" }\n\
+                    peer = { device.mass = 1, coupling.stiffness = 1, hand = { operator = { sees = \"peer2\" } } }\n\
+                    task = { kind = \"reach\", targets = [0.1], radius = 0.01 }";
+        let overrides: Vec<String> = overrides.iter().map(|text| (*text).to_owned()).collect();
+        let scene = Scene::parse(text, Path::new("x.toml"), &overrides).unwrap_or_else(|error| panic!("{error}"));
+        let explanation = explain(&scene);
+        assert!(explanation.left_out.iter().any(|row| row == "arrays: an operator sees and moves at each tick; the run has events"));
+        let rows = explanation.models.into_iter().filter(|row| row.part.starts_with("operator"));
+        rows.map(|row| (row.part, row.model)).collect::<Vec<_>>()
+    };
+    let arm = "an arm of 0.5 kg, 20 N·s/m and 300 N/m";
+    let usual = "moves: of 250ms, the first after 250ms, noise 0.1 of the length; learns the gain by 0.2 of each movement; waits for a delay of";
+    let row = |part: &str, model: String| (part.to_owned(), model);
+    assert_eq!(
+        found(&[]),
+        [
+            row("operator of peer1", format!("{usual} 48ms; sees the newest sample of peer2, 200ms late; {arm}")),
+            row("operator of peer2", format!("{usual} 0s; sees the own copy, 200ms late; {arm}")),
+        ]
+    );
+    let plain = "peer.hand.operator={ speed = 0.5, step = 0.02, noise = 0, learns = 0 }";
+    let limited = "moves: of 250ms, the first after 250ms, with at most 0.5 m/s, at most 0.02 m long; takes the gain for 1; waits for a delay of 0s";
+    assert_eq!(found(&[plain]), [row("operator of peer1, peer2", format!("{limited}; sees the own copy, 200ms late; {arm}"))]);
+    let tracks = ["task={ kind = \"track\", sines = [{ amplitude = 0.1, frequency = 0.5 }] }", "peer.hand.operator={ visual-delay = \"150ms\" }"];
+    let crossover = "crossover: the velocity of the hand is 3 rad/s times the error; sees the own copy, 150ms late";
+    assert_eq!(found(&tracks), [row("operator of peer1, peer2", format!("{crossover}; {arm}"))]);
+}

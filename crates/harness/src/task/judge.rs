@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cohaptic_scene::{Carry, Gap, Hold, Judged, Reach, Scene, Target, TaskKind, TaskOutcome, TaskSpec};
+use cohaptic_scene::{Carry, Gap, Judged, Scene, Target, TaskKind, TaskOutcome, TaskSpec};
 use cohaptic_units::Instant;
 
 use super::copies::{Copy, Group, direction, distance, dot, less, norm};
@@ -19,6 +19,8 @@ pub(crate) struct Judge {
     /// Positions of the two devices with a limited distance \[m\]; `None` before the first tick of the device's peer.
     devices: [Option<[f64; 3]>; 2],
     axes: usize,
+    /// True if only the targets matter, so that no judged instant is shown, and nothing is measured but the progress along a path.
+    only_targets: bool,
     /// End of the time for the task: `start` and the timeout, or the end of the scene.
     deadline: Instant,
     /// Judged copies at their latest ticks.
@@ -49,15 +51,20 @@ impl Judge {
         };
         let end = Instant::ZERO.saturating_add(scene.duration);
         let deadline = spec.timeout.map_or(end, |timeout| spec.start.saturating_add(timeout));
-        Some(Self { axes: scene.axes.count(), targets, devices: [None; 2], deadline, copies, groups, now: None, measured: None, outcome: None, spec })
+        let axes = scene.axes.count();
+        let (devices, only_targets) = ([None; 2], false);
+        Some(Self { axes, only_targets, targets, devices, deadline, copies, groups, now: None, measured: None, outcome: None, spec })
+    }
+
+    /// Returns a judge who knows the targets of a run and measures nothing else; `None` for a scene without a task.
+    pub(crate) fn of_targets(scene: &Scene) -> Option<Self> {
+        Self::of(scene).map(|judge| Self { only_targets: true, ..judge })
     }
 
     /// Takes the state of a peer at a tick. The states of peers that are not judged have no effect. An instant is judged at the first row of a later instant,
     /// when the ticks of all peers of the instant are known.
     pub(crate) fn on_tick(&mut self, row: &TickRow<'_>, on_row: OnRow<'_>) {
-        if self.now.is_some_and(|at| at < row.at) {
-            self.settle(on_row);
-        }
+        self.judge_before(row.at, on_row);
         if let Some(place) = self.gap().and_then(|gap| gap.peers.iter().position(|peer| *peer == row.peer)) {
             self.devices[place] = Some(std::array::from_fn(|axis| row.device.position.get(axis).copied().unwrap_or(0.0)));
         }
@@ -72,6 +79,13 @@ impl Judge {
         copy.speed = norm(row.object.velocity);
         copy.force = norm(row.coupling_force);
         copy.has_ticked = true;
+    }
+
+    /// Judges the latest instant with rows seen by [`on_tick`](Self::on_tick) if the instant is before `now`, so that all its rows were seen.
+    pub(crate) fn judge_before(&mut self, now: Instant, on_row: OnRow<'_>) {
+        if self.now.is_some_and(|at| at < now) {
+            self.settle(on_row);
+        }
     }
 
     /// Judges the latest instant with rows, if this instant is not judged yet. For a caller that knows that no further peer ticks at this instant.
@@ -89,6 +103,31 @@ impl Judge {
     /// Returns the end of the time for the task: `start` and the timeout, or the end of the scene.
     pub(crate) const fn deadline(&self) -> Instant {
         self.deadline
+    }
+
+    /// Returns whether the target depends on the copies, and not on the time alone.
+    pub(crate) fn target_follows_copies(&self) -> bool {
+        match &self.spec.kind {
+            TaskKind::Reach(reach) | TaskKind::Carry(Carry { reach, .. }) => reach.targets.len() > 1,
+            TaskKind::Path(_) => true,
+            TaskKind::Track(_) | TaskKind::Hold(_) => false,
+        }
+    }
+
+    /// Returns the position that the task asks the user of a peer for at an instant \[m\], and the largest distance that counts as there \[m\], zero for a
+    /// task without such a distance. All earlier instants must be judged: a target reached at an instant is replaced at the next one, as in `task.csv`. The user of a
+    /// peer that is not judged is asked for the target of the leading peers.
+    ///
+    /// `noise`: standard deviation of the end of the user's movement over the length of the movement. On a path of the width w the user aims w/(4·noise) ahead of
+    /// the progress of the copy, so that half of the width is two standard deviations of such a movement (Accot & Zhai 1997: the time grows as length over width).
+    pub(crate) fn asks(&self, peer: usize, at: Instant, noise: f64) -> ([f64; 3], f64) {
+        let copy = self.copies.binary_search_by_key(&peer, |copy| copy.peer).ok();
+        let of_copy = copy.and_then(|copy| self.groups.iter().position(|group| group.places().contains(&copy)));
+        let group = of_copy.unwrap_or_else(|| self.leading());
+        match &self.spec.kind {
+            TaskKind::Path(path) => (path.point(self.progress_of(group) + path.width / (4.0 * noise)), 0.0),
+            kind => (self.target_of(group, at).position, kind.radius().unwrap_or(0.0)),
+        }
     }
 
     /// Returns whether an instant with rows seen by [`on_tick`](Self::on_tick) belongs to the time of the task, from the start to the outcome, both included.
@@ -127,8 +166,12 @@ impl Judge {
             self.time_is_over(on_row);
             return;
         }
-        self.measure(at);
-        on_row(at, TaskRow::Judged(self.seen(at)));
+        if !self.only_targets || matches!(self.spec.kind, TaskKind::Path(_)) {
+            self.measure(at);
+        }
+        if !self.only_targets {
+            on_row(at, TaskRow::Judged(self.seen(at)));
+        }
         if let Some(limit) = self.spec.fail_force
             && let Some(copy) = self.copies.iter().find(|copy| copy.force > limit)
         {
@@ -304,7 +347,7 @@ impl Judge {
         let error = copies.iter().map(|copy| copy.error).fold(0.0, f64::max);
         let turn = copies.iter().filter_map(|copy| copy.turn(&target)).reduce(f64::max);
         let is_turned = turn.is_none_or(|turn| turn <= self.angle());
-        Seen { goal, target, error, turn, is_inside: self.radius().map(|radius| error <= radius && is_turned) }
+        Seen { goal, target, error, turn, is_inside: self.spec.kind.radius().map(|radius| error <= radius && is_turned) }
     }
 
     /// Returns what there is to see at an instant, at or after the latest judged instant.
@@ -316,7 +359,7 @@ impl Judge {
         let seen = self.ended().unwrap_or(at).max(self.spec.start);
         TaskView {
             target: self.target_of(leading, seen),
-            radius: self.radius(),
+            radius: self.spec.kind.radius(),
             reached: group.reached.len(),
             targets: self.targets.len(),
             dwelt: group.dwelt(at, dwell),
@@ -326,15 +369,9 @@ impl Judge {
         }
     }
 
-    /// Returns the radius of the targets, or half the width of a lane \[m\]; `None` for a task without a radius.
-    fn radius(&self) -> Option<f64> {
-        match &self.spec.kind {
-            TaskKind::Reach(Reach { radius, .. })
-            | TaskKind::Hold(Hold { radius, .. })
-            | TaskKind::Carry(Carry { reach: Reach { radius, .. }, .. }) => Some(*radius),
-            TaskKind::Path(path) => Some(0.5 * path.width),
-            TaskKind::Track(_) => None,
-        }
+    /// Returns the length along a path up to which all copies of a group have come \[m\].
+    fn progress_of(&self, group: usize) -> f64 {
+        self.groups[group].of(&self.copies).iter().map(|copy| copy.progress).reduce(f64::min).unwrap_or(0.0)
     }
 
     /// Returns the largest angle between a copy and the orientation of a target \[rad\]; infinite without a limit.
@@ -346,10 +383,7 @@ impl Judge {
     fn target_of(&self, group: usize, at: Instant) -> Target {
         match &self.spec.kind {
             TaskKind::Track(track) => Target::at(track.target(at.saturating_duration_since(self.spec.start))),
-            TaskKind::Path(path) => {
-                let progress = self.groups[group].of(&self.copies).iter().map(|copy| copy.progress).reduce(f64::min);
-                Target::at(path.point(progress.unwrap_or(0.0)))
-            }
+            TaskKind::Path(path) => Target::at(path.point(self.progress_of(group))),
             TaskKind::Reach(_) | TaskKind::Hold(_) | TaskKind::Carry(_) => self.targets[self.goal_of(group)],
         }
     }

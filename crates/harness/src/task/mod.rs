@@ -1,8 +1,8 @@
 //! Tasks: what the users of a scene are asked to do, judged during a run.
 //!
-//! The judge reads the states of the copies and changes nothing, so a scene moves the same, to the bit, with and without its task. Every instant at which a
-//! judged peer ticks is judged, with the states of all judged peers at their latest ticks. [`Measures`](crate::measures::Measures) has the result of a task, and
-//! [`crate::record`] writes its files.
+//! The judge of an observed run reads the states of the copies and changes nothing, so a scene moves the same, to the bit, with and without being observed.
+//! Operators see the targets of the task in a judge of their own. Every instant at which a judged peer ticks is judged, with the states of all judged peers at
+//! their latest ticks. [`Measures`](crate::measures::Measures) has the result of a task, and [`crate::record`] writes its files.
 //!
 //! ```
 //! use cohaptic_harness::Model;

@@ -6,6 +6,7 @@
 mod changes;
 pub(crate) mod live;
 mod member;
+mod operators;
 mod remote;
 mod stopping;
 mod turning;
@@ -15,7 +16,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use cohaptic_peer::coordination::Role;
-use cohaptic_peer::rotation::{Attitude, Rotation};
+use cohaptic_peer::rotation::Attitude;
 use cohaptic_peer::wire::{Sample, SampleKind};
 use cohaptic_peer::{Contact, Device, LastSent, Peer, Reception, SendWhen, State, Strategy};
 use cohaptic_scene::{Change, Scene, Topology};
@@ -32,6 +33,7 @@ use crate::summary::{AccessSummary, Ending, LinkSummaries, PeerSummary, Summary}
 
 use changes::{ParameterChange, parameter_changes};
 use member::{DeviceModel, Member};
+use operators::Operators;
 pub(crate) use remote::{Arriving, NoRemote, Remote};
 use stopping::Stopping;
 use turning::Turning;
@@ -69,6 +71,8 @@ pub(crate) struct World<const A: usize, S, E: Remote<A> = NoRemote> {
     latest: Vec<[f64; A]>,
     /// Attitudes of the copies; `None` if the object does not turn.
     turning: Option<Box<Turning>>,
+    /// Modelled persons at the hands; `None` without persons.
+    operators: Option<Box<Operators<A>>>,
     max_discrepancy: f64,
     finite: bool,
     /// Peers that tick at the present instant, by index. In lockstep all local peers.
@@ -109,7 +113,8 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
     pub(crate) fn new(scene: &Scene, plan: &Plan, disturbance: Option<Disturbance>, remote: E, strategy: impl Fn(usize) -> S) -> Self {
         let initial: Vec<State<A>> = (0..scene.peers.len()).map(|place| scene.initial_state(place)).collect();
         let member = |place| Member::new(scene, plan, &initial, disturbance, place, strategy(place));
-        let members: Vec<Member<A, S, E::Device>> = (0..scene.peers.len()).map(member).collect();
+        let mut members: Vec<Member<A, S, E::Device>> = (0..scene.peers.len()).map(member).collect();
+        let operators = Operators::new(scene, &mut members);
         Self {
             axes: scene.axes.count(),
             names: scene.peers.iter().map(|peer| peer.name.clone()).collect(),
@@ -121,6 +126,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             parameters: parameter_changes(scene),
             turning: Turning::new(scene),
             members,
+            operators,
             network: network(scene, plan),
             schedule: Schedule::new(plan.ticking, scene.peers.iter().map(|peer| &peer.clock).enumerate()),
             changes: scene.timeline.iter().rev().cloned().collect(),
@@ -176,6 +182,10 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         // Without remote peers nothing else polls the network, so an instant without events need not be delivered.
         if !E::IS_EMPTY || self.network.may_have_events(now) {
             self.deliver(now, observer, watch)?;
+        }
+        // A person sees what has arrived by now, and the hand pulls during the tick that begins now.
+        if let Some(operators) = &mut self.operators {
+            operators.act(now, &self.ticking, &mut self.members);
         }
         self.compute_and_move(now, observer, watch)?;
         // `latest` holds the positions before the move, so the discrepancy belongs to `now`.
@@ -324,7 +334,9 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             }
             Schedule::EventDriven(_) => None,
         };
-        if let (Some(span), false, true) = (lockstep, watch.ticks || watch.steps || self.stopping.is_some(), E::IS_EMPTY) {
+        let judged = self.operators.as_ref().is_some_and(|operators| operators.needs_ticks());
+        let shows_ticks = watch.ticks || judged || self.stopping.is_some();
+        if let (Some(span), false, true) = (lockstep, shows_ticks || watch.steps, E::IS_EMPTY) {
             self.move_together(now, span);
             return Ok(());
         }
@@ -343,7 +355,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             if let (Some(turning), Some(rotation)) = (&mut self.turning, member.peer.rotation()) {
                 turning.latest[place] = *rotation.copy();
             }
-            if watch.ticks || self.stopping.is_some() {
+            if shows_ticks {
                 let axes = self.axes;
                 let device = member.peer.device().state();
                 let tick = TickRow {
@@ -356,12 +368,19 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                     coordination_force: &forces.coordination[..axes],
                     turn: None,
                 };
-                let rotation = member.peer.rotation();
-                if let Some(stopping) = &mut self.stopping {
-                    show(&mut **stopping, tick, rotation)?;
-                }
-                if watch.ticks {
-                    show(observer, tick, rotation)?;
+                let (operators, stopping) = (self.operators.as_mut().filter(|_| judged), &mut self.stopping);
+                let show = |row: &TickRow<'_>| {
+                    if let Some(operators) = operators {
+                        operators.judge(row);
+                    }
+                    if let Some(stopping) = stopping {
+                        stopping.judge(row);
+                    }
+                    if watch.ticks { observer.on_tick(row) } else { Ok(()) }
+                };
+                match member.peer.rotation() {
+                    None => show(&tick)?,
+                    Some(rotation) => turning::on_tick(show, tick, rotation)?,
                 }
             }
             member.tick += 1;
@@ -544,15 +563,6 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> Receivers<'_, A, S, E> {
             observer.on_packet(&event.record)?;
         }
         Ok(())
-    }
-}
-
-/// Shows a tick to an observer, with the turn of a peer that turns.
-#[inline(always)]
-fn show(observer: &mut (impl Observer<Error = Ended> + ?Sized), tick: TickRow<'_>, rotation: Option<&Rotation>) -> Result<(), Ended> {
-    match rotation {
-        None => observer.on_tick(&tick),
-        Some(rotation) => turning::on_tick(observer, tick, rotation),
     }
 }
 

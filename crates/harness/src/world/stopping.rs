@@ -3,8 +3,7 @@
 use cohaptic_scene::Scene;
 use cohaptic_units::Instant;
 
-use crate::observer::{Ended, Observer};
-use crate::rows::TickRow;
+use crate::TickRow;
 use crate::task::Judge;
 
 /// Judge of a task with `end = "stop"`. A judge of its own, because a run ends at the same instant whoever observes it.
@@ -24,13 +23,9 @@ impl Stopping {
         // No tick can change the outcome after the deadline, so the deadline ends the run before a later tick.
         self.judge.ended().or_else(|| Some(self.judge.deadline()).filter(|deadline| next.is_none_or(|next| next > *deadline)))
     }
-}
 
-impl Observer for Stopping {
-    type Error = Ended;
-
-    fn on_tick(&mut self, row: &TickRow<'_>) -> Result<(), Ended> {
+    /// Takes in the tick of a peer.
+    pub(super) fn judge(&mut self, row: &TickRow<'_>) {
         self.judge.on_tick(row, &mut |_, _| ());
-        Ok(())
     }
 }

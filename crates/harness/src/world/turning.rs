@@ -4,7 +4,7 @@ use cohaptic_peer::Gains;
 use cohaptic_peer::rotation::{Attitude, Rotation, Triple};
 use cohaptic_scene::Scene;
 
-use crate::observer::{Ended, Observer};
+use crate::observer::Ended;
 use crate::rows::{TickRow, TurnRow};
 use crate::spread::Spread;
 
@@ -48,10 +48,10 @@ impl Turning {
     }
 }
 
-/// Shows a tick of a peer that turns. A function of its own, so the loop over peers does not build the larger row for peers that do not turn.
+/// Calls `show` with the tick of a peer that turns. A function of its own, so the loop over peers does not build the larger row for peers that do not turn.
 #[inline(never)]
-pub(super) fn on_tick(observer: &mut (impl Observer<Error = Ended> + ?Sized), tick: TickRow<'_>, rotation: &Rotation) -> Result<(), Ended> {
-    observer.on_tick(&TickRow {
+pub(super) fn on_tick(show: impl FnOnce(&TickRow<'_>) -> Result<(), Ended>, tick: TickRow<'_>, rotation: &Rotation) -> Result<(), Ended> {
+    show(&TickRow {
         turn: Some(TurnRow {
             object: rotation.copy(),
             device: rotation.device(),

@@ -6,6 +6,7 @@
 mod bands;
 mod hands;
 mod many_peers;
+mod operators;
 mod pointers;
 mod questions;
 mod records;

@@ -135,3 +135,19 @@ fn an_onlooker_sees_attitudes_of_the_same_instant_as_positions() {
     let live = LiveScene::new(&Scene::parse_live(&still, Path::new("live.toml"), &[]).unwrap(), |_| None);
     assert_eq!(live.peer(0).unwrap().turn, None);
 }
+
+/// A modelled person sees and moves in a session as in virtual time, in whatever steps time passes.
+#[test]
+fn operators_are_the_same_live() {
+    let text = r#"
+        scene = { duration = "1.5s", seed = 5 }
+        object = { mass = 0.45 }
+        coordination = { strategy = "average-position", stiffness = 1000.0, damping = 5.0, update = "8ms" }
+        peer = { device = { mass = 0.1, damping = 5.0 }, coupling = { stiffness = 3500.0, damping = 5.0 } }
+        peers = [{ name = "left", hand = { operator = { sees = "right" } } }, { name = "right", hand = { operator = {} } }]
+        link = { delay = "24ms", jitter = "3ms", loss = "5%" }
+        task = { kind = "reach", targets = [0.02, 0.0], radius = 0.015 }
+    "#;
+    let scene = Scene::parse(text, Path::new("operators.toml"), &[]).unwrap();
+    same(&scene, &[370_000, 1_000_000, 2_500_000]).unwrap();
+}

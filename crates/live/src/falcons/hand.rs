@@ -57,7 +57,7 @@ impl SceneHand {
     pub(super) fn mass(&self) -> f64 {
         match &self.hand {
             Some(cohaptic_peer::Hand::Arm { arm, .. }) => arm.mass,
-            Some(cohaptic_peer::Hand::Force(_)) | None => 0.0,
+            Some(cohaptic_peer::Hand::Force(_) | cohaptic_peer::Hand::Operator { .. }) | None => 0.0,
         }
     }
 }
@@ -66,7 +66,8 @@ impl Hand for SceneHand {
     fn force(&mut self, now: Instant, position: [f64; 3], velocity: [f64; 3]) -> [f64; 3] {
         let Some(elapsed) = self.beginning.since(now) else { return self.homing.force(now, position, velocity) };
         match &self.hand {
-            None => [0.0; 3],
+            // A scene with an operator at a Falcon is refused.
+            None | Some(cohaptic_peer::Hand::Operator { .. }) => [0.0; 3],
             Some(cohaptic_peer::Hand::Force(signal)) => signal.value(elapsed),
             Some(cohaptic_peer::Hand::Arm { arm, follows }) => {
                 // The arm as spring and damper between grip and wanted position. The mass of the arm is part of the mechanics of the device.

@@ -10,6 +10,7 @@ use cohaptic_units::Hertz;
 use cohaptic_units::print::{SixDigits, Span};
 
 use super::motion_file::{Columns, read_motion_file};
+use super::operator::{OPERATOR, read_operator, remembers};
 use crate::context::SceneContext;
 use crate::quantities::{ADDED_MASS, ANGLE, DAMPING, FORCE, FREQUENCY, POSITION, STIFFNESS, Spread, TORQUE, read_vector, vector_of};
 
@@ -20,6 +21,7 @@ static HAND_TABLE: Table = Table::of(&[&[
     optional("file", Form::File, "CSV file of a recorded force with the header t,fx (and fy, fz, then tx,ty,tz), in s, N and N·m"),
     optional("arm", Form::Table(&ARM), "Arm that adds its mass to the device and holds the device with a damper and a spring"),
     optional("follows", Form::Table(&FOLLOWS), "Motion that the arm wants, with hand.arm; rest at 0 by default"),
+    optional("operator", Form::Table(&OPERATOR), "Model of a person who does the task of the scene, with an arm"),
     optional("torque", vector(TORQUE), "Constant torque on a device that turns, in world axes"),
 ]]);
 static FORCE_SINE: Table = Table::of(&[
@@ -43,7 +45,7 @@ static FOLLOWS: Table = Table::of(&[&[
     optional("file", Form::File, "CSV file of a recorded motion with the header t,x (and y, z, then tx,ty,tz), in s, m and N·m"),
 ]]);
 
-const EXPECTED: &str = "\"none\", { force = … }, { sine = … }, { file = … } or { arm = …, follows = … }";
+const EXPECTED: &str = "\"none\", { force = … }, { sine = … }, { file = … }, { arm = …, follows = … } or { operator = … }";
 
 /// Reads a hand. Returns `Some(None)` for "none", and `None` if the hand was refused.
 pub(crate) fn read_hand(node: &Node, context: SceneContext<'_>) -> Option<Option<Hand>> {
@@ -61,13 +63,14 @@ pub(crate) fn read_hand(node: &Node, context: SceneContext<'_>) -> Option<Option
     let file = table.entry("file");
     let arm = table.entry("arm");
     let follows = table.entry("follows");
+    let operator = table.entry("operator");
     let torque = table.entry("torque");
     table.finish();
     // A torque alone is a hand without a force. `read_hand_torque` reads the torque.
-    if torque.is_some() && [force, sine, file, arm].iter().all(Option::is_none) {
+    if torque.is_some() && [force, sine, file, arm, operator].iter().all(Option::is_none) {
         return Some(None);
     }
-    let chosen = only_one(node, *context, &[force, sine, file, arm], EXPECTED)?;
+    let chosen = only_one(node, *context, &[force, sine, file, arm, operator], EXPECTED)?;
     if let (Some(follows), None) = (follows, arm) {
         context.fault(follows.key, &follows.node.path, "only an arm follows a wanted motion: expected arm = { mass, damping, stiffness } too");
         return None;
@@ -77,6 +80,7 @@ pub(crate) fn read_hand(node: &Node, context: SceneContext<'_>) -> Option<Option
         "force" => Signal::Constant(constant(&HAND_TABLE, chosen, context)?),
         "sine" => read_sine(value, context, &FORCE_SINE)?,
         "file" => Signal::Table(read_motion_file(value, context, Columns::Force)?.motion),
+        "operator" => return read_operator(value, context).map(Some),
         _ => {
             let arm = read_arm(value, *context);
             let follows = match follows {
@@ -123,12 +127,14 @@ pub(super) fn read_hand_torque(hand: &Node, context: SceneContext<'_>) -> Option
     Some(Some(Signal::Sine { amplitude: amplitude?, frequency: Hertz(frequency?), phase: phase? }))
 }
 
-/// Returns false after a fault if the peer's ticks cannot sample the sine of the hand, otherwise true. A hand is computed once per tick, so that a sine of half
+/// Returns false after a fault if the peer's ticks cannot sample the sine of the hand, or the peer cannot hold all that an operator has not seen yet, otherwise
+/// true. A hand is computed once per tick, so that a sine of half
 /// the rate of ticks or faster has the values of a slower sine, or zeros alone (Shannon 1949).
 pub(crate) fn hand_is_sampled(hand: Option<&Hand>, tick: Duration, node: &Node, context: Context<'_>) -> bool {
     let (signal, path): (&Signal, &[&str]) = match hand {
         Some(Hand::Force(signal)) => (signal, &["sine", "frequency"]),
         Some(Hand::Arm { follows, .. }) => (follows, &["follows", "sine", "frequency"]),
+        Some(Hand::Operator { operator, .. }) => return remembers(operator, tick, node, context),
         None => return true,
     };
     let Signal::Sine { frequency: Hertz(frequency), .. } = signal else { return true };

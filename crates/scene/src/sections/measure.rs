@@ -55,7 +55,7 @@ impl Default for MeasureSettings {
     /// Returns the settings of a scene without `[measure]`: the copy of the first peer, 20 mm along x; a band of 1 mm; no probe.
     fn default() -> Self {
         defaults(|node, file| {
-            let context = SceneContext { file, axes: Some(Axes::One), live: false, turns: false };
+            let context = SceneContext { file, axes: Some(Axes::One), live: false, turns: false, task: None };
             read_measure(node, Measured { peers: Some(&[]), timeline: None, offered: Offered::default() }, context).map(|measure| measure.settings)
         })
     }
@@ -186,7 +186,7 @@ fn read_probe(node: &Node, of: Measured<'_>, context: SceneContext<'_>) -> Optio
             let pushes = frequency.0 > 0.0 && amplitude.iter().any(|amplitude| *amplitude != 0.0);
             (!pushes).then_some("is a sine that does not sway")
         }
-        Some(Hand::Force(Signal::Constant(_) | Signal::Table(_)) | Hand::Arm { .. }) | None => Some("is not a sine"),
+        Some(Hand::Force(Signal::Constant(_) | Signal::Table(_)) | Hand::Arm { .. } | Hand::Operator { .. }) | None => Some("is not a sine"),
     };
     if let Some(refused) = refused {
         context.fault_at(peer_node, format!("the hand of peer {} {refused}: expected {EXPECTED}", quote(&spec.name)));

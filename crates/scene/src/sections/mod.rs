@@ -12,6 +12,7 @@ mod kind;
 mod measure;
 mod motion_file;
 mod object;
+mod operator;
 mod peer;
 mod peers;
 mod rotation;

@@ -30,7 +30,7 @@ const KEYS: [Key; 19] = [
     somewhere("device", Form::Table(&DEVICE), "Haptic device of the peer"),
     somewhere("coupling", Form::Table(&COUPLING), "Spring and damper between device and copy; not needed where contact is none"),
     usual("contact", CONTACT, "\"grasp\"", "Contact between the device and the object"),
-    usual("hand", HAND, "\"none\"", "Action of the user: a constant force, a sine, a recorded file, or an arm that follows a motion"),
+    usual("hand", HAND, "\"none\"", "Action of the user: a constant force, a sine, a recorded file, an arm that follows a motion, or an operator"),
     usual("tick", Form::PositiveDuration, "\"1ms\"", "Period of the control loop"),
     usual("compute-delay", Form::Integer(0, 1), "0", "Ticks between the computation of a force and its application")
         .expecting("a number of ticks, 0 or 1"),

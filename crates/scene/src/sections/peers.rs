@@ -6,7 +6,8 @@ use std::collections::BTreeMap;
 use cohaptic_linkfile::document::{BEGINNING, Entry, Node, Place, join, quote};
 use cohaptic_linkfile::library::of_owner;
 use cohaptic_linkfile::reading::{Context, Names, one_of, values};
-use cohaptic_peer::Gains;
+use cohaptic_peer::operator::Seen;
+use cohaptic_peer::{Gains, Hand};
 use cohaptic_units::print::Counted;
 
 use super::peer::{PEER, PEERS, PeerKeys, nested, read_peer};
@@ -124,11 +125,11 @@ pub(crate) fn read_peers(sources: PeerSources<'_>, object: Option<&ObjectSpec>, 
     let named = names.as_slice().iter().enumerate();
     let made = sources.count.map_or(base.place, |entry| entry.key);
     named
-        .map(|(place, name)| {
+        .map(|(index, name)| {
             // The keys of the entry, otherwise the shared keys, which exist if any peer has no entry.
-            let (keys, place) = keys.remove(&place).or_else(|| Some((shared.clone()?, made)))?;
+            let (keys, place) = keys.remove(&index).or_else(|| Some((shared.clone()?, made)))?;
             let rotation = keys.rotation.clone();
-            Some(PeerRead { spec: spec(name, keys, object?), rotation, place })
+            Some(PeerRead { spec: spec(name, index, keys, object?), rotation, place })
         })
         .collect()
 }
@@ -140,7 +141,14 @@ fn read_entry(entry: &Node, base: &Node, update: Option<(Duration, &Node)>, cont
     read_peer(&entry.over(base, &nested()), context, &PEERS, update)
 }
 
-fn spec(name: &str, keys: PeerKeys, object: &ObjectSpec) -> PeerSpec {
+fn spec(name: &str, index: usize, keys: PeerKeys, object: &ObjectSpec) -> PeerSpec {
+    let mut hand = keys.hand;
+    // The name of the peer itself, where peers share the keys of `[peer]`.
+    if let Some(Hand::Operator { operator, .. }) = &mut hand
+        && operator.sees == Seen::Peer(index)
+    {
+        operator.sees = Seen::Own;
+    }
     let (coupling, coupling_scaling) = keys.coupling.unwrap_or((Gains { stiffness: 0.0, damping: 0.0 }, Scaling::None));
     PeerSpec {
         name: name.to_owned(),
@@ -152,7 +160,7 @@ fn spec(name: &str, keys: PeerKeys, object: &ObjectSpec) -> PeerSpec {
         device: keys.device,
         coupling,
         coupling_scaling,
-        hand: keys.hand,
+        hand,
         position: keys.position.unwrap_or(object.position),
         velocity: keys.velocity.unwrap_or(object.velocity),
         device_position: keys.device_position,

@@ -187,8 +187,16 @@ fn contact_is_possible(peer: &PeerSpec, contact: Contact, node: &Node, context: 
 }
 
 /// Returns true if the peer can have this hand, otherwise false after a fault. An arm adds mass to the device, so that an arm cannot appear, vanish or change
-/// during the run.
+/// during the run. A person would begin the task in the middle.
 fn hand_is_possible(peer: &PeerSpec, hand: Option<&Hand>, node: &Node, context: Context<'_>) -> bool {
+    if [hand, peer.hand.as_ref()].into_iter().flatten().any(|hand| hand.operator().is_some()) {
+        let message = format!(
+            "an operator cannot appear, vanish or change while the scene runs: expected a peer without one, and \"{}\" with its hand",
+            peer.name
+        );
+        context.fault_at(node, message);
+        return false;
+    }
     // Compared with the hand of the beginning: no earlier change can have another arm.
     let arm = peer.hand.as_ref().and_then(Hand::arm);
     let same = arm == hand.and_then(Hand::arm);

@@ -16,6 +16,7 @@ use cohaptic_scene::Scene;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
+use crate::analysis::arms_alone;
 use crate::network::NominalNetwork;
 use crate::rounding::real;
 
@@ -137,6 +138,7 @@ impl Admittance {
             return Err(uncoupled());
         }
         admittance.notes.push(UNLOADED.to_owned());
+        admittance.notes.extend(arms_alone(scene));
         if !scene.timeline.is_empty() {
             admittance.notes.push(TIMELINE.to_owned());
         }

@@ -5,6 +5,7 @@ use cohaptic_scene::Scene;
 
 use super::harmonic::Harmonic;
 use super::response::AdmittancePoint;
+use crate::analysis::arms_alone;
 use crate::lifted::{Body, Lifted, Node, Sampling};
 use crate::linear_form::LinearLaw;
 use crate::network::NominalNetwork;
@@ -100,6 +101,7 @@ pub(super) fn closed_contacts(scene: &Scene, axis: usize) -> (Contacts, Vec<Stri
     if !scene.timeline.is_empty() {
         notes.push(TIMELINE.to_owned());
     }
+    notes.extend(arms_alone(scene));
     let absent = vec![false; scene.peers.len()];
     (Contacts { touching, at_wall: false, absent }, notes)
 }

@@ -34,7 +34,7 @@ impl PeerLeaf {
 
     fn of(self, spec: &mut PeerSpec) -> Option<&mut f64> {
         let arm = match &mut spec.hand {
-            Some(Hand::Arm { arm, .. }) => Some(arm),
+            Some(Hand::Arm { arm, .. } | Hand::Operator { arm, .. }) => Some(arm),
             Some(Hand::Force(_)) | None => None,
         };
         match self {

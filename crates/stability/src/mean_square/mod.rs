@@ -39,7 +39,7 @@ pub(crate) use self::equal::{Equal, EqualScratch};
 use self::law::{LinkLaw, is_random};
 use self::positive::{Positive, radius_watched};
 use self::symmetric::Symmetric;
-use crate::analysis::{CHANGES_LEFT_OUT, UNLOADED};
+use crate::analysis::{CHANGES_LEFT_OUT, UNLOADED, arms_alone};
 use crate::combinations::{Combination, pairs};
 use crate::cost::{FrameCost, PASSES};
 use crate::lifted::{Lifted, Node};
@@ -160,6 +160,7 @@ pub fn mean_square_watched(scene: &Scene, limits: &Limits<'_>) -> Result<MeanSqu
     if scene.rotation.is_some() {
         notes.push(UNLOADED.to_owned());
     }
+    notes.extend(arms_alone(scene));
     notes.dedup();
     let none = MeanSquare {
         radius: NOTHING,

@@ -51,9 +51,10 @@ impl Load {
     /// Returns the load of the peer with the index `place`, or [`AnalysisError::NoRest`] if its hand varies.
     fn of(scene: &Scene, place: usize) -> Result<Self, AnalysisError> {
         let spec = &scene.peers[place];
+        let varies = || AnalysisError::NoRest { why: format!("the hand of {} does not stay as it is", spec.name) };
         let constant = |signal: &Signal| match signal {
             Signal::Constant(value) => Ok(*value),
-            Signal::Sine { .. } | Signal::Table(_) => Err(AnalysisError::NoRest { why: format!("the hand of {} does not stay as it is", spec.name) }),
+            Signal::Sine { .. } | Signal::Table(_) => Err(varies()),
         };
         let rotation = scene.rotation.as_ref().and_then(|rotation| rotation.peers[place].device.as_ref());
         let torque = rotation.and_then(|device| device.torque.as_ref()).map_or(Ok([0.0; 3]), constant)?;
@@ -62,6 +63,7 @@ impl Load {
             None => none,
             Some(Hand::Force(force)) => Self { force: constant(force)?, ..none },
             Some(Hand::Arm { arm, follows }) => Self { spring: arm.stiffness, towards: constant(follows)?, ..none },
+            Some(Hand::Operator { .. }) => return Err(varies()),
         })
     }
 }

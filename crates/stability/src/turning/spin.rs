@@ -72,7 +72,7 @@ impl Drive {
                 None => {}
             }
             match &spec.hand {
-                Some(Hand::Arm { .. }) => return Err(none(format!("the arm of {} ties the object to the world", spec.name))),
+                Some(Hand::Arm { .. } | Hand::Operator { .. }) => return Err(none(format!("the arm of {} ties the object to the world", spec.name))),
                 Some(Hand::Force(Signal::Constant(force))) if force.iter().all(|component| *component == 0.0) => {}
                 Some(Hand::Force(_)) => return Err(none(format!("the hand of {} pushes in one direction of the world", spec.name))),
                 None => {}

@@ -48,10 +48,10 @@ fn cross_packets_of_the_words_keep_datagrams_waiting() {
             let (sender, receiver) = (bed.host("a").bind("0.0.0.0:1").unwrap(), bed.host("b").bind("0.0.0.0:1").unwrap());
             let mut delays = Vec::new();
             for _ in 0..200 {
-                let begin = time::Instant::now();
+                let begin = time::now();
                 sender.send_to(b"hello", "b:1").await.unwrap();
                 receiver.recv_from(&mut [0; 8]).await.unwrap();
-                delays.push(begin.elapsed());
+                delays.push(time::now() - begin);
             }
             delays
         })

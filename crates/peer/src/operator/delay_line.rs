@@ -1,0 +1,39 @@
+//! Delay between an image and its use by the person.
+
+use alloc::vec::Vec;
+
+use super::View;
+
+/// Views of the latest ticks. A view is used a fixed number of ticks after its tick.
+#[derive(Clone, Debug)]
+pub(super) struct DelayLine<const A: usize> {
+    /// Views of the latest ticks, in a ring. Empty before the first tick.
+    views: Vec<View<A>>,
+    /// Number of views in the ring: the delay in ticks, and one for the present tick.
+    len: usize,
+    /// Place of the oldest view, which the next view replaces.
+    next: usize,
+}
+
+impl<const A: usize> DelayLine<A> {
+    /// Returns a line with this delay in ticks.
+    pub(super) fn new(delay: u64) -> Self {
+        let len = usize::try_from(delay).unwrap_or(usize::MAX).saturating_add(1);
+        Self { views: Vec::new(), len, next: 0 }
+    }
+
+    /// Takes in the view of a tick and returns the view that is used at this tick. Before the delay has passed for the first time, this is the first view.
+    #[inline]
+    pub(super) fn pass(&mut self, view: &View<A>) -> View<A> {
+        if self.views.is_empty() {
+            // Filled with the first view, which therefore stands for all views before it.
+            self.views.resize(self.len, *view);
+        }
+        self.views[self.next] = *view;
+        self.next += 1;
+        if self.next == self.len {
+            self.next = 0;
+        }
+        self.views[self.next]
+    }
+}
