@@ -36,6 +36,7 @@ fn parts(runs: u64, events: u64, columns: usize, part: Option<u64>) -> Parts {
         access_lines: false,
         cross_traffic: false,
         turns: false,
+        tasks: false,
         measures: BTreeSet::new(),
     };
     Parts::of(&plan(&[], runs, part), &Checked { roster, events, numbers: BTreeMap::new(), refused: BTreeMap::new() }, columns).unwrap()
