@@ -6,7 +6,6 @@ use std::path::Path;
 
 use cohaptic_harness::measures::Measures;
 use cohaptic_harness::record::Recorder;
-use cohaptic_harness::task::TaskWatch;
 use cohaptic_harness::{Model, NoObserver, Observer, Simulation, TickRow};
 use cohaptic_scene::{Scene, TaskOutcome};
 use cohaptic_units::Instant;
@@ -34,9 +33,7 @@ fn scene(overrides: &[&str]) -> Scene {
 
 /// Returns the instants at which the targets are reached \[ms\].
 fn reached(scene: &Scene) -> Vec<u128> {
-    let mut watch = TaskWatch::of(scene).unwrap();
-    let Ok(summary) = Simulation::new(scene, Model::Least).run(&mut watch);
-    let result = watch.result(&summary);
+    let result = Measures::run(scene, Model::Least).task.unwrap();
     result.reached.iter().map(|at| (*at - Instant::ZERO).as_millis()).collect()
 }
 
@@ -80,7 +77,7 @@ fn crossover_has_the_error_that_the_other_program_finds() {
     let task = format!("task={{ kind = \"track\", sines = [{sines}] }}");
     let names = "measure={ names = [\"peers.left.error_rms_m\", \"peers.right.error_rms_m\"] }";
     let scene = scene(&["peers.left.hand.operator={}", &task, "scene.duration=25s", names]);
-    let (_, values) = Measures::run(&scene, Model::Least);
+    let values = Measures::run(&scene, Model::Least).values;
     for (value, expected) in values.iter().zip([13.518_128_552e-3, 14.146_200_964e-3]) {
         assert!((value.value.unwrap() - expected).abs() < 1e-11, "{:?}", value.value);
     }
@@ -121,8 +118,7 @@ proptest! {
         let scene = scene(&overrides.iter().map(String::as_str).collect::<Vec<_>>());
         let least = recorded(&scene, Model::Least);
         prop_assert!(least == recorded(&scene, Model::General), "a file differs");
-        let mut watch = TaskWatch::of(&scene).unwrap();
-        let Ok(watched) = Simulation::new(&scene, Model::Least).run(&mut watch);
+        let watched = Measures::run(&scene, Model::Least).summary;
         let Ok(alone) = Simulation::new(&scene, Model::Least).run(&mut NoObserver);
         prop_assert_eq!(&watched, &alone);
         prop_assert!(alone.peers[0].position[0] != 0.0, "nobody moved");
@@ -181,7 +177,5 @@ fn an_operator_waits_for_the_task() {
 fn an_operator_of_an_unjudged_peer_goes_for_the_same_targets() {
     // The right copy alone is judged, and is moved by the left hand.
     let scene = scene(&[BACK, "task.who=right"]);
-    let mut watch = TaskWatch::of(&scene).unwrap();
-    let Ok(summary) = Simulation::new(&scene, Model::Least).run(&mut watch);
-    assert_eq!(watch.result(&summary).outcome, TaskOutcome::Done);
+    assert_eq!(Measures::run(&scene, Model::Least).task.unwrap().outcome, TaskOutcome::Done);
 }
