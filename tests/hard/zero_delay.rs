@@ -72,7 +72,7 @@ fn a_ring_that_answers_at_once_without_delay_ends_with_an_error() {
         }));
         let message = *ended.unwrap_err().downcast::<String>().unwrap();
         assert!(message.starts_with("time stands still at 0 s after 100000 packets and timers: node `n"), "{message}");
-        assert!(message.contains("answers without end over links without delay: give them one, or let the nodes stop"), "{message}");
+        assert!(message.contains("answers without end over links without delay: give the links a delay, or let the nodes stop"), "{message}");
     }
 }
 

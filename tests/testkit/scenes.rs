@@ -29,7 +29,7 @@ fn a_scene_that_does_something_else_fails_with_what_it_did() {
     let path = base.path().join("mine.toml");
     fs::write(&path, format!("{SCENE}\nexpect = {{ stable = true }}\n")).unwrap();
     let text = message(|| check_scene(&path));
-    assert!(text.starts_with(&format!("{}: what came out is not what it expects:\n  ", path.display())), "{text}");
+    assert!(text.starts_with(&format!("{}: the results differ from the expectations of the scene:\n  ", path.display())), "{text}");
     assert!(text.contains("stable"), "{text}");
     fs::write(&path, format!("{SCENE}\nexpect = {{ stable = false }}\n")).unwrap();
     check_scene(&path);
@@ -39,7 +39,8 @@ fn a_scene_that_does_something_else_fails_with_what_it_did() {
 fn a_scene_that_expects_nothing_or_makes_no_sense_fails_with_the_way_out() {
     let base = tempfile::tempdir().unwrap();
     let path = base.path().join("mine.toml");
-    let nothing = format!("{}: nothing was compared: expected a table [expect] that says what must come out", path.display());
+    let nothing =
+        format!("{}: the scene has no expectations to check: expected a table [expect] with the results that must come out", path.display());
     fs::write(&path, SCENE).unwrap();
     assert_eq!(message(|| check_scene(&path)), nothing);
     fs::write(&path, SCENE.replace("24ms", "24 parsecs")).unwrap();
@@ -58,9 +59,9 @@ fn all_scenes_of_a_folder_are_checked_whatever_came_before() {
     write("c.toml", SCENE);
     let text = message(|| check_scenes(base.path()));
     assert!(
-        text.starts_with("of 3 scenes 2 failed:\n")
+        text.starts_with("2 of 3 scenes failed:\n")
             && text.contains("a.toml:1:9: scene: found the integer 1")
-            && text.contains("c.toml: nothing was compared"),
+            && text.contains("c.toml: the scene has no expectations to check"),
         "{text}"
     );
     fs::remove_file(base.path().join("a.toml")).unwrap();

@@ -5,9 +5,9 @@ use cohaptic_wan::{LinkModel, LinkStats};
 /// Lines between a host and all its links.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub(crate) struct AccessLines {
-    /// Line that every packet of the host passes before its link.
+    /// Line before the links: all packets from the host pass the line.
     pub(crate) uplink: Option<LinkModel>,
-    /// Line that every packet to the host passes after its link.
+    /// Line after the links: all packets to the host pass the line.
     pub(crate) downlink: Option<LinkModel>,
 }
 
@@ -15,8 +15,8 @@ pub(crate) struct AccessLines {
 #[derive(Clone, PartialEq, Debug, Default)]
 #[non_exhaustive]
 pub struct AccessStats {
-    /// Statistics of the line that every packet of the host passes before its link.
+    /// Statistics of the line before the links.
     pub uplink: LinkStats,
-    /// Statistics of the line that every packet to the host passes after its link.
+    /// Statistics of the line after the links.
     pub downlink: LinkStats,
 }

@@ -105,10 +105,12 @@ impl Addresses {
         match address {
             IpAddr::V4(v4) => {
                 let is_special = v4.is_unspecified() || v4.is_loopback() || v4.is_multicast() || v4.octets()[0] >= 240 || Self::is_broadcast(short);
-                (!is_special).then_some(short).ok_or_else(|| format!("{v4} is no address of a host: expected one such as 192.168.1.10"))
+                (!is_special)
+                    .then_some(short)
+                    .ok_or_else(|| format!("{v4} cannot be the address of a host: expected an address such as 192.168.1.10"))
             }
             IpAddr::V6(v6) if short == 0 || short == u32::MAX => {
-                Err(format!("{v6} cannot be the address of a host here: expected one from fd00::1 to fd00::ffff:fffe"))
+                Err(format!("{v6} cannot be the address of a host: expected an address from fd00::1 to fd00::ffff:fffe"))
             }
             IpAddr::V6(_) => Ok(short),
         }
@@ -152,6 +154,7 @@ impl AddressPlan {
         loop {
             let number = u32::try_from(self.owners.len() + 1).unwrap_or(u32::MAX);
             let is_free = ![false, true].into_iter().any(|is_six| self.chosen.contains_key(&(is_six, number)));
+            // The number of a chosen address is skipped. Its entry has no owner, so that later numbers keep their index.
             self.owners.push(if is_free { [Some(host); 2] } else { [None; 2] });
             if is_free {
                 return number;
@@ -164,7 +167,7 @@ impl AddressPlan {
         self.owners.iter_mut().skip(Self::place(number)).take(1).for_each(|owner| owner[version] = None);
     }
 
-    /// Gives a host addresses that no host has had. Its former addresses belong to no host from now on.
+    /// Gives a host addresses that no host has had. The former addresses belong to no host from now on.
     pub(crate) fn change(&mut self, host: NodeId) -> Addresses {
         let before = self.current[host.index()];
         for (version, short) in before.into_iter().enumerate() {
@@ -178,7 +181,7 @@ impl AddressPlan {
         self.of(host)
     }
 
-    /// Returns the names of the hosts, in the order in which they were given.
+    /// Returns the names of the hosts, in the given order.
     #[must_use]
     pub fn names(&self) -> &[String] {
         &self.names
@@ -230,6 +233,7 @@ impl AddressPlan {
     /// Returns the index in `owners` of the addresses of number `number`. For number 0, which no host has, the index wraps beyond the end.
     #[inline]
     const fn place(number: u32) -> usize {
+        // Zero, the number of loopback in IPv6, becomes an index beyond all entries.
         number.wrapping_sub(1) as usize
     }
 

@@ -7,8 +7,8 @@ pub(crate) const LEAST_SEND_BUFFER: u32 = 4608;
 /// Default of `net.core.rmem_max` and of `wmem_max` \[byte\].
 const GREATEST: u32 = 212_992;
 
-/// Returns the size of a buffer for which a program has asked for `size`, and which has `least` at least \[byte\]. Linux reserves as much again for its own
-/// overhead, and reports the sum.
+/// Returns the size of a buffer after a program has asked for `size`, at least `least` \[byte\]. Linux reserves as much again for overhead, and reports the
+/// sum.
 pub(crate) fn doubled(size: u32, least: u32) -> usize {
     (2 * size.min(GREATEST)).max(least) as usize
 }

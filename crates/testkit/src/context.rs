@@ -1,4 +1,4 @@
-//! The test bed that runs on the present thread, through which programs reach its state.
+//! The running test bed of the present thread: the way of programs to the state of the run.
 
 use std::cell::RefCell;
 use std::io;
@@ -36,7 +36,10 @@ impl Running {
     pub(crate) fn enter(self) -> Entered {
         RUNNING.with_borrow_mut(|running| {
             if running.is_some() {
-                panic!("a test bed runs inside another one: the time of both cannot pass. Give both programs hosts of one test bed, or run one after the other");
+                panic!(
+                    "a test bed was started inside the run of another test bed, whose virtual time cannot pass meanwhile. Give both programs hosts of one test \
+                     bed, or run the two test beds one after the other"
+                );
             }
             let Self { shared, tasks } = self.clone();
             current::begin(shared.run(), Rc::new(move || tasks.current(shared.names())));
@@ -114,7 +117,7 @@ impl Call {
         call
     }
 
-    /// Returns the running test bed, and the host of the task that is being polled. `how` tells in the message what a task without a host must do.
+    /// Returns the running test bed, and the host of the task being polled. `how` tells in the message what a task without a host must do.
     ///
     /// # Panics
     ///
@@ -127,7 +130,7 @@ impl Call {
             return (shared, host);
         }
         let Self { name, place } = self;
-        let text = format!("`{name}` at {place} is called by a task that lives on no host: spawn the task with `Host::spawn`, or {how}");
+        let text = format!("`{name}` at {place} was called by a task that belongs to no host: spawn the task with `Host::spawn`, or {how}");
         // Tokio catches the panic of its own tasks. The noted fault fails the run nevertheless.
         shared.note_fault(&text);
         panic!("{text}");
@@ -137,7 +140,7 @@ impl Call {
     #[track_caller]
     #[expect(clippy::panic, reason = "a misuse, and the way out")]
     fn is_outside(self) -> ! {
-        panic!("`{}` at {} is called outside of a test bed: call it within `Testbed::run`, on its thread", self.name, self.place);
+        panic!("`{}` at {} was called outside of a test bed: make the call within `Testbed::run`, on the thread of the run", self.name, self.place);
     }
 }
 
@@ -154,5 +157,5 @@ pub(crate) fn outside(what: &str) -> io::Error {
 }
 
 fn outside_text(what: &str) -> String {
-    format!("only inside a running test bed {what}: call it within `Testbed::run`, on its thread")
+    format!("{what} only inside a running test bed: make the call within `Testbed::run`, on the thread of the run")
 }

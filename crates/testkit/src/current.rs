@@ -1,4 +1,4 @@
-//! State of the present thread: the run, the task that is being polled, and the host on which the task lives.
+//! State of the present thread: the run, the task being polled, and the host of the task.
 
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
@@ -8,13 +8,13 @@ use cohaptic_wan::NodeId;
 thread_local! {
     /// Number of the run; 0 if there is none.
     static RUN: Cell<u64> = const { Cell::new(0) };
-    /// Host of the task that is being polled; `None` for a task without a host.
+    /// Host of the task being polled; `None` for a task without a host.
     static HOST: Cell<Option<NodeId>> = const { Cell::new(None) };
-    /// Function that describes the task that is being polled.
+    /// Function that describes the task being polled.
     static TASK: RefCell<Option<Rc<dyn Fn() -> String>>> = const { RefCell::new(None) };
 }
 
-/// Begins a run on this thread. `task` describes the task that is being polled.
+/// Begins a run on this thread. `task` describes the task being polled.
 pub(crate) fn begin(run: u64, task: Rc<dyn Fn() -> String>) {
     RUN.set(run);
     TASK.set(Some(task));
@@ -32,13 +32,13 @@ pub(crate) fn run() -> u64 {
     RUN.get()
 }
 
-/// Returns a description of the task that is being polled on this thread, or `None` outside of a run.
+/// Returns a description of the task being polled on this thread, or `None` outside of a run.
 pub(crate) fn task() -> Option<String> {
     let task = TASK.with_borrow(Clone::clone)?;
     Some(task())
 }
 
-/// Returns the host of the task that is being polled.
+/// Returns the host of the task being polled.
 pub(crate) fn host() -> Option<NodeId> {
     HOST.get()
 }

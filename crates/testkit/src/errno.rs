@@ -1,4 +1,4 @@
-//! Error numbers of the system on which the test runs. Programs compare them by [`io::Error::raw_os_error`].
+//! Error numbers of the system on which the test runs. Programs compare the numbers by [`io::Error::raw_os_error`].
 
 use std::io;
 
@@ -70,7 +70,7 @@ impl Errno {
         }
     }
 
-    /// Returns the number. macOS and the other systems that descend from BSD have the same ones.
+    /// Returns the number. macOS and the systems that descend from BSD have equal numbers.
     #[cfg(not(any(target_os = "linux", target_os = "android", windows)))]
     const fn number(self) -> i32 {
         match self {

@@ -131,9 +131,9 @@ impl Host {
         }
     }
 
-    /// Crashes the host at once: its tasks are dropped at the points at which they wait, and its sockets are closed. Packets that the host has sent stay under
-    /// way; packets to the host are lost. Tasks that were not spawned by [`Host::spawn`] or [`Host::start`] (but by `tokio::spawn`, for example) go on, and
-    /// their sockets return errors.
+    /// Crashes the host at once: each task is dropped at the point at which the task waits, and all sockets are closed. Packets that the host has sent stay
+    /// under way; packets to the host are lost. Tasks that were not spawned by [`Host::spawn`] or [`Host::start`] (but by `tokio::spawn`, for example) go on,
+    /// and their sockets return errors.
     ///
     /// # Panics
     ///
@@ -145,9 +145,9 @@ impl Host {
         running.tasks.stop_all_of(self.node);
     }
 
-    /// Kills the program of the host at once, as a process is killed; the host itself stays up. The tasks are dropped at the points at which they wait, and the
-    /// sockets are closed as if the program had dropped them, so that peers are told. [`Host::restart`] starts the program anew. Nothing happens to a host that
-    /// is down.
+    /// Kills the program of the host at once, as a process is killed; the host itself stays up. Each task is dropped at the point at which the task waits, and
+    /// the sockets are closed as if the program had dropped the sockets, so that peers are told. [`Host::restart`] starts the program anew. Nothing happens to
+    /// a host that is down.
     ///
     /// # Panics
     ///
@@ -155,7 +155,7 @@ impl Host {
     pub fn kill(&self) {
         let running = self.running("programs are killed");
         if self.is_up() {
-            // Tasks are stopped first, and drop the sockets that they hold. Sockets of this host that other tasks hold are closed after that.
+            // Tasks are stopped first, and drop their sockets. Sockets of this host in the hands of other tasks are closed afterwards.
             running.tasks.stop_all_of(self.node);
             self.shared.with(|core| core.kill(self.node));
         }
@@ -173,7 +173,8 @@ impl Host {
     pub fn signal(&self, number: i32) {
         assert!(
             matches!(number, 1..=8 | 10..=18 | 23..=31),
-            "host `{}` cannot get the signal {number}: expected a number from 1 to 31, without 9, for which there is `Host::kill`, and without 19 to 22, which stop a program",
+            "host `{}` cannot get the signal {number}: expected 1 to 8, 10 to 18 or 23 to 31. `Host::kill` stands for 9; a test bed cannot stop a program, as \
+             19 to 22 do",
             self.name()
         );
         let running = self.running("signals are sent");
@@ -203,8 +204,9 @@ impl Host {
         self.shared.with(|core| core.is_up(self.node))
     }
 
-    /// Gives the host addresses that no host has had, like a phone that changes its network. The former addresses belong to no host from now on: packets to
-    /// them are lost, packets under way included. Sockets bound to `0.0.0.0` or `[::]` go on with the new addresses; other sockets cannot send any more.
+    /// Gives the host addresses that no host has had, like a phone that changes its network. The former addresses belong to no host from now on: packets to a
+    /// former address are lost, packets under way included. Sockets bound to `0.0.0.0` or `[::]` go on with the new addresses; other sockets cannot send any
+    /// more.
     pub fn change_addresses(&self) -> Addresses {
         self.shared.with(|core| core.change_addresses(self.node))
     }
@@ -217,7 +219,7 @@ impl Host {
     fn running(&self, what: &str) -> Running {
         let running = context::expect_running(what);
         let is_own = Arc::ptr_eq(&running.shared, &self.shared);
-        assert!(is_own, "host `{}` belongs to another test bed than the one that runs: take a host of the `Bed` of this run", self.name());
+        assert!(is_own, "host `{}` belongs to the test bed of another run: take a host of the `Bed` of this run", self.name());
         running
     }
 

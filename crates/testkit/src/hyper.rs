@@ -30,7 +30,7 @@ where
 }
 
 /// Connector that opens connections from a host to the authorities of URIs, which are names of hosts or addresses. Without a port the connector uses 443 for
-/// `https`, and 80 otherwise. It does not encrypt; a connector around this one can.
+/// `https`, and 80 otherwise. The connector does not encrypt; a connector around this connector can.
 #[derive(Clone, Debug)]
 pub struct Connector(Host);
 

@@ -66,7 +66,7 @@ impl LibraryLink {
             let factor = word.split_once('*').and_then(|(key, factor)| Some((key, thousandths(factor)?)));
             let Some((key, factor)) = factor else {
                 return Err(format!(
-                    "`{word}` is no factor: expected a key and a number above 0 with at most three decimal places, such as delay*1.4, or a key with its value, \
+                    "`{word}` is not a factor: expected a key and a number above 0 with at most three decimal places, such as delay*1.4, or a key with its value, \
                      such as rate=2Mbit"
                 ));
             };
@@ -160,7 +160,7 @@ impl LibraryLink {
     /// Returns the access lines of a host, in each of which a modulator of the library is the host's own.
     pub(crate) fn both_ways(&self, host: &str) -> Result<AccessLines, String> {
         if self.direction.is_some() {
-            return Err(format!("an access line has both directions: expected {}", self.profile.title()));
+            return Err(format!("an access line has both directions: expected the name without a direction, {}", self.profile.title()));
         }
         let line = |direction| self.model(direction).map(|link| Some(Arc::unwrap_or_clone(of_owner(Arc::new(link), host))));
         Ok(AccessLines { uplink: line(Direction::Up)?, downlink: line(Direction::Down)? })
@@ -169,7 +169,7 @@ impl LibraryLink {
 
 #[cfg(feature = "strategies")]
 impl LibraryLink {
-    /// Returns the keys that differ from link to link, each with the range of the factor in thousandths. A range is that of the first direction; profiles
+    /// Returns the keys that differ from link to link, each with the range of the factor in thousandths. The range comes from the first direction; profiles
     /// have one for both.
     pub(crate) fn ranges(&self) -> BTreeMap<String, RangeInclusive<u64>> {
         let range = |key: &str| {
@@ -215,6 +215,7 @@ impl Quantity {
 
     /// Returns the quantity times a factor in thousandths, as the value of a key.
     fn times(self, factor: u64) -> Option<String> {
+        // Half of the divisor is added, so that the division rounds to the nearest number.
         let scaled = u64::try_from((u128::from(self.count) * u128::from(factor) + u128::from(ONE / 2)) / u128::from(ONE)).ok()?;
         Some(format!("{scaled}{}", self.unit))
     }
@@ -334,7 +335,7 @@ mod tests {
             ("", "no link of the library is called \"\""),
             ("starlnk", "did you mean \"starlink\"?"),
             ("starlink@2", "starlink has no version \"2\": expected starlink@1"),
-            ("lte-driving slow", "`slow` is no factor: expected a key and a number above 0"),
+            ("lte-driving slow", "`slow` is not a factor: expected a key and a number above 0"),
             ("lte-driving delay*0", "`delay*0` is no factor"),
             ("lte-driving delay*1.2345", "`delay*1.2345` is no factor"),
             ("lte-driving delay*-1", "`delay*-1` is no factor"),

@@ -1,4 +1,4 @@
-//! Runtimes of tokio whose loopback is a link, for test suites that nobody changes.
+//! Runtimes of tokio whose loopback is a link, for unchanged test suites.
 //!
 //! The package `tokio` that `cohaptic tokio` generates depends on a copy of this crate that is compiled against the real tokio, and builds its runtimes with a
 //! [`Loopback`] if the environment asks for one.
@@ -66,13 +66,13 @@ impl Loopback {
         Self { words: words.to_owned(), seed, hook: Arc::default(), origin: OnceLock::new() }
     }
 
-    /// Returns the seed with which the runtime must be built, from which `tokio::select!` chooses where it begins.
+    /// Returns the seed for the runtime. From the seed, `tokio::select!` chooses where to begin.
     #[must_use]
     pub const fn seed(&self) -> u64 {
         self.seed
     }
 
-    /// Prepares the builder of the runtime, which must be one of a runtime with one thread.
+    /// Prepares the builder of the runtime, which must have a single thread.
     pub fn prepare(&self, builder: &mut tokio::runtime::Builder) {
         on_tokio::prepare(builder, &self.hook);
     }

@@ -7,7 +7,7 @@ use cohaptic_wan::{MOST_NODES, NodeId, Path};
 
 use crate::current;
 
-/// Names of hosts, in the order in which they were given, with an index sorted by name. Looking a host up takes as many steps as the number of hosts has bits.
+/// Names of hosts, in the given order, with an index sorted by name. Looking a host up takes as many steps as the number of hosts has bits.
 /// Names that differ only in the case of letters of ASCII, or in a final dot, are the same name (RFC 4343).
 #[derive(Clone, PartialEq, Eq, Default)]
 pub(crate) struct Names {
@@ -31,7 +31,7 @@ impl Names {
         assert!(fault.is_none(), "{}", fault.unwrap_or_default());
         assert!(self.list.len() < MOST_NODES, "a test bed has at most {MOST_NODES} hosts");
         match self.search(&name) {
-            Ok(_) => panic!("two hosts are called `{name}`"),
+            Ok(_) => panic!("two hosts have the name `{name}`: expected a name of its own for each host"),
             Err(place) => self.sorted.insert(place, NodeId::new(self.list.len())),
         }
         self.list.push(name);
@@ -50,13 +50,13 @@ impl Names {
     ///
     /// # Panics
     ///
-    /// If there is no host of that name.
+    /// If no host has the name.
     #[expect(clippy::panic, reason = "a misuse, and the way out")]
     pub(crate) fn node(&self, name: &str) -> NodeId {
         self.find(name).unwrap_or_else(|| panic!("{}", self.unknown(name)))
     }
 
-    /// Returns the path from one host to another.
+    /// Returns the path from a host to another host.
     ///
     /// # Panics
     ///
@@ -73,7 +73,7 @@ impl Names {
             let _ = write!(text, " and {} more", self.list.len() - SHOWN);
         }
         if let Some(task) = current::task() {
-            let _ = write!(text, "; {task} asks for it");
+            let _ = write!(text, "; the name was asked for by {task}");
         }
         text
     }
@@ -115,5 +115,5 @@ pub(crate) fn name_fault(name: &str) -> Option<String> {
         && !name.contains([':', '[', ']'])
         && !name.contains(char::is_whitespace)
         && name.parse::<std::net::IpAddr>().is_err();
-    (!is_word).then(|| format!("`{name}` is not a name of a host; expected a word without `:`, `[` and `]` that is not an address"))
+    (!is_word).then(|| format!("`{name}` cannot be the name of a host: expected a word without `:`, `[` and `]` that is not an IP address"))
 }

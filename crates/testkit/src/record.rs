@@ -45,9 +45,9 @@ impl Record {
         &self.seed
     }
 
-    /// Returns the fates of the packets from one host to another on their link, in the form that [`LinkModel::Replay`](cohaptic_wan::LinkModel::Replay)
+    /// Returns the fates of the packets from a host to another host on their link, in the form that [`LinkModel::Replay`](cohaptic_wan::LinkModel::Replay)
     /// replays. With access lines (`Testbed::access`) the fate is that of the whole path, from uplink to downlink. A packet that its link delivered to a host
-    /// that was down, or over a path that was cut, counts as delivered here; the trace tells its end.
+    /// that was down, or over a path that was cut, counts as delivered here; the trace tells the end of the packet.
     ///
     /// # Panics
     ///

@@ -19,7 +19,7 @@ pub trait ToSocketAddrs {
     ///
     /// # Errors
     ///
-    /// [`io::ErrorKind::InvalidInput`] if the text is no address, [`io::ErrorKind::NotFound`] if there is no host of that name, or no test bed is running.
+    /// [`io::ErrorKind::InvalidInput`] if the text is no address, [`io::ErrorKind::NotFound`] if no host has the name, or no test bed is running.
     fn to_socket_addrs(&self) -> io::Result<Vec<SocketAddr>>;
 
     /// Returns the first socket address.
@@ -49,7 +49,7 @@ pub(crate) fn each<T>(addresses: impl ToSocketAddrs, mut attempt: impl FnMut(Soc
     Err(failed)
 }
 
-/// Implements the trait for types that are one address.
+/// Implements the trait for types of a single address.
 macro_rules! one_address {
     ($($kind:ty),*) => {
         $(
@@ -119,7 +119,7 @@ fn of_text(text: &str) -> io::Result<Found> {
     let wrong = || {
         io::Error::new(
             io::ErrorKind::InvalidInput,
-            format!("`{text}` is not an address; expected one like `10.0.0.1:80`, `[fd00::1]:80` or `server:80`"),
+            format!("`{text}` is not an address: expected an address such as `10.0.0.1:80`, `[fd00::1]:80` or `server:80`"),
         )
     };
     let (name, port) = text.rsplit_once(':').ok_or_else(wrong)?;

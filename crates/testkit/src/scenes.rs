@@ -43,7 +43,7 @@ pub fn check_scenes(folder: impl AsRef<Path>) {
     };
     let failures: Vec<String> = files.iter().filter_map(|file| failure(file)).collect();
     if !failures.is_empty() {
-        panic!("of {} scenes {} failed:\n{}", files.len(), failures.len(), failures.join("\n"));
+        panic!("{} of {} scenes failed:\n{}", failures.len(), files.len(), failures.join("\n"));
     }
 }
 
@@ -55,13 +55,13 @@ fn failure(path: &Path) -> Option<String> {
     };
     let shown = path.display();
     if scene.expect.as_ref().is_none_or(|expect| *expect == Expect::default()) {
-        return Some(format!("{shown}: nothing was compared: expected a table [expect] that says what must come out"));
+        return Some(format!("{shown}: the scene has no expectations to check: expected a table [expect] with the results that must come out"));
     }
     let failures = check::check(&scene, Model::Least, || true);
     if failures.is_empty() {
         return None;
     }
-    let mut text = format!("{shown}: what came out is not what it expects:");
+    let mut text = format!("{shown}: the results differ from the expectations of the scene:");
     for line in failures.iter().flat_map(|failure| failure.lines()) {
         // Writing to a `String` cannot fail.
         let _ = write!(text, "\n  {line}");

@@ -38,7 +38,7 @@ pub(crate) struct Settings {
     pub(crate) laws: Laws,
     /// Access lines of the hosts that have some.
     pub(crate) access: BTreeMap<NodeId, AccessLines>,
-    /// Link that the packets of its sender to itself take; `None` if such packets arrive at once. The receiver of the link is a host without programs.
+    /// Link for packets of the sender to itself; `None` if such packets arrive at once. The receiver of the link is a host without programs.
     pub(crate) loopback: Option<Path>,
 }
 

@@ -30,7 +30,7 @@ pub(crate) struct Setup {
     pub(crate) changes: Vec<LinkChange>,
     pub(crate) seed: Option<u64>,
     pub(crate) settings: Settings,
-    /// Folder into which a failing run writes its record.
+    /// Folder for the record of a failing run.
     pub(crate) artefacts: Option<PathBuf>,
     pub(crate) stall_limit: Duration,
 }
@@ -82,7 +82,7 @@ impl Setup {
         Arc::make_mut(&mut self.settings.said).set_every(&link);
     }
 
-    /// Sets the link from one host to another.
+    /// Sets the link from a host to another host.
     ///
     /// # Panics
     ///
@@ -111,7 +111,7 @@ impl Setup {
         let named = crate::library::LibraryLink::expect(link);
         // A host has one name, whatever the letters of the test: the name decides about the random numbers of its lines.
         let lines = named.and_then(|named| Ok((named.both_ways(&self.names[node.index()])?, named.to_string())));
-        let (lines, words) = lines.unwrap_or_else(|error| panic!("`{link}` is no access of host `{host}`: {error}"));
+        let (lines, words) = lines.unwrap_or_else(|error| panic!("`{link}` cannot be the access line of host `{host}`: {error}"));
         self.settings.access.insert(node, lines);
         Arc::make_mut(&mut self.settings.said).set_access(node, Some(words));
     }

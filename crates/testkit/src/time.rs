@@ -1,6 +1,6 @@
 //! Virtual time to the nanosecond, for programs that do not use tokio's timers.
 //!
-//! The functions of this module also work on tokio's clock (`Testbed::on_tokio`). They keep their resolution of a nanosecond, while tokio's own timers are
+//! The functions of this module also work on tokio's clock (`Testbed::on_tokio`). The resolution stays a nanosecond, while tokio's own timers are
 //! rounded up to milliseconds.
 
 use std::fmt;
@@ -175,7 +175,7 @@ pub async fn timeout<F: Future>(span: Duration, future: F) -> Result<F::Output, 
 /// Outside a running test bed, and with a period of zero.
 #[must_use]
 pub fn interval(period: Duration) -> Interval {
-    assert!(!period.is_zero(), "an interval of no time would never let time pass; expected one longer than zero");
+    assert!(!period.is_zero(), "an interval with a period of zero would never let time pass: expected a period above zero");
     let shared = context::ask("time passes", Arc::clone);
     let next = shared.now();
     Interval { shared, next, period }

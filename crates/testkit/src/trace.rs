@@ -82,11 +82,11 @@ pub enum Happening {
     Restarted(NodeId),
     /// A host has new addresses.
     Readdressed(NodeId),
-    /// The path from one host to another was cut.
+    /// The path from a host to another host was cut.
     Cut(Path),
     /// The cut of a path has ended.
     Mended(Path),
-    /// The link from one host to another was replaced.
+    /// The link from a host to another host was replaced.
     Relinked(Path),
     /// The program added a note: see [`Bed::note`](crate::Bed::note).
     Note(String),
@@ -146,7 +146,7 @@ impl fmt::Display for Lost {
             Self::Link(cause) => cause.name(),
             Self::Uplink(cause) => return write!(f, "{} (uplink)", cause.name()),
             Self::Downlink(cause) => return write!(f, "{} (downlink)", cause.name()),
-            Self::Cut => "the way is cut",
+            Self::Cut => "the path is cut",
             Self::HostDown => "the host is down",
             Self::NoSuchAddress => "the host has another address",
             Self::NoSocket => "no socket at that port",
@@ -227,7 +227,7 @@ impl Difference<'_> {
 
 impl fmt::Display for Difference<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "the runs part at {} s, with event {}:", Seconds(self.at()), self.place)?;
+        writeln!(f, "the runs differ from {} s on, at event {}:", Seconds(self.at()), self.place)?;
         for (name, event) in [("first ", self.events.0), ("second", self.events.1)] {
             match event {
                 Some(event) => writeln!(f, "  {name}: {}", Words { hosts: self.hosts, event })?,
@@ -298,7 +298,7 @@ impl fmt::Display for Words<'_> {
                     Verdict::Delay(by) => write!(f, " hit: delayed by {}", Span(*by)),
                     Verdict::Duplicate(by) => write!(f, " hit: copied, the copy {} later", Span(*by)),
                     Verdict::Corrupt(bit) => write!(f, " hit: bit {bit} flipped"),
-                    Verdict::Behind(count) => write!(f, " hit: held behind {count} more"),
+                    Verdict::Behind(count) => write!(f, " hit: held until {count} later packets have passed"),
                 }
             }
             Happening::Crashed(host) => write!(f, "{} crashed", self.name(*host)),
@@ -315,7 +315,7 @@ impl fmt::Display for Words<'_> {
             }
             Happening::Relinked(path) => {
                 self.path(f, *path)?;
-                f.write_str(" is another link")
+                f.write_str(" has another link")
             }
             Happening::Note(note) => write!(f, "note: {note}"),
         }
@@ -343,7 +343,7 @@ mod tests {
         assert_eq!(shorter.first_difference(&one).unwrap().at(), Instant::from_nanos(5_000));
         assert_eq!(
             shorter.first_difference(&one).unwrap().to_string(),
-            "the runs part at 0.000005 s, with event 1:\n  first : nothing more\n  second: 0.000005 s  a -> b  packet 1 sent, 3 bytes, digest 0000000000000007\n"
+            "the runs differ from 0.000005 s on, at event 1:\n  first : nothing more\n  second: 0.000005 s  a -> b  packet 1 sent, 3 bytes, digest 0000000000000007\n"
         );
     }
 }

@@ -53,7 +53,7 @@ pub(crate) fn parse(text: &str, mut file: impl FnMut(&str) -> Result<String, Str
     let every = reader.every.unwrap_or_default();
     if reader.hosts.is_empty() {
         let end = last.1.len()..last.1.len();
-        return Err(locate(last.0, last.1, (end, "no line names a host: expected one such as `a -> b: delay 24ms` or `hosts: a b`".to_owned())));
+        return Err(locate(last.0, last.1, (end, "no line names a host: expected a line such as `a -> b: delay 24ms` or `hosts: a b`".to_owned())));
     }
     Ok(Words { hosts: reader.hosts.to_vec(), every, links: reader.links, hits: reader.hits, seed: reader.seed })
 }
@@ -159,10 +159,10 @@ impl Reader {
             return Err(twice(subject, "hosts"));
         }
         if !self.hosts.is_empty() {
-            return Err((subject.clone(), "hosts were named before: expected this line before those of links".to_owned()));
+            return Err((subject.clone(), "a line above names hosts already: expected `hosts` before the lines of links".to_owned()));
         }
         if rest.is_empty() {
-            return Err((rest_of(line, subject, rest), "expected the names of hosts, parted by blanks".to_owned()));
+            return Err((rest_of(line, subject, rest), "expected the names of hosts, separated by spaces".to_owned()));
         }
         for span in rest {
             let name = &line[span.clone()];
@@ -188,7 +188,7 @@ impl Reader {
             return Err((span.clone(), fault));
         }
         if self.hosts.len() == MOST_NODES {
-            return Err((span.clone(), format!("this is host {}: expected {MOST_NODES} at most", MOST_NODES + 1)));
+            return Err((span.clone(), format!("this is host {}: expected at most {MOST_NODES} hosts", MOST_NODES + 1)));
         }
         self.hosts.add(name.to_owned());
         Ok(self.hosts.len() - 1)
@@ -207,7 +207,7 @@ fn colon(line: &str, example: &str) -> Result<Option<(usize, usize)>, Fault> {
 }
 
 fn twice(span: &Range<usize>, what: &str) -> Fault {
-    (span.clone(), format!("{what} is said twice: expected it once"))
+    (span.clone(), format!("{what} is given twice: expected one line with {what}"))
 }
 
 /// Returns the span after the colon, or the end of the line if nothing follows.
@@ -312,22 +312,22 @@ mod tests {
             ("a->b: delay 1ms", "1:1: expected `a -> b`"),
             ("é -> é: delay 1ms", "1:1: a host has no link to itself"),
             ("é -> b: delai 1ms", "1:9: unknown word \"delai\""),
-            ("a -> b:\nb -> a:\n a -> b: loss 1%", "3:2: this link is said twice"),
-            ("a -> b:\nb <-> a:", "2:1: this link is said twice"),
-            ("all:\nall:", "2:1: all is said twice"),
+            ("a -> b:\nb -> a:\n a -> b: loss 1%", "3:2: this link is given twice"),
+            ("a -> b:\nb <-> a:", "2:1: this link is given twice"),
+            ("all:\nall:", "2:1: all is given twice"),
             ("hosts: a b\na -> c:", "2:6: there is no host `c`: expected one of a, b"),
             ("hosts: a a", "1:10: host `a` is named twice"),
             ("hosts:  ", "1:7: expected the names of hosts"),
-            ("a -> b:\nhosts: a", "2:1: hosts were named before"),
-            ("hosts: a\nhosts: b", "2:1: hosts is said twice"),
-            ("a -> [b]:", "1:6: `[b]` is not a name of a host"),
-            ("10.0.0.1 -> b:", "1:1: `10.0.0.1` is not a name of a host"),
+            ("a -> b:\nhosts: a", "2:1: a line above names hosts already"),
+            ("hosts: a\nhosts: b", "2:1: hosts is given twice"),
+            ("a -> [b]:", "1:6: `[b]` cannot be the name of a host"),
+            ("10.0.0.1 -> b:", "1:1: `10.0.0.1` cannot be the name of a host"),
             ("hosts: a b\nhit a -> c: drop packet 1", "2:10: there is no host `c`: expected one of a, b"),
             ("hit a -> a: drop packet 1", "1:5: a host has no link to itself"),
             ("hit a -> b: drop packet", "1:24: expected numbers of packets"),
             ("seed: x", "1:7: expected a number"),
             ("seed: 1 2", "1:7: expected one number"),
-            ("seed: 1\nseed: 1", "2:1: seed is said twice"),
+            ("seed: 1\nseed: 1", "2:1: seed is given twice"),
             ("a -> b: replay", "1:15: expected the file of a fate log"),
             ("a -> b: replay x.csv", "1:16: x.csv: not there"),
             ("a -> b: delay 5ms 9ms distribution uniform", "1:9: delay: uniform jitter of 9ms around 5ms begins below zero"),

@@ -196,7 +196,7 @@ fn a_socket_on_no_host() {
 
 /// Nothing of tokio tells a user to call `enable_io`.
 #[test]
-#[should_panic(expected = "An `AsyncFd` waits for a descriptor of the system: replace it by a socket or a channel")]
+#[should_panic(expected = "Replace an `AsyncFd`, which waits for a descriptor of the system, by a socket or a channel")]
 fn an_asynchronous_descriptor() {
     on_a_host(async |_| {
         let (one, _other) = std::os::unix::net::UnixStream::pair().unwrap();

@@ -78,7 +78,7 @@ impl Again {
         }
         let _ = write!(text, "\n        .{method}({program});\n");
         if !has_failed {
-            text.push_str("    // What the test expects of the outcome is not met.\n");
+            text.push_str("    // Write here what the test expects of the outcome: this expectation failed.\n");
         }
         text.push_str("}\n");
         text
@@ -107,6 +107,7 @@ impl Again {
 
     /// Returns the numbers of the lost packets by path, if chance has had no other effect.
     fn lost(&self, drawn: &Drawn) -> Option<BTreeMap<Path, Vec<u64>>> {
+        // A full list may lack later losses. Other chance, such as jitter, cannot be replaced by hits.
         let is_known = drawn.lost.len() < MOST_LOST && !self.has_other_chance(drawn) && self.needs_seed(drawn);
         is_known.then(|| {
             let mut lost: BTreeMap<Path, Vec<u64>> = BTreeMap::new();
@@ -126,14 +127,15 @@ impl Again {
         let mut lines = Vec::new();
         let every = shown(self.said.every());
         match &every {
-            None => lines.push("// .links(…): a model without words, as the test says it.".to_owned()),
+            None => lines.push("// .links(…): a model without words; copy the call from the test.".to_owned()),
             Some(words) if !words.is_empty() => lines.push(format!(".links({words:?})")),
             Some(_) => {}
         }
         for (path, words) in self.said.links() {
             let (from, to) = (name(path.from), name(path.to));
             match shown(words) {
-                None => lines.push(format!("// .link({from:?}, {to:?}, …): a model without words, as the test says it.")),
+                None => lines.push(format!("// .link({from:?}, {to:?}, …): a model without words; copy the call from the test.")),
+                // `.links` has set this link already.
                 words if words == every => {}
                 Some(words) => lines.push(format!(".link({from:?}, {to:?}, {words:?})")),
             }
@@ -142,7 +144,7 @@ impl Again {
             let host = name(host);
             lines.push(match words {
                 Words::Known(words) => format!(".access({host:?}, {words:?})"),
-                Words::Model => format!("// the access lines of {host}: models without words, as the test says it."),
+                Words::Model => format!("// The access lines of {host} are models without words; copy the call from the test."),
             });
         }
         // Losses precede the other laws, because the first verdict counts, and another law could delay a lost packet.
@@ -153,7 +155,7 @@ impl Again {
             let (from, to) = (name(law.path.from), name(law.path.to));
             match law.words() {
                 Some(words) => lines.push(format!(".hit({from:?}, {to:?}, {:?})", words.to_string())),
-                None => lines.push(format!("// {} of {from} -> {to}, as the test says it.", law.name)),
+                None => lines.push(format!("// {} of {from} -> {to} has no words; copy the call from the test.", law.name)),
             }
         }
         if with_seed {

@@ -84,6 +84,7 @@ fn closing(text: &str) -> Option<(usize, bool)> {
         };
         has_long_text |= matches!(bytes[place], b'"' | b'r') && len > 1 && rest.get(..len).is_some_and(|string| string.contains('\n'));
         place += len;
+        // A step of one byte may end within a character.
         while !text.is_char_boundary(place) {
             place += 1;
         }
@@ -128,12 +129,14 @@ fn string(text: &str) -> Option<usize> {
 /// Returns whether a raw string begins at `place`, as opposed to a name that contains an `r`.
 fn is_raw(text: &str, place: usize) -> bool {
     let before = text[..place].chars().next_back();
+    // An `r` within a word begins no string. The `b` of `br"…"` is no word.
     let is_word = before.is_some_and(|before| before.is_alphanumeric() || before == '_') && !text[..place].ends_with('b');
     !is_word && text[place + 1..].trim_start_matches('#').starts_with('"')
 }
 
 /// Returns the length of a raw string.
 fn raw_string(text: &str) -> Option<usize> {
+    // The string begins after `r`, the hashes and a quotation mark, and ends with a quotation mark and as many hashes.
     let hashes = text[1..].bytes().take_while(|byte| *byte == b'#').count();
     let begin = hashes + 2;
     let end = format!("\"{}", "#".repeat(hashes));
@@ -146,6 +149,7 @@ fn character(text: &str) -> usize {
     match characters.next() {
         // The character after the backslash may be a quotation mark itself.
         Some((_, '\\')) => text.get(3..).and_then(|rest| rest.find('\'')).map_or(1, |end| end + 4),
+        // Without a second quotation mark, the first one begins a lifetime.
         Some(_) => characters.next().filter(|(_, mark)| *mark == '\'').map_or(1, |(place, _)| place + 1),
         None => 1,
     }

@@ -48,6 +48,7 @@ impl Words {
         if words.is_empty() {
             return Chance::Nothing;
         }
+        // Words that `tc-netem` does not know name a link of the library, in which chance does more than lose packets.
         Netem::parse(words).map_or(Chance::Other, |netem| Chance::of(&netem))
     }
 }

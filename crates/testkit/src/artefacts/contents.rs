@@ -38,12 +38,13 @@ pub(super) fn files(record: &Record) -> Vec<(String, Vec<u8>)> {
         let _ = writeln!(hits, "  {}", count.words());
     }
     if !hits.is_empty() {
-        hits = format!("What was hit; the fates have it:\n\n{hits}\n");
+        hits = format!("Packets that were hit, also in the fates:\n\n{hits}\n");
     }
     let seed = record.seed();
     let summary = format!(
-        "{MARK}: that of `{}`, which ended at {} s.\n\nIts seed was {}: {}={} runs it again.\n\nWhat the links did, of what they took:\n\n{table}\n{hits}\
-         trace.txt has all that happened, in order. links.txt replays what the links did:\nTestbed::from_file(\"links.txt\") has these hosts and links.\n",
+        "{MARK}: the run of `{}`, which ended at {} s.\n\nThe seed was {}: {}={} repeats the run.\n\nPackets of each link, and their fates:\n\n{table}\n{hits}\
+         trace.txt has all events in their order. links.txt replays the fates:\nTestbed::from_file(\"links.txt\") makes a test bed with these hosts and \
+         links.\n",
         seed.test,
         Seconds(record.ended()),
         seed.value,
@@ -51,8 +52,8 @@ pub(super) fn files(record: &Record) -> Vec<(String, Vec<u8>)> {
         seed.value,
     );
     let asked: String = record.network().iter().map(|line| format!("# {line}\n")).collect();
-    let asked = if asked.is_empty() { asked } else { format!("# The links as the test has them:\n{asked}") };
-    let links = format!("# What the links did, packet by packet.\n{asked}seed: {}\nhosts: {}\n{links}", seed.value, hosts.join(" "));
+    let asked = if asked.is_empty() { asked } else { format!("# The links of the test:\n{asked}") };
+    let links = format!("# The fate of each packet, link by link.\n{asked}seed: {}\nhosts: {}\n{links}", seed.value, hosts.join(" "));
     files.push((MARKED.to_owned(), summary.into_bytes()));
     files.push(("trace.txt".to_owned(), trace.into_bytes()));
     files.push(("links.txt".to_owned(), links.into_bytes()));
@@ -68,7 +69,7 @@ fn counts(record: &Record, path: Path, log: &FateLog) -> String {
         let _ = write!(text, ", {copied} copied");
     }
     let mut lost: BTreeMap<Lost, usize> = BTreeMap::new();
-    // The log may be shorter than the packets, and counts those that it has.
+    // The log may end before the last packets. Only packets of the log are counted.
     for seen in record.packets_of(path).filter(|seen| seen.sequence < log.packets() as u64) {
         if let Fate::Dropped(cause) = seen.fate {
             *lost.entry(Lost::on(seen.part, cause)).or_default() += 1;
@@ -101,7 +102,7 @@ fn capture(record: &Record, path: Path, from: &str, to: &str) -> Vec<u8> {
     write().unwrap_or_default()
 }
 
-/// Returns the numbers of the packets of a path that are whole IP packets, which are those of TCP.
+/// Returns the numbers of the whole IP packets of a path, that is, of the packets of TCP.
 #[cfg(all(feature = "pcapng", feature = "tcp"))]
 fn segments(record: &Record, path: Path) -> std::collections::BTreeSet<u64> {
     let number = |event: &crate::TraceEvent| {

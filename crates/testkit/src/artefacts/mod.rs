@@ -12,7 +12,7 @@ use crate::record::Record;
 use crate::seed::Seed;
 use crate::wire::HitCount;
 
-/// Name of the environment variable with a folder. Every test bed that fails writes its record into a folder below it, named after the test.
+/// Name of the environment variable with a folder. Every failing test bed writes a record into a subfolder with the name of the test.
 pub const ARTEFACTS_VARIABLE: &str = "COHAPTIC_TEST_ARTEFACTS";
 
 /// Error of writing a record into a folder.
@@ -42,9 +42,9 @@ impl fmt::Display for WriteError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NotOurs { folder } => {
-                write!(f, "{} is there already and was not written by a test bed; expected a folder of its own", folder.display())
+                write!(f, "{} exists and was not written by a test bed; expected a new folder, or the folder of an earlier failure", folder.display())
             }
-            Self::NoName { folder } => write!(f, "`{}` names no folder of its own; expected a path that ends with a name", folder.display()),
+            Self::NoName { folder } => write!(f, "`{}` cannot be the folder of a failure; expected a path that ends with a name", folder.display()),
             Self::Io { path, source } => write!(f, "{}: {source}", path.display()),
         }
     }
@@ -81,7 +81,7 @@ impl Record {
     }
 }
 
-/// Folders into which a failing test writes its record.
+/// Folders for the record of a failing test.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub(crate) struct Artefacts {
     folders: Vec<PathBuf>,
@@ -119,12 +119,12 @@ impl Artefacts {
             let record = record();
             for folder in &self.folders {
                 match record.write(folder) {
-                    Ok(()) => lines.push(format!("what happened is in {}", folder.display())),
-                    Err(error) => lines.push(format!("what happened could not be written: {error}")),
+                    Ok(()) => lines.push(format!("the record of the run is in {}", folder.display())),
+                    Err(error) => lines.push(format!("the record of the run could not be written: {error}")),
                 }
             }
         } else {
-            lines.push(format!("{ARTEFACTS_VARIABLE}=FOLDER writes what happens: its trace, and all packets"));
+            lines.push(format!("{ARTEFACTS_VARIABLE}=FOLDER writes the record of a failed run: its trace, and all packets"));
         }
         for nothing in hits.iter().filter(|count| count.hit == 0) {
             lines.push(format!("note: {}", nothing.words()));

@@ -28,8 +28,8 @@ impl Testbed {
             (*receive_buffer != RECEIVE_BUFFER).then(|| format!(".receive_buffer({receive_buffer})")),
             (limits.time != default.time).then(|| format!(".time_limit({})", nanos(limits.time))),
             (limits.steps != default.steps).then(|| format!(".step_limit({})", limits.steps)),
-            has_constants.then(|| "// The constants of TCP, as the test says them.".to_owned()),
-            (!self.setup.changes.is_empty()).then(|| "// The changes of links, as the file of the test says them.".to_owned()),
+            has_constants.then(|| "// The constants of TCP have no words; copy the call from the test.".to_owned()),
+            (!self.setup.changes.is_empty()).then(|| "// The changes of links stand in the file of the test.".to_owned()),
             is_tokio.then(|| ".on_tokio()".to_owned()),
         ];
         Again {

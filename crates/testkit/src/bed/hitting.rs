@@ -4,8 +4,8 @@ use super::Testbed;
 use crate::hit::{Hits, PacketLaw, SentPacket, Verdict};
 
 impl Testbed {
-    /// Asks a function for the fate of every packet offered to the link from one host to another: see [`hit`](crate::hit). Every run begins with a clone of the
-    /// function.
+    /// Asks a function for the fate of every packet offered to the link from a host to another host: see [`hit`](crate::hit). Every run begins with a clone of
+    /// the function.
     ///
     /// ```
     /// use cohaptic_testkit::{Testbed, hit::Verdict, tcp::Flags};
@@ -27,7 +27,7 @@ impl Testbed {
         self
     }
 
-    /// Asks a law for the fate of every packet offered to the link from one host to another: see [`PacketLaw`].
+    /// Asks a law for the fate of every packet offered to the link from a host to another host: see [`PacketLaw`].
     ///
     /// # Panics
     ///
@@ -38,7 +38,7 @@ impl Testbed {
         self
     }
 
-    /// Hits packets from one host to another, as words such as `drop first SYN; delay 30ms packets 3 8` say: see [`hit`](crate::hit).
+    /// Hits packets from a host to another host, as words such as `drop first SYN; delay 30ms packets 3 8` say: see [`hit`](crate::hit).
     ///
     /// # Panics
     ///

@@ -79,7 +79,7 @@ impl Testbed {
     /// white space).
     pub fn new<N: Into<String>>(hosts: impl IntoIterator<Item = N>) -> Self {
         let names: Names = hosts.into_iter().collect();
-        assert!(!names.is_empty(), "a test bed without hosts; expected one name at least");
+        assert!(!names.is_empty(), "a test bed without hosts: expected at least one name");
         Self {
             setup: Setup::new("host", names),
             #[cfg(feature = "tcp")]
@@ -119,7 +119,7 @@ impl Testbed {
         self
     }
 
-    /// Sets the link from one host to another. The link back is separate.
+    /// Sets the link from a host to another host. The link back is separate.
     ///
     /// # Panics
     ///
@@ -179,9 +179,9 @@ impl Testbed {
         self
     }
 
-    /// Sets the size of the receive buffer of a UDP socket \[bytes\]. As with Linux, a datagram counts with the memory that its packet takes, 832 bytes at least,
-    /// and datagrams that do not fit are lost until the program reads. A datagram fits into an empty buffer, however long it is. The default is 212,992, as
-    /// with Linux: 256 datagrams of at most 197 bytes, or 92 of 1472.
+    /// Sets the size of the receive buffer of a UDP socket \[bytes\]. As with Linux, a datagram counts with the memory that its packet takes, 832 bytes at
+    /// least, and datagrams that do not fit are lost until the program reads. A datagram fits into an empty buffer, however long it is. The default is 212,992,
+    /// as with Linux: 256 datagrams of at most 197 bytes, or 92 of 1472.
     pub const fn receive_buffer(mut self, bytes: usize) -> Self {
         self.setup.settings.receive_buffer = bytes;
         self
@@ -309,7 +309,7 @@ impl Testbed {
         let (_, second) = self.run_once(&seed, &program, Location::caller());
         if let Some(difference) = first.trace().first_difference(second.trace()) {
             panic!(
-                "the program does not do the same twice: {difference}Look for hash maps, threads, the time of day, random numbers without a seed, and \
+                "two runs of the program are not the same: {difference}Look for hash maps, threads, the time of day, random numbers without a seed, and \
                  `tokio::select!` without `biased`.\n{}",
                 seed.advice()
             );
@@ -379,8 +379,8 @@ impl Testbed {
                 (outcome, record)
             }
             Err(panic) => {
-                // A test with its own links fails again as it stands if its seed is that of its place, or if it has no chance. Otherwise, or if a strategy drew
-                // the links, the report prints a test.
+                // A test with links of its own fails again as it stands, if the seed comes from the place of the test or nothing is left to chance. Otherwise,
+                // or if a strategy drew the links, the report prints a test.
                 let differs = has_test && (failure::is_searching() || !seed.is_of_place && again.has_chance());
                 failure::report(Box::new(move || {
                     let test = if differs { again.test(&drawn, true) } else { String::new() };

@@ -15,7 +15,7 @@ impl Testbed {
     /// If the numbers of hosts differ.
     pub fn network(mut self, network: &ImpairedNetwork) -> Self {
         let hosts = self.setup.names.len();
-        assert!(network.hosts() == hosts, "a network of {} hosts for a test bed of {hosts}: expected as many", network.hosts());
+        assert!(network.hosts() == hosts, "the network has {} hosts and the test bed has {hosts}: expected the same number", network.hosts());
         for (from, to, link) in network.links() {
             self.setup.set_path(Path { from, to }, link);
         }

@@ -34,13 +34,13 @@ impl Bed {
     ///
     /// # Panics
     ///
-    /// If there is no host of that name.
+    /// If no host has the name.
     #[must_use]
     pub fn host(&self, name: &str) -> Host {
         Host::new(Arc::clone(&self.shared), self.names().node(name))
     }
 
-    /// Returns all hosts, in the order in which they were named.
+    /// Returns all hosts, in the order of naming.
     #[must_use]
     pub fn hosts(&self) -> Vec<Host> {
         (0..self.names().len()).map(|host| Host::new(Arc::clone(&self.shared), NodeId::new(host))).collect()
@@ -81,11 +81,11 @@ impl Bed {
         F::Output: 'static,
     {
         let running = context::expect_running("tasks can be spawned");
-        assert!(Arc::ptr_eq(&running.shared, &self.shared), "the run of this `Bed` has ended: spawn the task by the `Bed` of the run that goes on");
+        assert!(Arc::ptr_eq(&running.shared, &self.shared), "the run of this `Bed` has ended: spawn the task with the `Bed` of the present run");
         running.tasks.spawn(None, Location::caller(), future)
     }
 
-    /// Cuts the path from one host to another: packets that are sent or would arrive from now on are lost. The path back is not changed.
+    /// Cuts the path from a host to another host: packets that are sent or would arrive from now on are lost. The path back is not changed.
     ///
     /// # Panics
     ///
@@ -94,7 +94,7 @@ impl Bed {
         self.set_cut(from, to, true);
     }
 
-    /// Ends the cut of the path from one host to another.
+    /// Ends the cut of the path from a host to another host.
     ///
     /// # Panics
     ///
@@ -120,7 +120,7 @@ impl Bed {
         self.shared.with(|core| core.wire.mend_all());
     }
 
-    /// Replaces the link from one host to another. Packets inside the link follow the rules of [`cohaptic_wan::Link::set_model`].
+    /// Replaces the link from a host to another host. Packets inside the link follow the rules of [`cohaptic_wan::Link::set_model`].
     ///
     /// # Panics
     ///
@@ -132,7 +132,7 @@ impl Bed {
         self.shared.with(|core| core.set_link(path, link));
     }
 
-    /// Returns the statistics of the link from one host to another so far. Packets that an uplink before the link has lost do not count.
+    /// Returns the statistics of the link from a host to another host so far. Packets that an uplink before the link has lost do not count.
     ///
     /// # Panics
     ///
@@ -154,7 +154,7 @@ impl Bed {
         self.shared.with(|core| core.wire.access_stats(host))
     }
 
-    /// Returns how many packets from one host to another were [hit](crate::hit) so far.
+    /// Returns how many packets from a host to another host were [hit](crate::hit) so far.
     ///
     /// # Panics
     ///

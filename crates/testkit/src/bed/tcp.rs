@@ -35,6 +35,6 @@ impl Testbed {
 #[expect(clippy::panic, reason = "a misuse, and the way out")]
 fn check_tcp(config: &TcpConfig) {
     if let Err(error) = config.check() {
-        panic!("these constants of TCP make no sense: {error}");
+        panic!("these constants of TCP are not valid: {error}");
     }
 }

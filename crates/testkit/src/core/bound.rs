@@ -4,7 +4,7 @@
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct SocketId(pub(super) usize);
 
-/// Bound sockets of a host, sorted by version of IP, then by port. Sockets of the same port keep the order in which they were bound.
+/// Bound sockets of a host, sorted by version of IP, then by port. Sockets of the same port keep the order of binding.
 ///
 /// A sorted array, because each arriving datagram looks up its port and most hosts have few sockets. Dynamic ports ascend, so most sockets are added at the
 /// end.
@@ -33,7 +33,7 @@ impl Port {
 }
 
 impl Bound {
-    /// Returns the sockets of `port`, in the order in which they were bound.
+    /// Returns the sockets of `port`, in the order of binding.
     #[inline]
     pub(super) fn at(&self, port: Port) -> impl Iterator<Item = SocketId> {
         let first = self.0.partition_point(|(bound, _)| *bound < port);

@@ -13,7 +13,7 @@ use cohaptic_wan::NodeId;
 use super::{Core, Shared};
 use crate::current;
 
-/// Acts that other threads have left for the thread of a run.
+/// Acts of other threads, left for the thread of a run.
 #[derive(Default)]
 pub(super) struct Elsewhere {
     /// `true` if `left` may hold something. Read without the lock between two polls of tasks.
@@ -72,7 +72,7 @@ impl Shared {
     ///
     /// # Errors
     ///
-    /// [`io::ErrorKind::ConnectionAborted`] after the end of the run; [`io::ErrorKind::Unsupported`] on a thread that does not run the test bed, and the run
+    /// [`io::ErrorKind::ConnectionAborted`] after the end of the run; [`io::ErrorKind::Unsupported`] outside of the thread of the run, and the run
     /// then fails as well.
     #[inline]
     pub(crate) fn check_open(&self, host: NodeId, kind: &str) -> io::Result<()> {
@@ -84,8 +84,7 @@ impl Shared {
         let name = &self.names()[host.index()];
         if self.has_ended() {
             let place = if current::run() != 0 { ", in the run of another test bed" } else { "" };
-            let text =
-                format!("{kind} of host `{name}` is used after the run of its test bed has ended{place}: take one of a host of the run that uses it");
+            let text = format!("{kind} of host `{name}` was used after the end of its run{place}: make a new one on a host of the present run");
             return Err(io::Error::new(io::ErrorKind::ConnectionAborted, text));
         }
         Err(io::Error::new(io::ErrorKind::Unsupported, self.note_misuse(&format!("{kind} of host `{name}`"))))
@@ -94,8 +93,8 @@ impl Shared {
     /// Notes that another thread uses the value `what`, so that the run fails. Returns the text of the fault.
     pub(super) fn note_misuse(&self, what: &str) -> String {
         let text = format!(
-            "{what} was used on another thread{}: the sockets of a test bed belong to the thread that runs it. Use them in its tasks, and let other threads hand over what \
-             they have through a channel",
+            "{what} was used on another thread{}: sockets of a test bed work only on the thread that runs the test bed. Use sockets in tasks of the run; \
+             other threads send their data to these tasks through a channel",
             std::thread::current().name().map_or_else(String::new, |name| format!(" (`{name}`)"))
         );
         self.note_fault(&text);

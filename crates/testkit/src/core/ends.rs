@@ -16,7 +16,7 @@ pub(crate) fn mapped(address: SocketAddr) -> SocketAddr {
     }
 }
 
-/// Returns the address of IPv4 that an address such as `::ffff:10.0.0.1` stands for; any other address as it is.
+/// Returns the address of IPv4 for an address such as `::ffff:10.0.0.1`, and all other addresses unchanged.
 #[inline]
 pub(crate) fn unmapped(address: SocketAddr) -> SocketAddr {
     if address.is_ipv4() { address } else { SocketAddr::new(address.ip().to_canonical(), address.port()) }

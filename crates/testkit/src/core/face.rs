@@ -87,13 +87,14 @@ impl Face {
         // A value that is dropped during the unwinding may call again. Without the reset that call would panic within a panic and abort the process.
         self.calls.store(0, Ordering::Relaxed);
         let who = match (current::task(), socket) {
-            (Some(task), Some(socket)) => format!(". It is {task}, which called {socket} last"),
-            (Some(task), None) => format!(". It is {task}"),
-            (None, Some(socket)) => format!(". It called {socket} last"),
+            (Some(task), Some(socket)) => format!(". The caller is {task}, which called {socket} last"),
+            (Some(task), None) => format!(". The caller is {task}"),
+            (None, Some(socket)) => format!(". The last call was of {socket}"),
             (None, None) => String::new(),
         };
         panic!(
-            "time stands still at {} s: a task asks for the time, sends or tries to receive again and again and never waits; `sleep(..).await` lets it pass{who}",
+            "time stands still at {} s: a task asks for the time, sends, or tries to receive again and again without waiting; let the task wait, for instance \
+             by `sleep(..).await`{who}",
             Seconds(self.now())
         );
     }

@@ -174,7 +174,7 @@ impl Core {
     /// Fails the run, which holds too many bytes. `socket` is the socket that sent last.
     #[cold]
     fn fail_for(&self, socket: SocketName) {
-        let task = current::task().map_or_else(String::new, |task| format!(", used by {task},"));
+        let task = current::task().map_or_else(String::new, |task| format!(", used by {task}"));
         self.wire.held.fail(format_args!("{}{task}", socket.words(&self.plan)));
     }
 

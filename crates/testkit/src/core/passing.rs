@@ -19,7 +19,7 @@ const LONGEST: [usize; 2] = [65_507, 65_527];
 /// Datagram that a socket sends.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Outgoing<'a> {
-    /// Address of the receiver. `None`: the peer to which the socket is connected.
+    /// Address of the receiver. `None` stands for the peer of a connected socket.
     pub(crate) to: Option<&'a SocketAddr>,
     pub(crate) bytes: &'a [u8],
     /// ECN codepoint of the datagram.
@@ -42,7 +42,7 @@ enum Receivers {
 pub(super) struct Route {
     /// Address of the sender, as [`Addresses::short`].
     from: u32,
-    /// Address on the packet, as [`Addresses::short`]. Differs from the address that the program gave if that is the unspecified one.
+    /// Address on the packet, as [`Addresses::short`]. Differs from the address of the program's call if the latter is unspecified.
     pub(super) to: u32,
     receivers: Receivers,
 }
@@ -80,6 +80,7 @@ impl Core {
             Receivers::All => {
                 // The receiver of the link of a loopback is the sender.
                 let paths = (0..self.hosts.len()).map(|other| Path { from: host, to: NodeId::new(other) });
+                // The paths are collected first, because an offer changes the state that the filter reads.
                 for path in paths.filter(|path| self.receiver(*path) != host).collect::<Vec<_>>() {
                     self.offer(path, parcel.clone());
                 }
@@ -121,7 +122,10 @@ impl Core {
     fn other_receivers(&self, host: NodeId, to: &SocketAddr, number: &mut u32) -> io::Result<Receivers> {
         let ip = to.ip();
         if ip.is_multicast() {
-            return Err(io::Error::new(io::ErrorKind::Unsupported, format!("{to} is a multicast address, and a test bed has no groups")));
+            return Err(io::Error::new(
+                io::ErrorKind::Unsupported,
+                format!("{to} is a multicast address, and a test bed has no multicast groups; send to each host, or broadcast"),
+            ));
         }
         if ip.is_unspecified() {
             *number = Addresses::LOOPBACK[usize::from(ip.is_ipv6())];
@@ -162,8 +166,11 @@ impl Core {
             return Errno::InvalidInput.fail();
         }
         if !bound.is_loopback() && !addresses.has(bound) {
-            let text =
-                format!("host `{}` does not have the address {bound} any more; it has {}", self.plan.names()[host.index()], addresses.like(bound));
+            let text = format!(
+                "host `{}` no longer has the address {bound}; it has {}. Bind a new socket",
+                self.plan.names()[host.index()],
+                addresses.like(bound)
+            );
             return Err(io::Error::new(io::ErrorKind::AddrNotAvailable, text));
         }
         Ok(())
@@ -184,13 +191,14 @@ impl Core {
     pub(super) fn take_arrivals(&mut self) {
         loop {
             while let Some(parcel) = self.wire.poll() {
-                // The parts are copied one by one. A processor that loads a value whole shortly after the value was stored in parts has to wait for the stores.
+                // The parts are copied one by one: a processor that loads a whole value shortly after storing the parts waits for the stores.
                 let Arrival { packet: PacketName { path: Path { from, to }, sequence, copy }, at, is_cut, .. } = parcel.arrival;
                 let path = Path { from, to: self.receiver(Path { from, to }) };
                 let end = if is_cut { Err(Lost::Cut) } else { self.arrive(path, parcel) };
                 self.wire.ends(PacketName { path: Path { from, to }, sequence, copy }, at, end);
             }
             #[cfg(feature = "tcp")]
+            // A packet of loopback may let packets leave over links without delay, so the links are polled again.
             if self.take_from_loopback() {
                 continue;
             }
@@ -250,6 +258,7 @@ impl Core {
             let socket = self.sockets.get(id);
             let fits = socket.at.is_none_or(|at| at == ends.to) && socket.peer.is_none_or(|peer| peer == ends.from());
             let rank = (socket.peer.is_some(), socket.at.is_some());
+            // `at` keeps the order of binding, so that `>=` prefers the socket bound last among equals.
             if fits && best.is_none_or(|(highest, _)| rank >= highest) {
                 best = Some((rank, id));
             }

@@ -13,7 +13,7 @@ pub(crate) struct SocketName {
     pub(crate) kind: &'static str,
     pub(crate) host: NodeId,
     pub(crate) local: SocketAddr,
-    /// Other end of a stream; `None` for sockets without one.
+    /// Peer of a stream; `None` for sockets without a peer.
     pub(crate) peer: Option<SocketAddr>,
 }
 

@@ -1,4 +1,4 @@
-//! State of one UDP socket: its address and peer, the datagrams in its buffer, and the tasks that wait for datagrams.
+//! State of a UDP socket: address and peer, the datagrams in the buffer, and the tasks that wait for datagrams.
 
 use std::io;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
@@ -42,7 +42,7 @@ pub(crate) struct SocketState {
     /// Address to which the socket is bound, as [`Addresses::short`]; `None` if the socket is bound to all addresses of its host.
     pub(super) at: Option<u32>,
     pub(super) port: Port,
-    /// Peer to which the socket is connected, as packets have its address: of IPv4 also if the socket is of IPv6.
+    /// Peer of a connected socket, with the address on packets: of IPv4 also if the socket is of IPv6.
     pub(super) peer: Option<SocketAddr>,
     /// Size of the receive buffer \[byte\].
     pub(super) room: usize,
@@ -52,7 +52,7 @@ pub(crate) struct SocketState {
     /// Memory that Linux would count for all datagrams in `inbox` \[bytes\].
     pub(super) memory: usize,
     pub(super) readers: Waiters,
-    /// `true` if IP has refused a datagram that was sent, and the program has not been told.
+    /// `true` if IP has refused a sent datagram, and the program has not been told.
     pub(super) refused: bool,
     pub(super) may_broadcast: bool,
     /// Instant at which the host crashed or its program was killed; `None` while the socket lives.

@@ -1,4 +1,4 @@
-//! UDP sockets: the ports to which they are bound, the datagrams in their buffers, and the tasks that wait for datagrams.
+//! UDP sockets: bound ports, datagrams in buffers, and the tasks that wait for datagrams.
 
 use std::io;
 use std::net::{IpAddr, Ipv6Addr, SocketAddr};
@@ -98,7 +98,7 @@ impl Core {
                 return Ok(port);
             }
         }
-        let text = format!("all {count} dynamic ports of host `{}` are taken", self.plan.names()[host.index()]);
+        let text = format!("all {count} dynamic ports of host `{}` are taken; drop sockets that are no longer used", self.plan.names()[host.index()]);
         Err(io::Error::new(io::ErrorKind::AddrInUse, text))
     }
 
@@ -128,7 +128,7 @@ impl Core {
         Err(io::Error::new(io::ErrorKind::ConnectionAborted, text))
     }
 
-    /// Returns the local address of the socket. If the socket is connected and bound to all addresses, this is the address from which it sends.
+    /// Returns the local address of the socket. A connected socket that is bound to all addresses has the address from which the socket sends.
     pub(crate) fn local_of(&self, id: SocketId) -> SocketAddr {
         let socket = self.sockets.get(id);
         let local = socket.local();
@@ -146,13 +146,14 @@ impl Core {
         socket.peer.map(|peer| socket.shown(peer))
     }
 
-    /// Connects the socket: from now on it receives datagrams of `peer` only. As with Linux, datagrams already in the buffer stay, and a peer to which no
+    /// Connects the socket, which from now on receives datagrams of `peer` only. As with Linux, datagrams already in the buffer stay, and a peer to which no
     /// datagram could be sent is refused.
     pub(crate) fn connect(&mut self, id: SocketId, peer: SocketAddr) -> io::Result<()> {
         self.check_alive(id)?;
         let socket = self.sockets.get(id);
         let to = socket.wire_form(peer)?;
         let route = self.route(socket, &to)?;
+        // As with Linux, the unspecified address stands for loopback. Datagrams of the peer come from there.
         let ip = if to.ip().is_unspecified() { Addresses::long(route.to, to.is_ipv6()) } else { to.ip() };
         self.sockets.get_mut(id).peer = Some(SocketAddr::new(ip, to.port()));
         Ok(())
@@ -174,7 +175,7 @@ impl Core {
         lines.collect()
     }
 
-    /// Returns descriptions of the things that the task with the waker `waker` waits for. Empty if sockets and timers do not know the task.
+    /// Returns descriptions of the sockets and timers for which the task with the waker `waker` waits. Empty if no socket or timer knows the task.
     pub(crate) fn awaited_by(&self, waker: &Waker) -> Vec<String> {
         let sockets = self.sockets.places.iter().flatten().filter(|socket| socket.readers.has(waker));
         let mut awaited: Vec<String> = sockets.map(|socket| format!("a datagram at UDP {}", socket.local())).collect();

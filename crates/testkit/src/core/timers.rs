@@ -1,4 +1,4 @@
-//! Timers, sorted by deadline. Timers of equal deadlines go off in the order in which they were set.
+//! Timers, sorted by deadline. Timers of equal deadlines go off in the order of setting.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::task::Waker;
@@ -21,7 +21,7 @@ pub(crate) struct Timers {
     ordered: VecDeque<(TimerId, Option<Waker>)>,
     /// Number of cancelled timers in `ordered`.
     cancelled: usize,
-    /// Timers whose deadline was too early for the queue when they were set.
+    /// Timers with a deadline too early for the queue.
     others: BTreeMap<TimerId, Waker>,
     /// Number of timers set so far.
     set: u64,
@@ -138,7 +138,7 @@ mod tests {
 
     use super::*;
 
-    /// Waker that notes the number of its timer when it is woken.
+    /// Waker that notes the number of the timer when woken.
     struct Note(u64, Arc<Mutex<Vec<u64>>>);
 
     impl Wake for Note {
@@ -192,7 +192,7 @@ mod tests {
     fn timers_that_were_cancelled_take_no_memory_for_long() {
         let mut timers = Timers::default();
         let set = |timers: &mut Timers, nanos| timers.set(Instant::from_nanos(nanos), Waker::noop().clone());
-        // The timers lie between two timers that stay, so that none of the cancelled ones is at an end of the queue.
+        // The timers lie between two timers that stay, so that no cancelled timer is at an end of the queue.
         let _stay = [0, 20_000].map(|nanos| set(&mut timers, nanos));
         for nanos in 1..10_000 {
             let id = set(&mut timers, nanos);

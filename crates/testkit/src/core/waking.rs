@@ -2,7 +2,7 @@
 
 use std::task::{RawWakerVTable, Waker};
 
-/// Identity of a waker: the addresses of its data and of its table. No other waker has the same identity while this waker is kept.
+/// Identity of a waker: the addresses of data and table. No other waker has the same identity while this waker is kept.
 pub(crate) type Registered = [usize; 2];
 
 pub(crate) fn registered(waker: &Waker) -> Registered {
@@ -12,11 +12,11 @@ pub(crate) fn registered(waker: &Waker) -> Registered {
 /// Wakers of the tasks that wait for the same thing, such as a datagram at a socket.
 #[derive(Debug, Default)]
 pub(super) struct Waiters {
-    /// `true` if the task of `first` waits. `first` is kept after it was woken: most often the same task waits again, and its waker need not be cloned.
+    /// `true` if the task of `first` waits. `first` is kept after the waking: most often the same task waits again, and the waker need not be cloned.
     first_waits: bool,
-    /// Waker of the first waiting task. If `first_waits` is false, a waker that was woken before, or `None`.
+    /// Waker of the first waiting task. If `first_waits` is false, a waker woken before, or `None`.
     first: Option<Waker>,
-    /// Further waiting tasks, in the order in which they came. Empty while `first_waits` is false.
+    /// Further waiting tasks, in the order of arrival. Empty while `first_waits` is false.
     others: Vec<Waker>,
 }
 
@@ -36,7 +36,7 @@ impl Waiters {
         if self.others.iter().any(|waiting| waiting.will_wake(waker)) {
             return;
         }
-        // The tasks are woken in the order in which they came. `others` may be filled only while the first task waits.
+        // The tasks are woken in the order of arrival. `others` may be filled only while the first task waits.
         if self.first_waits {
             self.others.push(waker.clone());
         } else {
@@ -90,7 +90,7 @@ pub(crate) struct Woken {
 }
 
 impl Woken {
-    /// Declares that wakers with the table of `waker` only note a task, so that they may be called during a borrow of the state.
+    /// Declares that wakers with the table of `waker` only note a task and may be called during a borrow of the state.
     pub(crate) fn trust(&mut self, waker: &Waker) {
         self.own = Some(waker.vtable());
     }

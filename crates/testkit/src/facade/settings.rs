@@ -43,7 +43,7 @@ impl Configured for TcpStream {
             Setting::Linger(time) => self.set_linger(time),
             Setting::UserTimeout(timeout) => self.set_user_timeout(timeout),
             Setting::Ttl(ttl) => self.set_ttl(ttl),
-            // The buffers of a connection have their sizes from its beginning. The other options say how a socket is bound, or have no effect.
+            // The sizes of buffers are fixed when a connection begins. The other options say how a socket is bound, or have no effect.
             Setting::ReceiveBuffer(_)
             | Setting::SendBuffer(_)
             | Setting::TypeOfService(_)

@@ -96,7 +96,7 @@ impl ByteStream for Stream {
         self.poll(cx, Core::wait_to_write_unix, |core, id| core.write_unix(id, buffers))
     }
 
-    /// Each attempt counts, so that a task that tries again and again at one instant is noticed.
+    /// Each attempt counts, so that a task is noticed that tries again and again at an instant.
     fn try_read(&self, buffers: &mut [IoSliceMut<'_>]) -> io::Result<usize> {
         self.shared.note_call();
         self.ask(|core| core.read_unix(self.id, buffers))
@@ -191,7 +191,7 @@ impl UnixListener for Listener {
 }
 
 impl Datagrams {
-    /// Counts a call that does not wait, so that a task that tries again and again at one instant is noticed.
+    /// Counts a call that does not wait, so that a task is noticed that tries again and again at an instant.
     fn note_attempt(&self, waker: Option<&Waker>) {
         if waker.is_none() {
             self.shared.note_call();

@@ -17,9 +17,9 @@ const NO_RUNTIME: (&str, &str) = (
 /// Part of tokio's message that its runtime has no driver of input and output, and the message of the test kit.
 const NO_SOCKETS: (&str, &str) = (
     "IO is disabled",
-    "a socket, a pipe, a process, a signal or an `AsyncFd` of the real tokio is made in a test bed, in whose time nothing of the system takes part: take the \
-     sockets of `cohaptic_testkit::net`, or run the test with the package that `cohaptic tokio` writes, whose sockets, pipes and signals are those of the test bed. \
-     An `AsyncFd` waits for a descriptor of the system: replace it by a socket or a channel",
+    "the program makes a socket, a pipe, a process, a signal or an `AsyncFd` of the real tokio, and the real system takes no part in the virtual time of a \
+     test bed. Use the sockets of `cohaptic_testkit::net`, or run the test with the package that `cohaptic tokio` writes: its sockets, pipes and signals \
+     belong to the test bed. Replace an `AsyncFd`, which waits for a descriptor of the system, by a socket or a channel",
 );
 
 /// Returns the message of the test kit for a panic with this payload, or `None` if the message of the panic is good.

@@ -8,7 +8,7 @@ pub(crate) use hook::{install, told};
 #[cfg(feature = "strategies")]
 pub(crate) use searching::Searching;
 
-/// Lines about a run. They are made only when printed, because making them may write a trace.
+/// Lines about a run, made only when printed, because the making may write a trace.
 pub(crate) type Lines = Box<dyn FnOnce() -> Vec<String>>;
 
 /// Returns whether this thread tries values of a strategy.

@@ -101,7 +101,8 @@ impl fmt::Display for LinkFileError {
             Self::Words { path, error } => write!(f, "{}:{error}", path.display()),
             Self::NoDocuments { path } => write!(
                 f,
-                "{}: a relay file is read with the feature `files` of cohaptic-testkit only, a scene file with `scenes`; expected it, or a file of plain words",
+                "{}: a relay file needs the feature `files` of cohaptic-testkit, a scene file the feature `scenes`; expected that feature, or a file of plain \
+                 words",
                 path.display()
             ),
             #[cfg(feature = "files")]
@@ -154,7 +155,7 @@ impl LinkFile {
     ///
     /// [`WordsError`] if the text makes no sense. The error names the place.
     pub fn parse(text: &str) -> Result<Self, WordsError> {
-        Self::parse_with(text, |_| Err("a text names no files: expected words of tc-netem".to_owned()))
+        Self::parse_with(text, |_| Err("a text without a file of its own cannot name files: expected words of tc-netem".to_owned()))
     }
 
     /// Returns the names of the hosts.
@@ -163,7 +164,7 @@ impl LinkFile {
         &self.hosts
     }
 
-    /// Returns the link from one host to another at the beginning of the run. The hosts are given by their indices in [`LinkFile::hosts`].
+    /// Returns the link from a host to another host at the beginning of the run. The hosts are given by their indices in [`LinkFile::hosts`].
     #[must_use]
     pub fn between(&self, from: usize, to: usize) -> &LinkModel {
         self.links.get(&(from, to)).unwrap_or(&self.every)

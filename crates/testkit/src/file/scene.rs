@@ -29,7 +29,7 @@ fn may_copy(line: &LinkModel) -> bool {
 impl LinkFile {
     pub(super) fn of_scene(scene: Scene, path: &Path) -> Result<Self, LinkFileError> {
         let refused = |what: String| Err(LinkFileError::NotLinks { path: path.to_path_buf(), what });
-        // Copies are numbered as by a path with one line that copies, the link.
+        // The numbers of copies assume that a single line of a path copies: the link.
         let copied = |line: &Option<Arc<LinkModel>>| line.as_deref().is_some_and(may_copy);
         if let Some(peer) = scene.peers.iter().find(|peer| copied(&peer.uplink) || copied(&peer.downlink)) {
             return refused(format!(
@@ -38,7 +38,9 @@ impl LinkFile {
             ));
         }
         if scene.topology.is_some() {
-            return refused("a [topology], and a test bed has links from each host to each other; expected kind = \"full\"".to_owned());
+            return refused(
+                "the scene has a [topology], and a test bed has links from each host to every other host; expected kind = \"full\"".to_owned(),
+            );
         }
         let mut changes = Vec::new();
         for change in scene.timeline {

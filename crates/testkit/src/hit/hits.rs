@@ -115,7 +115,7 @@ mod tests {
             ("a -> b: drop packet 1\na -> b drop packet 1", "2:1: no colon"),
             ("a: drop packet 1", "1:1: expected `a -> b` before the colon"),
             ("a -> a: drop packet 1", "1:1: a host has no link to itself"),
-            ("a -> [b]: drop packet 1", "1:6: `[b]` is not a name of a host"),
+            ("a -> [b]: drop packet 1", "1:6: `[b]` cannot be the name of a host"),
             ("a -> b: drop packet x", "1:21: expected numbers of packets"),
             ("a -> b:", "1:8: expected drop, delay"),
         ] {

@@ -9,7 +9,7 @@ use cohaptic_wan::random::Draws;
 
 use super::{Hit, PacketLaw, SentPacket, Verdict, WordsLaw};
 
-/// Laws of a test bed, in the order in which they were given.
+/// Laws of a test bed, in the given order.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Laws(Vec<Given>);
 

@@ -27,17 +27,17 @@
 //!
 //! # What happens to a packet that is hit
 //!
-//! The law decides when the packet is sent. A packet to be dropped goes no further than to its link: its fate is
-//! [`DropCause::Filter`](cohaptic_wan::DropCause::Filter). It passes the uplink of its host before, if the host has one (`Testbed::access`), because other
-//! packets wait behind it there.
-//! Every other packet passes the link first, which may lose the packet, and is delayed, copied, damaged or held at the far end. So the link draws the same
-//! random numbers for every other packet, whatever is hit. A further hit changes nothing else, and therefore sets of hits can shrink (`strategies::any_hits`,
-//! feature `strategies`). Copies that a link makes of a packet are not hit. If a path has several laws, all laws are asked, and the first verdict other than
+//! The law decides when the packet is sent. A packet to be dropped goes no further than to its link, with the fate
+//! [`DropCause::Filter`](cohaptic_wan::DropCause::Filter). Before, the packet passes the uplink of its host (`Testbed::access`), because other
+//! packets wait behind the packet there. Every other packet passes the link first, which may lose the packet, and is delayed, copied, damaged or held at the
+//! far end. So the link draws the same random numbers for every other packet, whatever is hit. A further hit changes nothing else, and therefore sets of hits
+//! can shrink (`strategies::any_hits`, feature `strategies`). Copies that a link makes of a packet are not hit. If a path has several laws, all laws are asked,
+//! and the first verdict other than
 //! [`Verdict::Pass`] counts.
 //!
 //! The fates of a [`Record`](crate::Record) contain the effects of hits, so that its `links.txt` repeats the run without the laws; only damaged bits are not
-//! replayed. The trace contains each hit ([`Happening::Hit`](crate::Happening::Hit)), [`Bed::hits`](crate::Bed::hits) returns their number, and a failing test
-//! names the laws that have hit nothing.
+//! replayed. The trace contains each hit ([`Happening::Hit`](crate::Happening::Hit)), [`Bed::hits`](crate::Bed::hits) returns the number of hits, and a failing
+//! test names the laws that have hit nothing.
 //!
 //! # Words
 //!
@@ -50,14 +50,14 @@
 //! | action | does |
 //! | --- | --- |
 //! | `drop` | loses the packet |
-//! | `delay` *time* | lets it arrive later by this time |
-//! | `duplicate` \[*time*\] | lets it arrive twice, the second time later by this time; at once if it is not said |
-//! | `corrupt` | flips one bit, drawn from the seed. A UDP socket gets the damaged datagram: its checksum is not emulated here |
-//! | `behind` *k* | lets it arrive a nanosecond behind the *k*-th of the packets that arrive after it; never if they do not come |
+//! | `delay` *time* | lets the packet arrive later by this time |
+//! | `duplicate` \[*time*\] | lets the packet arrive twice, the second time later by this time; without a time, at once |
+//! | `corrupt` | flips one bit, drawn from the seed. A UDP socket gets the damaged datagram: the checksum of UDP is not emulated here |
+//! | `behind` *k* | lets the packet arrive a nanosecond after the *k*-th later arrival on the path; never without *k* later arrivals |
 //!
 //! | which | is |
 //! | --- | --- |
-//! | `packet` *n*, `packets` *n* *n*-*n* … | those of these numbers on their path, from 0, as traces and fate logs count them |
+//! | `packet` *n*, `packets` *n* *n*-*n* … | packets by number on the path, counted from 0 as in traces and fate logs |
 //! | `first` *kind*, `2nd` *kind*, … | the n-th of a kind |
 //! | `every` *kind* | all of a kind |
 //!

@@ -17,14 +17,14 @@ pub fn address(place: usize, port: u16) -> SocketAddr {
 
 /// Returns the addresses of the node with the index `place`.
 pub(super) fn addresses(place: usize) -> Addresses {
-    let number = u32::try_from(place).ok().filter(|place| *place < LAST).expect("there are at most 16,777,214 nodes");
+    let number = u32::try_from(place).ok().filter(|place| *place < LAST).expect("a run has at most 16,777,214 nodes");
     Addresses::numbered(number + 1)
 }
 
 /// Number of addresses of hosts in 10.0.0.0/8.
 const LAST: u32 = (1 << 24) - 2;
 
-/// Returns the index of the node that has the address, or `None` if the address is none of a node. Whether a node of that index exists is not checked.
+/// Returns the index of the node with the address, or `None` if no node can have the address. Whether a node of this index exists is not checked.
 #[must_use]
 pub fn place_of(address: IpAddr) -> Option<usize> {
     let number = match address {

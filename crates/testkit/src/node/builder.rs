@@ -52,7 +52,7 @@ impl Nodes {
         self
     }
 
-    /// Sets the link from one node to another. Both nodes must have been added. The link back is separate.
+    /// Sets the link from a node to another node. Both nodes must have been added. The link back is separate.
     ///
     /// # Panics
     ///
@@ -156,7 +156,7 @@ impl Nodes {
     }
 
     fn start_at(self, place: &Place) -> NodeRun {
-        assert!(!self.setup.names.is_empty(), "a run without nodes; `add` one before `start`");
+        assert!(!self.setup.names.is_empty(), "a run without nodes: `add` at least one before `start`");
         let seed = Seed::choose(self.setup.seed, place);
         NodeRun::new(self.setup, self.nodes, seed)
     }
@@ -178,7 +178,7 @@ impl Nodes {
         let ((outcome, first), (_, second)) = (run(), run());
         if let Some(difference) = first.trace().first_difference(second.trace()) {
             panic!(
-                "the nodes do not do the same twice: {difference}Look for hash maps, threads, the time of day and random numbers without a seed.\n{}",
+                "two runs of the nodes are not the same: {difference}Look for hash maps, threads, the time of day and random numbers without a seed.\n{}",
                 first.seed().advice()
             );
         }

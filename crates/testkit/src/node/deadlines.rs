@@ -32,6 +32,7 @@ impl Deadlines {
             let least = self.least[place].min(self.least[place ^ 1]);
             // The other child of the same parent differs in the lowest bit of its index.
             place /= 2;
+            // An unchanged entry leaves all entries above unchanged.
             if self.least[place] == least {
                 return;
             }
@@ -64,6 +65,7 @@ impl Deadlines {
         // Goes down to the leftmost node that is due.
         while place < self.first {
             place *= 2;
+            // One of both children is due, so that a left child that is not due leaves the right child.
             if self.least[place] > now {
                 place += 1;
             }

@@ -9,7 +9,7 @@ use crate::link::ToLink;
 use crate::trace::Happening;
 
 impl NodeRun {
-    /// Cuts the path from one node to another: packets that are sent or would arrive from now on are lost. The path back is not changed.
+    /// Cuts the path from a node to another node: packets that are sent or would arrive from now on are lost. The path back is not changed.
     ///
     /// # Panics
     ///
@@ -18,7 +18,7 @@ impl NodeRun {
         self.set_cut(from, to, true);
     }
 
-    /// Ends the cut of the path from one node to another.
+    /// Ends the cut of the path from a node to another node.
     ///
     /// # Panics
     ///
@@ -45,7 +45,7 @@ impl NodeRun {
         self.wire.mend_all();
     }
 
-    /// Replaces the link from one node to another. Packets inside the link follow the rules of [`cohaptic_wan::Link::set_model`].
+    /// Replaces the link from a node to another node. Packets inside the link follow the rules of [`cohaptic_wan::Link::set_model`].
     ///
     /// # Panics
     ///
@@ -59,11 +59,11 @@ impl NodeRun {
         self.hand_over();
     }
 
-    /// Crashes the node at once, and returns it. Packets that the node has sent stay under way; packets that arrive for it are lost.
+    /// Crashes the node at once, and returns the node. Packets from the node stay under way; packets that arrive for the node are lost.
     ///
     /// # Panics
     ///
-    /// If there is no node of that name, the node is down already, or it is of another type.
+    /// If no node has the name, the node is down already, or it is of another type.
     pub fn crash<T: Node>(&mut self, name: &str) -> T {
         // The type is checked first, so that a node of another type stays in the run.
         let _: &T = self.node(name);
@@ -83,10 +83,10 @@ impl NodeRun {
     ///
     /// # Panics
     ///
-    /// If there is no node of that name, or it is up.
+    /// If no node has the name, or it is up.
     pub fn restart(&mut self, name: &str, node: impl Node) {
         let id = self.id(name);
-        assert!(!self.up[id.index()], "node `{name}` is up; `crash` it before another one takes its place");
+        assert!(!self.up[id.index()], "node `{name}` is up: `crash` the node before `restart` puts another in its place");
         self.ask_touched();
         self.up[id.index()] = true;
         self.nodes[id.index()] = Some(Box::new(node));
@@ -99,7 +99,7 @@ impl NodeRun {
     ///
     /// # Panics
     ///
-    /// If there is no node of that name.
+    /// If no node has the name.
     #[must_use]
     pub fn is_up(&self, name: &str) -> bool {
         self.up[self.id(name).index()]

@@ -4,8 +4,8 @@ use super::Nodes;
 use crate::hit::{Hits, PacketLaw, SentPacket, Verdict};
 
 impl Nodes {
-    /// Asks a function for the fate of every packet offered to the link from one node to another: see [`hit`](crate::hit). Every run begins with a clone of the
-    /// function.
+    /// Asks a function for the fate of every packet offered to the link from a node to another node: see [`hit`](crate::hit). Every run begins with a clone of
+    /// the function.
     ///
     /// # Panics
     ///
@@ -16,7 +16,7 @@ impl Nodes {
         self
     }
 
-    /// Asks a law for the fate of every packet offered to the link from one node to another: see [`PacketLaw`].
+    /// Asks a law for the fate of every packet offered to the link from a node to another node: see [`PacketLaw`].
     ///
     /// # Panics
     ///
@@ -27,7 +27,7 @@ impl Nodes {
         self
     }
 
-    /// Hits packets from one node to another, as [words](crate::hit) say.
+    /// Hits packets from a node to another node, as [words](crate::hit) say.
     ///
     /// # Panics
     ///

@@ -75,7 +75,7 @@ pub trait Node: Any {
         None
     }
 
-    /// Returns the next packet that the node wants to send now, or `None` if there is none.
+    /// Returns the next packet to send now, or `None` if the node has nothing to send.
     fn poll_transmit(&mut self, now: Instant) -> Option<Transmit>;
 }
 
@@ -112,7 +112,7 @@ impl Packet {
 pub struct Transmit {
     /// Receiver: see [`address()`]. A packet to an address that no node has is [counted](NodeCounts::unroutable), and lost.
     pub to: SocketAddr,
-    /// Port from which the packet is sent. The receiver sees the port; otherwise it has no effect.
+    /// Port from which the packet is sent. The receiver sees the port, which has no other effect.
     pub from_port: u16,
     /// Content of the packet.
     pub bytes: Bytes,

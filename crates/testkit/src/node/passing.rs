@@ -25,6 +25,8 @@ impl NodeRun {
         }
         let mut from = 0;
         while let Some(due) = self.deadlines.due(from, self.now()) {
+            // The search goes on after the woken node: a node that wants to be woken again at this instant waits for the next step, and cannot keep others from
+            // theirs.
             from = due + 1;
             let (id, now) = (NodeId::new(due), self.now());
             self.count(Does::Wakes, id);
@@ -40,6 +42,7 @@ impl NodeRun {
 
     /// Asks a node for packets and its deadline. `because` is the cause of the question, for the message of a run that does not end.
     pub(super) fn ask(&mut self, id: NodeId, because: Does) {
+        // The node leaves its place while its methods run, so that `send` can borrow the run.
         let Some(mut node) = self.nodes[id.index()].take() else { return self.deadlines.set(id.index(), None) };
         let mut sent = 0;
         // The pulse numbers the nodes in their order, from 1.
@@ -51,7 +54,7 @@ impl NodeRun {
             self.count(if sent > self.patience / 2 { Does::Sends } else { because }, id);
             self.send(id, transmit);
         }
-        // A deadline that has passed counts as now, so that late nodes are woken in their order, however late they are.
+        // A past deadline counts as now, so that late nodes are woken in the order of nodes, however late each node is.
         let deadline = node.poll_timeout().map(|deadline| deadline.max(self.now()));
         self.deadlines.set(id.index(), deadline);
         self.nodes[id.index()] = Some(node);
@@ -77,7 +80,9 @@ impl NodeRun {
             self.arrive(path, parcel, false);
         } else {
             match self.wire.offer(path, Box::new(parcel)) {
+                // A link without delay delivers within the offer.
                 Ok(_) => self.take_arrivals(),
+                // Only a path that is cut refuses a packet.
                 Err(_) => self.counts[from.index()].cut += 1,
             }
         }
@@ -143,8 +148,8 @@ impl NodeRun {
     fn give_up(&self, does: Does, node: NodeId) -> ! {
         let what = match does {
             Does::Sends => "sends without end: `poll_transmit` must give `None` when there is nothing more to send now",
-            Does::Receives => "answers without end over links without delay: give them one, or let the nodes stop",
-            Does::Wakes => "wants to be woken again and again: after `handle_timeout`, `poll_timeout` must name a later instant, or none",
+            Does::Receives => "answers without end over links without delay: give the links a delay, or let the nodes stop",
+            Does::Wakes => "wants to be woken again and again: after `handle_timeout`, `poll_timeout` must give a later instant, or `None`",
         };
         panic!(
             "time stands still at {} s after {} packets and timers: node `{}` {what}",

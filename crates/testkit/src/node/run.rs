@@ -28,10 +28,11 @@ use crate::wire::{HasFlow, Wire};
 ///
 /// Between the steps of time the test looks at the nodes, changes the nodes, and breaks the links between them. At one instant packets arrive first, in the
 /// order of the [network](cohaptic_wan::Network). Then the timers that are due go off, in the order of the nodes. Then packets arrive that are sent at this
-/// instant over links without delay. If the test fails while the run exists, the seed is printed, and the record is written where [`Nodes::artefacts`](super::Nodes::artefacts) says.
+/// instant over links without delay. If the test fails while the run exists, the seed is printed, and the record is written where
+/// [`Nodes::artefacts`](super::Nodes::artefacts) says.
 pub struct NodeRun {
     pub(super) names: Arc<Names>,
-    /// Nodes by index. `None` while a node is down, or while one of its own methods runs.
+    /// Nodes by index. `None` while a node is down, or while a method of the node runs.
     pub(super) nodes: Vec<Option<Box<dyn Node>>>,
     pub(super) up: Vec<bool>,
     pub(super) wire: Wire<Ports>,
@@ -132,7 +133,7 @@ impl NodeRun {
     ///
     /// # Panics
     ///
-    /// If there is no node of that name, the node is down, or it is of another type.
+    /// If no node has the name, the node is down, or the node is of another type.
     #[must_use]
     pub fn node<T: Node>(&self, name: &str) -> &T {
         let id = self.id(name);
@@ -157,13 +158,13 @@ impl NodeRun {
     ///
     /// # Panics
     ///
-    /// If there is no node of that name.
+    /// If no node has the name.
     #[must_use]
     pub fn counts(&self, name: &str) -> NodeCounts {
         self.counts[self.id(name).index()]
     }
 
-    /// Returns the statistics of the link from one node to another so far.
+    /// Returns the statistics of the link from a node to another node so far.
     ///
     /// # Panics
     ///
@@ -178,7 +179,7 @@ impl NodeRun {
     ///
     /// # Panics
     ///
-    /// If there is no node of that name.
+    /// If no node has the name.
     #[must_use]
     pub fn access_stats(&self, name: &str) -> Option<AccessStats> {
         self.wire.access_stats(self.id(name))
@@ -214,7 +215,7 @@ impl NodeRun {
     ///
     /// As [`NodeRun::step`]; if `until` has passed.
     pub fn run_until(&mut self, until: Instant) {
-        assert!(until >= self.now(), "{} s has passed: it is {} s", Seconds(until), Seconds(self.now()));
+        assert!(until >= self.now(), "cannot run until {} s: the run is already at {} s", Seconds(until), Seconds(self.now()));
         self.ask_touched();
         while let Some(next) = self.next().filter(|next| *next <= until) {
             self.pass(next);
@@ -232,7 +233,7 @@ impl NodeRun {
         while self.step() {
             if self.is_late() {
                 panic!(
-                    "at {} s something happens still; nodes that always wake again run with `run_until` or `run_while`.{}",
+                    "the nodes are not idle at {} s, beyond the time limit; run nodes that always wake again with `run_until` or `run_while`.{}",
                     Seconds(self.now()),
                     self.network()
                 );
@@ -252,13 +253,17 @@ impl NodeRun {
         while is_so(self) {
             if !self.step() {
                 panic!(
-                    "nothing will ever happen after {} s, and what was to end has not ended: no packet is on its way, and no node wants to be woken. A lost \
-                     packet needs a timer",
+                    "nothing will ever happen after {} s, and the condition of `run_while` still holds: no packet is under way, and no node wants to be \
+                     woken. A node needs a timer for each packet that may be lost",
                     Seconds(self.now())
                 );
             }
             if self.is_late() {
-                panic!("at {} s what was to end has not ended; `Nodes::time_limit` lets it go on for longer.{}", Seconds(self.now()), self.network());
+                panic!(
+                    "the condition of `run_while` still holds at {} s, beyond the time limit; `Nodes::time_limit` sets another limit.{}",
+                    Seconds(self.now()),
+                    self.network()
+                );
             }
         }
         self.now()
@@ -271,7 +276,7 @@ impl NodeRun {
     /// If the run is not [recorded](super::Nodes::recorded).
     #[must_use]
     pub fn record(&self) -> Record {
-        assert!(self.wire.recording().traces, "nothing was recorded; `Nodes::recorded` asks for it");
+        assert!(self.wire.recording().traces, "the run was not recorded; call `Nodes::recorded` before `start`");
         Record::new(self.again.seed.clone(), self.wire.recorded())
     }
 
@@ -311,7 +316,7 @@ impl NodeRun {
 
 #[expect(clippy::panic, reason = "a misuse, and the way out")]
 fn is_down<T>(name: &str) -> T {
-    panic!("node `{name}` is down; `NodeRun::restart` brings one back in its place")
+    panic!("node `{name}` is down; `NodeRun::restart` puts a node in its place")
 }
 
 #[expect(clippy::panic, reason = "a misuse, and the way out")]
@@ -330,7 +335,7 @@ impl Drop for NodeRun {
             let text = if network.is_empty() {
                 String::new()
             } else {
-                format!("nodes with this network meet the same again:\n    {}\n", network.join("\n    "))
+                format!("the nodes meet the same fates again with this network:\n    {}\n", network.join("\n    "))
             };
             let (artefacts, record) = (self.artefacts.clone(), Record::new(self.again.seed.clone(), recorded));
             failure::report(Box::new(move || artefacts.report(None, text, record)));

@@ -48,7 +48,7 @@ impl Runtime for OnHost {
     }
 
     fn wrap_udp_socket(&self, _socket: std::net::UdpSocket) -> io::Result<Arc<dyn AsyncUdpSocket>> {
-        let text = "a socket of the system has no place in a test bed; `cohaptic_testkit::quinn::endpoint` makes endpoints on hosts";
+        let text = "a test bed cannot use a socket of the system; `cohaptic_testkit::quinn::endpoint` makes endpoints on hosts";
         Err(io::Error::new(io::ErrorKind::Unsupported, text))
     }
 

@@ -22,8 +22,7 @@ fn write_lines<T: std::fmt::Display>(text: &mut String, what: &str, lines: impl 
     }
 }
 
-/// Returns a line for each waiting task, with the things that the task waits for and the instant since which it waits. A line for each socket that a task waits
-/// for follows.
+/// Returns a line for each waiting task, with the beginning of the wait and the awaited sockets and timers. A line for each awaited socket follows.
 fn who_waits(core: &Core, tasks: &Tasks) -> String {
     let mut text = String::new();
     write_lines(&mut text, "", tasks.waiting().iter().map(|task| task.waits(core)));
@@ -40,7 +39,8 @@ fn who_waits(core: &Core, tasks: &Tasks) -> String {
 pub(super) fn nothing_will_happen(shared: &Shared, tasks: &Tasks) -> ! {
     let (now, text) = shared.with(|core| (core.now(), who_waits(core, tasks)));
     panic!(
-        "nothing will ever happen after {} s: no packet is on its way, no timer is set, and these wait for what never comes. A lost packet needs a `timeout`:{text}",
+        "nothing will ever happen after {} s: no packet is under way, no timer is set, and tasks still wait. Put a `timeout` around each wait for a packet \
+         that may be lost. Who waits:{text}",
         Seconds(now)
     );
 }
@@ -63,7 +63,7 @@ pub(super) fn goes_on(shared: &Shared, tasks: &Tasks, limit: Reached) -> ! {
         Reached::Steps(steps) => (format!("its step limit of {steps} polls of tasks"), "step_limit"),
     };
     panic!(
-        "the run goes on beyond {limit}: it is {} s. A program that tries again needs a last attempt, or a `timeout` around all of them; \
+        "the run goes on beyond {limit}, at {} s. A program that tries again needs a last attempt, or a `timeout` around all attempts; \
          `Testbed::{method}` sets another limit. {text}",
         Seconds(now)
     );

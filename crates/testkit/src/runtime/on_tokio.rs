@@ -261,8 +261,8 @@ where
 {
     if tokio::runtime::Handle::try_current().is_ok() {
         panic!(
-            "a test bed on tokio brings its own runtime, and this one runs inside another: use a plain `#[test]` in place of `#[tokio::test]`, and `Testbed::run` \
-             outside of `block_on`"
+            "a test bed on tokio starts a runtime, which cannot run inside another runtime: use a plain `#[test]` in place of `#[tokio::test]`, and call \
+             `Testbed::run` outside of `block_on`"
         );
     }
     let hook = Arc::default();
@@ -288,7 +288,7 @@ where
             Poll::Pending
         }));
         drive(&begun, Some(main), beside.as_mut()).await;
-        outcome.take().unwrap_or_else(|| panic!("the program was stopped before it was over: do not abort it, or the runtime"))
+        outcome.take().unwrap_or_else(|| panic!("the program was stopped before its end: do not abort the program or the runtime"))
     })
 }
 
@@ -320,7 +320,7 @@ pub(crate) fn run_beside<F: Future>(
     // Whatever the runtime polls lives on the host, wherever it was started.
     crate::current::on_host(Some(host), || block_on(pin!(run)));
     hook.set(None);
-    outcome.unwrap_or_else(|| panic!("the runtime was stopped before the program was over"))
+    outcome.unwrap_or_else(|| panic!("the runtime was stopped before the end of the program"))
 }
 
 /// Polls tasks until `main` or `beside` is over. `beside` is polled whenever it was woken. Unlike [`run`], this function is not generic, so that it is compiled
@@ -420,8 +420,8 @@ async fn pump(shared: &Shared, tasks: &Tasks, idle: &Idle, origin: tokio::time::
             if next.is_none() {
                 nothing_will_happen(shared, tasks);
             }
-            // The clock has reached the millisecond of the next event, or an earlier one; the hook moves it on. The timer is set far away, so that it does not
-            // go off again.
+            // The clock has reached the millisecond of the next event, or an earlier millisecond; the hook moves the clock on. The timer is set far away, so
+            // that it does not go off again.
             due = NEVER;
             timer.as_mut().reset(origin + NEVER);
             let _ = timer.as_mut().poll(cx);

@@ -1,7 +1,7 @@
 //! Executor of this crate: one thread, and a clock that jumps to the next event, to the nanosecond.
 //!
-//! The executor polls all tasks that can go on, in the order in which the tasks were woken, until no task can. Then time jumps to the next arrival or timer. At
-//! one instant packets arrive first, then timers go off, in the order in which they were set.
+//! The executor polls all runnable tasks, in the order of waking, until no task is runnable. Then time jumps to the next arrival or timer. At
+//! one instant packets arrive first, then timers go off, in the order of setting.
 
 use std::cell::{Cell, RefCell};
 use std::ops::Deref;
@@ -30,7 +30,7 @@ thread_local! {
 struct Here {
     /// Number of the executor; 0 if none has run here.
     executor: Cell<u64>,
-    /// Indices of the tasks that can go on, in the order in which they were woken.
+    /// Indices of the runnable tasks, in the order of waking.
     ready: RefCell<Vec<usize>>,
     /// Wakes the executor if it is itself a task of another executor.
     main: RefCell<Option<Waker>>,
@@ -151,7 +151,7 @@ pub(crate) struct Inner {
     batch: Cell<Batch>,
 }
 
-/// Tasks that are polled before the tasks that are woken meanwhile. The batch is taken out of the thread-local queue as a whole, so that not every poll looks
+/// Tasks to poll before the tasks woken meanwhile. The batch is taken out of the thread-local queue as a whole, so that not every poll looks
 /// there.
 #[derive(Default)]
 struct Batch {
@@ -327,7 +327,7 @@ impl Executor {
         Some(polled)
     }
 
-    /// Removes a task that is over. Its index is free afterwards.
+    /// Removes a task that is over. The index is free afterwards.
     #[inline(never)]
     fn forget(&self, number: usize) {
         let over = self.slots.borrow_mut()[number].take();
@@ -402,8 +402,8 @@ pub(crate) fn time_stands_still(shared: &Shared, polls: u64, last: Option<&Task>
     let now = shared.with(|core| core.now());
     let who = last.map_or_else(|| "a task that is over now".to_owned(), |task| task.words(shared.names()));
     panic!(
-        "time stands still at {} s: tasks were polled {polls} times without waiting for it to pass, {who} the last. It wakes itself, or others, again and again: let \
-         it wait for a socket or a `sleep`",
+        "time stands still at {} s: tasks were polled {polls} times at this instant, the last of them {who}. That task wakes itself, or others, again and \
+         again: let the task wait for a socket or a `sleep`",
         Seconds(now)
     );
 }

@@ -53,7 +53,7 @@ impl UdpSocket {
     ///
     /// # Errors
     ///
-    /// As with tokio, those of the last address that was tried: the address is taken, or is no address of the host.
+    /// As with tokio, the errors of the last tried address: the address is taken, or is no address of the host.
     ///
     /// # Panics
     ///
@@ -83,7 +83,7 @@ impl UdpSocket {
     ///
     /// # Errors
     ///
-    /// If the run has ended, on a thread that does not run the test bed, or if the host of the socket has crashed.
+    /// If the run has ended, outside of the thread of the run, or if the host of the socket has crashed.
     fn open<T>(&self, ask: impl FnOnce(&mut Core) -> T) -> io::Result<T> {
         self.shared.open(self.host, KIND, |core| {
             core.check_alive(self.id)?;
@@ -91,7 +91,7 @@ impl UdpSocket {
         })?
     }
 
-    /// Returns the address to which the socket is bound. A socket that is bound to all addresses and connected has the address from which it sends to its peer.
+    /// Returns the address to which the socket is bound. A connected socket that is bound to all addresses has the source address of packets to the peer.
     ///
     /// # Errors
     ///
@@ -109,11 +109,11 @@ impl UdpSocket {
         self.open(|core| core.peer_of(self.id))?.ok_or_else(|| Errno::NotConnected.into())
     }
 
-    /// Connects the socket: from now on it sends to `peer`, and receives from no other address. Datagrams that have arrived before stay in the buffer.
+    /// Connects the socket, which from now on sends to `peer` and receives from `peer` alone. Datagrams that have arrived before stay in the buffer.
     ///
     /// # Errors
     ///
-    /// Those of the last address that was tried: the socket cannot send to the address, because it is of the other version of IP, of a network that cannot be
+    /// The errors of the last tried address: the socket cannot send to the address, because it is of the other version of IP, of a network that cannot be
     /// reached, or a broadcast address without [`UdpSocket::set_broadcast`].
     #[expect(clippy::unused_async, reason = "as tokio's")]
     pub async fn connect(&self, peer: impl ToSocketAddrs) -> io::Result<()> {

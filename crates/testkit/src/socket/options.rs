@@ -250,7 +250,7 @@ impl UdpSocket {
     ///
     /// # Errors
     ///
-    /// If the run has ended, or on a thread that does not run the test bed. The next call returns an error of the socket itself.
+    /// If the run has ended, or outside of the thread of the run. The next call returns an error of the socket itself.
     #[cfg(feature = "tokio-net")]
     pub async fn ready(&self, interest: tokio::io::Interest) -> io::Result<tokio::io::Ready> {
         use tokio::io::Ready;

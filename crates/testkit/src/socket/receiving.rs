@@ -84,7 +84,7 @@ impl UdpSocket {
         self.look::<true, _>(Parcel::from)
     }
 
-    /// Receives a datagram if there is one. Returns the number of bytes received.
+    /// Receives a datagram, if any. Returns the number of bytes received.
     ///
     /// # Errors
     ///
@@ -93,7 +93,7 @@ impl UdpSocket {
         self.try_look::<false, _>(|datagram| datagram.copy_to(buffer))
     }
 
-    /// Receives a datagram if there is one. Returns the number of bytes received, and the sender.
+    /// Receives a datagram, if any. Returns the number of bytes received, and the sender.
     ///
     /// # Errors
     ///
@@ -102,7 +102,7 @@ impl UdpSocket {
         self.try_look::<false, _>(|datagram| (datagram.copy_to(buffer), datagram.from()))
     }
 
-    /// Receives a datagram into the free space of `buffer` if there is one. Returns the number of bytes received.
+    /// Receives a datagram into the free space of `buffer`, if any. Returns the number of bytes received.
     ///
     /// # Errors
     ///
@@ -111,7 +111,7 @@ impl UdpSocket {
         self.try_look::<false, _>(|datagram| datagram.put_into(buffer))
     }
 
-    /// Receives a datagram into the free space of `buffer` if there is one. Returns the number of bytes received, and the sender.
+    /// Receives a datagram into the free space of `buffer`, if any. Returns the number of bytes received, and the sender.
     ///
     /// # Errors
     ///
@@ -120,7 +120,7 @@ impl UdpSocket {
         self.try_look::<false, _>(|datagram| (datagram.put_into(buffer), datagram.from()))
     }
 
-    /// Copies the next datagram, if there is one, without taking it from the socket. Returns the number of bytes copied.
+    /// Copies the next datagram, if any, without taking it from the socket. Returns the number of bytes copied.
     ///
     /// # Errors
     ///
@@ -129,7 +129,7 @@ impl UdpSocket {
         self.try_look::<true, _>(|datagram| datagram.copy_to(buffer))
     }
 
-    /// Copies the next datagram, if there is one, without taking it from the socket. Returns the number of bytes copied, and the sender.
+    /// Copies the next datagram, if any, without taking it from the socket. Returns the number of bytes copied, and the sender.
     ///
     /// # Errors
     ///
@@ -138,7 +138,7 @@ impl UdpSocket {
         self.try_look::<true, _>(|datagram| (datagram.copy_to(buffer), datagram.from()))
     }
 
-    /// Returns the sender of the next datagram, if there is one. The datagram stays in the socket.
+    /// Returns the sender of the next datagram, if any. The datagram stays in the socket.
     ///
     /// # Errors
     ///
@@ -190,7 +190,7 @@ impl UdpSocket {
     ///
     /// # Errors
     ///
-    /// If the run has ended, or on a thread that does not run the test bed. The next call returns an error of the socket itself.
+    /// If the run has ended, or outside of the thread of the run. The next call returns an error of the socket itself.
     pub async fn readable(&self) -> io::Result<()> {
         poll_fn(|cx| self.poll_recv_ready(cx)).await
     }
@@ -205,7 +205,7 @@ impl UdpSocket {
         polled.map_or_else(|error| Poll::Ready(Err(error)), |ready| ready.map(Ok))
     }
 
-    /// Calls `look` on the next datagram, if there is one.
+    /// Calls `look` on the next datagram, if any.
     pub(crate) fn try_look<const PEEK: bool, T>(&self, look: impl FnOnce(&Parcel) -> T) -> io::Result<T> {
         self.shared.open(self.host, KIND, |core| core.try_receive::<PEEK, _>(self.id, look))?
     }

@@ -91,7 +91,7 @@ impl UdpSocket {
     ///
     /// # Errors
     ///
-    /// If the run has ended, or on a thread that does not run the test bed.
+    /// If the run has ended, or outside of the thread of the run.
     #[expect(clippy::unused_async, reason = "as tokio's")]
     pub async fn writable(&self) -> io::Result<()> {
         self.shared.check_open(self.host, KIND)

@@ -67,6 +67,7 @@ fn loss(bounds: &LinkBounds, link: &ImpairedLink) -> bool {
         Some(LossSpec::State(_)) => LossModel::State,
     };
     let span = bounds.span(Stage::Loss);
+    // The loss of a chain is fitted to a share, and hits the share only within the tolerance.
     let within = |loss: u64| span.low <= loss + SLACK && loss <= span.high + SLACK;
     bounds.models.contains(&model) && (model == LossModel::Random || long_run(link).is_some_and(within))
 }
@@ -87,13 +88,14 @@ fn shapes(bounds: &LinkBounds, netem: &Netem) -> bool {
 }
 
 /// Returns the chain whose long-run loss is `share`. `chain` makes a chain from the probability of entering bursts, which is varied up to `most`, in
-/// ten-thousandths of a percent; the loss must grow with it. `None` if no chain comes within half of the tolerance.
+/// ten-thousandths of a percent; the loss must grow with this probability. `None` if no chain comes within half of the tolerance.
 pub(super) fn fitting(share: u64, most: u64, chain: impl Fn(u64) -> LossSpec) -> Option<LossSpec> {
     let lost = |p: u64| {
         let netem = Netem { loss: Some(chain(p)), ..Netem::default() };
         ImpairedLink::new(netem).ok().as_ref().and_then(long_run)
     };
     let (mut low, mut high) = (1, most);
+    // The long-run loss grows with `p`, so bisection finds the first probability that reaches the share.
     while low < high {
         let middle = low.midpoint(high);
         if lost(middle)? < share {

@@ -83,7 +83,7 @@ pub fn networks_like(hosts: usize, bounds: LinkBounds) -> Networks {
 #[expect(clippy::panic, reason = "documented: bounds stand in a test")]
 pub(super) fn checked(bounds: LinkBounds) -> Arc<LinkBounds> {
     if let Err(error) = bounds.check() {
-        panic!("bounds of links that make no sense: {error}");
+        panic!("the bounds of links are not valid: {error}");
     }
     Arc::new(bounds)
 }

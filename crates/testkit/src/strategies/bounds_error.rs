@@ -60,16 +60,15 @@ impl fmt::Display for BoundsError {
                 write!(f, "{stage}: the range from {low} to {high} is empty: expected its end at or above its beginning")
             }
             Self::OnlyZero { stage } => {
-                write!(f, "{stage}: a range with nothing but zero: expected LinkBounds::never(Stage::{stage:?}), or an end above zero")
+                write!(f, "{stage}: the range holds only zero: expected LinkBounds::never(Stage::{stage:?}), or an end above zero")
             }
             Self::Percentage { stage, found } => write!(f, "{stage}: {found} is not a percentage: expected 0 to 100"),
             Self::TooLong { stage, found } => write!(f, "{stage}: {found:?} is too long: expected at most 1 hour"),
             Self::Rate { found } => write!(f, "rate: {found} bit/s: expected 8 bit/s to 1 Tbit/s"),
-            Self::JitterAboveDelay { jitter, delay } => write!(
-                f,
-                "jitter of at least {jitter:?} around delays of at most {delay:?}: expected a delay that may be as long as the least jitter"
-            ),
-            Self::NoModel => f.write_str("loss without a model: expected one of random, gemodel and state, or LinkBounds::never(Stage::Loss)"),
+            Self::JitterAboveDelay { jitter, delay } => {
+                write!(f, "the jitter is at least {jitter:?} and the delay at most {delay:?}: expected a longest delay of at least the least jitter")
+            }
+            Self::NoModel => f.write_str("loss has no model: expected one of random, gemodel and state, or LinkBounds::never(Stage::Loss)"),
         }
     }
 }

@@ -85,6 +85,7 @@ fn delay(bounds: &LinkBounds, jitters: bool, dice: &mut Dice<'_>) -> DelaySpec {
     let sd = dice.number(bounds.span(Stage::Jitter)).min(longest);
     mean = mean.max(sd);
     let law = if bounds.distributions && dice.one_in(2) {
+        // The bounds may forbid a mean of twice the deviation. Such a jitter stays uniform.
         mean = mean.max((2 * sd).min(longest));
         Some(dice.pick(Distribution::Normal.name(), &["pareto", "paretonormal"])).filter(|_| 2 * sd <= mean).and_then(Distribution::named)
     } else {
@@ -101,6 +102,7 @@ fn slot(bounds: &LinkBounds, dice: &mut Dice<'_>) -> SlotSpec {
     let min = dice.number(span);
     let gap = match dice.below(4) {
         0 => SlotGap::Range { min: nanos(min), max: Some(nanos(dice.number(Span { low: min, high: 2 * min, step: 1 }))) },
+        // A slot of 1 ns has no room for a jitter of at least 1 ns.
         1 if bounds.distributions && min > 1 => {
             let distribution = Distribution::named(dice.pick("normal", &["pareto", "paretonormal"])).unwrap_or(Distribution::Normal);
             SlotGap::Drawn { distribution, delay: nanos(min), jitter: nanos(dice.number(Span { low: 1, high: min / 2, step: 1 })) }
@@ -121,7 +123,7 @@ fn loss(bounds: &LinkBounds, dice: &mut Dice<'_>) -> LossSpec {
         LossModel::Gemodel => gemodel(share, dice),
         LossModel::State => state(share, dice),
     };
-    // Any share can be lost by a chain that leaves its bad state with the probability of not entering it.
+    // A chain can lose any share if the probability of leaving the bad state and the probability of entering the state add up to 1.
     in_bursts.unwrap_or_else(|| two_states(model, share, ALL - share))
 }
 
@@ -136,6 +138,8 @@ fn two_states(model: LossModel, p: u64, r: u64) -> LossSpec {
 fn gemodel(share: u64, dice: &mut Dice<'_>) -> Option<LossSpec> {
     let r = Some(percent(50_000 + 50_000 * dice.below(15)));
     let loss_in_bad = dice.one_in(2).then(|| percent(500_000 + 50_000 * dice.below(10)));
+    // The words of netem are positional: the loss in the good state needs the loss in the bad state before it. A quarter of the share leaves the rest to
+    // bursts.
     let loss_in_good = (dice.one_in(3) && loss_in_bad.is_some()).then(|| percent(share / 4));
     fitting(share, ALL, |p| LossSpec::Gemodel(GemodelSpec { p: percent(p), r, loss_in_bad, loss_in_good }))
 }
@@ -143,6 +147,7 @@ fn gemodel(share: u64, dice: &mut Dice<'_>) -> Option<LossSpec> {
 fn state(share: u64, dice: &mut Dice<'_>) -> Option<LossSpec> {
     let p31 = Some(percent(50_000 + 50_000 * dice.below(10)));
     let in_burst = dice.one_in(2).then(|| (percent(50_000 + 50_000 * dice.below(8)), percent(500_000 + 50_000 * dice.below(10))));
+    // The words of netem are positional, so the isolated losses need the probabilities of bursts before them.
     let p14 = (dice.one_in(3) && in_burst.is_some()).then_some(share / 4);
     let (p32, p23) = in_burst.unzip();
     let most = ALL - p14.unwrap_or(0);

@@ -9,7 +9,7 @@ use super::numbers::{jitter_mut, random_mut, reorder_mut};
 use super::stage::{self, Stage};
 use super::units::{ALL, percent, whole};
 
-/// Change of a link to a plainer form. The variants are in the order in which they are tried.
+/// Change of a link to a plainer form. The variants are in the order of trial.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Form {
     /// Reordering becomes its delay.
@@ -80,6 +80,7 @@ impl Form {
             Self::LastProbability => netem.loss = old.loss.map(|loss| without_last_probability(loss, long_run(link).unwrap_or(0))),
             Self::FourStates => {
                 if let Some(LossSpec::State(state)) = old.loss
+                    // Without p32 the chain has p13 and p31 alone, which are the probabilities p and r of two states.
                     && state.p32.is_none()
                 {
                     netem.loss = Some(LossSpec::Gemodel(GemodelSpec { p: state.p13, r: state.p31, loss_in_bad: None, loss_in_good: None }));
@@ -121,6 +122,7 @@ fn without_last_probability(loss: LossSpec, share: u64) -> LossSpec {
     match loss {
         LossSpec::Random(_) => None,
         LossSpec::Gemodel(mut model) => {
+            // The words of netem are positional, so probabilities go from the last to the first.
             if model.loss_in_good.is_some() {
                 model.loss_in_good = None;
             } else {

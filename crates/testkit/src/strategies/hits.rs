@@ -51,7 +51,7 @@ pub fn any_hits<N: Into<String>, A: AsRef<str>>(
 ) -> PacketSets {
     let hosts: crate::names::Names = hosts.into_iter().collect();
     let actions: Vec<Action> = actions.into_iter().map(|words| action(words.as_ref())).collect();
-    assert!(!actions.is_empty(), "hits without actions: expected one at least, such as `drop`");
+    assert!(!actions.is_empty(), "hits without actions: expected at least one action, such as `drop`");
     let space = SetSpace { hosts: hosts.to_vec().into(), actions: actions.into() };
     PacketSets(Sets { space, packets })
 }
@@ -78,7 +78,7 @@ impl Strategy for PacketSets {
 fn action(words: &str) -> Action {
     match hits_on(&format!("{words} packet 0")).as_deref() {
         Ok([Hit { action, .. }]) => *action,
-        Ok(_) => panic!("`{words}` is more than one action: expected one such as `drop`"),
+        Ok(_) => panic!("`{words}` is more than one action: expected a single one, such as `drop`"),
         Err(error) => panic!("`{words}` is not an action: {}", error.message()),
     }
 }

@@ -45,7 +45,7 @@ impl Strategy for LibraryLinks {
 /// Space of the links like one of the library.
 #[derive(Clone, Debug)]
 struct FactorSpace {
-    /// Link to which all others shrink.
+    /// Link to which all links shrink.
     usual: LibraryLink,
 }
 

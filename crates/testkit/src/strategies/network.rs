@@ -80,10 +80,10 @@ pub enum NetworkTextError {
 impl fmt::Display for NetworkTextError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Hosts { found } => write!(f, "\"{found}\" does not count hosts: expected a first line such as \"3 hosts\", with 1 to {MOST}"),
+            Self::Hosts { found } => write!(f, "\"{found}\" is not a number of hosts: expected a first line such as \"3 hosts\", with 1 to {MOST}"),
             Self::Line { found } => write!(f, "\"{found}\" is not a link: expected a line such as \"a -> b: delay 24ms\""),
             Self::NoLink { found, first, last } => write!(f, "\"{found}\" is not a link between two of the hosts {first} to {last}"),
-            Self::Repeated { from, to } => write!(f, "the link {from} -> {to} is said twice: expected it once"),
+            Self::Repeated { from, to } => write!(f, "the link {from} -> {to} is given twice: expected one line for each link"),
             Self::Link { from, to, reason } => write!(f, "{from} -> {to}:\n{reason}"),
         }
     }
@@ -100,7 +100,7 @@ impl ImpairedNetwork {
     #[must_use]
     #[track_caller]
     pub fn ideal(hosts: usize) -> Self {
-        assert!((1..=MOST).contains(&hosts), "a network of {hosts} hosts: expected 1 to {MOST}");
+        assert!((1..=MOST).contains(&hosts), "a network of {hosts} hosts: expected 1 to {MOST} hosts");
         Self { hosts, links: BTreeMap::new(), ideal: ImpairedLink::ideal() }
     }
 
@@ -138,6 +138,7 @@ impl ImpairedNetwork {
     /// Returns the name of a host in the text form.
     #[must_use]
     pub fn name(node: NodeId) -> String {
+        // Names count in base 26 without a digit for zero: after `z` comes `aa`.
         let mut rest = u64::from(node.0) + 1;
         let mut letters = Vec::new();
         while let Some(place) = rest.checked_sub(1) {
@@ -153,7 +154,7 @@ impl ImpairedNetwork {
         NetworkConfig { seed, nodes: self.nodes().map(Self::name).collect(), ..NetworkConfig::default() }
     }
 
-    /// Returns the link from one host to another, or `None` if there is none.
+    /// Returns the link from a host to another host, or `None` without such a link.
     #[must_use]
     pub fn link(&self, from: NodeId, to: NodeId) -> Option<&ImpairedLink> {
         self.is_link(from, to).then(|| self.links.get(&(from, to)).unwrap_or(&self.ideal))

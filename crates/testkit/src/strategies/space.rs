@@ -108,6 +108,7 @@ impl Space for NetworkSpace {
             return stages.into_iter().map(|(pair, stage)| NetworkPart::Stage(pair, stage)).collect();
         }
         let mut pairs: Vec<Pair> = stages.into_iter().map(|(pair, _)| pair).collect();
+        // The stages of a link are neighbours, so equal pairs are too.
         pairs.dedup();
         pairs.into_iter().map(NetworkPart::Link).collect()
     }
@@ -117,6 +118,7 @@ impl Space for NetworkSpace {
         for part in parts {
             match *part {
                 NetworkPart::Link(pair) => gone.push((pair, self.0.parts(network.link(pair.0, pair.1)?, 0))),
+                // The parts keep the order of `parts`, in which the stages of a link are neighbours.
                 NetworkPart::Stage(pair, stage) => match gone.last_mut() {
                     Some((last, stages)) if *last == pair => stages.push(stage),
                     Some(_) | None => gone.push((pair, vec![stage])),

@@ -111,6 +111,7 @@ pub(super) fn without(netem: &Netem, stages: &[Stage], keeps_delay: bool) -> Net
     let carried = jitters(&less) || reorders(&less);
     let was_carried = jitters(netem) || reorders(netem);
     if !carried && !keeps_delay && (was_carried || stages.contains(&Stage::Delay)) {
+        // A reordering with the probability zero may be left, which has no effect without a delay either.
         less.delay = None;
         less.reorder = None;
     }

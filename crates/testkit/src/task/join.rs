@@ -15,13 +15,13 @@ pub struct JoinHandle<T> {
     task: Weak<Task>,
 }
 
-/// Error of a task that was stopped before it was over, by [`JoinHandle::abort`] or because its host crashed.
+/// Error of a task that was stopped before its end, by [`JoinHandle::abort`] or because the host crashed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct TaskStopped;
 
 impl fmt::Display for TaskStopped {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("the task was stopped before it was over: it was aborted, or its host crashed")
+        f.write_str("the task was stopped before its end: the task was aborted, or its host crashed")
     }
 }
 
@@ -38,7 +38,7 @@ impl<T> JoinHandle<T> {
         Self { state, task }
     }
 
-    /// Stops the task. Its future is dropped at the point at which it waits.
+    /// Stops the task. The future is dropped at the point at which the task waits.
     pub fn abort(&self) {
         if let Some(task) = self.task.upgrade() {
             task.stop();

@@ -83,13 +83,13 @@ impl Task {
         Poll::Ready(())
     }
 
-    /// Drops the program as a task of its host, so that destructors act on that host.
+    /// Drops the program as a task of the host, so that destructors act on the host.
     #[inline(never)]
     fn drop_there(&self, program: Option<Program>) {
         current::on_host(self.runner.host, || drop(program));
     }
 
-    /// Stops the task: drops its program. The program of a task that stops itself is dropped when its poll returns.
+    /// Stops the task: drops its program. A task that stops itself is dropped when the poll returns.
     pub(crate) fn stop(&self) {
         self.is_doomed.set(true);
         // The program is borrowed while it is being polled. `poll` then drops it, because the task is doomed.
@@ -107,11 +107,11 @@ impl Task {
         self.program.try_borrow().is_ok_and(|program| program.is_none())
     }
 
-    /// Returns a description of the task, with the instant since which the task waits and the things that it waits for.
+    /// Returns a description of the task, with the beginning of the wait and the awaited sockets and timers.
     pub(crate) fn waits(&self, core: &Core) -> String {
         let awaited = self.waker.borrow().as_ref().map(|waker| core.awaited_by(waker)).unwrap_or_default();
-        let awaited = if awaited.is_empty() { "another task, or something that is not of the test bed".to_owned() } else { awaited.join(", or ") };
-        format!("{} waits since {} s for {awaited}", self.words(core.plan.names()), Seconds(self.polled.get()))
+        let awaited = if awaited.is_empty() { "another task, or something outside of the test bed".to_owned() } else { awaited.join(", or ") };
+        format!("{} has waited since {} s for {awaited}", self.words(core.plan.names()), Seconds(self.polled.get()))
     }
 
     /// Returns the name of the task in messages: see [`Runner::words`].
@@ -220,7 +220,7 @@ impl Tasks {
         self.pulse.turns();
     }
 
-    /// Returns the name of the task that is being polled.
+    /// Returns the name of the task being polled.
     pub(crate) fn current(&self, hosts: &[String]) -> String {
         let host = current::host();
         match (self.pulse.running(), host.and_then(|host| hosts.get(host.index()))) {

@@ -1,4 +1,4 @@
-//! Tasks of tokio that live on hosts. The test bed does not poll them, but stops them with their host.
+//! Tasks of tokio that live on hosts. Tokio polls these tasks, and the test bed stops the tasks of a host with the host.
 
 use std::sync::{Arc, Mutex, PoisonError};
 

@@ -10,15 +10,15 @@ use cohaptic_wan::NodeId;
 #[derive(Default)]
 pub(crate) struct Handlers(Mutex<Vec<Handler>>);
 
-/// A signal that the program of a host handles, with those who wait for the signal. As with Linux, the program handles the signal until its end, also when
-/// nobody waits for it any more.
+/// A signal that the program of a host handles, with the waiting listeners. As with Linux, the program handles the signal until the end of the program, also
+/// when nobody waits for the signal any more.
 struct Handler {
     host: NodeId,
     number: i32,
     waiting: Vec<Arc<Mutex<Waiting>>>,
 }
 
-/// State of one that waits for a signal.
+/// State of a listener that waits for a signal.
 #[derive(Debug, Default)]
 struct Waiting {
     has_come: bool,

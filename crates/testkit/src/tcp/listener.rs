@@ -44,7 +44,7 @@ impl TcpListener {
     ///
     /// # Errors
     ///
-    /// As with tokio, those of the last address that was tried: the address is taken by another listener, or is no address of the host.
+    /// As with tokio, the errors of the last tried address: the address is taken by another listener, or is no address of the host.
     ///
     /// # Panics
     ///
@@ -86,7 +86,7 @@ impl TcpListener {
     ///
     /// # Errors
     ///
-    /// If the run has ended, on a thread that does not run the test bed, or if the host of the listener has crashed.
+    /// If the run has ended, outside of the thread of the run, or if the host of the listener has crashed.
     fn open<T>(&self, ask: impl FnOnce(&mut Core) -> T) -> io::Result<T> {
         self.shared.open(self.host, KIND, |core| {
             core.check_listener(self.id)?;

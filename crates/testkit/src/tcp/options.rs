@@ -104,7 +104,7 @@ impl TcpStream {
     /// If a time is zero, or the host of the stream has crashed.
     pub fn set_keepalive_times(&self, keepalive: Option<Keepalive>) -> io::Result<()> {
         if keepalive.is_some_and(|keepalive| keepalive.idle.is_zero() || keepalive.interval.is_zero()) {
-            return Err(io::Error::new(io::ErrorKind::InvalidInput, "a time of keep-alive probes is zero; expected one above zero"));
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, "a time of keep-alive probes is zero; expected a time above zero"));
         }
         self.change(|now, connection| connection.set_keepalive(now, keepalive))
     }

@@ -13,7 +13,7 @@ impl TcpStream {
     ///
     /// # Errors
     ///
-    /// If the run has ended, or on a thread that does not run the test bed. The next call returns an error of the connection itself.
+    /// If the run has ended, or outside of the thread of the run. The next call returns an error of the connection itself.
     pub async fn readable(&self) -> io::Result<()> {
         poll_fn(|cx| self.poll_read_ready(cx)).await
     }
@@ -37,7 +37,7 @@ impl TcpStream {
     ///
     /// # Errors
     ///
-    /// If the run has ended, or on a thread that does not run the test bed. The next call returns an error of the connection itself.
+    /// If the run has ended, or outside of the thread of the run. The next call returns an error of the connection itself.
     pub async fn writable(&self) -> io::Result<()> {
         poll_fn(|cx| self.poll_write_ready(cx)).await
     }
@@ -112,7 +112,7 @@ impl TcpStream {
     ///
     /// # Errors
     ///
-    /// If the run has ended, or on a thread that does not run the test bed. The next call returns an error of the connection itself.
+    /// If the run has ended, or outside of the thread of the run. The next call returns an error of the connection itself.
     #[cfg(feature = "tokio-net")]
     pub async fn ready(&self, interest: tokio::io::Interest) -> io::Result<tokio::io::Ready> {
         poll_fn(|cx| {
@@ -175,7 +175,7 @@ impl TcpStream {
         }
     }
 
-    /// Copies received bytes without taking them from the stream, and returns their number. If there are none, the task is woken when bytes arrive.
+    /// Copies received bytes and leaves the bytes in the stream. Returns the number of bytes. Without bytes, the task is woken when bytes arrive.
     ///
     /// # Errors
     ///

@@ -175,7 +175,7 @@ impl TcpSocket {
     ///
     /// # Errors
     ///
-    /// If the run has ended, or on a thread that does not run the test bed.
+    /// If the run has ended, or outside of the thread of the run.
     pub fn local_addr(&self) -> io::Result<SocketAddr> {
         self.shared.check_open(self.host, KIND)?;
         Ok(self.settings().bound.map_or_else(|| self.any(), |(_, address)| address))
@@ -190,7 +190,7 @@ impl TcpSocket {
     ///
     /// # Errors
     ///
-    /// If the run has ended, or on a thread that does not run the test bed.
+    /// If the run has ended, or outside of the thread of the run.
     pub fn take_error(&self) -> io::Result<Option<io::Error>> {
         self.shared.check_open(self.host, KIND)?;
         Ok(None)
@@ -204,7 +204,7 @@ macro_rules! option {
         ///
         /// # Errors
         ///
-        /// If the run has ended, or on a thread that does not run the test bed.
+        /// If the run has ended, or outside of the thread of the run.
         pub fn $get(&self) -> io::Result<$kind> {
             self.shared.check_open(self.host, KIND)?;
             let $settings = self.settings();
@@ -215,7 +215,7 @@ macro_rules! option {
         ///
         /// # Errors
         ///
-        /// If the run has ended, or on a thread that does not run the test bed.
+        /// If the run has ended, or outside of the thread of the run.
         pub fn $set(&self, $value: $kind) -> io::Result<()> {
             self.shared.check_open(self.host, KIND)?;
             let $to = &mut *self.settings();

@@ -51,7 +51,7 @@ impl TcpStream {
     ///
     /// # Errors
     ///
-    /// If the run has ended, or on a thread that does not run the test bed.
+    /// If the run has ended, or outside of the thread of the run.
     pub(super) fn open<T>(&self, ask: impl FnOnce(&mut Core) -> T) -> io::Result<T> {
         self.shared.open(self.host, KIND, ask)
     }
@@ -81,7 +81,7 @@ impl TcpStream {
     ///
     /// # Errors
     ///
-    /// Those of the last address that was tried: [`io::ErrorKind::ConnectionRefused`] after a round trip if nobody listens there;
+    /// The errors of the last tried address: [`io::ErrorKind::ConnectionRefused`] after a round trip if nobody listens there;
     /// [`io::ErrorKind::TimedOut`] after 131 s without an answer; [`io::ErrorKind::HostUnreachable`] after 3 s if no host has the address, which is one of the
     /// network of the hosts, 10.0.0.0/8 or `fd00::/8`; [`io::ErrorKind::NetworkUnreachable`] at once for other networks. Errors have the numbers of the system
     /// ([`io::Error::raw_os_error`]).
@@ -98,7 +98,7 @@ impl TcpStream {
         }
     }
 
-    /// Opens a connection to the first of the addresses that answers, one after the other.
+    /// Opens a connection to the first address that answers. The addresses are tried in turn.
     pub(crate) async fn connect_to(shared: &Arc<Shared>, host: NodeId, addresses: Vec<SocketAddr>) -> io::Result<Self> {
         let mut failed = none();
         // A loop and not an asynchronous closure, whose future would not be `Send` wherever this one is spawned.
@@ -131,7 +131,7 @@ impl TcpStream {
         Ok(Self { shared, host, id })
     }
 
-    /// Waits until the handshake is over, and returns its error if it failed.
+    /// Waits until the handshake is over, and returns the error of a failed handshake.
     pub(crate) async fn established(self) -> io::Result<Self> {
         poll_fn(|cx| {
             self.open(|core| match core.is_settled(self.id) {
@@ -163,6 +163,7 @@ impl TcpStream {
     pub fn peer_addr(&self) -> io::Result<SocketAddr> {
         let (state, peer) = self.open_alive(|core| (core.connection(self.id).state(), core.ends_of(self.id)[1]))?;
         match state {
+            // As with Linux, a connection that is over has no peer any more.
             State::SynSent | State::Closed | State::TimeWait => Errno::NotConnected.fail(),
             State::SynReceived | State::Established | State::FinWait1 | State::FinWait2 | State::CloseWait | State::Closing | State::LastAck => {
                 Ok(peer)
@@ -175,7 +176,7 @@ impl TcpStream {
     ///
     /// # Panics
     ///
-    /// On a thread that does not run the test bed, while the run goes on.
+    /// Outside of the thread of the run, while the run goes on.
     #[must_use]
     pub fn info(&self) -> Info {
         self.shared.with(|core| core.connection(self.id).info())

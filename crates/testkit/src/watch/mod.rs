@@ -1,4 +1,4 @@
-//! Watchdog by the wall clock: a thread that checks now and then whether tasks and nodes have returned to their test beds.
+//! Watchdog by the wall clock: a thread that checks now and then whether tasks and nodes have returned to the test bed.
 //!
 //! A loop that never calls the test bed cannot be interrupted. Hence the process ends, after the task was named. The watchdog never reports a task that
 //! returns: the limits on polls and calls at one instant apply there.
@@ -30,7 +30,7 @@ pub(crate) const LIMIT: Duration = Duration::from_secs(60);
 pub(crate) struct Pulse {
     /// Number of polls and other turns of the executor so far.
     turns: AtomicU64,
-    /// Number of the runner that runs now, from 1; 0 if none runs.
+    /// Number of the present runner, from 1; 0 without a runner.
     running: AtomicUsize,
     /// Runners that have been numbered.
     known: Mutex<Runners>,
@@ -96,7 +96,7 @@ impl Pulse {
         (self.turns.load(Ordering::Relaxed), self.running.load(Ordering::Relaxed))
     }
 
-    /// Returns the task that runs now. While a panic unwinds, that is the task that panicked.
+    /// Returns the running task. While a panic unwinds, the task that panicked.
     pub(crate) fn running(&self) -> Option<Runner> {
         self.runner(self.now().1)
     }

@@ -99,8 +99,8 @@ impl Watched {
             #[cfg(feature = "tokio")]
             (Kind::Tokio, None) => {
                 // Only the unstable build of tokio tells which task is polled and where it was spawned.
-                "no task of the test bed, but one of `tokio::spawn` or `spawn_local` (one of `Host::spawn` or `Bed::spawn` is named with its place), or the function that \
-                 makes the program,"
+                "a task of `tokio::spawn` or `spawn_local`, or the function that makes the program (a task of `Host::spawn` or `Bed::spawn` would be named \
+                 with its place),"
                     .to_owned()
             }
         };
@@ -125,8 +125,8 @@ impl Watched {
         }
         let _ = writeln!(
             text,
-            "The process ends here, since a thread cannot be stopped. `stall_limit` of the test bed, or {STALL_VARIABLE}=10min, gives it longer, {STALL_VARIABLE}=off for \
-             ever; under a debugger nothing is ended."
+            "The process ends here, because a thread cannot be stopped. `stall_limit` of the test bed, or {STALL_VARIABLE}=10min, sets another limit; \
+             {STALL_VARIABLE}=off sets none. Under a debugger the process does not end."
         );
         text
     }

@@ -16,17 +16,17 @@ pub(super) type Out<A> = PacketEvent<Box<Parcel<A>>, Path>;
 pub(super) struct Exits<A> {
     /// Packets inside their links or copied here, by path and sequence number.
     hit: BTreeMap<(Path, u64), Hit>,
-    /// Packets that are to arrive. Sorted like the events of a network, so that a replay of the fates has the same order at each instant.
+    /// Packets with a scheduled arrival, sorted like the events of a network, so that a replay of the fates has the same order at each instant.
     late: BTreeMap<Key, Out<A>>,
-    /// Packets that wait for further arrivals on their path, each with the number of arrivals that it still waits for.
+    /// Packets that wait for further arrivals on the path, each with the number of missing arrivals.
     behind: BTreeMap<Path, Vec<(u32, Out<A>)>>,
 }
 
 /// Instant of arrival, path, sequence number, and number of the copy.
 type Key = (Instant, Path, u64, u8);
 
-#[derive(Clone, Debug)]
 /// State of a packet that was hit.
+#[derive(Clone, Debug)]
 enum Hit {
     /// The packet has not come out of its link.
     Inside {
@@ -45,7 +45,7 @@ impl<A> Default for Exits<A> {
 }
 
 impl<A: Clone> Exits<A> {
-    /// Notes a packet that is hit when it enters its link.
+    /// Notes a hit packet as the packet enters the link.
     pub(super) fn expect(&mut self, path: Path, number: u64, verdict: Verdict) {
         self.hit.insert((path, number), Hit::Inside { verdict, copies: 0 });
     }
@@ -63,10 +63,11 @@ impl<A: Clone> Exits<A> {
                 return out;
             }
         }
+        // All due arrivals of the links are in `late` now, so that the first entry is the earliest arrival.
         self.late.first_entry().filter(|first| first.key().0 <= now).map(|first| first.remove())
     }
 
-    /// Returns sequence number and number of missing arrivals of each packet of `path` that waits for others.
+    /// Returns sequence number and number of missing arrivals of each waiting packet of `path`.
     pub(super) fn waiting(&self, path: Path) -> impl Iterator<Item = (u64, u32)> {
         self.behind.get(&path).into_iter().flatten().map(|(left, out)| (out.sequence, *left))
     }
@@ -104,6 +105,7 @@ impl<A: Clone> Exits<A> {
                     Some(Hit::Copied(_)) | None => 1,
                 };
                 self.hit.insert(key, Hit::Copied(copy));
+                // A record has the copying before both arrivals, as for a copy that a link makes.
                 let second = PacketEvent { record: PacketRecord { copy, ..out.record }, ..out.clone() };
                 let copied = PacketEvent { record: PacketRecord { fate: Fate::Duplicated, ..second.record }, ..out.clone() };
                 self.arrives(out, at);
@@ -127,6 +129,7 @@ impl<A: Clone> Exits<A> {
     /// Counts an arrival on a path. Packets that have waited for this arrival arrive a nanosecond later: at the same instant a replay could have another order.
     pub(super) fn arrived(&mut self, path: Path, at: Instant) {
         let Some(waiting) = self.behind.get_mut(&path) else { return };
+        // Packets whose count reaches zero leave `behind` below, so that no count is zero here.
         waiting.iter_mut().for_each(|(left, _)| *left -= 1);
         let (come, rest) = std::mem::take(waiting).into_iter().partition(|(left, _)| *left == 0);
         *waiting = rest;
@@ -134,7 +137,7 @@ impl<A: Clone> Exits<A> {
         come.into_iter().for_each(|(_, out)| self.arrives(out, at.saturating_add_nanos(1)));
     }
 
-    /// Drops the packets that still wait for others, as the record shows their end.
+    /// Drops the packets that still wait for further arrivals, and returns the end of each packet for the record.
     pub(super) fn abandon(&mut self, now: Instant) -> impl Iterator<Item = Out<A>> {
         std::mem::take(&mut self.behind).into_values().flatten().map(move |(_, mut out)| {
             out.record.at = now.max(out.at);

@@ -5,11 +5,11 @@ use std::fmt;
 /// Default limit of the bytes that a run may hold: a gibibyte.
 pub(crate) const BYTE_LIMIT: u64 = 1 << 30;
 
-/// Memory of a packet besides its content \[byte\]: its box, its allocation, and its entries in the queues of events and of sockets, which have up to twice as
-/// many entries as packets. Hence packets without content count as well.
+/// Memory of a packet besides the content \[byte\]: box, allocation, and entries in the queues of events and of sockets, which have up to twice as many entries
+/// as packets. Hence packets without content count as well.
 pub(crate) const PACKET_COST: u64 = 200;
 
-/// Bytes that a run holds: bytes that were sent, and were neither read nor lost. Each byte is counted in exactly one of the three parts.
+/// Bytes that a run holds: sent, and neither read nor lost. Each byte is counted in exactly one of the three parts.
 #[derive(Debug)]
 pub(crate) struct Held {
     /// Bytes on links, with the queues of the links. Counted by the [`Wire`](super::Wire) only.
@@ -84,9 +84,9 @@ impl Held {
             return;
         }
         panic!(
-            "too many bytes are on their way: {sender} has sent, and the test bed now holds {} bytes that were sent and neither read nor lost, where its limit is {}: {} on \
-             links, {} in buffers of sockets, {} in streams, where each packet counts {PACKET_COST} more than its content. Let the sender wait, for an answer or by \
-             `sleep(..).await`, and let receivers read; `byte_limit` of the test bed sets another limit",
+            "too many bytes are under way after a send of {sender}: the test bed holds {} bytes that were sent and neither read nor lost, and its limit is {} \
+             bytes. {} bytes are on links, {} in buffers of sockets and {} in streams; each packet counts {PACKET_COST} bytes more than its content. Let the \
+             sender wait, for an answer or by `sleep(..).await`, and let receivers read. `byte_limit` of the test bed sets another limit",
             self.total(),
             self.limit,
             self.links,

@@ -15,7 +15,7 @@ use super::parcel::Parcel;
 use crate::hit::{Laws, PacketLaw, Seen, SentPacket, Verdict};
 use crate::trace::PacketName;
 
-/// The laws of a run, and what they have done.
+/// The laws of a run, with counts of judged and hit packets.
 pub(super) struct Hitting<A> {
     paths: BTreeMap<Path, OnPath>,
     pub(super) exits: Exits<A>,
@@ -33,7 +33,7 @@ struct OnPath {
     hit: u64,
 }
 
-/// A law of a path, in the order in which the laws were given.
+/// A law of a path, in the given order.
 struct Running {
     name: String,
     law: Box<dyn PacketLaw + Send>,
@@ -42,7 +42,7 @@ struct Running {
     hit: u64,
 }
 
-/// Report of what a law did in a run.
+/// Counts of a law in a run, for reports.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct HitCount {
     pub(crate) from: String,
@@ -50,7 +50,7 @@ pub(crate) struct HitCount {
     /// Name of the law: its words, or the place where the test gave the law.
     pub(crate) name: String,
     pub(crate) hit: u64,
-    /// Number of packets about which the law was asked.
+    /// Number of packets that the law has judged.
     pub(crate) judged: u64,
 }
 
@@ -70,7 +70,7 @@ impl<A: Clone + Send + Sync + 'static> Hitting<A> {
         let mut network = network;
         for given in laws.iter() {
             let Path { from, to } = given.path;
-            // A path needs only one filter for all its laws: the packet carries the verdict, over an uplink too, to its link.
+            // A path needs a single filter for all laws: the packet carries the verdict to the link, over an uplink too.
             if !hitting.paths.contains_key(&given.path) {
                 network = network.with_filter(from, to, |packet| packet.payload.is_hit).expect("the hosts of laws are checked");
             }
@@ -139,7 +139,7 @@ impl<A: Clone> Hitting<A> {
             let mut waiting = String::new();
             for (number, left) in self.exits.waiting(*path) {
                 // Writing to a `String` cannot fail.
-                let _ = write!(waiting, " (packet {number} waits for {left} more)");
+                let _ = write!(waiting, " (packet {number} waits for {left} more packets)");
             }
             let OnPath { from, to, judged, .. } = on_path;
             let count = |law: &Running| HitCount {

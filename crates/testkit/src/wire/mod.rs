@@ -1,7 +1,7 @@
 //! The network between the hosts of a run, with its faults, its changes, and the record of its packets.
 //!
-//! Sockets ([`core`](crate::core)) and state machines ([`node`](crate::node)) hand packets in with [`Wire::offer`]. They take arrived packets with
-//! [`Wire::poll`], until the result is `None`, after each packet and whenever time has passed.
+//! Sockets ([`core`](crate::core)) and state machines ([`node`](crate::node)) hand packets in with [`Wire::offer`]. Both take arrived packets with
+//! [`Wire::poll`] after each packet and whenever time has passed, until the result is `None`.
 
 mod exits;
 mod held;
@@ -113,7 +113,7 @@ impl<A: Clone> Wire<A> {
         earlier(earlier(self.network.poll_timeout(), change), late)
     }
 
-    /// Performs the next change of a link that is due. Returns whether there was one.
+    /// Performs the next due change of a link. Returns whether a change was due.
     pub(crate) fn change_next(&mut self) -> bool {
         if self.changes.front().is_none_or(|change| change.at > self.now) {
             return false;
@@ -188,6 +188,7 @@ impl<A: Clone> Wire<A> {
                 parcel.arrival = Arrival { packet: PacketName { path, sequence, copy: 0 }, at, marked: false, is_cut };
                 parcel
             });
+            // The event that stopped `take_mere_arrival` may be a loss or a copy, which only `poll_event` handles.
             if arrived.is_some() || !self.network.may_have_events(self.now) {
                 return arrived;
             }
@@ -195,7 +196,7 @@ impl<A: Clone> Wire<A> {
         self.poll_event()
     }
 
-    /// Like [`Wire::poll`], for packets that can have fates other than an arrival, or that are recorded.
+    /// Like [`Wire::poll`], for recorded packets, and for packets with fates other than an arrival.
     #[inline(never)]
     fn poll_event(&mut self) -> Option<Box<Parcel<A>>> {
         loop {
@@ -203,7 +204,7 @@ impl<A: Clone> Wire<A> {
             let packet = PacketName { path: event.path, sequence: event.sequence, copy: event.copy };
             self.recording.keep(&event);
             let cost = Held::cost(event.payload.bytes.len());
-            // An event that is no end is a copy: the run then holds one more packet.
+            // An event that is no end is a copy: the run then holds a further packet.
             if event.fate.is_end() {
                 self.held.remove(Where::Links, cost)
             } else {
@@ -226,6 +227,7 @@ impl<A: Clone> Wire<A> {
                     return Some(parcel);
                 }
                 Fate::Dropped(cause) => {
+                    // Only losses by chance are noted: a printed test names them in place of the seed.
                     if cause == DropCause::Loss && self.drawn.lost.len() < MOST_LOST {
                         self.drawn.lost.push(packet);
                     }

@@ -62,7 +62,7 @@ pub(crate) enum Octets {
     Segment(Box<Whole>, usize),
 }
 
-/// Segment that travels as it is. Its IP packet, with checksums, is written only if something looks at the octets: a record, a law or a damage.
+/// Segment that travels as it is. The IP packet, with checksums, is written only for a reader of the octets: a record, a law or a damage.
 #[cfg(feature = "tcp")]
 #[derive(Clone, Debug)]
 pub(crate) struct Whole {
@@ -149,6 +149,7 @@ impl Octets {
     #[inline]
     fn refill(&mut self, bytes: &[u8]) {
         match self {
+            // Packets of a flow often have one length. A copy of equal length needs no check of the capacity.
             Self::Own(octets) if octets.len() == bytes.len() => octets.copy_from_slice(bytes),
             Self::Own(octets) => {
                 octets.clear();
@@ -161,7 +162,7 @@ impl Octets {
     }
 }
 
-/// Parcels that were read, kept with their memory for later packets.
+/// Read parcels, kept with memory for later packets.
 #[derive(Debug)]
 pub(crate) struct Spare<A>(Vec<Box<Parcel<A>>>);
 
@@ -202,7 +203,7 @@ impl<A: Default> Spare<A> {
         parcel
     }
 
-    /// Takes back a parcel that was read. Drops the parcel if enough are kept, and its content if it is shared or too long.
+    /// Takes back a read parcel. Drops the parcel if enough are kept, and the content if shared or too long.
     #[inline]
     pub(crate) fn put(&mut self, mut parcel: Box<Parcel<A>>) {
         if self.0.len() >= Self::MOST {

@@ -224,7 +224,7 @@ fn what_is_no_access_fails_the_test() {
     };
     assert_eq!(
         message("phone", "starlink/up"),
-        "`starlink/up` is no access of host `phone`: an access line has both directions: expected starlink@1"
+        "`starlink/up` cannot be the access line of host `phone`: an access line has both directions: expected the name without a direction, starlink@1"
     );
     assert!(message("phone", "starlnk").contains("no link of the library is called \"starlnk\": expected"));
     assert!(message("laptop", "starlink").contains("there is no host `laptop`"));

@@ -68,7 +68,7 @@ fn a_run_that_fails_leaves_all_that_happened() {
     let copied = logs[0].records().iter().filter(|record| record.fate == Fate::Duplicated).count();
     let line = format!("  a -> b: 50 packets, {} arrived, {copied} copied, {lost} lost (loss)\n", 50 + copied - lost);
     assert!(
-        summary.contains(&line) && summary.contains("which ended at 0.05 s") && summary.contains("COHAPTIC_TEST_SEED=5 runs it again"),
+        summary.contains(&line) && summary.contains("which ended at 0.05 s") && summary.contains("COHAPTIC_TEST_SEED=5 repeats the run"),
         "{summary}"
     );
     // As long as a capture has frames: one for each record.
@@ -228,9 +228,10 @@ fn the_environment_asks_for_the_artefacts_of_every_test_that_fails_and_sets_its_
     );
     let folder = base.path().join("all").join(name);
     assert!(
-        said.contains(&format!("what happened is in {}\n", folder.display())) && said.contains("seed 77; COHAPTIC_TEST_SEED=77 runs it again"),
+        said.contains(&format!("the record of the run is in {}\n", folder.display()))
+            && said.contains("seed 77; COHAPTIC_TEST_SEED=77 runs it again"),
         "{said}"
     );
     assert_eq!(names(&folder), FILES);
-    assert!(fs::read_to_string(folder.join("summary.txt")).unwrap().contains("Its seed was 77:"));
+    assert!(fs::read_to_string(folder.join("summary.txt")).unwrap().contains("The seed was 77:"));
 }

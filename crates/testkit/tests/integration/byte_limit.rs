@@ -60,9 +60,9 @@ fn datagrams_that_pile_up_are_named_with_host_socket_and_task() {
                 });
             });
             let parts = [
-                "too many bytes are on their way: the UDP socket 0.0.0.0:49152 of host `a`, used by the task of host `a` that was spawned at ",
+                "too many bytes are under way after a send of the UDP socket 0.0.0.0:49152 of host `a`, used by the task of host `a` that was spawned at ",
                 "byte_limit.rs:",
-                "where its limit is 1048576: ",
+                "and its limit is 1048576 bytes. ",
                 "`byte_limit` of the test bed sets another limit",
             ];
             says(way, &text, &parts);
@@ -129,7 +129,7 @@ fn a_node_that_floods_is_named() {
     for to in [0, 1] {
         let nodes = Nodes::new().add("quiet", Quiet).add("floods", Floods(to)).byte_limit(LIMIT);
         let text = complaint(|| drop(nodes.links("delay 1000s").start()));
-        says("nodes", &text, &["too many bytes are on their way: node `floods` has sent", "its limit is 1048576: "]);
+        says("nodes", &text, &["too many bytes are under way after a send of node `floods`: ", "its limit is 1048576 bytes. "]);
     }
 }
 
@@ -221,7 +221,7 @@ fn values_that_are_dropped_while_a_run_fails_may_send() {
             }
         });
     });
-    says("dropped", &text, &["too many bytes are on their way"]);
+    says("dropped", &text, &["too many bytes are under way"]);
 }
 
 /// A test bed without a configured limit has a limit of one gibibyte.

@@ -111,12 +111,15 @@ fn after_the_run_all_that_sockets_are_asked_is_an_error_that_names_the_host() {
             let text = error.to_string();
             assert_eq!(error.kind(), io::ErrorKind::ConnectionAborted, "{text}");
             assert!(
-                text.contains(" of host `") && text.contains("` is used after the run of its test bed has ended: take one of a host of the run"),
+                text.contains(" of host `") && text.contains("` was used after the end of its run: make a new one on a host of the present run"),
                 "{text}"
             );
         }
         let name = "b:7".to_socket_addr().unwrap_err().to_string();
-        assert_eq!(name, "only inside a running test bed the name `b` of a host means something: call it within `Testbed::run`, on its thread");
+        assert_eq!(
+            name,
+            "the name `b` of a host means something only inside a running test bed: make the call within `Testbed::run`, on the thread of the run"
+        );
         // The value can still be looked at and dropped.
         assert!(format!("{:?} {:?} {:?} {:?} {:?}", left.udp, left.listener, left.stream, left.host, left.bed).contains("10.0.0.1:7"));
         drop(left);
@@ -134,13 +137,13 @@ fn in_another_test_bed_sockets_and_hosts_of_an_ended_one_are_refused() {
             });
         }));
         let text = spawned.unwrap_err().downcast::<&str>().map_or_else(|text| *text.downcast::<String>().unwrap(), |text| (*text).to_owned());
-        assert!(text.contains("host `a` belongs to another test bed than the one that runs"), "{text}");
+        assert!(text.contains("host `a` belongs to the test bed of another run"), "{text}");
         let stats = other.run(|bed| async move {
             let _hears = bed.host("b").bind("0.0.0.0:7").unwrap();
             for error in errors(&left) {
                 let text = error.to_string();
                 assert_eq!(error.kind(), io::ErrorKind::ConnectionAborted, "{text}");
-                assert!(text.contains("has ended, in the run of another test bed: "), "{text}");
+                assert!(text.contains("was used after the end of its run, in the run of another test bed: "), "{text}");
             }
             drop(left);
             time::sleep(Duration::from_millis(10)).await;
@@ -171,7 +174,7 @@ fn a_socket_on_another_thread_fails_the_test_and_does_not_end_the_process() {
             });
         });
         assert!(text.contains("a UDP socket of host `b` was used on another thread"), "{text}");
-        assert!(text.contains("the sockets of a test bed belong to the thread that runs it"), "{text}");
+        assert!(text.contains("sockets of a test bed work only on the thread that runs the test bed"), "{text}");
         // A call without an error to return panics on that thread, and the run fails with the same words.
         let text = complaint(|| {
             bed.run(|bed| async move {

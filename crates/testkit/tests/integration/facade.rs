@@ -342,7 +342,7 @@ fn a_signal_that_no_program_handles_kills_it_as_with_linux() {
 }
 
 #[test]
-#[should_panic(expected = "host `server` cannot get the signal 9: expected a number from 1 to 31")]
+#[should_panic(expected = "host `server` cannot get the signal 9: expected 1 to 8")]
 fn a_signal_that_no_program_can_receive_is_refused() {
     two().run(|bed| async move { bed.host("server").signal(9) });
 }

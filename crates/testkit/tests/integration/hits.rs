@@ -163,7 +163,7 @@ fn what_was_hit_is_recorded_counted_and_replayed_without_the_laws() {
         "0.003 s  a -> b  packet 3 hit: dropped\n0.003 s  a -> b  packet 3 lost: filter\n",
         "packet 7 hit: delayed by 40ms\n",
         "packet 8 hit: copied, the copy 1ms later\n",
-        "packet 11 hit: held behind 4 more\n",
+        "packet 11 hit: held until 4 later packets have passed\n",
     ] {
         assert!(trace.contains(line), "{line}");
     }

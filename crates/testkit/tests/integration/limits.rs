@@ -51,15 +51,15 @@ fn who_asks_for_ever_is_stopped_after_an_hour_with_the_network_and_who_waits_for
         let text = complaint(bed, asks);
         // Questions leave every 200 ms from 0 s on. The server has begun to wait at 0 s.
         for part in [
-            &*format!("the run goes on beyond its time limit of 3600s: it is {now}"),
+            &*format!("the run goes on beyond its time limit of 3600s, at {now}"),
             "A program that tries again needs a last attempt",
             "`Testbed::time_limit` sets another limit. The network:\n  client -> server: delay 5ms loss 100%\nWho waits:\n",
             "\n  the task of host `server` that was spawned at crates/testkit/tests/integration/limits.rs:",
-            " waits since 0 s for a datagram at UDP 0.0.0.0:7\n",
+            " has waited since 0 s for a datagram at UDP 0.0.0.0:7\n",
             "\n  the task of host `client` that was spawned at crates/testkit/tests/integration/limits.rs:",
-            " waits since 3600 s for a datagram at UDP 0.0.0.0:49152, or 3600.2 s of the run\n",
+            " has waited since 3600 s for a datagram at UDP 0.0.0.0:49152, or 3600.2 s of the run\n",
             "  the task that was spawned at crates/testkit/tests/integration/limits.rs:",
-            " waits since 0 s for another task",
+            " has waited since 0 s for another task",
         ] {
             assert!(text.contains(part), "no {part:?} in {text}");
         }
@@ -70,7 +70,7 @@ fn who_asks_for_ever_is_stopped_after_an_hour_with_the_network_and_who_waits_for
 fn both_limits_can_be_set() {
     let short = Duration::from_secs(2);
     let text = complaint(silent().time_limit(short), asks);
-    assert!(text.starts_with("the run goes on beyond its time limit of 2s: it is 2 s."), "{text}");
+    assert!(text.starts_with("the run goes on beyond its time limit of 2s, at 2 s."), "{text}");
     let beats = |_| async {
         loop {
             time::sleep(Duration::from_micros(1)).await;
@@ -78,7 +78,7 @@ fn both_limits_can_be_set() {
     };
     for bed in [silent(), silent().on_tokio()] {
         let text = complaint(bed.step_limit(1000), beats);
-        assert!(text.starts_with("the run goes on beyond its step limit of 1000 polls of tasks: it is 0.00"), "{text}");
+        assert!(text.starts_with("the run goes on beyond its step limit of 1000 polls of tasks, at 0.00"), "{text}");
         assert!(text.contains("`Testbed::step_limit` sets another limit"), "{text}");
     }
     // A run that ends at the limit has ended.
@@ -100,7 +100,7 @@ fn tasks_of_tokio_alone_are_stopped_too() {
         .unwrap()
     };
     let text = complaint(silent().on_tokio().time_limit(Duration::from_secs(60)), program);
-    assert!(text.starts_with("the run goes on beyond its time limit of 60s: it is 60."), "{text}");
+    assert!(text.starts_with("the run goes on beyond its time limit of 60s, at 60."), "{text}");
 }
 
 #[test]

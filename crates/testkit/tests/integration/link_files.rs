@@ -97,7 +97,7 @@ fn a_file_that_makes_no_sense_fails_the_test_with_its_place() {
     let path = file(base.path(), "bytes.links", "");
     fs::write(&path, [0xff, 0xfe]).unwrap();
     assert!(message(|| drop(Testbed::from_file(&path))).contains("cannot be read: it is not a text: expected UTF-8"));
-    assert!(LinkFile::parse("a -> b: replay x.csv").unwrap_err().to_string().starts_with("1:16: a text names no files"));
+    assert!(LinkFile::parse("a -> b: replay x.csv").unwrap_err().to_string().starts_with("1:16: a text without a file of its own cannot name files"));
 }
 
 /// Sends once, at the beginning, to the one that was added after it; keeps when something came.

@@ -35,13 +35,13 @@ fn a_task_that_spins_is_named() {
             }));
             time::sleep(Duration::from_secs(1)).await;
         };
-        says(|| bed.run(spin), &["time stands still at 0.007 s", "host `b`", "misuse.rs:", "let it wait for a socket or a `sleep`"]);
+        says(|| bed.run(spin), &["time stands still at 0.007 s", "host `b`", "misuse.rs:", "let the task wait for a socket or a `sleep`"]);
     }
 }
 
 #[test]
 fn what_takes_no_time_does_not_let_it_pass() {
-    let parts = ["time stands still at 0.002 s", "again and again and never waits", "`sleep(..).await` lets it pass"];
+    let parts = ["time stands still at 0.002 s", "again and again without waiting", "let the task wait, for instance by `sleep(..).await`"];
     for bed in [bed().patience(1000), bed().patience(1000).on_tokio()] {
         for way in 0..5 {
             let spin = |bed: Bed| async move {
@@ -65,7 +65,7 @@ fn what_takes_no_time_does_not_let_it_pass() {
                 assert!(text.contains(part), "no {part:?} in {text:?}");
             }
             // The task is the program itself, and its sockets are of host `a`.
-            assert!(text.contains(". It is the task that was spawned at crates/testkit/tests/integration/misuse.rs:"), "{text}");
+            assert!(text.contains(". The caller is the task that was spawned at crates/testkit/tests/integration/misuse.rs:"), "{text}");
             assert_eq!(text.ends_with(", which called the UDP socket 0.0.0.0:49152 of host `a` last"), way == 2 || way == 3, "{text}");
         }
     }
@@ -82,7 +82,7 @@ fn a_task_that_tries_again_and_again_is_named_with_its_host() {
             time::sleep(Duration::from_secs(1)).await;
         };
         let parts = [
-            "It is the task of host `b` that was spawned at crates/testkit/tests/integration/misuse.rs:",
+            "The caller is the task of host `b` that was spawned at crates/testkit/tests/integration/misuse.rs:",
             "which called the UDP socket 0.0.0.0:7 of host `b` last",
         ];
         says(|| bed.run(spin), &parts);
@@ -91,14 +91,14 @@ fn a_task_that_tries_again_and_again_is_named_with_its_host() {
 
 #[test]
 fn a_name_that_no_host_has_is_told_with_the_task_that_asks() {
-    let asks = "; the task of host `b` that was spawned at crates/testkit/tests/integration/misuse.rs:";
+    let asks = " asked for by the task of host `b` that was spawned at crates/testkit/tests/integration/misuse.rs:";
     for bed in [bed(), bed().on_tokio()] {
         let names = |bed: Bed| async move {
             let other = bed.clone();
             bed.host("b").spawn(async move { drop(other.host("c")) });
             time::sleep(Duration::from_secs(1)).await;
         };
-        says(|| bed.clone().run(names), &["there is no host `c`; the hosts are a, b; the task", asks, " asks for it"]);
+        says(|| bed.clone().run(names), &["there is no host `c`; the hosts are a, b; the name was asked for by the task", asks]);
         let sends = |bed: Bed| async move {
             bed.host("b").spawn(async {
                 let socket = UdpSocket::bind("0.0.0.0:7").await.unwrap();
@@ -106,7 +106,7 @@ fn a_name_that_no_host_has_is_told_with_the_task_that_asks() {
             });
             time::sleep(Duration::from_secs(1)).await;
         };
-        says(|| bed.run(sends), &["there is no host `c`; the hosts are a, b; the task", asks]);
+        says(|| bed.run(sends), &["there is no host `c`; the hosts are a, b; the name was asked for by the task", asks]);
     }
     // Of many hosts not all are named.
     let many = Testbed::new((0..100).map(|host| format!("host-{host}")));
@@ -122,27 +122,36 @@ fn who_waits_for_what_never_comes_is_named() {
             let task = bed.host("a").spawn(async move { socket.recv(&mut [0; 1]).await });
             task.await.unwrap().unwrap();
         };
-        says(|| bed.run(wait), &["nothing will ever happen after ", "host `a`", "misuse.rs:", "A lost packet needs a `timeout`"]);
+        says(|| bed.run(wait), &["nothing will ever happen after ", "host `a`", "misuse.rs:", "Put a `timeout` around each wait"]);
     }
 }
 
 #[test]
 fn test_beds_and_runtimes_are_not_nested() {
-    says(|| bed().run(|_| async { bed().run(|_| async {}) }), &["a test bed runs inside another one", "Give both programs hosts of one test bed"]);
+    says(
+        || bed().run(|_| async { bed().run(|_| async {}) }),
+        &["a test bed was started inside the run of another test bed", "Give both programs hosts of one test bed"],
+    );
     let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
-    says(|| runtime.block_on(async { bed().on_tokio().run(|_| async {}) }), &["brings its own runtime", "`#[test]` in place of `#[tokio::test]`"]);
+    says(
+        || runtime.block_on(async { bed().on_tokio().run(|_| async {}) }),
+        &["a test bed on tokio starts a runtime", "`#[test]` in place of `#[tokio::test]`"],
+    );
     // After a failure the next one runs.
     bed().run(|_| async { time::sleep(Duration::from_secs(1)).await });
 }
 
 #[test]
 fn outside_of_a_test_bed_nothing_can_be_bound_and_no_time_passes() {
-    says(|| drop(time::sleep(Duration::ZERO)), &["only inside a running test bed time passes: call it within `Testbed::run`, on its thread"]);
+    says(
+        || drop(time::sleep(Duration::ZERO)),
+        &["time passes only inside a running test bed: make the call within `Testbed::run`, on the thread of the run"],
+    );
     let place = "at crates/testkit/tests/integration/misuse.rs:";
-    let parts = ["`UdpSocket::bind` ", place, " is called outside of a test bed: call it within `Testbed::run`, on its thread"];
+    let parts = ["`UdpSocket::bind` ", place, " was called outside of a test bed: make the call within `Testbed::run`, on the thread of the run"];
     says(|| drop(UdpSocket::bind("0.0.0.0:0")), &parts);
-    says(|| drop(net::lookup_host("a:7")), &["`lookup_host` ", place, " is called outside of a test bed"]);
-    let parts = ["`UdpSocket::bind` ", place, " is called by a task that lives on no host", "`Host::spawn`, or bind with `Host::bind`"];
+    says(|| drop(net::lookup_host("a:7")), &["`lookup_host` ", place, " was called outside of a test bed"]);
+    let parts = ["`UdpSocket::bind` ", place, " was called by a task that belongs to no host", "`Host::spawn`, or bind with `Host::bind`"];
     for bed in [bed(), bed().on_tokio()] {
         says(|| bed.run(|_| async { drop(UdpSocket::bind("0.0.0.0:0").await) }), &parts);
     }
@@ -156,15 +165,15 @@ fn outside_of_a_test_bed_nothing_can_be_bound_and_no_time_passes() {
     let again = |bed: Bed| async move { while bed.host("a").bind("c:0").is_err() {} };
     says(|| bed().patience(1000).run(again), &["time stands still at 0 s"]);
     let error = bed().run(|bed| async move { bed.host("a").bind("c:0").unwrap_err().to_string() });
-    assert!(error.starts_with("there is no host `c`; the hosts are a, b; the task that was spawned at "), "{error}");
+    assert!(error.starts_with("there is no host `c`; the hosts are a, b; the name was asked for by the task that was spawned at "), "{error}");
 }
 
 #[test]
 fn a_test_bed_that_is_none_is_refused_where_it_is_said() {
     says(|| drop(Testbed::new(Vec::<String>::new())), &["without hosts"]);
-    says(|| drop(Testbed::new(["a", "a"])), &["two hosts are called `a`"]);
-    says(|| drop(Testbed::new(["a:b"])), &["`a:b` is not a name of a host"]);
-    says(|| drop(Testbed::new(["10.0.0.1"])), &["`10.0.0.1` is not a name of a host"]);
+    says(|| drop(Testbed::new(["a", "a"])), &["two hosts have the name `a`"]);
+    says(|| drop(Testbed::new(["a:b"])), &["`a:b` cannot be the name of a host"]);
+    says(|| drop(Testbed::new(["10.0.0.1"])), &["`10.0.0.1` cannot be the name of a host"]);
     says(|| drop(bed().link("a", "c", "delay 1ms")), &["there is no host `c`; the hosts are a, b"]);
     says(|| drop(bed().link("a", "a", "delay 1ms")), &["host `a` has no link to itself"]);
     says(|| drop(bed().links("delay 24ms loss 250%")), &["this is not a link", "^^^^ expected a percentage from 0 to 100"]);
@@ -202,8 +211,8 @@ fn a_program_that_differs_is_shown_where() {
             }
         };
         let parts = [
-            "does not do the same twice",
-            "the runs part at 0.000501 s, with event 1:",
+            "two runs of the program are not the same",
+            "the runs differ from 0.000501 s on, at event 1:",
             "first : 0.000501 s  a -> b  packet 1 sent, 5 bytes",
             "COHAPTIC_TEST_SEED=1",
         ];
@@ -237,7 +246,7 @@ fn tokio_without_its_runtime_is_told_the_way_out() {
 
 #[test]
 fn a_socket_of_the_real_tokio_is_told_the_way_out() {
-    let way_out = ["of the real tokio is made in a test bed", "`cohaptic_testkit::net`", "`cohaptic tokio`"];
+    let way_out = ["an `AsyncFd` of the real tokio", "`cohaptic_testkit::net`", "`cohaptic tokio`"];
     let bind = async || drop(tokio::net::UdpSocket::bind("127.0.0.1:0").await);
     let connect = async || drop(tokio::net::TcpStream::connect("127.0.0.1:9").await);
     says(|| bed().on_tokio().run(move |_| bind()), &way_out);
@@ -250,7 +259,7 @@ fn a_socket_of_the_real_tokio_is_told_the_way_out() {
         let descriptor = async || drop(tokio::io::unix::AsyncFd::new(std::os::unix::net::UnixStream::pair().unwrap().0));
         says(
             || bed().on_tokio().run(move |_| descriptor()),
-            &["An `AsyncFd` waits for a descriptor of the system: replace it by a socket or a channel"],
+            &["Replace an `AsyncFd`, which waits for a descriptor of the system, by a socket or a channel"],
         );
     }
     // Tokio catches the panic of its own task, and the run fails all the same.

@@ -266,7 +266,10 @@ fn two_runs_that_differ_are_told_apart() {
             run.note("here");
         });
     });
-    assert!(text.starts_with("the nodes do not do the same twice: the runs part at 0.001 s, with event 1:\n  first : 0.001 s  note: here"), "{text}");
+    assert!(
+        text.starts_with("two runs of the nodes are not the same: the runs differ from 0.001 s on, at event 1:\n  first : 0.001 s  note: here"),
+        "{text}"
+    );
 }
 
 /// Node that does one thing without end at a single instant.
@@ -300,7 +303,7 @@ fn misuse_says_what_to_do() {
     assert_eq!(
         message(|| _ = run(Wrong::Wakes).run_until_idle()),
         "time stands still at 0.003 s after 1000 packets and timers: node `a` wants to be woken again and again: after `handle_timeout`, `poll_timeout` must \
-         name a later instant, or none"
+         give a later instant, or `None`"
     );
     let echo = |patience| {
         #[derive(Default)]
@@ -324,20 +327,23 @@ fn misuse_says_what_to_do() {
     let mut fine = run(Wrong::Answers);
     assert!(message(|| _ = fine.run_while(|_| true)).starts_with("nothing will ever happen after 0 s"));
     fine.run_until(ms(5));
-    assert_eq!(message(|| fine.run_until(ms(4))), "0.004 s has passed: it is 0.005 s");
-    assert_eq!(message(|| drop(fine.record())), "nothing was recorded; `Nodes::recorded` asks for it");
+    assert_eq!(message(|| fine.run_until(ms(4))), "cannot run until 0.004 s: the run is already at 0.005 s");
+    assert_eq!(message(|| drop(fine.record())), "the run was not recorded; call `Nodes::recorded` before `start`");
     assert!(message(|| _ = fine.node::<Echo>("a")).starts_with("node `a` is not a `"));
     assert_eq!(message(|| _ = fine.counts("c")), "there is no host `c`; the hosts are a, b");
-    assert!(message(|| fine.restart("a", Wrong::Answers)).contains("is up; `crash` it before"));
+    assert!(message(|| fine.restart("a", Wrong::Answers)).contains("is up: `crash` the node before"));
     let _: Wrong = fine.crash("a");
     assert!(message(|| _ = fine.crash::<Wrong>("a")).contains("is down; `NodeRun::restart`"));
     assert!(message(|| drop(Nodes::new().start())).contains("a run without nodes"));
-    assert!(message(|| drop(Nodes::new().add("a", Wrong::Sends).add("a", Wrong::Sends))).contains("two hosts are called `a`"));
+    assert!(message(|| drop(Nodes::new().add("a", Wrong::Sends).add("a", Wrong::Sends))).contains("two hosts have the name `a`"));
     assert!(message(|| _ = fine.link_stats("a", "a")).contains("no link to itself"));
     let mut beats = Nodes::new().add("a", Beat(ms(0))).links("delay 3ms").time_limit(Duration::from_secs(2)).start();
     let text = message(|| _ = beats.run_until_idle());
-    assert!(text.starts_with("at 2.001 s something happens still") && text.ends_with(". The network:\n  all: delay 3ms"), "{text}");
-    assert!(message(|| _ = beats.run_while(|_| true)).starts_with("at 2.002 s what was to end has not ended"));
+    assert!(
+        text.starts_with("the nodes are not idle at 2.001 s, beyond the time limit") && text.ends_with(". The network:\n  all: delay 3ms"),
+        "{text}"
+    );
+    assert!(message(|| _ = beats.run_while(|_| true)).starts_with("the condition of `run_while` still holds at 2.002 s, beyond the time limit"));
     assert_eq!(address(0, 1).port(), 1);
 }
 

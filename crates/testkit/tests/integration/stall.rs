@@ -103,11 +103,17 @@ fn what_stalls_is_named_and_ends_the_process() {
     let artefacts = base.path().join("all");
     let at = "at 0.007 s of the run and has not returned for 1s by the wall clock";
     let spawned = "that was spawned at crates/testkit/tests/integration/stall.rs:";
-    let of_tokio = "no task of the test bed, but one of `tokio::spawn` or `spawn_local`";
+    let of_tokio = "a task of `tokio::spawn` or `spawn_local`, or the function that makes the program";
     let ways: [(&str, &[&str]); 10] = [
         (
             "loop",
-            &["the task of host `b`", spawned, at, "what happened is in ", "note: b -> a: the law of crates/testkit/tests/integration/stall.rs:"],
+            &[
+                "the task of host `b`",
+                spawned,
+                at,
+                "the record of the run is in ",
+                "note: b -> a: the law of crates/testkit/tests/integration/stall.rs:",
+            ],
         ),
         ("loop on tokio", &["the task of host `b`", spawned, at]),
         ("block", &[": the task that", spawned, at]),

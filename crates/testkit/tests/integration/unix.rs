@@ -405,10 +405,10 @@ fn a_task_that_waits_for_ever_is_told_with_its_socket() {
 fn a_socket_needs_a_host_and_its_own_thread() {
     let panicked = std::panic::catch_unwind(|| two().run(|_| async { drop(here().unix_pair(call())) }));
     let text = *panicked.unwrap_err().downcast::<String>().unwrap();
-    assert!(text.contains("is called by a task that lives on no host"), "{text}");
+    assert!(text.contains("was called by a task that belongs to no host"), "{text}");
     let [one, _other] = two().run(|bed: Bed| async move { bed.host("a").spawn(async { here().unix_pair(call()).unwrap() }).await.unwrap() });
     let error = write(&*one, b"x").unwrap_err().to_string();
-    assert!(error.starts_with("a Unix socket or a pipe of host `a` is used after the run of its test bed has ended"), "{error}");
+    assert!(error.starts_with("a Unix socket or a pipe of host `a` was used after the end of its run"), "{error}");
 }
 
 #[test]

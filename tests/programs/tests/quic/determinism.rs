@@ -62,7 +62,7 @@ fn with_quinns_configurations_times_and_lengths_are() {
 }
 
 #[test]
-#[should_panic(expected = "the program does not do the same twice: the runs part at 0 s, with event 0")]
+#[should_panic(expected = "two runs of the program are not the same: the runs differ from 0 s on, at event 0")]
 fn and_bytes_are_not() {
     pair().run_twice(ask_by_quinns_configurations);
 }
@@ -126,7 +126,7 @@ fn an_endpoint_is_over_with_its_test_bed() {
 }
 
 #[test]
-#[should_panic(expected = "only inside a running test bed the numbers of an endpoint can be drawn")]
+#[should_panic(expected = "the numbers of an endpoint can be drawn only inside a running test bed")]
 fn a_configuration_draws_inside_a_test_bed_only() {
     drop(quinn::endpoint_config());
 }

@@ -183,8 +183,8 @@ impl Core {
         self.tcp.listeners.remove(id.0);
     }
 
-    /// Ends the acceptance of connections. Waiting connections are reset. Connections whose handshake is not complete are forgotten, so that their next segment
-    /// is refused.
+    /// Ends the acceptance of connections. Waiting connections are reset. Connections whose handshake is not complete are forgotten, so that the next segment
+    /// of the peer is refused.
     pub(super) fn stop_listening(&mut self, id: ListenId) {
         let listener = self.tcp.listeners.get_mut(id.0);
         let (half_open, waiting) = (std::mem::take(&mut listener.half_open), std::mem::take(&mut listener.waiting));
@@ -194,6 +194,7 @@ impl Core {
         }
         for conn in waiting {
             let end = self.tcp.end_mut(conn);
+            // Without a listener nothing holds the connection, so `settle` removes it after the reset.
             end.listener = None;
             end.machine.abort();
             self.settle(conn);

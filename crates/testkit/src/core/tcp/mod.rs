@@ -46,7 +46,7 @@ pub(crate) struct ConnId(usize);
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) struct ListenId(usize);
 
-/// Key by which a packet finds its connection: host, local port, local address, remote address. The port precedes the address, so that all connections of a
+/// Key by which a packet finds the connection: host, local port, local address, remote address. The port precedes the address, so that all connections of a
 /// port are adjacent.
 type Route = (NodeId, u16, IpAddr, SocketAddr);
 
@@ -65,7 +65,7 @@ pub(super) struct Tcp {
     latest: Option<(Route, ConnId)>,
     ports: ports::Ports,
     timers: timers::Timers,
-    /// Connections in TIME-WAIT, roughly sorted by its end. The end has no visible effect, and so is no event.
+    /// Connections in TIME-WAIT, roughly sorted by the end of TIME-WAIT. The end has no visible effect, and so is no event.
     time_waits: VecDeque<(Instant, ConnId)>,
     /// Packets that do not leave their host, with the host, in the order of sending.
     loopback: VecDeque<(NodeId, Segment<'static>)>,
@@ -73,7 +73,7 @@ pub(super) struct Tcp {
     calls: u64,
 }
 
-/// Side of a connection, and the tasks that wait to read from it or to write to it.
+/// Side of a connection, and the tasks that wait to read or to write.
 #[derive(Debug)]
 struct End {
     host: NodeId,
@@ -86,7 +86,7 @@ struct End {
     is_write_blocked: bool,
     /// `true` if the socket of the program is of IPv6 and the packets are of IPv4: the program sees `::ffff:10.0.0.1`.
     is_mapped: bool,
-    /// Instant at which the system gives up to look for the other end, whose address nobody has; `None` if somebody has the address.
+    /// Instant at which the system stops looking for the other end, if nobody has the address; `None` if a host has the address.
     unreachable_at: Option<Instant>,
     /// Linger time set by the program. Only zero has an effect: the connection is reset when its stream is dropped.
     linger: Option<Duration>,
@@ -125,7 +125,7 @@ struct Listener {
     backlog: usize,
     /// Connections whose handshake is not complete.
     half_open: BTreeSet<ConnId>,
-    /// Connections to accept, in the order in which their handshakes were completed.
+    /// Connections to accept, in the order of completed handshakes.
     waiting: VecDeque<ConnId>,
     wakers: Waiters,
     /// Port at which the listener listens.
@@ -180,6 +180,7 @@ impl Tcp {
             counted: 0,
             looked_at: (u64::MAX, None),
         })));
+        // The new connection may take the route of an old one that is the latest answer.
         self.routes.insert(route, id);
         self.latest = None;
         id
@@ -235,6 +236,7 @@ impl Listener {
 impl Core {
     /// Removes an end with its route, timer and port.
     fn remove_connection(&mut self, id: ConnId) {
+        // Route and timer are found through the end, which is removed last.
         self.tcp.unroute(id);
         self.tcp.remove_timer(id);
         let Some(end) = self.tcp.connections.remove(id.0) else { return };

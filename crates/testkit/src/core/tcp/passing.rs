@@ -39,6 +39,7 @@ impl Core {
         let route = super::route(host, segment.destination, segment.source);
         if let Some(id) = self.tcp.routed(&route) {
             let (now, end) = (self.now(), self.tcp.end(id));
+            // While the queue of the listener is full, the ACK that would complete a handshake is dropped, as in Linux. A reset needs no room in the queue.
             if let (Some(waited_at), State::SynReceived, false) = (end.listener, end.machine.state(), segment.flags.has(Flags::RST)) {
                 self.check_backlog(waited_at)?;
             }
@@ -72,11 +73,12 @@ impl Core {
             };
             path
         } else {
-            // The segment is lost if its source is an address that the host has given up, or if no host has its destination any more.
+            // The segment is lost if the host has given the source address up, or if no host has the destination any more.
             let Some(receiver) = self.plan.owner_node(to).filter(|_| self.plan.of(host).has(from)) else { return };
             Path { from: host, to: receiver }
         };
         let addresses = Ends::new(segment.source, segment.destination, Kind::Segment);
+        // The entry is made before the offer, which takes the segment, and noted after the offer, so that the trace has the sending first.
         let happening = self.wire.recording().traces.then(|| self.described(self.wire.next_packet(path), connection, &segment));
         let parcel = self.spare.wrapped(addresses, segment);
         // A segment over a path that is cut is lost like any other packet.
@@ -109,7 +111,7 @@ impl Core {
         }
     }
 
-    /// Delivers the next packet that does not leave its host. Returns whether there was one.
+    /// Delivers the next packet of loopback. Returns whether a packet was waiting.
     pub(in crate::core) fn take_from_loopback(&mut self) -> bool {
         let Some((host, segment)) = self.tcp.loopback.pop_front() else { return false };
         // Fates of packets are recorded for links only. Loopback is not part of the network.

@@ -100,7 +100,7 @@ impl Ports {
         }
     }
 
-    /// Returns the dynamic ports in the order in which they are tried. Ports given longest ago come first.
+    /// Returns the dynamic ports in the order of trial. Ports given longest ago come first.
     fn turn(&self, host: NodeId) -> impl Iterator<Item = u16> + use<> {
         let first = self.next[host.index()];
         (0..COUNT).map(move |step| FIRST_DYNAMIC + (first + step) % COUNT)
@@ -118,6 +118,7 @@ impl Core {
         let Sharing { is_shared, is_only_six } = sharing;
         let (ip, port) = (wanted.ip(), wanted.port());
         let port = if port == 0 {
+            // A socket that hears both versions of IP needs a port that is free in both.
             let is_held = |port: u16| self.tcp.ports.at(host, port).iter().any(|hold| hold.hears(ip) || is_dual(ip, is_only_six));
             let free = self.tcp.ports.turn(host).find(|port| !is_held(*port) && !self.has_connections(host, *port));
             free.ok_or_else(|| self.no_port(host, io::ErrorKind::AddrInUse))?
@@ -183,6 +184,9 @@ impl Core {
     }
 
     fn no_port(&self, host: NodeId, kind: io::ErrorKind) -> io::Error {
-        io::Error::new(kind, format!("all {COUNT} dynamic ports of host `{}` are taken", self.plan.names()[host.index()]))
+        io::Error::new(
+            kind,
+            format!("all {COUNT} dynamic ports of host `{}` are taken; drop sockets that are no longer used", self.plan.names()[host.index()]),
+        )
     }
 }

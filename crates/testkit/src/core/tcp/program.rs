@@ -40,7 +40,7 @@ impl End {
 }
 
 impl Core {
-    /// Checks that the socket lives. It does not after a crash of its host, or after the program of the host was killed.
+    /// Checks that the socket lives. A crash of the host, or a kill of the host's program, ends the socket.
     pub(in crate::core) fn check_gone(&self, gone: Option<Gone>, host: NodeId, local: impl Display) -> io::Result<()> {
         let Some(Gone { at, is_killed }) = gone else { return Ok(()) };
         let name = &self.plan.names()[host.index()];
@@ -60,8 +60,8 @@ impl Core {
         [end.machine.local_addr(), end.machine.peer_addr()].map(|address| end.shown(address))
     }
 
-    /// Returns what would not block now, as the `poll` of Linux tells: reading, writing, the end of reading, and the end of writing. Writing has ended when both
-    /// directions have: after a shutdown of the own direction alone the system does not tell so.
+    /// Returns what would not block now, as the `poll` of Linux tells: reading, writing, the end of reading, and the end of writing. Writing has ended when
+    /// both directions have: after a shutdown of the own direction alone the system does not tell so.
     #[cfg(feature = "facade")]
     pub(crate) fn readiness(&self, id: ConnId) -> [bool; 4] {
         let [readable, writable] = self.is_ready(id);
@@ -164,7 +164,7 @@ impl Core {
         }
     }
 
-    /// Returns whether [`Core::read`] and [`Core::write`] would do other than wait.
+    /// Returns whether [`Core::read`] and [`Core::write`] would return at once.
     pub(crate) fn is_ready(&self, id: ConnId) -> [bool; 2] {
         let end = self.tcp.end(id);
         if end.gone.is_some() { [true; 2] } else { [end.machine.is_readable(), !end.is_write_blocked] }

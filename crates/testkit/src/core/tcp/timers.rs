@@ -10,8 +10,8 @@ use super::{ConnId, Core, Tcp};
 
 /// Deadlines of connections, sorted by time, host and connection.
 ///
-/// Most deadlines move on with each segment, and few are reached. So the entry of a connection may lie before its deadline: such an entry moves when it comes
-/// to the front. A deadline that moves back moves its entry at once, so that no entry lies after its deadline.
+/// Most deadlines move on with each segment, and few are reached. So the entry of a connection may lie before the deadline: such an entry moves on once the
+/// entry is at the front. A deadline that moves back moves the entry at once, so that no entry lies after a deadline.
 #[derive(Debug, Default)]
 pub(super) struct Timers(BTreeSet<(Instant, NodeId, ConnId)>);
 

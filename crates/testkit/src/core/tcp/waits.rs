@@ -38,7 +38,7 @@ impl Core {
             if is_held_back {
                 let reader = if peer.ip().is_loopback() { Some(end.host) } else { self.plan.owner_node(peer.ip()) };
                 let reader = reader.map_or("?", |host| &names[host.index()]);
-                text.push_str(&format!("; {} octets wait, since the program of host `{reader}` does not read", info.unacknowledged));
+                text.push_str(&format!("; {} octets wait, because the program of host `{reader}` does not read", info.unacknowledged));
             }
             if info.unread > 0 {
                 text.push_str(&format!("; {} octets are there to be read", info.unread));

@@ -1,7 +1,7 @@
-//! Direction of a Unix stream, or a pipe: the bytes that were written and not read yet, and the tasks that wait at both ends.
+//! Direction of a Unix stream, or a pipe: the written and unread bytes, and the tasks that wait at both ends.
 //!
 //! The limits are those of Linux 6.18, measured by writing pieces of one size until the system refuses. A stream counts the memory of each piece
-//! (`unix_stream_sendmsg`, `SKB_TRUESIZE`), so that many small writes fill it with fewer bytes than few large ones. A pipe counts pages (`pipe_write`).
+//! (`unix_stream_sendmsg`, `SKB_TRUESIZE`), so that many small writes fill a stream with fewer bytes than few large writes. A pipe counts pages (`pipe_write`).
 
 use std::collections::VecDeque;
 use std::io::{IoSlice, IoSliceMut};
@@ -14,7 +14,7 @@ pub(super) const SEND_BUFFER: usize = 212_992;
 /// Largest piece of a stream \[byte\]: a head of one page, and 32 KiB in pages.
 const PIECE: usize = HEAD + 32_768;
 
-/// Bytes that fit into the first page of a piece beside what the kernel keeps there \[byte\].
+/// Bytes that fit into the first page of a piece beside the structures of the kernel \[byte\].
 const HEAD: usize = PAGE - 320;
 
 const PAGE: usize = 4096;
@@ -29,7 +29,7 @@ pub(super) enum Law {
     Pipe,
 }
 
-/// Bytes that were written at once. In a pipe, bytes on one page.
+/// Bytes of a single write. In a pipe, bytes on a page.
 #[derive(Debug)]
 struct Piece {
     bytes: Vec<u8>,
@@ -143,6 +143,7 @@ impl Channel {
         if bytes.is_empty() {
             return Some(0);
         }
+        // As with the edges of `epoll`, a refused writer stays refused until `release` has found enough room.
         if self.is_blocked {
             return None;
         }
@@ -198,7 +199,7 @@ impl Channel {
     }
 }
 
-/// Returns the memory of a piece of a stream \[byte\]: what exceeds the head lies in whole pages, and the head shrinks by what these pages can take.
+/// Returns the memory of a piece of a stream \[byte\]: bytes beyond the head lie in whole pages, and the head shrinks by the rest of the last page.
 fn piece_cost(len: usize) -> usize {
     let pages = pages_of(len.saturating_sub(HEAD));
     buffer_cost(len - pages.min(len)) + pages
@@ -209,7 +210,7 @@ pub(super) const fn pages_of(bytes: usize) -> usize {
     bytes.next_multiple_of(PAGE)
 }
 
-/// Returns the memory of a buffer in one block with `bytes` in it \[byte\]: 256 for the description, and a power of two for bytes and 320 beside them.
+/// Returns the memory of a buffer of `bytes` in one block \[byte\]: 256 for the description, and the power of two that holds the bytes and 320 more.
 pub(super) fn buffer_cost(bytes: usize) -> usize {
     256 + (bytes + 320).next_power_of_two()
 }

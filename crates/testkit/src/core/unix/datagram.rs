@@ -15,7 +15,7 @@ use crate::core::tcp::Gone;
 use crate::core::waking::{Waiters, Woken};
 use crate::errno::Errno;
 
-/// Datagrams that may wait at a socket whose peer is not their sender, less 1: `net.unix.max_dgram_qlen`.
+/// Number of datagrams, less 1, that may wait at a socket if the sender is not the peer of the socket: `net.unix.max_dgram_qlen`.
 const QUEUE: usize = 10;
 
 /// Bytes of a datagram in one block \[byte\]: the rest lies in pages. `SKB_MAX_ALLOC`.
@@ -86,7 +86,7 @@ impl Unix {
             Owner::Nobody => return Errno::ConnectionRefused.fail(),
             Owner::Stream | Owner::Listener(_) => return Errno::WrongType.fail(),
         };
-        // A socket that is connected to another one takes datagrams of that one alone.
+        // A connected socket takes datagrams of its peer alone.
         match self.socket(to).peer {
             Peer::Socket(peer) if peer != from => Errno::NotPermitted.fail(),
             Peer::Nobody | Peer::Socket(_) | Peer::Gone => Ok(to),
@@ -103,7 +103,7 @@ impl Unix {
         }
     }
 
-    /// Takes a socket out of the reach of others: its name, its datagrams, and the connections to it.
+    /// Takes a socket out of the reach of other sockets: frees the name, drops the datagrams, and ends the connections to the socket.
     pub(super) fn leave(&mut self, id: UnixId, woken: &mut Woken) {
         let socket = self.socket_mut(id);
         // The socket of a crashed host has left already, and another one may have the name by now.
@@ -237,7 +237,7 @@ impl Core {
         Ok((count, datagram.from))
     }
 
-    /// Returns the operations that would not block. `waker` is woken when another one does not.
+    /// Returns the operations that would not block. `waker` is woken when a further operation does not block any more.
     pub(crate) fn unix_datagrams_ready(&mut self, id: UnixId, waker: Option<&Waker>) -> io::Result<Ready> {
         self.check_unix_datagrams(id)?;
         let socket = self.unix.socket(id);

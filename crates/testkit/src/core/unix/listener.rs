@@ -20,7 +20,7 @@ pub(super) struct Listener {
     pub(super) name: UnixName,
     /// Maximum number of waiting connections, less 1.
     backlog: usize,
-    /// Ends of the connections to accept, in the order in which they came.
+    /// Ends of the connections to accept, in the order of arrival.
     waiting: VecDeque<UnixId>,
     pub(super) wakers: Waiters,
     pub(super) gone: Option<Gone>,

@@ -1,4 +1,4 @@
-//! Unix sockets and pipes of a run. They live in memory: no packet touches a link, and bytes arrive at the instant at which they were written.
+//! Unix sockets and pipes of a run, in memory: no packet touches a link, and bytes arrive at the instant of the write.
 //!
 //! Names belong to a host: two hosts that bind the same path have two sockets. Everything a call does is over when the call returns, and tasks are woken in the
 //! order in which they began to wait, so that a run repeats itself.
@@ -32,7 +32,7 @@ pub(crate) struct UnixId(u64);
 pub(super) struct Unix {
     /// Number of the next socket or channel.
     next: u64,
-    /// Names that were bound, also those whose socket is gone: as with Linux a path stays.
+    /// Bound names, also of sockets that are gone: as with Linux a path stays.
     names: BTreeMap<(NodeId, UnixName), Owner>,
     ends: BTreeMap<UnixId, End>,
     channels: BTreeMap<UnixId, Channel>,
@@ -98,8 +98,8 @@ impl Unix {
 }
 
 impl Core {
-    /// Ends all Unix sockets and pipes of a host that has crashed, or whose program was killed. They stay in memory as long as a program holds them, so that the
-    /// next call returns the error.
+    /// Ends all Unix sockets and pipes of a host that has crashed, or whose program was killed. A socket stays in memory as long as a program holds the socket,
+    /// so that the next call returns the error.
     pub(super) fn end_unix(&mut self, host: NodeId, gone: Gone) {
         let unix = &mut self.unix;
         let woken = &mut self.woken;
@@ -174,7 +174,7 @@ impl Core {
     }
 }
 
-/// Returns what tasks wait to do; `None` if none waits.
+/// Returns the operations for which tasks wait, in words; `None` if no task waits.
 const fn waits(is_reading: bool, is_writing: bool) -> Option<&'static str> {
     match (is_reading, is_writing) {
         (false, false) => None,

@@ -18,7 +18,7 @@ use crate::errno::Errno;
 pub(super) struct End {
     pub(super) host: NodeId,
     law: Law,
-    /// Name of this end. The end that a listener has accepted has the listener's.
+    /// Name of this end. An accepted end has the name of the listener.
     name: UnixName,
     peer: UnixName,
     /// `true` if the name ends with this end.
@@ -67,7 +67,7 @@ impl Unix {
         (reader.incoming, reader.peer) = (Some(channel), own);
     }
 
-    /// Closes an end, as its process does at its end. The end itself remains until [`Core::drop_unix`].
+    /// Closes an end, as the end of a process does. The entry remains until [`Core::drop_unix`].
     pub(super) fn close(&mut self, id: UnixId, woken: &mut Woken) {
         let end = self.end_mut(id);
         let (host, name) = (end.host, end.name.clone());
@@ -77,6 +77,7 @@ impl Unix {
         if let Some(id) = incoming
             && let Some(channel) = self.channels.get_mut(&id)
         {
+            // As with Linux, an end that closes with unread bytes resets the peer, which reads `ECONNRESET`.
             is_unread = !channel.is_empty();
             channel.clear();
             channel.is_unread = true;
@@ -96,7 +97,7 @@ impl Unix {
         }
     }
 
-    /// Notes that one end uses a channel no more, and removes the channel after the second.
+    /// Notes that an end no longer uses a channel, and removes the channel after the second end.
     fn forget(&mut self, id: UnixId) {
         let Some(channel) = self.channels.get_mut(&id) else { return };
         channel.users -= 1;

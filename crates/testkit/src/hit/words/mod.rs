@@ -10,7 +10,7 @@ use cohaptic_units::{parse, print};
 
 use crate::fault::Fault;
 
-/// Hit: the packets of a path that are hit, and the action.
+/// Hit: an action, and the packets of a path to which the action applies.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Hit {
     pub(crate) action: Action,
@@ -69,7 +69,7 @@ const EXPECTED_KINDS: &str = if cfg!(feature = "tcp") {
 };
 
 impl Hit {
-    /// Creates a hit that drops the packets of these numbers, which must ascend.
+    /// Creates a hit that drops the packets with the given numbers, in ascending order.
     pub(crate) fn dropping(numbers: impl IntoIterator<Item = u64>) -> Self {
         let mut ranges = Vec::new();
         numbers.into_iter().for_each(|number| push_number(&mut ranges, number));
@@ -157,6 +157,7 @@ impl<'a> Reader<'a> {
         let action = match word {
             "drop" => Action::Drop,
             "delay" => Action::Delay(self.time()?),
+            // The time is optional: a word that is no time begins the packets.
             "duplicate" if self.peek().is_some_and(|(word, _)| parse::duration(word).is_ok()) => Action::Duplicate(self.time()?),
             "duplicate" => Action::Duplicate(Duration::ZERO),
             "corrupt" => Action::Corrupt,
@@ -224,6 +225,7 @@ fn range(word: &str) -> Option<RangeInclusive<u64>> {
 fn ordinal(word: &str) -> Option<u64> {
     let digits = word.trim_end_matches(|c: char| c.is_ascii_alphabetic());
     let number: u64 = digits.parse().ok().filter(|number| *number > 0)?;
+    // The whole word is compared, so that `2st` and `02nd` are refused.
     (word == format!("{number}{}", suffix(number))).then_some(number)
 }
 
@@ -242,6 +244,7 @@ fn bytes(word: &str) -> Option<Vec<u8>> {
     if let Some(text) = word.strip_prefix('"') {
         return text.strip_suffix('"').map(|text| text.as_bytes().to_vec());
     }
+    // Only ASCII can be cut into pairs of bytes without a cut within a character.
     let digits = word.strip_prefix("0x").filter(|digits| digits.is_ascii() && digits.len() % 2 == 0)?;
     digits.as_bytes().chunks(2).map(|pair| u8::from_str_radix(str::from_utf8(pair).ok()?, 16).ok()).collect()
 }
@@ -275,6 +278,7 @@ impl fmt::Display for Hit {
                 write!(f, " {name}")?;
                 match str::from_utf8(with) {
                     _ if with.is_empty() => Ok(()),
+                    // A text in quotes has no escapes, and hits of a link file stand on one line. Other bytes are written in hexadecimal.
                     Ok(text) if !text.contains(['"', '\n', '\r']) => write!(f, " with \"{text}\""),
                     Ok(_) | Err(_) => {
                         f.write_str(" with 0x")?;

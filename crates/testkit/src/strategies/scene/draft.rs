@@ -75,9 +75,9 @@ pub struct DraftPeer {
     pub offset: u64,
     /// Drift of the clock \[parts per billion\].
     pub drift: i32,
-    /// Initial position of the device, if it differs from that of the object \[m\].
+    /// Initial position of the device \[m\]. `None`: the position of the object.
     pub position: Option<Place>,
-    /// Initial velocity of the device, if it differs from that of the object \[m/s\].
+    /// Initial velocity of the device \[m/s\]. `None`: the velocity of the object.
     pub velocity: Option<Place>,
     /// Keys of the uplink, as TOML.
     pub uplink: Option<String>,

@@ -130,6 +130,7 @@ impl Space for SceneSpace {
         let mut links = Vec::new();
         for part in parts {
             match part {
+                // A peer is found by name, because the removal of another peer has moved the indexes.
                 Part::Peer(name) => {
                     let place = less.draft.peers.iter().position(|peer| peer.name == *name)?;
                     if less.draft.peers.len() == self.least {

@@ -73,6 +73,7 @@ impl<S: Space> Search<S> {
     fn advance(&mut self) -> bool {
         while let Some(candidate) = self.propose() {
             if candidate == self.best || self.passed.contains(&candidate) {
+                // A test depends on the input alone: a candidate that has passed would pass again, and is skipped.
                 self.answer(false);
                 continue;
             }
@@ -174,6 +175,7 @@ impl<P> Parts<P> {
             if candidate.is_some() {
                 return candidate;
             }
+            // The space has no value without this heap, for instance because the value would be outside of the bounds. Halves of the heap may still go.
             self.answer(false);
         }
         None
@@ -184,6 +186,7 @@ impl<P> Parts<P> {
         let Some(mut first) = self.tried.take() else { return };
         if !went && first.len() > 1 {
             let second = first.split_off(first.len() / 2);
+            // The first half comes last, because the last heap is tried next.
             self.heaps.extend([second, first]);
         }
     }

@@ -26,6 +26,7 @@ impl<P: Clone> Numbers<P> {
                 if candidate.is_some() {
                     return candidate;
                 }
+                // A number that the space refuses counts as passed: the bisection then looks for a number nearer to the failing one.
                 bisection.answer(false);
             }
             let place = self.places.next()?;
@@ -90,6 +91,7 @@ impl Bisection {
             Next::Goal => self.passes,
             Next::Nearest => {
                 self.digits = 2;
+                // The neighbour has as many digits as the number itself, so that a number with many digits moves by its last digit.
                 while !is_round(self.fails, self.digits, self.step) && self.digits < 20 {
                     self.digits += 1;
                 }

@@ -37,7 +37,7 @@ pub(in crate::strategies) trait Space: fmt::Debug {
     /// Returns the places of numbers.
     fn places(&self, value: &Self::Value) -> Vec<Self::Place>;
 
-    /// Returns the number at a place, or `None` if there is none.
+    /// Returns the number at a place, or `None` if the place has no number.
     fn number(&self, value: &Self::Value, place: &Self::Place) -> Option<Number>;
 
     /// Returns the value with another number at a place, or `None` if the result is not valid.

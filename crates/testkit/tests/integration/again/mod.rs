@@ -194,9 +194,12 @@ fn a_property_that_fails_prints_one_network_and_one_panic() {
     assert!(text.contains("the smallest input panics at crates/testkit/tests/integration/again/programs.rs:"), "{text}");
     let text = printed("as_many_letters_arrive_as_are_sent", &[]);
     assert!(test_in(&text).contains("    let outcome = Testbed::new([\"client\", \"server\"])\n"), "{text}");
-    assert!(test_in(&text).contains("        .on_tokio()\n        .run(programs::count_letters);\n    // What the test expects"), "{text}");
+    assert!(
+        test_in(&text).contains("        .on_tokio()\n        .run(programs::count_letters);\n    // Write here what the test expects"),
+        "{text}"
+    );
     let text = printed("nodes_hear_every_beat", &[]);
-    assert!(text.contains("nodes with this network meet the same again:\n    .hit(\"client\", \"server\", \"drop packet"), "{text}");
+    assert!(text.contains("the nodes meet the same fates again with this network:\n    .hit(\"client\", \"server\", \"drop packet"), "{text}");
 }
 
 #[test]
@@ -243,7 +246,7 @@ fn the_trace_of_the_smallest_input_is_kept_and_said() {
     for test in ["every_letter_arrives", "as_many_letters_arrive_as_are_sent"] {
         let base = tempfile::tempdir().unwrap();
         let text = printed(test, &[(ARTEFACTS_VARIABLE, base.path().to_str().unwrap())]);
-        let said: Vec<&str> = text.lines().filter_map(|line| line.strip_prefix("what happened is in ")).collect();
+        let said: Vec<&str> = text.lines().filter_map(|line| line.strip_prefix("the record of the run is in ")).collect();
         let [folder] = said[..] else { panic!("one folder is expected:\n{text}") };
         let trace = std::fs::read_to_string(std::path::Path::new(folder).join("trace.txt")).unwrap();
         assert_eq!(trace.lines().filter(|line| line.ends_with(" lost: loss")).count(), 1, "{trace}");

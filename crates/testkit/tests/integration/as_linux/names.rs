@@ -32,7 +32,7 @@ fn names_stand_for_the_addresses_of_both_versions() {
         assert_eq!(found((&bed.host("b"), 80)).await, "[fd00::2]:80 10.0.0.2:80");
     });
     let panic = catch_unwind(|| Testbed::new(["Host", "host."])).unwrap_err();
-    assert_eq!(panic.downcast_ref::<String>().unwrap(), "two hosts are called `host.`");
+    assert!(panic.downcast_ref::<String>().unwrap().starts_with("two hosts have the name `host.`"));
 }
 
 #[test]
@@ -104,7 +104,7 @@ fn a_test_chooses_addresses() {
         assert_eq!(timed(&bed, socket.send_to(b"x", "192.168.1.11:80")).await.0, Some(101));
     });
     for (act, text) in [
-        (Box::new(|| drop(Testbed::new(["a"]).address("a", [127, 0, 0, 1]))) as Box<dyn Fn()>, "127.0.0.1 is no address of a host"),
+        (Box::new(|| drop(Testbed::new(["a"]).address("a", [127, 0, 0, 1]))) as Box<dyn Fn()>, "127.0.0.1 cannot be the address of a host"),
         (Box::new(|| drop(Testbed::new(["a", "b"]).address("a", [10, 0, 0, 9]).address("b", [10, 0, 0, 9]))), "is the address of host `a` already"),
         (Box::new(|| drop(Testbed::new(["a"]).address("b", [10, 0, 0, 9]))), "there is no host `b`"),
     ] {

@@ -50,9 +50,9 @@ fn tasks_that_never_wait() {
             }
         })
     });
-    assert_begin_shown(&message, ", the task");
+    assert_begin_shown(&message, ", the last of them the task");
     let message = message_of(|| pair().patience(1000).run(|_| async { while time::now() < Instant::from_nanos(1) {} }));
-    assert_begin_shown(&message, ". It is the task");
+    assert_begin_shown(&message, ". The caller is the task");
 }
 
 #[test]
@@ -65,7 +65,7 @@ fn more_bytes_than_the_limit() {
             }
         });
     });
-    let (begin, end) = (message.find(", used by").unwrap(), message.find(", has sent").unwrap());
+    let (begin, end) = (message.find(", used by").unwrap(), message.find(": the test bed holds").unwrap());
     assert_shown(&format!("{}…{}", &message[..begin], &message[end..]));
 }
 
@@ -106,7 +106,7 @@ fn waits_that_never_end() {
 
 #[test]
 fn sockets_without_a_host_and_programs_that_never_end() {
-    let after_place = |message: &str| message.split_once(" is called ").map(|(_, rest)| format!("…is called {rest}")).unwrap();
+    let after_place = |message: &str| message.split_once(" was called ").map(|(_, rest)| format!("…was called {rest}")).unwrap();
     assert_shown(&after_place(&message_of(|| pair().run(|_| async { drop(UdpSocket::bind("0.0.0.0:7").await) }))));
     assert_shown(&after_place(&message_of(|| drop(UdpSocket::bind("0.0.0.0:7")))));
     let message = message_of(|| {
@@ -124,7 +124,7 @@ fn sockets_without_a_host_and_programs_that_never_end() {
 
 #[test]
 fn names_that_nobody_has_and_what_works_inside_a_run_only() {
-    assert_begin_shown(&message_of(|| pair().run(|bed| async move { drop(bed.host("sever")) })), "; the task");
+    assert_begin_shown(&message_of(|| pair().run(|bed| async move { drop(bed.host("sever")) })), "; the name was asked for by");
     let outside = || {
         let _ = time::now();
     };

@@ -151,15 +151,15 @@ fn bounds_that_make_no_sense_are_refused() {
         (LinkBounds::any().loss(3.0..=1.0), "loss: the range from 3% to 1% is empty: expected its end at or above its beginning"),
         (LinkBounds::any().loss(0.0..=101.0), "loss: 101 is not a percentage: expected 0 to 100"),
         (LinkBounds::any().reorder(f64::NAN..=1.0), "reorder: NaN is not a percentage: expected 0 to 100"),
-        (LinkBounds::any().limit(0..=0), "limit: a range with nothing but zero: expected LinkBounds::never(Stage::Limit), or an end above zero"),
+        (LinkBounds::any().limit(0..=0), "limit: the range holds only zero: expected LinkBounds::never(Stage::Limit), or an end above zero"),
         (LinkBounds::any().rate(0..=100), "rate: 0 bit/s: expected 8 bit/s to 1 Tbit/s"),
         (LinkBounds::any().rate(9..=15), "rate: the range from 9bit to 15bit is empty: expected its end at or above its beginning"),
         (LinkBounds::any().slot(us(1)..=Duration::MAX), "slot: 18446744073709551615.999999999s is too long: expected at most 1 hour"),
         (
             LinkBounds::any().delay(us(1)..=us(5)),
-            "jitter of at least 1ms around delays of at most 5µs: expected a delay that may be as long as the least jitter",
+            "the jitter is at least 1ms and the delay at most 5µs: expected a longest delay of at least the least jitter",
         ),
-        (LinkBounds::any().loss_models(&[]), "loss without a model: expected one of random, gemodel and state, or LinkBounds::never(Stage::Loss)"),
+        (LinkBounds::any().loss_models(&[]), "loss has no model: expected one of random, gemodel and state, or LinkBounds::never(Stage::Loss)"),
     ];
     for (bounds, message) in refused {
         assert_eq!(bounds.check().unwrap_err().to_string(), message);
@@ -170,13 +170,13 @@ fn bounds_that_make_no_sense_are_refused() {
 }
 
 #[test]
-#[should_panic(expected = "bounds of links that make no sense: loss: 101 is not a percentage")]
+#[should_panic(expected = "the bounds of links are not valid: loss: 101 is not a percentage")]
 fn a_strategy_within_no_bounds_is_not_made() {
     let _ = networks_like(3, LinkBounds::any().loss(0.0..=101.0));
 }
 
 #[test]
-#[should_panic(expected = "a network of 0 hosts: expected 1 to 1000")]
+#[should_panic(expected = "a network of 0 hosts: expected 1 to 1000 hosts")]
 fn a_network_without_hosts_is_not_made() {
     let _ = networks_like(0, LinkBounds::any());
 }

@@ -79,13 +79,13 @@ fn hosts_are_called_as_columns_are() {
 #[test]
 fn what_is_no_network_is_refused() {
     let refused = [
-        ("", "\"\" does not count hosts: expected a first line such as \"3 hosts\", with 1 to 1000"),
-        ("a -> b: delay 3ms", "\"a -> b: delay 3ms\" does not count hosts: expected a first line such as \"3 hosts\", with 1 to 1000"),
-        ("0 hosts", "\"0 hosts\" does not count hosts: expected a first line such as \"3 hosts\", with 1 to 1000"),
+        ("", "\"\" is not a number of hosts: expected a first line such as \"3 hosts\", with 1 to 1000"),
+        ("a -> b: delay 3ms", "\"a -> b: delay 3ms\" is not a number of hosts: expected a first line such as \"3 hosts\", with 1 to 1000"),
+        ("0 hosts", "\"0 hosts\" is not a number of hosts: expected a first line such as \"3 hosts\", with 1 to 1000"),
         ("2 hosts; a - b", "\"a - b\" is not a link: expected a line such as \"a -> b: delay 24ms\""),
         ("2 hosts; a -> c: loss 1%", "\"a -> c: loss 1%\" is not a link between two of the hosts a to b"),
         ("2 hosts; a -> a: loss 1%", "\"a -> a: loss 1%\" is not a link between two of the hosts a to b"),
-        ("2 hosts; a -> b: loss 1%; a -> b: loss 1%", "the link a -> b is said twice: expected it once"),
+        ("2 hosts; a -> b: loss 1%; a -> b: loss 1%", "the link a -> b is given twice: expected one line for each link"),
         ("2 hosts; a -> b: loss 300%", "a -> b:\nloss 300%\n     ^^^^ expected a percentage from 0 to 100"),
         ("2 hosts; a -> b: delay 1ms 2ms", "a -> b:\ndelay: uniform jitter of 2ms around 1ms begins below zero: expected a jitter of at most 1ms"),
     ];

@@ -166,8 +166,8 @@ fn two_ends_that_write_and_do_not_read_are_stuck_and_named() {
         says(
             &text,
             &[
-                "host `a`: TCP 10.0.0.1:49152 to 10.0.0.2:80 (Established) waits to write; 14752 octets wait, since the program of host `b` does not read",
-                "host `b`: TCP 10.0.0.2:80 to 10.0.0.1:49152 (Established) waits to write; 14752 octets wait, since the program of host `a` does not read",
+                "host `a`: TCP 10.0.0.1:49152 to 10.0.0.2:80 (Established) waits to write; 14752 octets wait, because the program of host `b` does not read",
+                "host `b`: TCP 10.0.0.2:80 to 10.0.0.1:49152 (Established) waits to write; 14752 octets wait, because the program of host `a` does not read",
                 "20000 octets are there to be read",
             ],
         );
