@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cohaptic_measure::fit::{LossFit, LossModel};
+use cohaptic_measure::fit::{Independence, LossFit, LossModel};
 use cohaptic_units::print::{Counted, Span};
 
 use super::ends::Ends;
@@ -65,7 +65,7 @@ fn estimated(scene: &str, estimate: &Estimate) -> String {
         line("no law fits: the link draws from the measured delays, a file that --out writes next to the link".to_owned());
     }
     match goodness.correlation {
-        None => line("\ndelays are as good as independent".to_owned()),
+        None => line(format!("\n{}", without_memory(goodness.independence))),
         Some(correlation) => {
             let [time, lag] = [correlation.time_se_s.map(milliseconds), correlation.lag_one_se.map(|error| format!("{error:.5}"))]
                 .map(|error| error.map_or_else(String::new, |error| format!(" +- {error}")));
@@ -74,6 +74,9 @@ fn estimated(scene: &str, estimate: &Estimate) -> String {
                 milliseconds(correlation.time_s),
                 correlation.lag_one
             ));
+            if let Some(rest) = goodness.independence.filter(|rest| !rest.holds()) {
+                line(format!("it is NOT all of their memory, and the link leaves the rest out: {}", found(&rest)));
+            }
         }
     }
     line(format!("\n  {:<60}{:>12}{:>14}", "loss", "mean", "BIC - best"));
@@ -86,6 +89,27 @@ fn estimated(scene: &str, estimate: &Estimate) -> String {
         text.push_str(&hold_out::words(judged));
     }
     text
+}
+
+/// Returns the figures of a test of independence.
+fn found(test: &Independence) -> String {
+    let Independence { neighbours, neighbours_se, lags, p_value, .. } = test;
+    format!("rank correlation of neighbours {neighbours:.5} +- {neighbours_se:.5}, p-value of {} {p_value:.5}", Counted(*lags, "lag"))
+}
+
+/// Returns the sentences about a link with independent delays: whether the measured delays are independent too.
+fn without_memory(test: Option<Independence>) -> String {
+    let Some(test) = test else { return "delays are independent in the link; no two neighbours arrived to tell whether they were".to_owned() };
+    let found = found(&test);
+    if test.holds() {
+        return format!("delays are as good as independent: {found}");
+    }
+    [
+        format!("delays are NOT independent: {found}"),
+        "no single correlation time describes them, so the link leaves their memory out: its delays are independent.".to_owned(),
+        "--hold-out shows what that changes; a trace of the measurement keeps the memory".to_owned(),
+    ]
+    .join("\n")
 }
 
 fn model(loss: &LossFit) -> String {

@@ -37,8 +37,9 @@ pub struct CorrelationFit {
 const SIGNIFICANT: f64 = 6.634_896_601_021_213;
 
 /// Fits the correlation time. `arrivals` are (sending, delay) \[s\] in the order of sending; `spacing` is the typical gap \[s\], not zero. Returns `None`
-/// if the delays do not differ significantly from independent delays.
-pub(super) fn fit(arrivals: &[(f64, f64)], spacing: f64) -> Option<CorrelationFit> {
+/// if the delays do not differ significantly from independent delays. Also returns the innovations (z' − φz)/√(1 − φ²), which are independent if the correlation
+/// time is all of the memory.
+pub(super) fn fit(arrivals: &[(f64, f64)], spacing: f64) -> Option<(CorrelationFit, Vec<f64>)> {
     let scores = normal_scores(&arrivals.iter().map(|arrival| arrival.1).collect::<Vec<_>>());
     // Packets sent at the same instant tell nothing about time.
     let steps: Vec<[f64; 3]> = arrivals
@@ -70,14 +71,17 @@ pub(super) fn fit(arrivals: &[(f64, f64)], spacing: f64) -> Option<CorrelationFi
     let relative_error = standard_error(log_time, 1e-3, |log_time| profile(&steps, log_time.exp()));
     let time_s = log_time.exp();
     let lag_one = (-spacing / time_s).exp();
-    Some(CorrelationFit {
+    let innovation = |&[gap, z, next]: &[f64; 3]| (next - (-gap / time_s).exp() * z) / (-(-2.0 * gap / time_s).exp_m1()).sqrt();
+    let innovations = steps.iter().map(innovation).collect();
+    let fit = CorrelationFit {
         time_s,
         time_se_s: relative_error.map(|error| (NORMAL_975 * error).exp_m1() / NORMAL_975 * time_s),
         lag_one,
         // By dφ/d ln τ = φ·Δ/τ.
         lag_one_se: relative_error.map(|error| error * lag_one * spacing / time_s),
         likelihood_ratio,
-    })
+    };
+    Some((fit, innovations))
 }
 
 /// Returns ln L with an estimated variance of z, up to a constant. Only this curvature tells the real error, because normal scores have the scale of the
@@ -134,13 +138,15 @@ mod tests {
     #[test]
     fn the_correlation_time_is_found_within_its_standard_error() {
         for (seed, time, even) in [(1, 0.02, true), (2, 0.2, true), (3, 0.02, false), (4, 0.2, false)] {
-            let fit = fit(&arrivals(seed, time, even), 0.008).unwrap();
+            let (fit, innovations) = fit(&arrivals(seed, time, even), 0.008).unwrap();
             let se = fit.time_se_s.unwrap();
             // Compared in the logarithm, because the error of the logarithm does not depend on the estimate.
             assert!((fit.time_s / time).ln().abs() < 4.0 * se / fit.time_s, "{fit:?}");
             assert!(se < 0.1 * time, "{fit:?}");
             let rho = (-0.008 / time).exp();
             assert!((fit.lag_one - rho).abs() < 4.0 * fit.lag_one_se.unwrap(), "{fit:?}");
+            // One correlation time is all of the memory, so that nothing is left.
+            assert!(super::super::independence::test(&innovations.into_iter().map(Some).collect::<Vec<_>>()).unwrap().holds());
             // With even gaps and few losses the standard error is that of an autoregression, √((1 − φ²)/n), of 18 000 to 20 000 packets.
             if even {
                 let theory = ((1.0 - rho * rho) / 19_000.0).sqrt();

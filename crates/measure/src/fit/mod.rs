@@ -23,6 +23,7 @@ mod correlation;
 mod distribution;
 mod hidden_markov;
 pub mod hold_out;
+mod independence;
 mod law;
 mod link;
 mod link_delay;
@@ -45,6 +46,7 @@ use serde::Serialize;
 
 pub use correlation::CorrelationFit;
 pub use distribution::LawFit;
+pub use independence::Independence;
 pub use law::DelayLaw;
 pub use link::{FittedJitter, FittedLaw, FittedLink};
 pub use loss::{LossFit, LossModel};
@@ -121,9 +123,13 @@ pub struct Goodness {
     pub kolmogorov_limit: f64,
     /// All laws able to have the moments of the delays. Fitting laws come first, and the first fitting law is the law of the link.
     pub laws: Vec<LawFit>,
-    /// Correlation of the delays; `None` if the delays may be independent.
+    /// Correlation of the delays in the link; `None` if no single correlation time describes them significantly better than independent delays.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub correlation: Option<CorrelationFit>,
+    /// Test of independent delays, without a model of their memory. With a correlation time, the test of what the correlation time does not explain: the
+    /// innovations of the normal scores. `None` if no two neighbours arrived.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub independence: Option<Independence>,
     /// Wilson's interval of the share lost at confidence 0.95. From 300 packets on, batch means take bursts into account. `None` for losses with a too long
     /// memory.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -232,7 +238,11 @@ pub fn fit(measurements: &Measurements) -> Result<Fitted, FitError> {
     let effective = effective(packets);
     let moments = Moments::of(&sorted, effective).expect("delays differ");
     let laws = distribution::fit_all(&cells, &moments, effective);
-    let correlation = correlation::fit(&arrivals, spacing_s);
+    let (correlation, innovations) = correlation::fit(&arrivals, spacing_s).unzip();
+    let tested: Vec<Option<f64>> = match innovations {
+        Some(innovations) => innovations.into_iter().map(Some).collect(),
+        None => packets.iter().map(|packet| packet.delay_s).collect(),
+    };
     let losses = loss::fit_all(&packets.iter().map(|packet| (packet.sent_s, packet.delay_s.is_none())).collect::<Vec<_>>(), evenly_spaced);
     // Batch means need the order of sending, so `sorted` does not serve here.
     let delays: Vec<f64> = arrivals.iter().map(|arrival| arrival.1).collect();
@@ -263,6 +273,7 @@ pub fn fit(measurements: &Measurements) -> Result<Fitted, FitError> {
         kolmogorov_limit: distribution::limit(effective),
         laws: laws.iter().map(|law| law.fit).collect(),
         correlation,
+        independence: independence::test(&tested),
         loss_interval_95: batches::share_interval(&packets.iter().map(|packet| f64::from(u8::from(packet.delay_s.is_none()))).collect::<Vec<_>>()),
         losses,
     };

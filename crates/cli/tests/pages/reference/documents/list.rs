@@ -537,7 +537,9 @@ pub(super) const DOCUMENTS: [Document; 25] = [
             (
                 "goodness.NAME",
                 "what was measured, and how well each law and each model of loss fits: `resolution_s` of the clock, `effective` number of delays; of each law \
-                 `kolmogorov`, its `p_value`, and whether it `fits`, with a distance of at most `kolmogorov_limit`",
+                 `kolmogorov`, its `p_value`, and whether it `fits`, with a distance of at most `kolmogorov_limit`; \
+                 `independence` of the delays, or of what the correlation time does not explain: rank correlation of `neighbours`, and the `statistic` of several `lags` \
+                 with its `p_value`",
             ),
             ("scene", "the `[link]` table as text"),
             (
