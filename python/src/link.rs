@@ -187,7 +187,7 @@ impl Link {
                 meter.record(record);
                 Ok::<(), Infallible>(())
             };
-            let Ok(sent) = stream.over(&mut link, record, |_| !stop.is_asked());
+            let Ok(sent) = stream.over(&mut link, record, |_, _| !stop.is_asked());
             let asked = Asked::of(&self.model, every, stream.info.size);
             json(&document(&meter.finish(said, asked, [sent, packets], link.stats().cross_traffic()), None))
         })

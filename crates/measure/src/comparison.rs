@@ -209,7 +209,7 @@ mod tests {
                     beside.record(record);
                     Ok::<(), ()>(())
                 },
-                |_| true,
+                |_, _| true,
             )
             .unwrap();
         beside.figures(&Asked::of_config(&config(asked), stream.every, info.size))

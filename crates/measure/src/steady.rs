@@ -25,7 +25,7 @@ impl SteadyStream {
     }
 
     /// Sends the stream over a new link and waits for all arrivals. Calls `on_record` with each fate in order of time. Calls `keep_going` before every
-    /// 1024th packet with the number of packets sent so far; `false` ends the stream. Returns the number of packets sent.
+    /// 64th packet with the number of packets sent so far and the link; `false` ends the stream. Returns the number of packets sent.
     ///
     /// # Errors
     ///
@@ -34,7 +34,7 @@ impl SteadyStream {
         &self,
         link: &mut Link<()>,
         mut on_record: impl FnMut(&PacketRecord) -> Result<(), E>,
-        mut keep_going: impl FnMut(u64) -> bool,
+        mut keep_going: impl FnMut(u64, &Link<()>) -> bool,
     ) -> Result<u64, E> {
         let mut drain = |link: &mut Link<()>| {
             while let Some(event) = link.poll_event() {
@@ -43,7 +43,7 @@ impl SteadyStream {
             Ok(())
         };
         let mut sent = 0;
-        while sent < self.packets && (!sent.is_multiple_of(1024) || keep_going(sent)) {
+        while sent < self.packets && (!sent.is_multiple_of(64) || keep_going(sent, link)) {
             // Cannot fail: the instants grow with the number, and no other code uses the link.
             let _ = link.handle_packet(self.sent(sent), self.info, ());
             sent += 1;
@@ -80,7 +80,7 @@ mod tests {
                 records.push(*record);
                 Ok::<(), ()>(())
             },
-            |_| true,
+            |_, _| true,
         );
         assert_eq!(sent, Ok(3000));
         assert_eq!(records.len(), 3000);
@@ -99,9 +99,9 @@ mod tests {
                 heard += 1;
                 Ok::<(), ()>(())
             },
-            |sent| sent < 2048,
+            |sent, _| sent < 2048,
         );
         assert_eq!((sent, heard), (Ok(2048), 2048));
-        assert_eq!(STREAM.over(&mut link(), |record| if record.sequence < 7 { Ok(()) } else { Err(record.sequence) }, |_| true), Err(7));
+        assert_eq!(STREAM.over(&mut link(), |record| if record.sequence < 7 { Ok(()) } else { Err(record.sequence) }, |_, _| true), Err(7));
     }
 }

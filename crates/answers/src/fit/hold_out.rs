@@ -48,7 +48,7 @@ fn packets_of(config: LinkConfig, every: Duration) -> Measurements {
             }
             Ok::<(), Infallible>(())
         },
-        |_| true,
+        |_, _| true,
     );
     debug_assert_eq!(sent, Ok(PACKETS));
     let packets = (0..).zip(delays).map(|(number, delay_s)| Measurement { sent_s: stream.sent(number).as_secs_f64(), delay_s });

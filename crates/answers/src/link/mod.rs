@@ -11,7 +11,7 @@ use cohaptic_measure::steady::SteadyStream;
 use cohaptic_wan::{CrossCounts, PacketRecord};
 
 pub use document::{Written, document};
-pub use picture::LinkPicture;
+pub use picture::{CrossSamples, LinkPicture};
 pub use words::words;
 
 /// Greatest number of packets in the figures. Each packet takes 127 bytes during the computation, half a gigabyte in all.

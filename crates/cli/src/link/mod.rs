@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant as Clock;
 
-use cohaptic_answers::link::{LinkPicture, Measured, Meter, Written, too_long};
+use cohaptic_answers::link::{CrossSamples, LinkPicture, Measured, Meter, Written, too_long};
 use cohaptic_files::WholeFile;
 use cohaptic_measure::fates::FateWriter;
 use cohaptic_measure::pcapng::CaptureWriter;
@@ -57,13 +57,17 @@ fn drive(arguments: &LinkArguments, spec: Spec) -> Result<(Measured, Written), F
     let mut meter = Meter::default();
     let progress = Progress::new(wanted, "{bar:30} {percent:>3} %  {pos}/{len} packets, {eta} left");
     let start = Clock::now();
+    let mut crossed = CrossSamples::default();
     let sent = stream.over(
         &mut link,
         |record| {
             meter.record(record);
             sinks.write(record)
         },
-        |sent| {
+        |sent, link| {
+            if arguments.picture.is_some() {
+                crossed.record(stream.sent(sent), link.stats().cross_traffic());
+            }
             // The packets sent so far are a result, so a signal ends the stream and the report covers these packets.
             progress.reach_number(sent);
             interrupt::has_results();
@@ -72,10 +76,12 @@ fn drive(arguments: &LinkArguments, spec: Spec) -> Result<(Measured, Written), F
     )?;
     let wall_s = start.elapsed().as_secs_f64();
     progress.clear();
-    let files = sinks.finish(&spec.said)?;
+    let cross_traffic = link.stats().cross_traffic();
+    crossed.record(stream.sent(sent), cross_traffic);
+    let files = sinks.finish(&spec.said, &crossed)?;
     #[expect(clippy::cast_precision_loss, reason = "for people")]
     let packets_per_s = sent as f64 / wall_s;
-    Ok((meter.finish(spec.said, spec.asked, [sent, wanted], link.stats().cross_traffic()), Written { packets_per_s, files }))
+    Ok((meter.finish(spec.said, spec.asked, [sent, wanted], cross_traffic), Written { packets_per_s, files }))
 }
 
 /// Files for the packets of a link.
@@ -112,10 +118,10 @@ impl Sinks {
     }
 
     /// Completes the files, and returns their names. `said` is the link in words.
-    fn finish(self, said: &str) -> Result<Vec<String>, Failure> {
+    fn finish(self, said: &str, crossed: &CrossSamples) -> Result<Vec<String>, Failure> {
         let fates = self.fates.map(|(path, writer)| (path, writer.finish()));
         let capture = self.capture.map(|(path, writer)| (path, writer.finish()));
-        let picture = self.picture.map(|(mut file, path, picture)| (path, file.write_all(picture.svg(said).as_bytes()).map(|()| file)));
+        let picture = self.picture.map(|(mut file, path, picture)| (path, file.write_all(picture.svg(said, crossed).as_bytes()).map(|()| file)));
         let mut files = Vec::new();
         for (path, file) in fates.into_iter().chain(capture).chain(picture) {
             file.and_then(WholeFile::finish).map_err(unwritten(&path))?;

@@ -62,7 +62,7 @@ fn measured(seed: u64, config: LinkConfig) -> (Asked, Vec<Figure>, Achieved) {
                 beside.record(record);
                 accumulator.record(record)
             },
-            |_| true,
+            |_, _| true,
         )
         .unwrap();
     let figures = beside.figures(&asked);
