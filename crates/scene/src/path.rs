@@ -21,6 +21,11 @@ pub enum Leave {
 }
 
 impl PathTask {
+    /// Returns whether points are the corners of a line: at least two, of which neighbours are apart.
+    pub(crate) fn is_line(points: &[[f64; 3]]) -> bool {
+        points.len() >= 2 && points.windows(2).all(|corners| distance(corners[0], corners[1]) > 0.0)
+    }
+
     /// Returns the length of the line \[m\].
     #[must_use]
     pub fn length(&self) -> f64 {

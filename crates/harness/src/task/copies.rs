@@ -212,7 +212,7 @@ impl Group {
 
     /// Judges an instant of a task that follows a path, with the progress of this instant. Returns whether all copies are at the end, or the failure of a copy
     /// that has left the lane.
-    pub(super) fn follow(&mut self, at: Instant, path: &PathTask, copies: &mut [Copy], on_row: OnRow<'_>) -> Result<bool, Failure> {
+    pub(super) fn follow(&self, at: Instant, path: &PathTask, copies: &mut [Copy], on_row: OnRow<'_>) -> Result<bool, Failure> {
         for copy in &mut copies[self.places()] {
             let (is_inside, peer) = (copy.error <= 0.5 * path.width, copy.peer);
             let has_left = copy.is_inside && !is_inside;

@@ -224,7 +224,7 @@ impl Judge {
         let (gap, [Some(one), Some(other)]) = (self.gap()?, self.devices) else { return None };
         let is_beyond = !(gap.min..=gap.max).contains(&distance(one, other, self.axes));
         // Only a judged peer can fail. There is one, because a task without is refused.
-        let peer = self.copies.iter().find(|copy| gap.peers.contains(&copy.peer)).or(self.copies.first())?.peer;
+        let peer = self.copies.iter().find(|copy| gap.peers.contains(&copy.peer)).or_else(|| self.copies.first())?.peer;
         is_beyond.then_some(Failure { peer, reason: FailureReason::Gap })
     }
 

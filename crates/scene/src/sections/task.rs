@@ -198,7 +198,7 @@ fn read_path(table: &mut TableReader<'_>, walls: Option<Option<Enclosure>>, cont
     table.require("width", RADIUS);
     let points = table.maybe("points", |node, file| {
         let points = read_targets(node, walls, context)?;
-        if points.len() < 2 || points.windows(2).any(|pair| pair[0] == pair[1]) {
+        if !PathTask::is_line(&points) {
             file.fault_at(node, format!("no line: expected {POINTS}"));
             return None;
         }
@@ -211,8 +211,8 @@ fn read_path(table: &mut TableReader<'_>, walls: Option<Option<Enclosure>>, cont
 
 fn read_carry(table: &mut TableReader<'_>, walls: Option<Option<Enclosure>>, context: SceneContext<'_>) -> Option<Carry> {
     let reach = read_reach(table, walls, context);
-    let has_limit = table.get("level").or(table.get("gap")).is_some();
-    if !has_limit {
+    let (has_level, has_gap) = (table.get("level").is_some(), table.get("gap").is_some());
+    if !(has_level || has_gap) {
         table.miss("gap", "a table such as { peers = [\"left\", \"right\"], max = 0.1 }, or level, an angle [rad]");
     }
     let turns = table.only_if(context.turns, "level", "this is about an object that turns: expected object.inertia, or no such key");
