@@ -326,6 +326,23 @@ impl DelayStage {
         }
     }
 
+    /// Returns whether delays are drawn from a normal number alone, so that [`nanos_at_once`](Self::nanos_at_once) knows most of them.
+    pub(crate) const fn is_from_normal(&self) -> bool {
+        matches!(self.law, StageLaw::FromNormal(_))
+    }
+
+    /// Returns the delays \[ns\] of several packets with these first random words for jitter, or [`Law::UNKNOWN`] for the few delays that need further words or
+    /// more digits, and for all delays of a law that is not drawn from a normal number.
+    #[inline(always)]
+    pub(crate) fn nanos_at_once<const N: usize>(&self, words: &[u64; N]) -> [u64; N] {
+        let StageLaw::FromNormal(checked) = &self.law else { return [Law::UNKNOWN; N] };
+        let mut z = [0.0; N];
+        for (z, word) in z.iter_mut().zip(words) {
+            *z = in_the_core_or_nan(*word);
+        }
+        checked.law.whole_at_normals(&z)
+    }
+
     /// Returns a delay \[ns\] of the laws without inline draw.
     #[inline(never)]
     fn draw_by_law(&mut self, purpose: Purpose, now: Instant, word: u64, packet: PacketDraws) -> u64 {

@@ -88,6 +88,18 @@ impl GammaMap {
         }
     }
 
+    /// Computes [`GammaMap::nearly`] of several numbers.
+    #[inline(always)]
+    pub(super) fn nearly_all<const N: usize>(&self, z: &[f64; N], x: &mut [f64; N]) {
+        let Some(logarithms) = &self.logarithms else {
+            return x.iter_mut().zip(z).for_each(|(x, z)| *x = sum(&self.cells, *z));
+        };
+        x.iter_mut().zip(z).for_each(|(x, z)| *x = sum(logarithms, *z));
+        for x in x {
+            *x = if *x < -100.0 { 0.0 } else { exp_nearly(*x) };
+        }
+    }
+
     /// Returns the terms of each cell, NaN without an accurate series, and the cell's left edge.
     pub(super) fn series(&self) -> impl Iterator<Item = ([f64; TERMS], f64)> {
         self.cells.iter().zip(0..).map(|(cell, number)| (cell.terms(), f64::from(number) / DENSITY - RANGE))

@@ -4,6 +4,7 @@ use cohaptic_units::Instant;
 
 use super::chains::Chains;
 use super::losses::{Losses, Verdict};
+use crate::laws::delay::Law;
 use crate::line::direct::Words;
 use crate::random::{PacketDraws, Purpose, Stream};
 use crate::stages::config::{Layout, LinkConfig};
@@ -24,6 +25,8 @@ pub(super) struct Kind {
     line: Line,
     /// Computation for eight links at once; `None` without correlated delays, with a rate, or where [`Chains::new`] returns `None`.
     pub(super) chains: Option<Chains>,
+    /// `true` if the links have no state, and delays that are best drawn for several links at once.
+    pub(super) draws_jointly: bool,
 }
 
 /// The transmitter of a link and its queue, for packets of one size.
@@ -78,7 +81,9 @@ impl Kind {
             (Delays::Correlated(delays), Line::Free(0)) if !keeps_order => Chains::new(&loss, delays),
             (Delays::Correlated(_) | Delays::Independent(_), _) => None,
         };
-        Some(Self { is_random: config.is_random(), keeps_order, loss, delay, line, chains })
+        let is_from_normal = matches!(&delay, Delays::Independent(delay) if delay.is_from_normal());
+        let kind = Self { is_random: config.is_random(), keeps_order, loss, delay, line, chains, draws_jointly: false };
+        Some(Self { draws_jointly: is_from_normal && !kind.remembers(), ..kind })
     }
 
     /// Returns whether links of this kind have state.
@@ -112,6 +117,27 @@ impl Kind {
                 Verdict::Arrives(leaves.saturating_add_nanos(delay.draw_nanos(leaves, jitter_word, packet)))
             }
             (_, Delays::Correlated(_)) => unreachable!("it remembers the delay before"),
+        }
+    }
+
+    /// Returns the delays of a packet of each of several links without state \[ns\], or [`Law::UNKNOWN`] where [`Kind::fate`] must draw the delay.
+    #[inline(always)]
+    pub(super) fn delays<const N: usize>(&self, words: &[Words; N]) -> [u64; N] {
+        let Delays::Independent(delay) = &self.delay else { return [Law::UNKNOWN; N] };
+        let mut of_jitter = [0; N];
+        for (of_jitter, [_, word]) in of_jitter.iter_mut().zip(words) {
+            *of_jitter = *word;
+        }
+        delay.nanos_at_once(&of_jitter)
+    }
+
+    /// Computes the fate of a packet of a link without state like [`Kind::fate`], with a delay \[ns\] that is known.
+    #[inline(always)]
+    pub(super) fn fate_of_known(&self, now: Instant, loss_word: u64, nanos: u64) -> Verdict {
+        match (&self.loss, self.line) {
+            (Losses::Independent(probability), _) if probability.happens(loss_word) => Verdict::Lost,
+            (_, Line::Free(time)) => Verdict::Arrives(now.saturating_add_nanos(time).saturating_add_nanos(nanos)),
+            (_, Line::Queued(_)) => unreachable!("it remembers when the packet before left"),
         }
     }
 

@@ -18,6 +18,7 @@ use switching::Switching;
 use super::id::LinkId;
 use crate::fates::fate::DropCause;
 use crate::fates::stats::LinkStats;
+use crate::laws::delay::Law;
 use crate::line::direct::{Direct, Words};
 use crate::line::model::LinkModel;
 use crate::line::name::LinkName;
@@ -244,9 +245,15 @@ impl DirectLinks {
             [(_, Kind { chains: Some(_), .. })] => self.offer_one_by_one(now, first, count, excluded, arrivals),
             _ if CHAINS => self.offer_one_by_one(now, first, count, excluded, arrivals),
             // `remembered` may be shorter than `links` only where several kinds exist, so with one kind the range is valid.
-            [(_, kind)] if self.others.is_empty() && self.remembered.is_empty() => alike::<false>(kind, (links, &mut []), span, excluded, arrivals),
+            // Inlined into the driver's loop, which may be compiled for wider registers than a function of its own.
+            [(_, kind)] if self.others.is_empty() && self.remembered.is_empty() && kind.draws_jointly => {
+                alike::<false, true>(kind, (links, &mut []), span, excluded, arrivals);
+            }
+            [(_, kind)] if self.others.is_empty() && self.remembered.is_empty() => {
+                alike::<false, false>(kind, (links, &mut []), span, excluded, arrivals);
+            }
             [(_, kind)] if self.others.is_empty() => {
-                alike::<true>(kind, (links, &mut self.remembered[first..first + count]), span, excluded, arrivals);
+                alike::<true, false>(kind, (links, &mut self.remembered[first..first + count]), span, excluded, arrivals);
             }
             _ => self.offer_one_by_one(now, first, count, excluded, arrivals),
         }
@@ -422,10 +429,10 @@ fn draw(is_random: bool, links: &[LinkState], sequences: &mut [u64; DirectLinks:
     words
 }
 
-/// Offers a packet to each of these links of one kind, with state if `REMEMBER` is set. All draws come before all verdicts. The verdict is chosen by a constant
-/// rather than given as a closure, so the verdict is inlined into the loop.
+/// Offers a packet to each of these links of one kind, with state if `REMEMBER` is set, and with delays drawn for all of them together if `JOINTLY` is set. All
+/// draws come before all verdicts. The verdict is chosen by constants rather than given as a closure, so the verdict is inlined into the loop.
 #[inline(always)]
-fn alike<const REMEMBER: bool>(
+fn alike<const REMEMBER: bool, const JOINTLY: bool>(
     kind: &mut Kind,
     (links, remembered): (&mut [LinkState], &mut [Remembered]),
     (now, until): (Instant, Instant),
@@ -433,13 +440,18 @@ fn alike<const REMEMBER: bool>(
     arrivals: &mut Arrivals,
 ) {
     let words = draw(kind.is_random, links, &mut arrivals.sequences);
+    let delays = if JOINTLY { kind.delays(&words) } else { [Law::UNKNOWN; DirectLinks::AT_ONCE] };
     let (mut bit, mut arrive, mut overtake) = (1, 0, 0);
     for place in 0..links.len().min(DirectLinks::AT_ONCE) {
         let (link, words) = (&mut links[place], words[place]);
         // An excluded link counts no packet, so its next packet has the same number and random words.
         if excluded & bit == 0 {
             let draws = link.draws.packet(link.offered);
-            let verdict = if REMEMBER { kind.verdict(now, &mut remembered[place], words, draws) } else { kind.fate(now, words, draws) };
+            let verdict = match delays[place] {
+                _ if REMEMBER => kind.verdict(now, &mut remembered[place], words, draws),
+                nanos if JOINTLY && nanos != Law::UNKNOWN => kind.fate_of_known(now, words[0], nanos),
+                _ => kind.fate(now, words, draws),
+            };
             link.offered += 1;
             match verdict {
                 Verdict::Arrives(arrival) => {

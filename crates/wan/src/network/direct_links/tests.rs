@@ -122,6 +122,29 @@ fn lines_without_wait_decide_what_whole_links_decide() {
     }
 }
 
+/// Delays of lognormal and gamma laws without correlation are drawn for several links together: with loss and without, in order, and behind a line on which no packet
+/// waits. The last law is nearly always at its floor, and has series of logarithms.
+#[test]
+fn delays_that_are_drawn_together_are_those_of_whole_links() {
+    let us = Duration::from_micros;
+    for (law, mean, sd, floor) in [
+        (Distribution::LogNormal, us(44_300), us(98_890), us(1_500)),
+        (Distribution::Gamma, us(24_000), us(6_000), us(0)),
+        (Distribution::Gamma, us(11_350), us(6_300), us(9_950)),
+    ] {
+        let delay = Delay::with_jitter(mean, Jitter { floor, ..Jitter::new(sd, law) }).unwrap();
+        for (loss, order, rate) in
+            [("", Order::AllowReordering, false), ("loss 20%", Order::InOrder, false), ("loss 20%", Order::AllowReordering, true)]
+        {
+            let config = LinkConfig { delay: delay.clone(), order, layout: Layout::Physical, ..model(loss).as_fixed().unwrap().clone() };
+            let bottleneck = rate.then(|| Bottleneck::at_rate(Rate::bits_per_sec(5_000_000).unwrap()));
+            let load = Load { gap: Duration::from_millis(4), ..OF_TESTS };
+            let link = LinkModel::from(LinkConfig { bottleneck, ..config });
+            compare_under(load, &[const { None }; 8].map(|_: Option<()>| link.clone()));
+        }
+    }
+}
+
 /// After jitter, packets may be closer together than they were offered.
 #[test]
 fn a_bucket_behind_jitter_needs_an_engine() {
