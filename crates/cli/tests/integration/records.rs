@@ -235,7 +235,7 @@ fn links_agree_with_the_document() {
         .replace("uplink = { rate = \"100kbit\",", "uplink = { rate = \"100kbit\", cross-traffic.poisson = { rate = \"100kbit\", size = \"100B\" },");
     let desk = Desk::with("three.toml", &scene);
     let document = desk.json("run three.toml --json --out out");
-    let cross = |counters: &Value, count: &str| counters.get("cross_traffic").map_or(json!(0), |counts| counts[count].clone());
+    let cross = |counters: &Value, count: &str| counters.get("cross_traffic").map_or_else(|| json!(0), |counts| counts[count].clone());
     assert!(cross(&document["access_lines"][0], "dropped").as_u64().unwrap() > 0);
     let table = Table::read(&desk, "out/links.csv");
     let links = links_of(&document);
