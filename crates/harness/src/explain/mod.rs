@@ -348,7 +348,8 @@ impl Rows {
                 || matches!(&change.what, ChangeKind::AllLinks(links) if links.configs().iter().any(|link| link.has_chance()))
         });
         let lines_are_random = access_lines(scene).iter().any(|(_, _, line)| line.has_chance());
-        if used.iter().all(|(config, _)| !config.has_chance()) && !lines_are_random && !timeline_is_random {
+        let people_are_random = operators::has_noise(scene);
+        if used.iter().all(|(config, _)| !config.has_chance()) && !lines_are_random && !timeline_is_random && !people_are_random {
             self.leave_out("random numbers: no link leaves anything to chance");
         }
     }

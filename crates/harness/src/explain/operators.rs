@@ -49,9 +49,15 @@ fn described(scene: &Scene, peer: usize, spec: &PeerSpec) -> Option<(String, &'s
     Some((format!("{law}; {seen}; {arm}"), reason))
 }
 
+/// Returns whether the movements of a person leave anything to chance.
+pub(super) fn has_noise(scene: &Scene) -> bool {
+    let noisy = |law: &OperatorLaw| matches!(law, OperatorLaw::Moves(moves) if moves.noise > 0.0);
+    (0..scene.peers.len()).filter_map(|peer| scene.operator(peer)).any(|operator| noisy(&operator.law))
+}
+
 fn of_moves(moves: &MovesConfig, expects: &Span) -> String {
     let MovesConfig { reaction, duration, speed, step, noise, learns, expects: _ } = moves;
-    let mut text = format!("moves: of {}, the first after {}", Span(*duration), Span(*reaction));
+    let mut text = format!("movements of {}, the first after {}", Span(*duration), Span(*reaction));
     if let Some(speed) = speed {
         text.push_str(&format!(", with at most {} m/s", Number(*speed)));
     }

@@ -148,11 +148,13 @@ fn operators_are_described_with_their_parameters() {
         let scene = Scene::parse(text, Path::new("x.toml"), &overrides).unwrap_or_else(|error| panic!("{error}"));
         let explanation = explain(&scene);
         assert!(explanation.left_out.iter().any(|row| row == "arrays: an operator sees and moves at each tick; the run has events"));
+        let draws = !explanation.left_out.iter().any(|row| row.starts_with("random numbers"));
+        assert_eq!(draws, explanation.models.iter().any(|row| row.model.contains("noise 0.1")));
         let rows = explanation.models.into_iter().filter(|row| row.part.starts_with("operator"));
         rows.map(|row| (row.part, row.model)).collect::<Vec<_>>()
     };
     let arm = "an arm of 0.5 kg, 20 N·s/m and 300 N/m";
-    let usual = "moves: of 250ms, the first after 250ms, noise 0.1 of the length; learns the gain by 0.2 of each movement; waits for a delay of";
+    let usual = "movements of 250ms, the first after 250ms, noise 0.1 of the length; learns the gain by 0.2 of each movement; waits for a delay of";
     let row = |part: &str, model: String| (part.to_owned(), model);
     assert_eq!(
         found(&[]),
@@ -162,7 +164,8 @@ fn operators_are_described_with_their_parameters() {
         ]
     );
     let plain = "peer.hand.operator={ speed = 0.5, step = 0.02, noise = 0, learns = 0 }";
-    let limited = "moves: of 250ms, the first after 250ms, with at most 0.5 m/s, at most 0.02 m long; takes the gain for 1; waits for a delay of 0s";
+    let limited =
+        "movements of 250ms, the first after 250ms, with at most 0.5 m/s, at most 0.02 m long; takes the gain for 1; waits for a delay of 0s";
     assert_eq!(found(&[plain]), [row("operator of peer1, peer2", format!("{limited}; sees the own copy, 200ms late; {arm}"))]);
     let tracks = ["task={ kind = \"track\", sines = [{ amplitude = 0.1, frequency = 0.5 }] }", "peer.hand.operator={ visual-delay = \"150ms\" }"];
     let crossover = "crossover: the velocity of the hand is 3 rad/s times the error; sees the own copy, 150ms late";

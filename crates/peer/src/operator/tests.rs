@@ -26,7 +26,11 @@ const PLAIN: MovesConfig = MovesConfig {
     expects: None,
 };
 
-/// Two words of a generator of Weyl and a mixer (splitmix64), for the tests alone.
+fn index(count: u64) -> usize {
+    usize::try_from(count).unwrap()
+}
+
+/// Returns a uniform number of the generator splitmix64 (Steele, Lea & Flood 2014), which the tests alone use.
 fn unit(state: &mut u64) -> f64 {
     *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let mut word = (*state ^ (*state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -107,7 +111,7 @@ proptest! {
         let tick = millis(1);
         let mut operator = Operator::<1>::new(&person(OperatorLaw::Moves(config), millis(visual)), tick, millis(delay + 1), [0.0]);
         let distance = count as f64;
-        let wanted = follow(&mut operator, delay as usize, 2000, |_| distance, 1e-6);
+        let wanted = follow(&mut operator, index(delay), 2000, |_| distance, 1e-6);
         // A place that was wanted over a tick is seen one tick later, and then as much later as the object lags.
         let expected = reaction + count * duration + (count - 1) * (visual + delay + 1);
         let first = wanted.iter().position(|wanted| (wanted - distance).abs() < 1e-9).unwrap();
@@ -121,7 +125,8 @@ proptest! {
         let config = MovesConfig { reaction: Duration::ZERO, speed: Some(speed), ..PLAIN };
         let mut operator = Operator::<1>::new(&person(OperatorLaw::Moves(config), Duration::ZERO), millis(1), Duration::ZERO, [0.0]);
         let view = View { position: [0.0], target: [distance], radius: 1e-3 };
-        let ticks = (250.0_f64 * (1.875 * distance / (speed * 0.25)).max(1.0)).ceil() as usize;
+        let least = 250.0_f64 * (1.875 * distance / (speed * 0.25)).max(1.0);
+        let ticks = (1_u32..).find(|ticks| f64::from(*ticks) >= least).map_or(0, |ticks| index(u64::from(ticks)));
         let wanted: Vec<_> = (0..=ticks).map(|_| operator.tick(&view, |_| [0.0])).collect();
         let peak = wanted.iter().map(|wanted| wanted.velocity[0]).fold(0.0, f64::max);
         prop_assert!(peak <= speed * (1.0 + 1e-12) && (peak >= 0.99 * speed || ticks == 250), "{} of {}", peak, speed);
@@ -142,9 +147,9 @@ fn who_does_not_wait_overshoots_more_and_more() {
         let movements = 60;
         // The target moves once, after three movements of 1 m, so that no error is zero and no movement is left out.
         let target = |tick: usize| if tick < 110 { 1.0 } else { 1.7 };
-        let wanted = follow(&mut operator, delay as usize, (period * (movements + 1)) as usize, target, 0.0);
+        let wanted = follow(&mut operator, index(delay), index(period * (movements + 1)), target, 0.0);
         // Error of the hand before each movement. The first two movements see nothing of the first.
-        let errors: Vec<f64> = (0..movements).map(|number| 1.7 - wanted[(number * period) as usize]).collect();
+        let errors: Vec<f64> = (0..movements).map(|number| 1.7 - wanted[index(number * period)]).collect();
         for place in 3..errors.len() - 1 {
             assert!(
                 (errors[place + 1] - (errors[place] - errors[place - 2])).abs() < 1e-6 * errors[place].abs().max(1.0),

@@ -39,14 +39,14 @@ pub(super) static OPERATOR: Table = Table::of(&[&[
         "expects",
         Form::AnyOf(&[Form::Words(&[("auto", "nothing with sees = own, else the mean delays of both ways")]), Form::Duration]),
         "\"auto\"",
-        "Delay of the seen copy that the person expects, and waits for after each movement",
+        "Delay of the seen copy that the person expects, and waits for after each movement; auto for none with the own copy, and else the mean delays of both ways",
     ),
     usual("crossover", number(FREQUENCY_LIMIT), "3", "Velocity of the hand over the seen error, for the law crossover"),
 ]]);
 static ARM: Table = Table::of(&[&[
-    usual("mass", number(ADDED_MASS), "0.5", "Mass that the arm adds to the device"),
-    usual("damping", number(DAMPING), "20", "Damping of the arm"),
-    usual("stiffness", number(STIFFNESS), "300", "Stiffness of the arm"),
+    usual("mass", number(ADDED_MASS), "0.5", "Mass of the arm, which moves with the device"),
+    usual("damping", number(DAMPING), "20", "Damping towards the wanted motion"),
+    usual("stiffness", number(STIFFNESS), "300", "Stiffness towards the wanted motion"),
 ]]);
 const LAWS: Choices<Law, 2> = [
     ("moves", Law::Moves, "movements toward a target at rest, one after the other"),
