@@ -22,6 +22,16 @@ impl<const A: usize> Crossover<A> {
         Self { frequency, tick: tick.as_secs_f64(), position: place }
     }
 
+    /// Returns the wanted position at the next tick \[m\].
+    pub(super) const fn position(&self) -> [f64; A] {
+        self.position
+    }
+
+    /// Sets the wanted position at the next tick \[m\].
+    pub(super) const fn set_position(&mut self, position: [f64; A]) {
+        self.position = position;
+    }
+
     /// Returns the wanted motion over a tick, and moves the wanted position on to the next tick.
     #[inline]
     pub(super) fn tick(&mut self, seen: &View<A>) -> State<A> {

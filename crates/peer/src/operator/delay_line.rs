@@ -36,4 +36,22 @@ impl<const A: usize> DelayLine<A> {
         }
         self.views[self.next]
     }
+
+    /// Returns the views that are still to be used, the newest first. Empty before the first tick.
+    pub(super) fn waiting(&self) -> impl Iterator<Item = &View<A>> {
+        let (len, newest) = (self.len, self.next + self.len - 1);
+        (0..len - 1).filter_map(move |age| self.views.get((newest - age) % len))
+    }
+
+    /// Replaces the views that are still to be used by `views`, the newest first. Views that are missing stand for a person who saw the origin.
+    pub(super) fn set_waiting(&mut self, views: impl Iterator<Item = View<A>>) {
+        let origin = View { position: [0.0; A], target: [0.0; A], radius: 0.0 };
+        self.views.clear();
+        self.views.resize(self.len, origin);
+        // The next view takes place 0, so the newest of these stands last.
+        self.next = 0;
+        for (place, view) in self.views.iter_mut().skip(1).rev().zip(views) {
+            *place = view;
+        }
+    }
 }

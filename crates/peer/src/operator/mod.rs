@@ -69,6 +69,21 @@ impl<const A: usize> Operator<A> {
             Law::Crossover(crossover) => crossover.tick(&seen),
         }
     }
+
+    /// Returns all that a person who tracks remembers: the wanted position at the next tick \[m\], and the views that are still to be used, the newest first.
+    /// There are no views before the first tick. `None` for a person who makes movements.
+    pub fn tracking(&self) -> Option<([f64; A], impl Iterator<Item = &View<A>>)> {
+        let Law::Crossover(crossover) = &self.law else { return None };
+        Some((crossover.position(), self.views.waiting()))
+    }
+
+    /// Lets a person who tracks remember the wanted position at the next tick \[m\], and the views that are still to be used, the newest first. Views that are
+    /// missing stand for a person who saw the origin. A person who makes movements stays as before.
+    pub fn set_tracking(&mut self, position: [f64; A], views: impl Iterator<Item = View<A>>) {
+        let Law::Crossover(crossover) = &mut self.law else { return };
+        crossover.set_position(position);
+        self.views.set_waiting(views);
+    }
 }
 
 /// Returns the number of ticks that a span takes, rounded up.

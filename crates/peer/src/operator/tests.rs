@@ -250,3 +250,27 @@ fn crossover_is_unstable_above_its_bound() {
         assert_eq!(envelope(190_000) > envelope(100_000), grows, "{factor}");
     }
 }
+
+/// A person who tracks is known by the wanted position and by what is seen and not yet used. Delays of no tick and of several.
+#[test]
+fn a_person_who_remembers_the_same_goes_on_alike() {
+    for delay in [0, 1, 5] {
+        let config = person(OperatorLaw::Crossover { frequency: 3.0 }, millis(delay));
+        let seen = |tick: u32| View { position: [0.01 * f64::from(tick * tick)], target: [0.2 - 0.03 * f64::from(tick)], radius: 0.0 };
+        let new = |place: f64| Operator::<1>::new(&config, millis(1), Duration::ZERO, [place]);
+        let (mut one, mut other) = (new(0.0), new(7.0));
+        (0..8).for_each(|tick| drop(one.tick(&seen(tick), |_| [0.0])));
+        let (position, views) = one.tracking().unwrap();
+        let views: Vec<View<1>> = views.copied().collect();
+        // Newest first: the view of tick 7 has waited least.
+        assert_eq!(views, (0..delay).map(|age| seen(7 - u32::try_from(age).unwrap())).collect::<Vec<_>>());
+        other.set_tracking(position, views.into_iter());
+        for tick in 8..20 {
+            assert_eq!(one.tick(&seen(tick), |_| [0.0]), other.tick(&seen(tick), |_| [0.0]), "{delay} ticks, at tick {tick}");
+        }
+    }
+    let mut moving = Operator::<1>::new(&person(OperatorLaw::Moves(PLAIN), millis(1)), millis(1), Duration::ZERO, [0.0]);
+    moving.set_tracking([1.0], std::iter::empty());
+    assert!(moving.tracking().is_none());
+    assert_eq!(moving.tick(&View { position: [0.0], target: [0.0], radius: 1.0 }, |_| [0.0]).position, [0.0]);
+}
