@@ -1,7 +1,9 @@
 //! Verdicts by analysis: whether a scene is stable, if the analysis takes seconds only and leaves nothing out, and the simplifications behind a verdict.
 
 use cohaptic_scene::Scene;
-use cohaptic_stability::{ARMS_ALONE, AnalysisError, Judgement, Limits, Method, NOMINAL, QUICK_UNKNOWNS, UNLOADED, Watch, has_chance, judge_watched};
+use cohaptic_stability::{
+    ARMS_ALONE, AnalysisError, Judgement, Limits, Method, NOMINAL, QUICK_UNKNOWNS, TRACKED, UNLOADED, Watch, has_chance, judge_watched,
+};
 
 /// Operations per second of this program on one thread, in the units of the analysis's estimate. Measured on a shared core of a server: 0.5 billion for a mean
 /// square with bursts on six links, 1.7 for an admittance, 5 for the eigenvalues of 400 rows. The number tells seconds from hours, and nothing finer.
@@ -36,7 +38,7 @@ pub(crate) fn quick_verdict(scene: &Scene, seconds: f64, watch: &dyn Watch) -> Q
     };
     let refused = judgement.analysis.notes.iter().find_map(|note| note.strip_prefix(NOMINAL)).map(str::to_owned);
     // Without a second moment the analysis is nominal. A simulation then runs what the analysis would leave out.
-    let is_left_out = judgement.analysis.notes.iter().any(|note| note != UNLOADED && note != ARMS_ALONE);
+    let is_left_out = judgement.analysis.notes.iter().any(|note| ![UNLOADED, ARMS_ALONE, TRACKED].contains(&note.as_str()));
     let nominal = judgement.mean_square.is_none() && (has_chance(scene) || is_left_out);
     if judgement.analysis.combines_contacts() || nominal { Quick::Simulate(refused) } else { Quick::Known(Box::new(judgement)) }
 }

@@ -2,9 +2,11 @@
 
 use std::time::Duration;
 
+use cohaptic_peer::operator::OperatorLaw;
 use cohaptic_scene::Scene;
 
 use crate::network::NominalNetwork;
+use crate::operators::Crossover;
 use crate::parts::Part;
 use crate::{Method, Radius, Verdict};
 
@@ -111,6 +113,9 @@ pub fn notes(said: &[String], combines: bool, scene: &Scene) -> Vec<String> {
         notes.push(UNLOADED.to_owned());
     }
     notes.extend(arms_alone(scene));
+    if Crossover::first_peer(scene).is_some() {
+        notes.push(TRACKED.to_owned());
+    }
     notes
 }
 
@@ -118,10 +123,14 @@ pub fn notes(said: &[String], combines: bool, scene: &Scene) -> Vec<String> {
 pub const ARMS_ALONE: &str =
     "of operators who make movements the arms alone are analysed: a movement is a wanted motion, and depends on what is seen only at its plan";
 
-/// Returns [`ARMS_ALONE`] for a scene with an operator; `None` without one.
+/// Returns [`ARMS_ALONE`] for a scene with an operator who makes movements; `None` without one.
 pub(crate) fn arms_alone(scene: &Scene) -> Option<String> {
-    (0..scene.peers.len()).any(|peer| scene.operator(peer).is_some()).then(|| ARMS_ALONE.to_owned())
+    let moves = |peer: usize| scene.operator(peer).is_some_and(|operator| matches!(operator.law, OperatorLaw::Moves(_)));
+    (0..scene.peers.len()).any(moves).then(|| ARMS_ALONE.to_owned())
 }
+
+/// Note for operators who track: nothing of their law is left out, but the law begins and ends with the task.
+pub const TRACKED: &str = "operators who track are followed as while the task lasts: what they see moves their hands, about the motion of the target";
 
 /// Note for an object that turns: its equations are linearised for small motions.
 pub const UNLOADED: &str = "the object turns: the verdict is about small motions near rest, all copies together, with no hand pushing";

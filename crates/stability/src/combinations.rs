@@ -98,7 +98,7 @@ pub fn pairs<'p, 's>(pieces: &'p [Piece<'s>], combines: &mut bool) -> Result<Vec
 /// Returns the combinations of contacts of all pieces of a scene, for the general path.
 pub(crate) fn whole(scene: &Scene) -> Result<Vec<Combination>, AnalysisError> {
     let mut all = Vec::new();
-    for piece in pieces::pieces(scene, "the matrix")? {
+    for piece in pieces::pieces_with_operators(scene, "the matrix")? {
         all.extend(combinations(&piece)?);
     }
     Ok(all)

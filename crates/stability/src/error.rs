@@ -94,6 +94,17 @@ pub enum AnalysisError {
         /// Analysis that was asked for, in words.
         what: &'static str,
     },
+    /// An operator with the law crossover holds a device, and this analysis does not follow operators.
+    #[error(
+        "{what} does not follow the operator of {peer}, whose law is \"crossover\": expected law = \"moves\", of which the arm alone counts, or hand.arm; \
+         `cohaptic stability point`, `map` and `boundary` follow the law crossover where links leave nothing to chance and nothing but the radius is asked for"
+    )]
+    Operator {
+        /// Analysis that was asked for, in words.
+        what: &'static str,
+        /// Name of the peer whose device the operator holds.
+        peer: String,
+    },
     /// The scene has a topology, and this analysis does not follow topologies.
     #[error(
         "{what} has every peer hear every other, and this scene has a [topology]: expected kind = \"full\"; \
@@ -115,15 +126,6 @@ pub enum AnalysisError {
          `cohaptic check`; or expected a scene without it"
     )]
     DeadBands,
-    /// The hand of an operator follows what the operator sees, continuously, and this analysis does not follow such hands.
-    #[error(
-        "peer {peer} has an operator of the law crossover, whose hand follows what it sees: no analysis contains it; simulations tell whether the scene is \
-         stable, as in `cohaptic check`, or expected an operator of the law moves, or an arm"
-    )]
-    Operator {
-        /// Name of the peer with the operator.
-        peer: String,
-    },
     /// The strategy uses the ages of samples, and the clocks drift apart.
     #[error("{strategy} coordination uses the ages of samples, which do not repeat where clocks drift apart: expected one drift for all peers")]
     AgesByClocks {

@@ -4,6 +4,7 @@
 //! this way. A strategy with a nonlinear force, or with more memory than the shown state, is detected and refused.
 
 mod layout;
+mod person;
 mod rigid;
 
 use std::time::Duration;
@@ -15,12 +16,13 @@ use cohaptic_scene::{Scene, Strategies};
 use cohaptic_units::Instant;
 
 use self::layout::{Layout, Member};
+use self::person::Person;
 use crate::cost::{PartCost, pushed_operations};
 use crate::lifted::majorant::error_of;
 use crate::lifted::{Body, Lifted, Node, closer_of};
 use crate::network::{LinkTiming, NominalNetwork};
 use crate::rounding::real;
-use crate::structure::{Contacts, Structure, common_time, has_one_drift, linear_law};
+use crate::structure::{Contacts, Structure, common_time, has_one_drift, knows_origin, linear_law};
 use crate::timetable::{Event, Instants, NodeClock, Timetable, UseOfHeld};
 use crate::unseen::felt;
 use crate::{AnalysisError, Matrix, StateName, Watch};
@@ -134,6 +136,8 @@ const EARLIER: Instant = Instant::from_nanos(1 << 60);
 /// The simulated peers of a scene with the layout of their states in a vector, for pushing vectors through a frame.
 struct Pusher<const A: usize, S> {
     members: Vec<Member<A, S>>,
+    /// Person who holds the device of each peer; `None` where the wanted motion of the hand is given, and where the device touches nothing.
+    people: Vec<Option<Person<A>>>,
     names: Vec<String>,
     timetable: Timetable,
     instants: Instants,
@@ -171,8 +175,11 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         let links: Vec<(usize, usize, LinkTiming)> = pairs.map(|(from, to)| (from, to, network.timing(from, to).clone())).collect();
         let uses = if scene.sample_kind() == SampleKind::State { UseOfHeld::Ticks } else { UseOfHeld::SamplesAndTicks };
         let timetable = Timetable::with_use_of_held(&clocks, &links, uses)?;
+        // A hand without a contact moves nothing but its own device.
+        let people: Vec<Option<Person<A>>> = (0..peers).map(|place| Person::of(scene, place).filter(|_| contacts.touching[place])).collect();
+        let remembered = people.iter().flatten().map(Person::states).sum::<usize>();
         // The states include a position and a velocity per axis of each sample in flight. The limit is checked before memory for them is allocated.
-        PartCost::of_eigenvalues(2 * A * timetable.depth.iter().sum::<usize>()).allowed(watch)?;
+        PartCost::of_eigenvalues(2 * A * timetable.depth.iter().sum::<usize>() + remembered).allowed(watch)?;
         let member = |place: usize| {
             let spec = &scene.peers[place];
             let mut config = scene.peer_config(place);
@@ -193,11 +200,11 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             return Err(AnalysisError::AgesByClocks { strategy: scene.coordination.strategy.name() });
         }
         let silent = links.iter().any(|(_, _, timing)| matches!(timing, LinkTiming::Pattern(pattern) if pattern.iter().all(Option::is_none)));
-        let arm = |place: usize| contacts.touching[place] && scene.device_plant(place).stiffness > 0.0;
+        let arm = |place: usize| contacts.touching[place] && knows_origin(scene, place);
         // Waves carry no position, so only the arm of the same peer ties a copy. With other samples one arm ties all copies.
         let tied = |place: usize| if kind == SampleKind::Wave { arm(place) } else { silent || (0..peers).any(arm) };
         let tied = (0..peers).map(tied).collect();
-        let layout = Layout::new(scene, contacts, &members, &timetable, tied);
+        let layout = Layout::new(scene, contacts, &members, &people, &timetable, tied);
         let touching = contacts.touching.iter().copied().enumerate();
         let time = common_time(scene, timetable.frame, linear_law(scene, 0).map_or(scene.coordination.gains, |law| law.held_by()), touching, false);
         let compliance: Vec<f64> = (0..peers).map(|peer| compliance(scene, peer, time)).collect();
@@ -211,6 +218,7 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             extras: vec![Vec::new(); peers],
             instants,
             members,
+            people,
             names,
             timetable,
             layout,
@@ -231,10 +239,10 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         PartCost::of_full(size, events, A).begin(watch)?;
         let rest = self.pushed(&vec![0.0; size], Instant::ZERO);
         let free = self.free_translations(&rest);
-        // Positions are relative to the reference copies, so the reference copies' own positions are dropped. Loose positions are dropped too, since nothing
-        // depends on a loose position.
-        let kept: Vec<usize> =
-            (0..size).filter(|state| free.iter().all(|free| free.reference != *state) && !self.layout.loose.contains(state)).collect();
+        // Positions are relative to the reference copies, so the reference copies' own positions are dropped. Loose positions and unfelt places are dropped
+        // too, since nothing depends on them.
+        let is_dropped = |state: &usize| self.layout.loose.contains(state) || self.layout.unfelt.contains(state);
+        let kept: Vec<usize> = (0..size).filter(|state| free.iter().all(|free| free.reference != *state) && !is_dropped(state)).collect();
         let mut monodromy = Matrix::zeros(kept.len(), kept.len());
         // Rest and displacements were pushed before. Only the growth of unit vectors enters the bound of the error.
         self.growth = 1.0;
@@ -339,6 +347,11 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
                 Event::Tick { node, at, span } => {
                     let now = begin.saturating_add_nanos(at);
                     let member = &mut self.members[node];
+                    if let Some(person) = &mut self.people[node] {
+                        // A person who hears nothing of the peer that he looks at sees the object where it was at first.
+                        let wanted = person.tick(member.seen(person.sees).unwrap_or([0.0; A]));
+                        member.device_mut().want(&person.arm, &wanted);
+                    }
                     // Forces first, motion after: the forces belong to the state at the tick.
                     let forces = member.compute(now);
                     member.advance(now, span);
@@ -413,6 +426,9 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
             }
             let memory: Vec<f64> = z[next..next + layout.memory[place]].iter().map(|number| number / self.remembered).collect();
             member.strategy_mut().set_memory(&memory);
+            if let Some(person) = &mut self.people[place] {
+                person.restore(&z[next + layout.memory[place]..]);
+            }
             // The vector has the newest sample first, `samples` the oldest, so the index in `samples` grows with the sample's number.
             let depth = self.timetable.depth[place];
             let begin = |age: usize| layout.samples[place] + age * layout.sample_len::<A>();
@@ -447,6 +463,9 @@ impl<const A: usize, S: Strategy<A>> Pusher<A, S> {
         }
         for (entry, number) in z[next..next + layout.memory[place]].iter_mut().zip(member.strategy().memory()) {
             *entry = number * self.remembered;
+        }
+        if let Some(person) = &self.people[place] {
+            person.read(&mut z[next + layout.memory[place]..][..person.states()]);
         }
         let receivers = layout.receivers;
         // Only the newest `depth` samples pass into the next frame, newest first as in `restore`.

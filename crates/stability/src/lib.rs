@@ -52,6 +52,7 @@ pub mod moments;
 mod monodromy;
 mod network;
 pub mod numerics;
+mod operators;
 #[cfg(test)]
 mod paper_scene;
 mod parts;
@@ -70,7 +71,7 @@ mod watch;
 
 pub use admittance::{Admittance, AdmittanceError, AdmittancePoint, Estimate, FrequencyResponse, LowFrequencyFit, PushedAxis, admittance, ideal};
 pub use analyse::{analyse, analyse_loaded, analyse_spinning, analyse_watched, analyse_with};
-pub use analysis::{ARMS_ALONE, Analysis, CHANGES_LEFT_OUT, ContactMode, UNLOADED};
+pub use analysis::{ARMS_ALONE, Analysis, CHANGES_LEFT_OUT, ContactMode, TRACKED, UNLOADED};
 pub use boundary::blocks::BoundaryBlock;
 pub use boundary::{Boundary, BoundaryError, BoundaryOptions, Crossing, Stretch};
 pub use cost::{MOST_MEMORY, PartCost};

@@ -104,11 +104,13 @@ pub(crate) fn reduced(structure: &Structure, scene: &Scene, axes: usize, method:
     parts.push(lifted_part(&quotient, PartKind::Together, axes, method, watch)?);
     for (class, members) in structure.classes.iter().enumerate() {
         let node = &nodes[class];
-        // Each sample is a position and a velocity.
-        dimension += members.len() * (node.states() + 2 * structure.timetable.depth[class]);
+        // Each sample is a position and a velocity. An operator remembers the places that it has seen.
+        let seen = node.operator.map_or(0, |operator| operator.lag);
+        dimension += members.len() * (node.states() + 2 * structure.timetable.depth[class] + seen);
         if let Some(timetable) = &structure.apart[class] {
             let weight = Matrix::from_fn(1, 1, |_, _| structure.difference_weight());
-            let apart = Lifted { nodes: &nodes[class..=class], weights: &weight, timetable, tied: true, ..quotient };
+            let nodes = Structure::apart(&nodes, class);
+            let apart = Lifted { nodes: &nodes, weights: &weight, timetable, tied: true, ..quotient };
             let part = lifted_part(&apart, PartKind::Apart { peer: members[0] }, (members.len() - 1) * axes, method, watch)?;
             // A class on its own may repeat more often than the whole scene.
             // Radii of all parts must count over the same span, or the largest radius would not be the scene's.
@@ -141,7 +143,9 @@ const MOST_SIGNALS: usize = 1024;
 /// [`AnalysisError::TooMuchMemory`] beyond what the watch allows; [`AnalysisError::Stopped`] if the watch stops the analysis.
 pub fn lifted_part(lifted: &Lifted<'_>, kind: PartKind, copies: usize, method: Method, watch: &dyn Watch) -> Result<Part, AnalysisError> {
     let Sizes { states: size, history, signals } = lifted.sizes();
-    let asked = method == Method::Determinant && history > 0 && signals <= MOST_SIGNALS;
+    // The places that an operator has seen are as many eigenvalues at zero, and rounding spreads those of a matrix so far that its bound says nothing. The
+    // determinant has none of them.
+    let asked = (method == Method::Determinant || lifted.has_operators()) && history > 0 && signals <= MOST_SIGNALS;
     let long = asked || size > LARGE && signals <= FEW;
     // The watch cannot stop the computation of eigenvalues, and the frame itself may be too large a matrix, so the cost is checked first.
     let cost = PartCost::of_eigenvalues(size);

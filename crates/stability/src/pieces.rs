@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use cohaptic_scene::{RotationPart, RotationParts, Scene};
 
 use crate::AnalysisError;
+use crate::operators::Crossover;
 
 /// A scene whose motion is independent of all other pieces.
 #[derive(Clone, Debug)]
@@ -34,14 +35,33 @@ pub(crate) fn split(scene: &Scene) -> Result<Vec<Piece<'_>>, &'static str> {
     Ok(parts.into_iter().map(piece).collect())
 }
 
-/// Returns the pieces of a scene, for an analysis that works on pieces only. `what` names the analysis in errors.
+/// Returns the pieces of a scene, for an analysis that works on pieces only and does not follow operators. `what` names the analysis in errors.
 ///
 /// # Errors
 ///
-/// [`AnalysisError`] if the scene has a topology, or an object whose motion does not split.
+/// [`AnalysisError`] if the scene has a topology, an operator with the law crossover, or an object whose motion does not split.
 pub fn pieces<'a>(scene: &'a Scene, what: &'static str) -> Result<Vec<Piece<'a>>, AnalysisError> {
+    refuse_operators(scene, what)?;
+    pieces_with_operators(scene, what)
+}
+
+/// Like [`pieces`], for an analysis that follows operators with the law crossover.
+pub(crate) fn pieces_with_operators<'a>(scene: &'a Scene, what: &'static str) -> Result<Vec<Piece<'a>>, AnalysisError> {
     refuse_topology(scene, what)?;
     split(scene).map_err(|why| AnalysisError::Unsplit { what, why })
+}
+
+/// Refuses a scene in which an operator with the law crossover holds a device, for an analysis that does not follow operators. `what` names the analysis in
+/// errors. Of other laws of an operator the arm alone counts, as in all analyses.
+///
+/// # Errors
+///
+/// [`AnalysisError::Operator`] with the name of the first peer with such an operator.
+pub fn refuse_operators(scene: &Scene, what: &'static str) -> Result<(), AnalysisError> {
+    match Crossover::first_peer(scene) {
+        Some(peer) => Err(AnalysisError::Operator { what, peer: scene.peers[peer].name.clone() }),
+        None => Ok(()),
+    }
 }
 
 /// Refuses a scene with a topology, for an analysis that does not follow topologies. `what` names the analysis in errors.

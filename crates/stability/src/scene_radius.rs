@@ -18,7 +18,7 @@ use crate::pieces::split;
 use crate::radius::worse;
 use crate::spectrum::Workspace;
 use crate::stack_frame::{StackFrame, StackNode};
-use crate::structure::{Contacts, Structure, linear_law};
+use crate::structure::{Contacts, Structure, knows_origin, linear_law};
 use crate::turning::{self, Together, mode_of};
 use crate::{AnalysisError, Matrix, Method, Radius, Unwatched};
 
@@ -265,7 +265,7 @@ impl PartsRadius {
         });
         let apart = apart.collect();
         let difference = Matrix::from_fn(1, 1, |_, _| structure.difference_weight());
-        // The size of the matrix is the same for all numbers, so the memory is checked once.
+        // Numbers that are written into the scene leave the size of the matrix as it is, so the memory is checked once.
         let nodes = structure.nodes(scenes[0]);
         PartCost::of_eigenvalues(structure.quotient(scenes[0], &nodes).sizes().states).allowed(&Unwatched)?;
         let followed = Followed::of(scenes[0], network, &structure);
@@ -280,7 +280,8 @@ impl PartsRadius {
         let mut worst = part::<BOUND>(self.together.as_ref(), &quotient, together, workspace);
         for (class, part_of) in self.apart.iter().enumerate() {
             if let (Some(Apart { stack, frames }), Some(timetable)) = (part_of, &structure.apart[class]) {
-                let lifted = Lifted { nodes: &nodes[class..=class], weights: &self.difference, timetable, tied: true, ..quotient };
+                let nodes = Structure::apart(nodes, class);
+                let lifted = Lifted { nodes: &nodes, weights: &self.difference, timetable, tied: true, ..quotient };
                 // The differences have a shorter frame than the scene, so their radius is raised to the number of such frames per frame of the scene.
                 let radius = part::<BOUND>(stack.as_ref(), &lifted, apart, workspace).over(*frames);
                 worst = worse::<BOUND>(worst, radius);
@@ -312,7 +313,7 @@ impl PartsRadius {
     /// Returns the system of the classes' averages with the numbers of `scene`.
     fn quotient<'a>(&'a self, scene: &Scene, nodes: &'a [Node]) -> Lifted<'a> {
         let structure = &self.structure;
-        let armed = |class: usize| structure.touching[class] && scene.device_plant(self.representative(class)).stiffness > 0.0;
+        let armed = |class: usize| structure.touching[class] && knows_origin(scene, self.representative(class));
         // An arm's stiffness is a number of the scene, so the tie is decided anew for each set of numbers.
         let tied = self.tied || (0..nodes.len()).any(armed);
         Lifted { tied, ..structure.quotient(scene, nodes) }
@@ -353,6 +354,7 @@ impl PartsRadius {
                 bodies.loose = loose(class);
                 node.device = node.device.map(|_| Body::new(device, scene.integrator, clock));
             }
+            node.operator = self.structure.operator(scene, class);
             node.coupling = scene.coupling(place);
             let law = scene.law(place);
             if bodies.law != law {
@@ -371,6 +373,13 @@ fn part<const BOUND: bool>(stack: Option<&StackFrame>, lifted: &Lifted<'_>, matr
         (Some(stack), Some(node)) => stack.monodromy::<BOUND>(node, matrix, || lifted.error()),
         _ => {
             let frame = lifted.frame(&mut Autonomous);
+            // As for a part of one scene: of a matrix with seen places the bound says nothing.
+            if BOUND
+                && lifted.has_operators()
+                && let Ok(delayed) = frame.delayed_loop()
+            {
+                return delayed.bounded_radius_watched(frame.error, &Unwatched).unwrap_or(Radius::UNKNOWN);
+            }
             *matrix = frame.monodromy();
             frame.error
         }

@@ -54,11 +54,14 @@ pub(crate) struct StackNode<'a> {
 }
 
 impl<'a> StackNode<'a> {
-    /// Returns the only node of a system, if the frame can be computed on the stack: forces act without a delay, and the law is a pull towards the mean with
-    /// gains not both zero. `None` for any other system.
+    /// Returns the only node of a system, if the frame can be computed on the stack: forces act without a delay, no operator moves the hand, and the law is a
+    /// pull towards the mean with gains not both zero. `None` for any other system.
     pub(crate) fn of(lifted: &Lifted<'a>) -> Option<Self> {
         let [node] = lifted.nodes else { return None };
-        let coordination = node.law.pull().filter(|gains| !node.compute_delay && gains.stiffness + gains.damping > 0.0)?;
+        let coordination = node.law.pull().filter(|gains| gains.stiffness + gains.damping > 0.0)?;
+        if node.compute_delay || node.operator.is_some() {
+            return None;
+        }
         Some(Self { node, weight: lifted.weights[(0, 0)], coordination, time: lifted.time, tied: lifted.tied })
     }
 }

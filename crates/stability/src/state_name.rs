@@ -30,6 +30,14 @@ pub enum StateKind {
     PendingForce { axis: usize },
     /// A number that the strategy remembers.
     Memory { number: usize },
+    /// Position at which the arm of an operator wants the device at the next tick.
+    WantedPosition { axis: usize },
+    /// Position that an operator has seen and that has not come to the hand.
+    SeenPosition {
+        axis: usize,
+        /// Number of ticks back: 1 for the last tick before the frame.
+        age: usize,
+    },
     /// Position of the copy at an earlier sampling.
     SamplePosition {
         axis: usize,
@@ -71,6 +79,8 @@ impl fmt::Display for StateKind {
             Self::PendingCoupling { axis: a } => write!(f, "coupling force to come {}", axis(a)),
             Self::PendingForce { axis: a } => write!(f, "force on the copy to come {}", axis(a)),
             Self::Memory { number } => write!(f, "memory {number} of the strategy"),
+            Self::WantedPosition { axis: a } => write!(f, "wanted position {}", axis(a)),
+            Self::SeenPosition { axis: a, age } => write!(f, "position {} seen {age} ticks before", axis(a)),
             Self::SamplePosition { axis: a, age } => write!(f, "position {} sampled {age} before", axis(a)),
             Self::SampleVelocity { axis: a, age } => write!(f, "velocity {} sampled {age} before", axis(a)),
             Self::SampleForce { axis: a, age, receiver } => write!(f, "force {} for peer {receiver} sampled {age} before", axis(a)),

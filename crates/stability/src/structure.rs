@@ -5,15 +5,18 @@
 //! differences of the other members as −d_i/(N−1). Each class of n > 1 members therefore has n − 1 copies of one system of a single node with the weight
 //! −1/(N−1). The spectrum of the scene is exactly the union of the spectra of these blocks.
 
+use std::borrow::Cow;
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 use cohaptic_peer::Gains;
 use cohaptic_peer::wire::SampleKind;
 use cohaptic_scene::{PeerRotation, PeerSpec, Scene};
 
-use crate::lifted::{Body, Lifted, Node, Sampling};
+use crate::lifted::{Body, Lifted, Node, Operator, Sampling, Seen};
 use crate::linear_form::LinearLaw;
 use crate::network::{LinkTiming, NominalNetwork};
+use crate::operators::Crossover;
 use crate::rounding::real;
 use crate::timetable::{NodeClock, Timetable};
 use crate::{AnalysisError, Matrix};
@@ -128,7 +131,7 @@ impl Structure {
         });
         // A held initial sample acts like a spring to a fixed point, so silence ties the object as an arm does.
         let silent = links.iter().any(|(_, _, timing)| matches!(timing, LinkTiming::Pattern(pattern) if pattern.iter().all(Option::is_none)));
-        let arm = |class: &Vec<usize>| contacts.touching[class[0]] && scene.device_plant(class[0]).stiffness > 0.0;
+        let arm = |class: &Vec<usize>| contacts.touching[class[0]] && knows_origin(scene, class[0]);
         let tied = contacts.at_wall || silent || classes.iter().any(arm);
         let touching = classes.iter().map(|class| contacts.touching[class[0]]).collect();
         let absent = classes.iter().map(|class| contacts.absent[class[0]]).collect();
@@ -168,11 +171,30 @@ impl Structure {
         Node {
             device: self.touching[class].then(|| Body::new(scene.device_plant(place), scene.integrator, &spec.clock)),
             object: Body::new(scene.copy_config(place).plant(), scene.integrator, &spec.clock),
+            operator: self.operator(scene, class),
             coupling: scene.coupling(place),
             law,
             wall: scene.object.enclosure.filter(|_| self.at_wall).map(|wall| Gains { stiffness: wall.stiffness, damping: wall.damping }),
             compute_delay: spec.compute_delay,
             keeps_whole_past: false,
+        }
+    }
+
+    /// Returns the operator of a class. A hand without a contact moves nothing but its own device, and its operator is left out.
+    pub(crate) fn operator(&self, scene: &Scene, class: usize) -> Option<Operator> {
+        let person = Crossover::of(scene, self.classes[class][0]).filter(|_| self.touching[class])?;
+        // A peer that is seen is alone in its class: see `classes`.
+        let class_of = |peer: usize| self.classes.iter().position(|members| members[0] == peer);
+        let sees = person.seen_peer().map_or(Seen::Own, |peer| class_of(peer).map_or(Seen::Nothing, |from| Seen::Held { from }));
+        let arm = Gains { stiffness: person.arm.stiffness, damping: person.arm.damping };
+        Some(Operator { crossover: person.frequency, arm, lag: person.lag, tick: person.tick, sees })
+    }
+
+    /// Returns the node of the differences between the members of a class, as a slice of one node. `nodes` are the nodes of all classes.
+    pub(crate) fn apart<'a>(nodes: &'a [Node], class: usize) -> Cow<'a, [Node]> {
+        match nodes[class].operator {
+            Some(operator) if operator != operator.apart() => Cow::Owned(vec![Node { operator: Some(operator.apart()), ..nodes[class].clone() }]),
+            _ => Cow::Borrowed(&nodes[class..=class]),
         }
     }
 
@@ -208,6 +230,11 @@ impl Structure {
             tied: self.tied,
         }
     }
+}
+
+/// Tells whether the hand of a peer that touches the object knows where the origin is: by an arm with a stiffness, or by what an operator sees.
+pub(crate) fn knows_origin(scene: &Scene, peer: usize) -> bool {
+    scene.device_plant(peer).stiffness > 0.0 || Crossover::of(scene, peer).is_some()
 }
 
 /// Returns the linear form of the law of a peer, or `None` if the law has no linear form.
@@ -269,15 +296,22 @@ pub(crate) fn common_time(scene: &Scene, frame: Duration, coordination: Gains, p
 /// Returns the classes of peers equal in each of the scenes. A pair of peers is never in one class if `apart` returns true for the pair.
 pub fn classes(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts, apart: impl Fn(usize, usize) -> bool) -> Vec<Vec<usize>> {
     let mut classes: Vec<Vec<usize>> = Vec::new();
+    // What an operator sees of another peer is that peer's own motion, not the average of a class.
+    let seen_by = |scene: &Scene, peer: usize| Crossover::of(scene, peer)?.seen_peer();
+    let seen: BTreeSet<usize> = scenes.iter().flat_map(|scene| (0..scene.peers.len()).filter_map(|peer| seen_by(scene, peer))).collect();
     for place in 0..scenes[0].peers.len() {
         // Equality of parameters is transitive, so comparing with the first member of a class is enough.
         let found = classes.iter().position(|class| {
             !apart(class[0], place)
+                && !seen.contains(&class[0])
+                && !seen.contains(&place)
                 && contacts.touching[class[0]] == contacts.touching[place]
                 && contacts.absent[class[0]] == contacts.absent[place]
                 && scenes.iter().all(|scene| {
                     let touching = contacts.touching[place];
-                    alike(&scene.peers[class[0]], &scene.peers[place], touching) && turn_alike(scene, class[0], place, touching)
+                    alike(&scene.peers[class[0]], &scene.peers[place], touching)
+                        && (!touching || Crossover::of(scene, class[0]) == Crossover::of(scene, place))
+                        && turn_alike(scene, class[0], place, touching)
                 })
         });
         match found {

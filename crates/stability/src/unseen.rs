@@ -45,7 +45,8 @@ pub(crate) fn felt(matrix: &Matrix, forces: &Matrix, states: &[StateName]) -> (M
     }
 }
 
-/// Tells whether bodies feel a state only through later forces: memory and samples, not positions, velocities or pending forces.
+/// Tells whether bodies feel a state only through later forces of strategies: memory and samples, not positions, velocities, pending forces or what an operator
+/// remembers.
 const fn is_hidden(kind: StateKind) -> bool {
     match kind {
         StateKind::DevicePosition { .. }
@@ -53,7 +54,9 @@ const fn is_hidden(kind: StateKind) -> bool {
         | StateKind::ObjectPosition { .. }
         | StateKind::ObjectVelocity { .. }
         | StateKind::PendingCoupling { .. }
-        | StateKind::PendingForce { .. } => false,
+        | StateKind::PendingForce { .. }
+        | StateKind::WantedPosition { .. }
+        | StateKind::SeenPosition { .. } => false,
         StateKind::Memory { .. }
         | StateKind::SamplePosition { .. }
         | StateKind::SampleVelocity { .. }

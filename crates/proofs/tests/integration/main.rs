@@ -6,4 +6,5 @@
 mod cases;
 #[path = "../../../stability/tests/integration/ends.rs"]
 mod ends;
+mod people;
 mod worst_case;

@@ -18,6 +18,7 @@ use rayon::prelude::*;
 
 use crate::analysis::arms_alone;
 use crate::network::NominalNetwork;
+use crate::pieces::refuse_operators;
 use crate::rounding::real;
 
 use crate::timetable::{Event, Timetable};
@@ -93,6 +94,8 @@ impl Admittance {
         watch: &dyn Watch,
     ) -> Result<Self, AdmittanceError> {
         let spec = scene.peers.get(peer).ok_or(AdmittanceError::NoSuchPeer { peer, peers: scene.peers.len() })?;
+        // All other hands are at rest in an admittance, and an operator who holds an object in place is felt as a stiffness without end.
+        refuse_operators(scene, "the admittance")?;
         let first = match spec.contact {
             Contact::Push(direction) => direction.axis,
             Contact::Grasp | Contact::None => 0,

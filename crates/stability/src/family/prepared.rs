@@ -107,7 +107,8 @@ impl Prepared {
                 | AnalysisError::TooManyMoments { .. }
                 | AnalysisError::OtherStrategy { .. }
                 | AnalysisError::Turns { .. }
-                | AnalysisError::Topology { .. },
+                | AnalysisError::Topology { .. }
+                | AnalysisError::Operator { .. },
             ) => Ok(Cell { radius: self.radius::<BOUND>(scene, scratch).over(2), is_nominal: true }),
             Err(error) => Err(error),
         }

@@ -1,9 +1,10 @@
-//! The layout of all peers' states in a vector: device, copy, pending forces and memory of each peer, then the samples of earlier frames.
+//! The layout of all peers' states in a vector: device, copy, pending forces, memory and person of each peer, then the samples of earlier frames.
 
 use cohaptic_peer::wire::SampleKind;
 use cohaptic_peer::{Peer, SimulatedDevice, Strategy};
 use cohaptic_scene::Scene;
 
+use super::person::Person;
 use crate::structure::Contacts;
 use crate::timetable::Timetable;
 use crate::{StateKind, StateName};
@@ -18,6 +19,8 @@ pub(super) struct Layout {
     pub(super) touching: Vec<bool>,
     /// Number of numbers that the strategy of each peer remembers.
     pub(super) memory: Vec<usize>,
+    /// Number of states of the person who holds the device of each peer; 0 without a person.
+    pub(super) people: Vec<usize>,
     /// `true` if each peer has computed forces that wait to be applied, as with a compute delay.
     pub(super) pending: Vec<bool>,
     /// Index of the newest sample of earlier frames of each peer; older samples follow.
@@ -29,6 +32,8 @@ pub(super) struct Layout {
     pub(super) size: usize,
     /// Indices of states on which nothing depends: positions of devices that touch nothing and have no arm.
     pub(super) loose: Vec<usize>,
+    /// Indices of states of persons on which nothing depends: the wanted places of arms without a spring.
+    pub(super) unfelt: Vec<usize>,
     /// `true` if something ties the copy of each peer to ground.
     pub(super) tied: Vec<bool>,
 }
@@ -38,6 +43,7 @@ impl Layout {
         scene: &Scene,
         contacts: &Contacts,
         members: &[Member<A, S>],
+        people: &[Option<Person<A>>],
         timetable: &Timetable,
         tied: Vec<bool>,
     ) -> Self {
@@ -45,12 +51,14 @@ impl Layout {
             first: Vec::new(),
             touching: contacts.touching.clone(),
             memory: Vec::new(),
+            people: people.iter().map(|person| person.as_ref().map_or(0, Person::states)).collect(),
             pending: Vec::new(),
             samples: Vec::new(),
             receivers: if members.iter().any(|member| member.kind().is_personal()) { members.len() - 1 } else { 0 },
             has_waves: members.iter().any(|member| member.kind() == SampleKind::Wave),
             size: 0,
             loose: Vec::new(),
+            unfelt: Vec::new(),
             tied,
         };
         for (place, member) in members.iter().enumerate() {
@@ -62,6 +70,10 @@ impl Layout {
                 layout.loose.extend((0..A).map(|axis| layout.size + axis));
             }
             layout.size += 4 * A + if pending { 2 * A } else { 0 } + memory;
+            if people[place].as_ref().is_some_and(Person::is_limp) {
+                layout.unfelt.extend((0..A).map(|axis| layout.size + axis));
+            }
+            layout.size += layout.people[place];
         }
         for depth in &timetable.depth {
             layout.samples.push(layout.size);
@@ -96,6 +108,9 @@ impl Layout {
             let count = if self.pending[peer] { 6 } else { 4 };
             names.extend(kinds.iter().take(count).flat_map(|kind| (0..A).map(move |axis| StateName { peer, kind: kind(axis) })));
             names.extend((0..self.memory[peer]).map(|number| StateName { peer, kind: StateKind::Memory { number } }));
+            let places = (0..self.people[peer] / A).flat_map(|age| (0..A).map(move |axis| (axis, age)));
+            let kind = |axis, age| if age == 0 { StateKind::WantedPosition { axis } } else { StateKind::SeenPosition { axis, age } };
+            names.extend(places.map(|(axis, age)| StateName { peer, kind: kind(axis, age) }));
         }
         for (peer, depth) in depth.iter().enumerate() {
             for age in 1..=*depth {

@@ -38,6 +38,9 @@ impl Instrument for Autonomous {}
 ///
 /// The unknowns, one column each, are the states at the beginning without the reference, then the used samples of earlier frames, then the inputs. A sample
 /// has one number or two, by [`Sampling`](super::Sampling), each with a separate place: with c numbers per sample, number i of sample s has the place c·s + i.
+///
+/// The places that operators see are further *series*, numbered after the nodes, in the order of the operators' nodes: a number for each tick of the node, as if
+/// the node sent the place to its own hand.
 #[derive(Clone, PartialEq, Debug)]
 pub struct FrameMap {
     /// States at the end, one row each, the reference among them. Positions are absolute here, not relative to the reference.
@@ -46,13 +49,13 @@ pub struct FrameMap {
     displacements: Vec<f64>,
     /// Row of the reference of all positions; `None` if the motion is tied to ground.
     reference: Option<usize>,
-    /// Samples sent in the frame, one row for each number, ordered by node, then by time.
+    /// Samples sent in the frame, one row for each number, ordered by node, then by time; then the places seen in the frame.
     pub sent: Matrix,
-    /// First row of `sent` of each node.
+    /// First row of `sent` of each node, then of each series of seen places.
     first_sent: Vec<usize>,
-    /// Used numbers of samples of earlier frames: the sending node, and the distance to the first number of this frame, at least 1.
+    /// Used numbers of samples and seen places of earlier frames: the sending node or the series, and the distance to the first number of this frame, at least 1.
     pub used: Vec<(usize, usize)>,
-    /// Number of sample numbers of earlier frames among the states, indexed by node.
+    /// Number of numbers of earlier frames among the states, indexed by node, then by series of seen places.
     depth: Vec<usize>,
     /// Distance by which a translation of everything by 1 moves each number of a sample.
     translations: Vec<f64>,
@@ -76,7 +79,13 @@ impl Lifted<'_> {
         let rows = self.rows();
         let count = self.nodes.iter().map(Node::states).sum::<usize>();
         let reference = (!self.tied).then(|| rows[0].object);
-        let used = if silent { Vec::new() } else { self.used() };
+        let mut used = if silent { Vec::new() } else { self.used() };
+        let mut sights = self.sights();
+        let mut first_looked = Vec::with_capacity(sights.len());
+        for (series, sight) in sights.iter().enumerate() {
+            first_looked.push(used.len());
+            used.extend(sight.ages().map(|age| (self.nodes.len() + series, age)));
+        }
         let states = count - usize::from(reference.is_some());
         let inputs = states + used.len();
         let columns = inputs + instrument.inputs();
@@ -91,12 +100,16 @@ impl Lifted<'_> {
                 _ => z[(row, row)] = 1.0,
             }
         }
-        // Rows of `store`: the used samples of earlier frames, then the samples sent in this frame.
+        // Rows of `store`: the used samples and seen places of earlier frames, then those of this frame.
         let mut first_sent = Vec::with_capacity(self.nodes.len());
         let mut samples = used.len();
         for sent in &self.timetable.sent {
             first_sent.push(samples);
             samples += sent * channels;
+        }
+        for (sight, first_looked) in sights.iter_mut().zip(first_looked) {
+            first_sent.push(samples);
+            samples = sight.place(first_looked, samples);
         }
         let mut store = Matrix::zeros(samples, columns);
         for place in 0..used.len() {
@@ -124,6 +137,7 @@ impl Lifted<'_> {
         scratch.resize(columns);
         let mut push = vec![0.0; columns];
         let [mut coupling, mut wall] = [vec![0.0; columns], vec![0.0; columns]];
+        let mut pulled = vec![0.0; if sights.is_empty() { 0 } else { columns }];
         let step = self.nodes.iter().map(|node| node.step_norm(scale)).fold(1.0, f64::max);
         let mut rounding = Rounding::new(step);
         let mut since = 0;
@@ -180,12 +194,18 @@ impl Lifted<'_> {
                         }
                         None => false,
                     };
+                    let mut hand = pushed.then_some(push.as_slice());
+                    if let Some(sight) = sights.iter_mut().find(|sight| sight.node == node) {
+                        let held = |from: usize| held[node * nodes + from].map(|(first, _)| first);
+                        sight.tick(&mut z, rows[node], &mut store, held, &mut pulled);
+                        // An instrument may push the hand of an operator too.
+                        if pushed {
+                            pulled.iter_mut().zip(&push).for_each(|(pulled, push)| *pulled += push);
+                        }
+                        hand = Some(&pulled);
+                    }
                     let [touches, stands] = instrument.touch(node, &z, rows[node], [&mut coupling[inputs..], &mut wall[inputs..]]);
-                    let external = External {
-                        hand: pushed.then_some(push.as_slice()),
-                        coupling: touches.then_some(coupling.as_slice()),
-                        wall: stands.then_some(wall.as_slice()),
-                    };
+                    let external = External { hand, coupling: touches.then_some(coupling.as_slice()), wall: stands.then_some(wall.as_slice()) };
                     let heard = |row: usize| heard.row(node * law_rows + row);
                     self.nodes[node].tick(&mut z, rows[node], heard, external, span, scale, &mut scratch);
                     rounding.tick(norm(&z, rows[node], self.nodes[node].states()));
@@ -204,7 +224,10 @@ impl Lifted<'_> {
             sent: tail(&store, used.len()),
             first_sent: first_sent.iter().map(|first| first - used.len()).collect(),
             used,
-            depth: self.timetable.depth.iter().map(|depth| if silent { 0 } else { depth * channels }).collect(),
+            depth: {
+                let sampled = self.timetable.depth.iter().map(|depth| if silent { 0 } else { depth * channels });
+                sampled.chain(sights.iter().map(|sight| sight.operator.lag)).collect()
+            },
             translations: (0..channels).map(|channel| self.sampling.translation(channel, self.time)).collect(),
             error: if instrument.inputs() == 0 {
                 rounding.bound(|| self.error())
@@ -245,7 +268,7 @@ impl Lifted<'_> {
 
 impl FrameMap {
     /// Returns the matrix from the relative state at the beginning of a frame to the relative state at its end: the states without the reference, then for each
-    /// node the samples of earlier frames, the newest first.
+    /// node the samples of earlier frames, and for each operator the seen places, the newest first.
     pub fn monodromy(&self) -> Matrix {
         self.driven(0)
     }
@@ -299,12 +322,12 @@ impl FrameMap {
         self.translations[(channels - age % channels) % channels]
     }
 
-    /// Returns the count of numbers of samples of earlier frames among the states.
+    /// Returns the count of numbers of samples and seen places of earlier frames among the states.
     pub(crate) fn history(&self) -> usize {
         self.depth.iter().sum()
     }
 
-    /// Returns the rows of `sent` of a node, ordered by time and then by the numbers of a sample.
+    /// Returns the rows of `sent` of a node or a series of seen places, ordered by time and then by the numbers of a sample.
     pub fn sent_by(&self, node: usize) -> std::ops::Range<usize> {
         let end = self.first_sent.get(node + 1).copied().unwrap_or_else(|| self.sent.rows());
         self.first_sent[node]..end

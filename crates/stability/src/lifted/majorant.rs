@@ -14,6 +14,7 @@
 use std::collections::VecDeque;
 
 use super::node::{Body, Node, Scale};
+use super::operator::Seen;
 use super::system::Lifted;
 use crate::rounding::real;
 use crate::timetable::Event;
@@ -56,6 +57,10 @@ struct NodeSizes {
     memory: Vec<Size>,
     /// Sizes of the used combinations of the own states of the latest ticks, the newest first.
     past: VecDeque<Size>,
+    /// Size of the wanted place of the operator's arm.
+    wanted: Size,
+    /// Sizes of the places that the operator saw in this frame, in the order of the ticks.
+    seen: Vec<Size>,
 }
 
 impl Lifted<'_> {
@@ -80,6 +85,8 @@ pub(crate) fn error_of(lifted: &Lifted<'_>, compliance: impl Fn(usize) -> f64) -
             pending: [force; 2],
             memory,
             past: vec![Size::UNIT; lifted.nodes[node].looks_back()].into(),
+            wanted: Size::UNIT,
+            seen: Vec::new(),
         }
     };
     let mut sizes: Vec<NodeSizes> = (0..nodes).map(begin).collect();
@@ -129,7 +136,13 @@ pub(crate) fn error_of(lifted: &Lifted<'_>, compliance: impl Fn(usize) -> f64) -
                     }
                 }
                 heard.iter_mut().for_each(|heard| *heard = heard.rounded(MEAN + real(channels * nodes) * f64::EPSILON));
-                tick(&lifted.nodes[node], &mut sizes[node], &heard, lifted, span);
+                let sees = match lifted.nodes[node].operator.map(|operator| operator.sees) {
+                    Some(Seen::Own) => sizes[node].copy[0],
+                    // The first number of a whole sample is the position.
+                    Some(Seen::Held { from }) => held[node * nodes + from].as_ref().map_or(Size::ZERO, |sample| sample[0]),
+                    Some(Seen::Nothing) | None => Size::ZERO,
+                };
+                tick(&lifted.nodes[node], &mut sizes[node], &heard, sees, lifted, span);
             }
         }
     }
@@ -151,6 +164,10 @@ pub(crate) fn error_of(lifted: &Lifted<'_>, compliance: impl Fn(usize) -> f64) -
         }
         // The reference counts in each number by the share of the position, a share of at most 1.
         size.past.iter().for_each(|number| add(*number, origin));
+        if lifted.nodes[node].operator.is_some() {
+            add(size.wanted, origin);
+            size.seen.iter().for_each(|place| add(*place, origin));
+        }
         let memory = size.memory.iter().enumerate();
         memory.for_each(|(place, number)| add(Size::ZERO.plus(unit(node, place), *number).rounded(2.0 * f64::EPSILON), Size::ZERO));
     }
@@ -158,8 +175,8 @@ pub(crate) fn error_of(lifted: &Lifted<'_>, compliance: impl Fn(usize) -> f64) -
     squares.sqrt()
 }
 
-/// Makes one tick of a node in sizes: see [`Node::tick`].
-fn tick(node: &Node, sizes: &mut NodeSizes, heard: &[Size], lifted: &Lifted<'_>, span: std::time::Duration) {
+/// Makes one tick of a node in sizes: see [`Node::tick`]. `sees` is the size of the place that the operator of the node sees.
+fn tick(node: &Node, sizes: &mut NodeSizes, heard: &[Size], sees: Size, lifted: &Lifted<'_>, span: std::time::Duration) {
     let time = lifted.time;
     let (wall, gains) = (node.wall.unwrap_or(cohaptic_peer::Gains { stiffness: 0.0, damping: 0.0 }), node.law.force.own);
     let [x, v] = sizes.copy;
@@ -185,6 +202,15 @@ fn tick(node: &Node, sizes: &mut NodeSizes, heard: &[Size], lifted: &Lifted<'_>,
         on_copy = on_copy.plus(1.0, on_device);
     }
     sizes.memory = next;
+    let mut of_hand = Size::ZERO;
+    if let Some(operator) = &node.operator {
+        sizes.seen.push(sees);
+        // A place of an earlier frame is a state, with the size 1.
+        let acts = (sizes.seen.len() - 1).checked_sub(operator.lag).map_or(Size::UNIT, |tick| sizes.seen[tick]);
+        let speed = Size::ZERO.plus(operator.crossover, acts);
+        of_hand = of_hand.plus(operator.arm.stiffness, sizes.wanted).plus(operator.arm.damping, speed);
+        sizes.wanted = sizes.wanted.plus(operator.tick, speed).rounded(TICK);
+    }
     if node.compute_delay {
         // The computed forces wait as lengths and act a tick later, so the forces now are those computed before.
         let computed = [on_copy.rounded(TICK), on_device.rounded(TICK)];
@@ -192,7 +218,8 @@ fn tick(node: &Node, sizes: &mut NodeSizes, heard: &[Size], lifted: &Lifted<'_>,
     }
     advance(&node.object, &mut sizes.copy, on_copy, time, span);
     if let Some(device) = &node.device {
-        advance(device, &mut sizes.device, on_device, time, span);
+        // The force of the hand acts at its own tick, also where computed forces wait.
+        advance(device, &mut sizes.device, on_device.plus(1.0, of_hand), time, span);
     }
 }
 

@@ -7,12 +7,14 @@ mod delayed;
 pub(crate) mod frame;
 pub(crate) mod majorant;
 pub(crate) mod node;
+pub(crate) mod operator;
 mod rounding;
 mod sampling;
 mod system;
 
 pub use frame::{Autonomous, FrameMap, Instrument};
 pub use node::{Body, Node};
+pub use operator::{Operator, Seen};
 pub(crate) use rounding::{Rounding, closer_of};
 pub use sampling::Sampling;
 pub use system::Lifted;

@@ -7,7 +7,8 @@ use std::time::Duration;
 
 use cohaptic_peer::{Clock, Gains, Integrator, Motion, Plant, StepMap, tick};
 
-use super::Sampling;
+use super::operator::Seen;
+use super::{Operator, Sampling};
 use crate::Matrix;
 use crate::linear_form::{LawRow, LinearLaw};
 
@@ -94,6 +95,8 @@ pub struct Node {
     pub device: Option<Body>,
     /// The copy of the object.
     pub object: Body,
+    /// The operator that moves the arm of the device; `None` if the wanted motion of the hand is given.
+    pub operator: Option<Operator>,
     /// Gains KC and BC of the coupling between device and copy.
     pub coupling: Gains,
     /// The coordination law.
@@ -115,6 +118,8 @@ pub struct Rows {
     pub object: usize,
     /// Row of the force on the copy at the next tick, if forces act one tick late; the row of the force of the device's coupling follows.
     pub(crate) pending: Option<usize>,
+    /// Row of the wanted place of the operator's arm, if it is a state.
+    pub(crate) wanted: Option<usize>,
     /// Row of the first number of the law's memory; the rest of the memory follows.
     pub(crate) memory: usize,
     /// First row of the own states of the latest ticks, the newest first, if the law looks back: one combination per tick, or position and velocity.
@@ -168,7 +173,12 @@ impl Node {
     /// Returns the number of rows of the node's states.
     pub fn states(&self) -> usize {
         let bodies = if self.device.is_some() { 2 } else { 1 };
-        2 * bodies + if self.compute_delay { bodies } else { 0 } + self.law.memory.len() + self.past_rows()
+        2 * bodies + if self.compute_delay { bodies } else { 0 } + usize::from(self.has_wanted()) + self.law.memory.len() + self.past_rows()
+    }
+
+    /// Tells whether the wanted place of an operator's arm is a state of the node.
+    fn has_wanted(&self) -> bool {
+        self.operator.is_some_and(|operator| operator.has_wanted())
     }
 
     /// Returns the number of rows of the own states of the past.
@@ -206,7 +216,9 @@ impl Node {
         let device = self.device.map(|_| first);
         let object = first + if self.device.is_some() { 2 } else { 0 };
         let past = first + self.states() - self.past_rows();
-        Rows { device, object, pending: self.compute_delay.then_some(object + 2), memory: past - self.law.memory.len(), past }
+        let memory = past - self.law.memory.len();
+        let wanted = self.has_wanted().then(|| memory - 1);
+        Rows { device, object, pending: self.compute_delay.then_some(object + 2), wanted, memory, past }
     }
 
     /// Returns the compliance by which the node's forces become lengths: the motion of the copy by a unit force within the common time [m/N].
@@ -240,10 +252,12 @@ impl Node {
             let velocity = 1.0 + e[1][0] * scale.time + e[1][1] + g[1] * scale.time * force;
             factor * position.max(velocity)
         };
-        let device = self.device.as_ref().map_or(0.0, |body| row(body, 2.0 * gain(self.coupling)));
+        let hand = self.operator.map_or(0.0, |operator| operator.force_norm());
+        let device = self.device.as_ref().map_or(0.0, |body| row(body, 2.0 * gain(self.coupling) + hand));
+        let wanted = self.operator.map_or(0.0, |operator| 1.0 + operator.tick * operator.crossover.abs());
         let memory = |(place, row): (usize, &LawRow)| (seen(row) + remembered(row)) * self.memory_unit(place, scale);
         let memory = self.law.memory.iter().enumerate().map(memory).fold(0.0, f64::max);
-        row(&self.object, on_object).max(device).max(memory)
+        row(&self.object, on_object).max(device).max(wanted).max(memory)
     }
 
     /// Returns the factor by which number `place` of the law's memory becomes a length: the motion of the copy by the force of one unit of the number within
@@ -407,7 +421,9 @@ impl Sampling {
                 && (row.heard == gains
                     || (row.heard.stiffness * gains.damping == row.heard.damping * gains.stiffness && row.heard.damping.is_finite()))
         };
-        if rows().all(is_multiple) { Self::Combined(gains) } else { Self::Whole }
+        // An operator that looks at a sample sees the position alone, which is no combination of a law.
+        let is_looked_at = nodes.iter().any(|node| node.operator.is_some_and(|operator| matches!(operator.sees, Seen::Held { .. })));
+        if rows().all(is_multiple) && !is_looked_at { Self::Combined(gains) } else { Self::Whole }
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::Sampling;
 use super::node::{Node, Rows};
+use super::operator::Sight;
 use crate::Matrix;
 use crate::timetable::{Event, Timetable};
 
@@ -28,7 +29,7 @@ pub struct Lifted<'a> {
 pub(crate) struct Sizes {
     /// Number of rows of the matrix: see [`FrameMap::size`](super::FrameMap::size).
     pub(crate) states: usize,
-    /// Number of rows for numbers of samples of earlier frames: see [`FrameMap::history`](super::FrameMap::history).
+    /// Number of rows for numbers of samples and for seen places of earlier frames: see [`FrameMap::history`](super::FrameMap::history).
     pub(crate) history: usize,
     /// Number of rows of the delayed loop: see [`FrameMap::signals`](super::FrameMap::signals).
     pub(crate) signals: usize,
@@ -41,8 +42,13 @@ impl Lifted<'_> {
         let silent = self.sampling.is_silent(self.time);
         let reference = usize::from(!self.tied);
         let own = self.nodes.iter().map(Node::states).sum::<usize>() - reference;
-        let history = if silent { 0 } else { self.timetable.depth.iter().sum::<usize>() * channels };
-        let sent = self.timetable.sent.iter().sum::<usize>() * channels;
+        let (mut seen_before, mut seen) = (0, 0);
+        for sight in self.sights() {
+            seen_before += sight.operator.lag;
+            seen += sight.ticks;
+        }
+        let history = if silent { 0 } else { self.timetable.depth.iter().sum::<usize>() * channels } + seen_before;
+        let sent = self.timetable.sent.iter().sum::<usize>() * channels + seen;
         Sizes { states: own + history, history, signals: own + sent + reference }
     }
 
@@ -55,6 +61,21 @@ impl Lifted<'_> {
             rows
         });
         rows.collect()
+    }
+
+    /// Tells whether an operator moves the hand of a node.
+    pub(crate) fn has_operators(&self) -> bool {
+        self.nodes.iter().any(|node| node.operator.is_some())
+    }
+
+    /// Returns the sights of the operators, ordered by node, without rows.
+    pub(super) fn sights(&self) -> Vec<Sight> {
+        if !self.has_operators() {
+            return Vec::new();
+        }
+        let ticks = self.ticks();
+        let operators = self.nodes.iter().enumerate().filter_map(|(node, of)| Some((node, of.operator?)));
+        operators.map(|(node, operator)| Sight::new(node, operator, ticks[node])).collect()
     }
 
     /// Returns the number of ticks of each node in a frame.

@@ -45,7 +45,7 @@ use crate::cost::{FrameCost, PASSES};
 use crate::lifted::{Lifted, Node};
 use crate::network::{LinkTiming, NominalNetwork};
 use crate::parts::{PartKind, radius_of, reduced};
-use crate::pieces::{refuse_topology, split};
+use crate::pieces::{refuse_operators, refuse_topology, split};
 use crate::rounding::real;
 use crate::structure::{Contacts, Structure, has_equal_clocks, linear_law};
 use crate::timetable::{Instants, NodeClock, Timetable};
@@ -133,6 +133,7 @@ pub fn mean_square(scene: &Scene) -> Result<MeanSquare, AnalysisError> {
 pub fn mean_square_watched(scene: &Scene, limits: &Limits<'_>) -> Result<MeanSquare, AnalysisError> {
     let limits = &Limits { unknowns: limits.unknowns.min(MOST_UNKNOWNS), ..*limits };
     refuse_topology(scene, "the mean square")?;
+    refuse_operators(scene, "the mean square")?;
     let pieces = split(scene).map_err(|why| AnalysisError::Turns { what: "the mean square", why })?;
     let network = NominalNetwork::of(scene)?;
     let mut notes = Vec::new();
@@ -401,6 +402,7 @@ impl Followed {
         if random_links(scene)?.is_empty() {
             return Ok(Self::Certain);
         }
+        refuse_operators(scene, "the mean square")?;
         Ok(Independent::of(scene, network, structure)?.map_or(Self::Anew, |Independent { timetable, hazards, held }| Self::Equal {
             frame: Equal::new(scene.peers.len(), timetable, &hazards),
             held: held.value,

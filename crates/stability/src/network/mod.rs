@@ -15,7 +15,6 @@ mod timing;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use cohaptic_peer::operator::OperatorLaw;
 use cohaptic_scene::Scene;
 use cohaptic_units::{Bytes, Ecn};
 use cohaptic_wan::{AccessLine, LinkConfig, Network, NetworkConfig, NodeId, PacketInfo};
@@ -26,7 +25,7 @@ use self::nominal::Nominal;
 use self::probe::{MOST_SAMPLES, NoPattern, Probe, RatedLine};
 use self::sampling::Sampling;
 use crate::AnalysisError;
-use crate::pieces::refuse_topology;
+use crate::pieces::{refuse_operators, refuse_topology};
 
 /// The largest number of peers with shared lines probed together.
 const MOST_SHARING: usize = 256;
@@ -64,14 +63,15 @@ impl NominalNetwork {
     /// # Errors
     ///
     /// [`AnalysisError`] if the fates of samples never repeat, because a queue is offered more than its rate or because periods do not meet; if too many
-    /// peers share lines; if the scene has a topology; if peers send only on changes (dead bands); or if an operator follows a target continuously.
+    /// peers share lines; if the scene has a topology; if peers send only on changes (dead bands); or if an operator with the law crossover holds a device of an
+    /// object that turns.
     pub fn of(scene: &Scene) -> Result<Self, AnalysisError> {
         refuse_topology(scene, "this analysis")?;
+        if scene.rotation.is_some() {
+            refuse_operators(scene, "the analysis of an object that turns")?;
+        }
         if scene.coordination.send_when.is_some() {
             return Err(AnalysisError::DeadBands);
-        }
-        if let Some(peer) = (0..scene.peers.len()).find(|peer| is_continuous(scene, *peer)) {
-            return Err(AnalysisError::Operator { peer: scene.peers[peer].name.clone() });
         }
         let size = Bytes::new(scene.sample_kind().datagram_len(scene.axes.count()) as u64);
         let access = |model: Option<&cohaptic_wan::LinkModel>| model.map(|model| Nominal::of(model, size));
@@ -273,11 +273,6 @@ fn shared(scene: &Scene, lines: &Lines, known: &mut Known) -> Result<Places, Ana
     // The diagonal has no meaning and must not count as a further timing.
     let places = timings.map(|(place, timing)| if place / peers == place % peers { 0 } else { known.place(timing, (place / peers, place % peers)) });
     Ok(Places::Each { peers, places: places.collect() })
-}
-
-/// Returns whether the hand of a peer follows what its operator sees, tick by tick.
-fn is_continuous(scene: &Scene, peer: usize) -> bool {
-    scene.operator(peer).is_some_and(|operator| matches!(operator.law, OperatorLaw::Crossover { .. }))
 }
 
 /// Returns the packet of a sample. Samples are capable of ECN, as in a simulation.

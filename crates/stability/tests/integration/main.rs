@@ -8,6 +8,7 @@ mod anchors;
 mod bursts;
 mod cases;
 mod client_server;
+mod crossover;
 mod ends;
 mod graphs;
 mod laws;
