@@ -28,6 +28,24 @@ impl Rows {
         for (model, reason, peers) in groups {
             self.model(&format!("operator of {}", names(&peers)), model, reason);
         }
+        self.stability_with_operators(scene);
+    }
+
+    /// Adds the analysis of stability of a scene with persons, by the law of their hands.
+    fn stability_with_operators(&mut self, scene: &Scene) {
+        let any = |is: fn(&OperatorLaw) -> bool| (0..scene.peers.len()).any(|peer| scene.operator(peer).is_some_and(|operator| is(&operator.law)));
+        if any(|law| matches!(law, OperatorLaw::Crossover { .. })) {
+            let (model, reason) = if scene.rotation.is_some() {
+                ("refused", "an object that turns is analysed without operators who track")
+            } else {
+                ("wanted and seen places are states of a frame", "the law is linear; point, map and boundary follow it, and nothing else does")
+            };
+            self.model("stability with operators who track", model, reason);
+        }
+        if any(|law| matches!(law, OperatorLaw::Moves(_))) {
+            let reason = "each movement is planned by a look after the movement before, which is not linear";
+            self.model("stability with operators who make movements", "their arms alone", reason);
+        }
     }
 }
 

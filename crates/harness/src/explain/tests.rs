@@ -51,6 +51,23 @@ fn queues_in_which_no_sample_waits_are_left_out() {
 }
 
 #[test]
+fn the_analysis_of_persons_is_that_of_their_law() {
+    let stability = |task: &str| {
+        let text = format!(
+            "scene.duration = \"9s\"\nscene.count = 2\nobject.mass = 1\npeer = {{ coupling.stiffness = 9, device.mass = 1, hand.operator = {{}} }}\n\
+             coordination = {{ strategy = \"average-position\", stiffness = 1, update = \"8ms\" }}\n[task]\n{task}"
+        );
+        let scene = Scene::parse(&text, Path::new("x.toml"), &[]).unwrap_or_else(|error| panic!("{error}"));
+        let rows = explain(&scene).models.into_iter().filter(|row| row.part.starts_with("stability"));
+        rows.map(|row| (row.part.clone(), row.model)).collect::<Vec<_>>()
+    };
+    let told = |part: &str, model: &str| vec![(format!("stability with operators who {part}"), model.to_owned())];
+    let tracks = "kind = \"track\"\nsines = [{ amplitude = 0.02, frequency = 0.1 }]";
+    assert_eq!(stability(tracks), told("track", "wanted and seen places are states of a frame"));
+    assert_eq!(stability("kind = \"reach\"\ntargets = [0.1]\nradius = 0.01"), told("make movements", "their arms alone"));
+}
+
+#[test]
 fn every_stage_is_described_with_its_numbers() {
     for (keys, expected) in [
         ("mtu = \"100B\"", "packets of at most 100B, then delay 0s"),
