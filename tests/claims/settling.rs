@@ -82,7 +82,9 @@ impl Settling {
             | StateKind::ObjectVelocity { .. }
             | StateKind::PendingCoupling { .. }
             | StateKind::PendingForce { .. }
-            | StateKind::Memory { .. } => 0,
+            | StateKind::Memory { .. }
+            | StateKind::WantedPosition { .. }
+            | StateKind::SeenPosition { .. } => 0,
         };
         self.monodromy.states.iter().map(|state| age(state.kind)).max().unwrap_or(0)
     }
@@ -110,9 +112,11 @@ impl Settling {
             StateKind::PendingCoupling { .. }
             | StateKind::PendingForce { .. }
             | StateKind::Memory { .. }
+            | StateKind::WantedPosition { .. }
+            | StateKind::SeenPosition { .. }
             | StateKind::SampleForce { .. }
             | StateKind::SampleWave { .. } => {
-                unreachable!("no computation delay, nothing remembered, no server")
+                unreachable!("no computation delay, nothing remembered, no operator, no server")
             }
         };
         self.monodromy.states.iter().map(|state| value(state.peer, state.kind).powi(2)).sum::<f64>().sqrt()

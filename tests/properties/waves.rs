@@ -65,6 +65,8 @@ fn bodies(monodromy: &Monodromy, draft: &Draft, log: &Log, frame: usize) -> Vec<
             StateKind::PendingCoupling { .. }
             | StateKind::PendingForce { .. }
             | StateKind::Memory { .. }
+            | StateKind::WantedPosition { .. }
+            | StateKind::SeenPosition { .. }
             | StateKind::SamplePosition { .. }
             | StateKind::SampleVelocity { .. }
             | StateKind::SampleForce { .. }
