@@ -21,6 +21,7 @@ mod rotation_laws;
 mod switching;
 mod symmetry;
 mod topologies;
+mod tracking;
 mod turned_growth;
 mod waves;
 

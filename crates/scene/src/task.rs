@@ -196,7 +196,9 @@ impl TaskKind {
     #[must_use]
     pub const fn radius(&self) -> Option<f64> {
         match self {
-            Self::Reach(Reach { radius, .. }) | Self::Hold(Hold { radius, .. }) | Self::Carry(Carry { reach: Reach { radius, .. }, .. }) => Some(*radius),
+            Self::Reach(Reach { radius, .. }) | Self::Hold(Hold { radius, .. }) | Self::Carry(Carry { reach: Reach { radius, .. }, .. }) => {
+                Some(*radius)
+            }
             Self::Path(path) => Some(0.5 * path.width),
             Self::Track(_) => None,
         }

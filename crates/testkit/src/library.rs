@@ -336,13 +336,13 @@ mod tests {
             ("starlnk", "did you mean \"starlink\"?"),
             ("starlink@2", "starlink has no version \"2\": expected starlink@1"),
             ("lte-driving slow", "`slow` is not a factor: expected a key and a number above 0"),
-            ("lte-driving delay*0", "`delay*0` is no factor"),
-            ("lte-driving delay*1.2345", "`delay*1.2345` is no factor"),
-            ("lte-driving delay*-1", "`delay*-1` is no factor"),
+            ("lte-driving delay*0", "`delay*0` is not a factor"),
+            ("lte-driving delay*1.2345", "`delay*1.2345` is not a factor"),
+            ("lte-driving delay*-1", "`delay*-1` is not a factor"),
             ("lte-driving rate*2", "does not say how the rate of lte-driving@1 differs from link to link: expected a factor of delay"),
             ("starlink delay*2", "expected the name alone"),
             ("cable delay*2 delay=4ms", "delay has a factor and a value: expected one of them"),
-            ("cable =4ms", "`=4ms` is no factor"),
+            ("cable =4ms", "`=4ms` is not a factor"),
         ] {
             let error = LibraryLink::expect(text).expect_err(text);
             assert!(error.contains(expected), "{text}: {error}");

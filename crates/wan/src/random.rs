@@ -302,8 +302,7 @@ mod tests {
     fn no_two_draws_share_an_address() {
         use Purpose::{
             Corruption, CrossTraffic, Duplication, InitialState, Jitter, Listed, Loss, Modulation, Movement, Outage, Queue, Reordering, Slot,
-            TargetOrder,
-            TraceLoss,
+            TargetOrder, TraceLoss,
         };
         let mut words = std::collections::BTreeSet::new();
         let mut count = 0;

@@ -124,10 +124,10 @@ impl Judge {
         let copy = self.copies.binary_search_by_key(&peer, |copy| copy.peer).ok();
         let of_copy = copy.and_then(|copy| self.groups.iter().position(|group| group.places().contains(&copy)));
         let group = of_copy.unwrap_or_else(|| self.leading());
-        match &self.spec.kind {
-            TaskKind::Path(path) => (path.point(self.progress_of(group) + path.width / (4.0 * noise)), 0.0),
-            kind => (self.target_of(group, at).position, kind.radius().unwrap_or(0.0)),
+        if let TaskKind::Path(path) = &self.spec.kind {
+            return (path.point(self.progress_of(group) + path.width / (4.0 * noise)), 0.0);
         }
+        (self.target_of(group, at).position, self.spec.kind.radius().unwrap_or(0.0))
     }
 
     /// Returns whether an instant with rows seen by [`on_tick`](Self::on_tick) belongs to the time of the task, from the start to the outcome, both included.

@@ -92,7 +92,7 @@ pub fn task_words(result: &TaskResult, scene: &Scene) -> String {
             FailureReason::Dropped => format!(": {name} dropped the object"),
             FailureReason::Left => format!(": {name} left the target"),
             FailureReason::Tilted => format!(": {name} tilted the object"),
-            FailureReason::Gap => format!(": the devices were too near or too far apart"),
+            FailureReason::Gap => ": the devices were too near or too far apart".to_owned(),
         }
     });
     match result.outcome {

@@ -53,7 +53,7 @@ fn each_link_is_written_however_links_are_kept() {
     let rows: Vec<String> = text(&together).lines().map(str::to_owned).collect();
     assert_eq!(rows.len(), 1 + 40 * 39);
     assert_eq!(rows[1].split(',').take(4).collect::<Vec<_>>(), ["peer1->peer2", "5", "0", "2"]);
-    assert!(rows.last().unwrap().starts_with("peer40->peer39,5,0,2,") && rows.last().unwrap().ends_with(",3,0.024"));
+    assert!(rows.last().unwrap().starts_with("peer40->peer39,5,0,2,") && rows.last().unwrap().ends_with(",3,0,0,0.024"));
     // What could not be written is not gone on with.
     let mut pieces = 0;
     let refuse = |_: &[u8]| {

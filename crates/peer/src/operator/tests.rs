@@ -91,6 +91,32 @@ fn the_number_of_movements_follows_fitts() {
     assert!((slope - expected).abs() < 5.0 * (error.hypot(other)) / 20.0, "{slope}, expected {expected}");
 }
 
+/// Steering law (Accot & Zhai 1997): along a lane of the width w, a person aims w/(4c) ahead and needs (T + τ)·4c/w for a length. The mean difference of the
+/// times for two lengths is that of a renewal process, without the movements at both ends.
+#[test]
+fn the_time_along_a_lane_follows_its_length_over_its_width() {
+    let (noise, width, tick, runs) = (0.1, 0.02, millis(10), 2_000_u32);
+    let ahead = width / (4.0 * noise);
+    let mut state = 3;
+    // Differences of the ticks at which 0.2 and 1.2 m are passed.
+    let mut between = || {
+        let config = person(OperatorLaw::Moves(MovesConfig { noise, ..PLAIN }), millis(200));
+        let mut operator = Operator::<1>::new(&config, tick, Duration::ZERO, [0.0]);
+        let (mut position, mut passed) = ([0.0], [0_u32; 2]);
+        while position[0] < 1.2 {
+            let view = View { position, target: [position[0] + ahead], radius: 0.0 };
+            position = operator.tick(&view, |_| [normal(&mut state)]).position;
+            passed = [passed[0] + u32::from(position[0] < 0.2), passed[1] + 1];
+        }
+        f64::from(passed[1] - passed[0])
+    };
+    let ticks: Vec<f64> = (0..runs).map(|_| between()).collect();
+    let mean = ticks.iter().sum::<f64>() / f64::from(runs);
+    let error = (ticks.iter().map(|ticks| (ticks - mean).powi(2)).sum::<f64>()).sqrt() / f64::from(runs);
+    let expected = 4.0 * noise * 0.45 * 1.0 / width / 0.01;
+    assert!((mean - expected).abs() < 5.0 * error && error < 2.0, "{mean} ± {error}, expected {expected}");
+}
+
 /// A hand whose object follows with a delay of some ticks. Returns the wanted positions of some ticks, beginning with the first.
 fn follow(operator: &mut Operator<1>, delay: usize, ticks: usize, target: impl Fn(usize) -> f64, radius: f64) -> Vec<f64> {
     let mut wanted: Vec<f64> = Vec::new();
@@ -259,7 +285,7 @@ fn a_person_who_remembers_the_same_goes_on_alike() {
         let seen = |tick: u32| View { position: [0.01 * f64::from(tick * tick)], target: [0.2 - 0.03 * f64::from(tick)], radius: 0.0 };
         let new = |place: f64| Operator::<1>::new(&config, millis(1), Duration::ZERO, [place]);
         let (mut one, mut other) = (new(0.0), new(7.0));
-        (0..8).for_each(|tick| drop(one.tick(&seen(tick), |_| [0.0])));
+        (0..8).for_each(|tick| _ = one.tick(&seen(tick), |_| [0.0]));
         let (position, views) = one.tracking().unwrap();
         let views: Vec<View<1>> = views.copied().collect();
         // Newest first: the view of tick 7 has waited least.
