@@ -348,7 +348,7 @@ mod tests {
             assert!(error.contains(expected), "{text}: {error}");
         }
         assert!(LibraryLink::parse("delay 20ms").is_none());
-        assert!(link("starlink/up").both_ways("phone").unwrap_err().contains("an access line has both directions: expected starlink@1"));
+        assert!(link("starlink/up").both_ways("phone").unwrap_err().contains("expected the name without a direction, starlink@1"));
         assert!(link("starlink").one_way().unwrap_err().contains("starlink differs by direction: expected starlink/down"));
         assert!(link("cable delay*9999999999999").one_way().is_err());
         for (text, expected) in
