@@ -73,7 +73,7 @@ async fn serve(mut stream: TcpStream) -> std::io::Result<()> {
     }
     let mut begin = BytesMut::new();
     message(&mut begin, b'R', |body| body.put_i32(0));
-    message(&mut begin, b'S', |body| body.put(&b"server_version\017.0\0"[..]));
+    message(&mut begin, b'S', |body| body.put(&b"server_version\x0017.0\0"[..]));
     message(&mut begin, b'K', |body| body.put_u64(7));
     is_ready(&mut begin);
     stream.write_all(&begin).await?;
