@@ -71,7 +71,7 @@ pub enum NetemErrorKind {
 }
 
 /// Disciplines of a queue that are qdiscs of their own in `tc` and keys of a link here.
-const DISCIPLINES: [&str; 4] = ["codel", "fq_codel", "pie", "red"];
+const DISCIPLINES: [&str; 5] = ["codel", "dualpi2", "fq_codel", "pie", "red"];
 
 impl fmt::Display for NetemErrorKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

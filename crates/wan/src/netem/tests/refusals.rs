@@ -212,6 +212,8 @@ fn an_unknown_word_says_what_is_known() {
     let error = Netem::parse("help").unwrap_err();
     assert!(matches!(&error.kind, NetemErrorKind::UnknownWord { word } if word == "help"));
     assert!(error.to_string().contains("expected limit, delay"));
-    let error = Netem::parse("delay 20ms fq_codel").unwrap_err();
-    assert!(error.to_string().contains("fq_codel is a qdisc of its own") && error.to_string().ends_with("with rate and queue.discipline"));
+    for words in ["delay 20ms fq_codel", "delay 20ms dualpi2"] {
+        let error = Netem::parse(words).unwrap_err();
+        assert!(error.to_string().contains(" is a qdisc of its own") && error.to_string().ends_with("with rate and queue.discipline"), "{error}");
+    }
 }
