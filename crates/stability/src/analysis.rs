@@ -130,7 +130,7 @@ pub(crate) fn arms_alone(scene: &Scene) -> Option<String> {
 }
 
 /// Note for operators who track: nothing of their law is left out, but the law begins and ends with the task.
-pub const TRACKED: &str = "operators who track are followed as while the task lasts: what they see moves their hands, about the motion of the target";
+pub const TRACKED: &str = "operators who track are analysed as during the task: their hands follow what they see, about the motion of the target";
 
 /// Note for an object that turns: its equations are linearised for small motions.
 pub const UNLOADED: &str = "the object turns: the verdict is about small motions near rest, all copies together, with no hand pushing";

@@ -50,7 +50,7 @@ pub(crate) struct LinkArguments {
     /// Write the fate of every packet as a capture, for packet analysers
     #[arg(long, value_name = "FILE")]
     pub(crate) pcapng: Option<PathBuf>,
-    /// Draw the delay of each packet, the distribution of the delays, and the rate of what arrived
+    /// Draw the delay of each packet, the distribution of the delays, and the rates of what arrived and of cross-traffic
     #[arg(long, value_name = "FILE.svg")]
     pub(crate) picture: Option<PathBuf>,
 }
