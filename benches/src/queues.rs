@@ -89,7 +89,7 @@ fn here(subject: &Subject, traffic: &[Offered]) -> Vec<Option<u64>> {
 
 /// Result of the program of ns-3.
 enum There {
-    /// Why the program cannot run here.
+    /// Reason for which the program cannot run here.
     Skipped(String),
     /// Name of the program, and the instants as [`here`] returns them.
     Ran(String, Vec<Option<u64>>),

@@ -1,4 +1,4 @@
-//! How long does a ping take while somebody downloads? At a home with a measured DSL line, with four disciplines of the queue before the line.
+//! Round trips of a ping during a download, at a home with a measured DSL line and with four disciplines of the queue before the line.
 //!
 //! A download fills the queue of a slow line, and all other packets wait behind the download. This is bufferbloat. The discipline of the queue is one word
 //! of the test, so that a program can be tested with and without bufferbloat.

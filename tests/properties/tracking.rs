@@ -1,5 +1,5 @@
-//! How a run with a person who tracks comes to rest at a target that stands still, against the spectral radius: two computations that share the steps of bodies
-//! and no more.
+//! Runs with a person who tracks, which come to rest at a target that stands still, against the spectral radius. The two computations share the steps of
+//! bodies and no more.
 
 use cohaptic_harness::Model;
 use cohaptic_scene::Scene;
@@ -44,7 +44,7 @@ fn comes_to_rest_by_its_radius(name: &str, overrides: &[&str]) {
     let at_frames = log.ticks.iter().filter(|tick| tick.peer == 0 && u128::from(tick.at.as_nanos()) % frame == 0);
     let left: Vec<f64> = at_frames.map(|tick| tick.object.position[0] - TARGET).collect();
     let size = |n: usize| left[n - 1] * left[n + 1] - left[n] * left[n];
-    // All other motions have died out when this one has come to a ten-thousandth, or at the end of the run.
+    // The slowest motion alone is left when it has come to a ten-thousandth, or at the end of the run.
     let late = (1..left.len() - APART - 1).find(|n| libm::pow(radius, count(*n)) < 1e-4).unwrap_or(left.len() - APART - 2);
     let found = libm::pow(size(late + APART) / size(late), 0.5 / count(APART));
     assert!((found - radius).abs() < 1e-6, "{name} {overrides:?}: a run falls by {found} a frame, and the radius is {radius}");

@@ -1,8 +1,8 @@
-// One discipline of a queue of ns-3 (https://www.nsnam.org) over the packets of a file: `ns3_queues DISCIPLINE LIMIT FILE`, called by `link-table` of
+// Runs a discipline of a queue of ns-3 (https://www.nsnam.org) over the packets of a file: `ns3_queues DISCIPLINE LIMIT FILE`, called by `link-table` of
 // cohaptic-benches through `ns3.sh`. DISCIPLINE is tail-drop, codel, fq-codel or pie; LIMIT is the number of packets that may wait.
 //
 // A line of FILE is a packet: instant of its offer [ns], number of its flow, size [byte]. The first line of the output is the name of this program.
-// Each further line is a packet, in the order of FILE: instant at which the packet has left the line of 12 Mbit/s [ns], or -1 for a dropped packet.
+// Further lines are packets, in the order of FILE: instant at which the packet has left the line of 12 Mbit/s [ns], or -1 for a dropped packet.
 //
 // ns-3 is under the GNU General Public Licence, version 2. Nothing of it is copied here or shipped with this project; this file only calls it, is compiled
 // by `ns3.sh` where the user has installed it, and is part of no other program. Whoever gives away a binary of it is bound by that licence.

@@ -246,7 +246,7 @@ fn the_task_of_each_run_stands_in_its_row() {
     let place = header.iter().position(|name| name == "task.outcome").unwrap();
     assert_eq!(header[place..place + 4], ["task.outcome", "task.time_s", "task.reached", "max_discrepancy_m"]);
     let of_task: Vec<&[String]> = rows.iter().map(|row| &row[place..place + 3]).collect();
-    // Everything lies within a metre, and nobody is there to a nanometre.
+    // Copies are always within a metre of the target, and never within a nanometre.
     assert_eq!(of_task[..2], [["done", "0.0", "1"]; 2]);
     assert_eq!(of_task[2..], [["timed-out", "0.02", "0"]; 2]);
 }

@@ -158,7 +158,7 @@ fn noise_has_the_address_of_the_movement() {
     let alone = device(&format!("{left}, {{ name = \"right\" }}"), &[]);
     let others = "{ name = \"right\" }, { name = \"third\", contact = \"none\", hand = { operator = { noise = 0.3 } } }";
     assert_eq!(alone, device(&format!("{others}, {left}"), &["link.jitter=5ms", "link.loss=10%"]));
-    // Both axes have noise, of different numbers; another seed and another name have other numbers.
+    // Noise of both axes differs from zero and from axis to axis. A different seed or name has different noise.
     let at = |device: &[u64], axis: usize| f64::from_bits(device[2 * 700 + axis]);
     assert!(at(&alone, 1) != 0.0 && (at(&alone, 0) - 0.1).abs() > 1e-6 && (at(&alone, 0) - 0.1 - at(&alone, 1)).abs() > 1e-6);
     assert!(alone != device(&format!("{left}, {{ name = \"right\" }}"), &["scene.seed=4"]));

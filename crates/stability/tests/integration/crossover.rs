@@ -105,11 +105,11 @@ fn what_people_see_counts_in_what_makes_peers_equal() {
     assert_eq!(parts("each-sees-the-other"), [together]);
     assert_eq!(parts("unequal-eyes"), [together]);
     assert_eq!(parts("two-see-a-third"), [together, ("apart", Some(0), 1)]);
-    // One person, and two peers without.
+    // A scene of one person and of two peers without a person.
     assert_eq!(parts("three"), [together, ("apart", Some(1), 1)]);
 }
 
-/// Nobody corrects by how much two hands pull against each other where both people watch one copy, so that pull stays.
+/// Where both people watch one copy, hands may pull against each other without moving this copy. No person sees and corrects the pull, so the pull stays.
 #[test]
 fn two_who_watch_one_copy_pull_against_each_other_without_end() {
     for name in ["two-see-a-third", "both-watch-one-copy"] {

@@ -126,7 +126,8 @@ class Frame:
                 for age in range(1, peer.lag + 1):
                     now["seen", i, age] = seen[i][-age]
         self.matrix = np.array([now[state] for state in self.states])
-        # What moves nothing: the position of a device that touches nothing on a hand without a spring, and the wanted place of an arm without one.
+        # States that move nothing: the position of a device that touches nothing on a hand without a spring, and the wanted place of an arm without a
+        # spring.
         loose = {("device", i, 0) for i, peer in enumerate(peers) if not peer.touches and peer.ka == 0}
         loose |= {("wanted", i) for i, peer in enumerate(peers) if peer.ka == 0}
         kept = [number for number, state in enumerate(self.states) if state not in loose]

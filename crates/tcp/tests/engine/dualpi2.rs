@@ -25,7 +25,7 @@ struct Shared {
     waits: Vec<(f64, u32)>,
 }
 
-/// What a flow got.
+/// Rate and wait of a flow over a span of time.
 #[derive(Clone, Copy, Debug)]
 struct Got {
     /// [bit/s]
@@ -134,7 +134,7 @@ impl Shared {
         self.now = end;
     }
 
-    /// What each flow gets from `from` to `until` [s].
+    /// Returns rate and wait of each flow from `from` to `until` [s].
     fn got(&mut self, from: u64, until: u64) -> Vec<Got> {
         self.run_until(Instant::from_nanos(from * 1_000_000_000));
         self.read.fill(0);

@@ -314,7 +314,7 @@ impl Line {
             }
             sending.since = now;
         }
-        // Another number of queues is another discipline.
+        // A change of the number of queues counts as a change of the discipline.
         let kind = |config: &Config| {
             let flows = if let Discipline::FqCoDel(fq_codel) = config.bottleneck.discipline { fq_codel.flows.get() } else { 0 };
             (std::mem::discriminant(&config.bottleneck.discipline), flows)

@@ -96,7 +96,7 @@ impl Line {
         }
         loop {
             let Some(place) = self.queue.iter().position(|queued| queued.packet.number == packet.number) else { return };
-            // As full as it is for the newest packet, which is not one of those before it.
+            // The limit is asked without the newest packet in the queue, because a packet does not wait before itself.
             let newest = self.queue.remove(place);
             let is_full = self.is_full(now, packet.size);
             self.queue.insert(place, newest);
