@@ -75,7 +75,7 @@ fn estimated(scene: &str, estimate: &Estimate) -> String {
                 correlation.lag_one
             ));
             if let Some(rest) = goodness.independence.filter(|rest| !rest.holds()) {
-                line(format!("it is NOT all of their memory, and the link leaves the rest out: {}", found(&rest)));
+                line(format!("the correlation time is NOT all of the memory of the delays, and the link leaves the rest out: {}", found(&rest)));
             }
         }
     }
