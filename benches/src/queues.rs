@@ -52,7 +52,7 @@ fn subjects() -> [Subject; 4] {
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "gaps of milliseconds in nanoseconds")]
 fn traffic() -> Vec<Offered> {
     let stream = Stream::new(1, b"traffic");
-    // Not at whole milliseconds, so that no small packet comes at the instant at which a large one leaves.
+    // Small packets are not offered at whole milliseconds, so that no small packet comes at the instant at which a large one leaves.
     let mut all: Vec<Offered> = (0..SECONDS * 50).map(|number| Offered { at: number * SECOND / 50 + 7_777, flow: LARGE, size: 100 }).collect();
     let (mut at, mut number) = (0, 0);
     while at < SECONDS * SECOND {
@@ -167,10 +167,10 @@ pub(crate) fn section() -> String {
 const HEAD: &str = "\
 ## Queues beside ns-3
 
-What the [disciplines of a queue](emulator-stages.md#bottleneck) make of one stream of packets, here and on ns-3 where it is installed
+The table compares the [disciplines of a queue](emulator-stages.md#bottleneck) with those of ns-3 on one stream of packets, where ns-3 is installed
 ([ns3_queues.cc](../benches/peers/others/ns3_queues.cc), compiled against Debian's `libns3-dev`). No figure depends on the machine.
 
-Twenty seconds of traffic on a line of 12 Mbit/s. Three flows of packets of 1500 bytes with exponential gaps offer 1.2 times the rate of the line together
+The traffic lasts twenty seconds, on a line of 12 Mbit/s. Three flows of packets of 1500 bytes with exponential gaps offer 1.2 times the rate of the line together
 in every other second, and half of the rate in the seconds between. A fourth flow has 100 bytes every 20 ms. No sender reacts to a drop, so that the
 differences are those of the disciplines alone. Parameters are the defaults of this project on both sides; 100 packets may wait with tail drop, 1000 with
 CoDel and PIE, 10,240 with FQ-CoDel. A delay lasts from the offer to the end of transmission, which takes 1 ms for a large packet and 0.07 ms for a small
@@ -184,7 +184,7 @@ one. *Same* is the share of packets that both drop, or that leave both lines at 
 const TAIL: &str = "
 Why the two differ:
 
-- **Tail drop** leaves nothing open.
+- **Tail drop** leaves no choice to a program, so there is no difference.
 - **CoDel**, and so **FQ-CoDel**: for each drop ns-3 takes one step of Newton's method in place of a square root, as Linux does. So the third drop of a
   series comes 50 ms after the second, and not 100/√2 = 71 ms, as in RFC 8289 and here. ns-3 also counts time in units of 1.024 µs. Every packet after the
   first drop that differs meets another queue.

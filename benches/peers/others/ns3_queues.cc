@@ -41,7 +41,7 @@ class Item : public ns3::QueueDiscItem {
     const std::size_t place;
 };
 
-// A queue and the line behind it.
+// A queue, and the line after the queue.
 class Line {
   public:
     Line(ns3::Ptr<ns3::QueueDisc> queue, const std::vector<Offered>& packets) : queue(queue), packets(packets), departures(packets.size(), -1) {}
