@@ -8,6 +8,8 @@
 //! A stage without configuration is `None`, and is not on the route of packets. A packet walks from stage to stage until a stage keeps the packet, drops the
 //! packet, or lets the packet out.
 
+mod route;
+
 use alloc::boxed::Box;
 use alloc::collections::{BinaryHeap, VecDeque};
 use alloc::vec::Vec;
@@ -15,6 +17,8 @@ use core::cmp::Ordering;
 use core::time::Duration;
 
 use cohaptic_units::{Bytes, Instant};
+
+use route::{NETEM, PHYSICAL, Route, Stage};
 
 use crate::fates::fate::DropCause;
 use crate::fates::stats::CrossCounts;
@@ -30,46 +34,6 @@ use crate::stages::path_trace::PathTrace;
 use crate::stages::queue::{BottleneckStage, CrossStage, TokenBucketStage};
 use crate::stages::reorder::{Placed, ReorderStage};
 use crate::stages::slots::SlotStage;
-
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Stage {
-    Mtu,
-    Outage,
-    Loss,
-    Duplication,
-    Corruption,
-    Limit,
-    Bucket,
-    Bottleneck,
-    Slots,
-    Propagation,
-}
-
-const PHYSICAL: [Stage; 10] = [
-    Stage::Mtu,
-    Stage::Outage,
-    Stage::Loss,
-    Stage::Duplication,
-    Stage::Corruption,
-    Stage::Limit,
-    Stage::Bucket,
-    Stage::Bottleneck,
-    Stage::Slots,
-    Stage::Propagation,
-];
-
-const NETEM: [Stage; 10] = [
-    Stage::Mtu,
-    Stage::Outage,
-    Stage::Duplication,
-    Stage::Loss,
-    Stage::Corruption,
-    Stage::Limit,
-    Stage::Propagation,
-    Stage::Bucket,
-    Stage::Bottleneck,
-    Stage::Slots,
-];
 
 /// The stages of one line and the packets in them. Rarely configured stages are boxed: a large mesh has many lines, and each must stay small.
 #[derive(Clone, Debug)]
@@ -106,41 +70,6 @@ pub(crate) struct Staged<T> {
     next_change: Option<Instant>,
     /// Buffer for packets on their way out of a stage, kept for the reuse of its memory. Empty between calls.
     released: VecDeque<Carried<T>>,
-}
-
-/// The configured stages, in the order of the layout. Most lines have two of the ten, so packets and searches for the next event visit few stages.
-#[derive(Clone, Debug)]
-struct Route {
-    /// The configured stages in the first `count` entries. The rest is not read.
-    stages: [Stage; 10],
-    count: u8,
-    /// Index of the first configured stage after the limit: only later stages can keep a packet.
-    keeping: u8,
-    /// Index in `stages` of the first configured stage after a stage, indexed by this stage.
-    behind: [u8; 10],
-}
-
-impl Route {
-    fn new(layout: &[Stage; 10], is_there: impl Fn(Stage) -> bool) -> Self {
-        let mut route = Self { stages: *layout, count: 0, keeping: 0, behind: [0; 10] };
-        for &stage in layout {
-            // `behind` is set for unconfigured stages too: packets of a removed stage go on from there.
-            if is_there(stage) {
-                route.stages[usize::from(route.count)] = stage;
-                route.count += 1;
-            }
-            route.behind[stage as usize] = route.count;
-            if stage == Stage::Limit {
-                route.keeping = route.count;
-            }
-        }
-        route
-    }
-
-    /// Returns the configured stages that can keep a packet: all stages after the limit.
-    fn keeping(&self) -> &[Stage] {
-        &self.stages[usize::from(self.keeping)..usize::from(self.count)]
-    }
 }
 
 /// A packet in propagation between two stages. The order is reversed, so the heap gives the earliest packet first.
