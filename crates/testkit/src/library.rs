@@ -325,7 +325,7 @@ mod tests {
         // A factor stands before the keys, in whatever order they are written.
         let phone = link("lte-driving  queue.limit='9 packets' delay*1.4\trate=2Mbit");
         assert_eq!(phone.to_string(), "lte-driving@1 delay*1.4 queue.limit='9 packets' rate=2Mbit");
-        // What has a value is the same for all links of the kind.
+        // A key with a value is the same for all links of the kind, and no factor is drawn for it.
         assert_eq!(link("5g-walking rate=9Mbit").keys().collect::<Vec<_>>(), ["delay"]);
     }
 

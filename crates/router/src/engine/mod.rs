@@ -160,7 +160,7 @@ impl Engine {
         self.now = self.now.max(now);
         if self.now.saturating_duration_since(self.caught_up) >= CATCH_UP {
             self.caught_up = self.now;
-            // Everything due has happened, so no packet leaves a link here.
+            // All due events have happened, so no packet leaves a link here.
             self.lanes.iter_mut().for_each(|lane| lane.catch_up(self.now));
         }
     }

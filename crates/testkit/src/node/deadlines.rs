@@ -65,7 +65,7 @@ impl Deadlines {
         // Goes down to the leftmost node that is due.
         while place < self.first {
             place *= 2;
-            // One of both children is due, so that a left child that is not due leaves the right child.
+            // At least one child is due. If the left child is not due, the right child is.
             if self.least[place] > now {
                 place += 1;
             }

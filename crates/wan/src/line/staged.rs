@@ -569,7 +569,8 @@ mod tests {
     use crate::line::name::LinkName;
     use crate::stages::queue::{Bottleneck, CrossTraffic, Poisson};
 
-    /// After a silence with calls, what is left for the next packet are the cross packets since the last call; without calls, those of the whole silence.
+    /// With calls during a silence, the next packet has to wait only for the cross packets since the last call. Without calls, the next packet has to wait for
+    /// the cross packets of the whole silence.
     #[test]
     fn cross_packets_of_a_silence_are_computed_on_the_way() {
         let rate = |bits| Rate::bits_per_sec(bits).unwrap();
@@ -586,7 +587,7 @@ mod tests {
             staged.catch_up(now, &mut outputs);
             assert!(next(&staged) > now && staged.next_at().is_none());
         }
-        // Nothing comes out, and a cross packet is reported only once a packet of the line has met the queue.
+        // No packet comes out, and a cross packet is reported only once a packet of the line has met the queue.
         assert!(outputs.is_empty() && staged.crossed().offered == 0);
     }
 }

@@ -71,7 +71,7 @@ impl DualPi2 {
 /// Most updates between two changes of the queues: 27 minutes with the usual time. Of queues that change nothing for longer, the updates before are left out.
 const MOST_UPDATES: u64 = 100_000;
 
-/// Both queues, with the state of the controller and of the scheduler.
+/// L queue and C queue, with the state of the controller and of the scheduler.
 #[derive(Clone, Debug)]
 pub(crate) struct DualQueues<P> {
     /// Packets with ECT(1) or CE, each with its place in the order of offers.

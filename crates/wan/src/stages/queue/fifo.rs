@@ -358,7 +358,7 @@ impl<P, S: Default> Fifo<P, S> {
         // A new kind of discipline begins without memory. New parameters of the same kind keep the memory.
         let (old, new) = (&before.bottleneck().discipline, &rules.bottleneck().discipline);
         let is_same = match (old, new) {
-            // Another number of queues spreads the flows anew.
+            // With a new number of queues, the flows are spread anew.
             (Discipline::FqCoDel(old), Discipline::FqCoDel(new)) => old.flows == new.flows,
             (old, new) => core::mem::discriminant(old) == core::mem::discriminant(new),
         };
