@@ -25,7 +25,7 @@ const WITNESSES: usize = 2;
 /// Largest sum of the omitted terms, relative to x.
 const TOLERANCE: f64 = 1e-14;
 
-/// Number below which [`GammaMap::nearly`] returns 0: e⁻¹⁰⁰.
+/// Number below which [`GammaMap::nearly`] gives 0: e⁻¹⁰⁰.
 const NOTHING: f64 = 3.7e-44;
 /// Largest sum of the omitted terms of ln x.
 const NEAR: f64 = 1e-13;
@@ -75,22 +75,10 @@ impl GammaMap {
         if x.is_nan() { self.exactly(z) } else { x }
     }
 
-    /// Returns x(z) with a relative error below 10⁻¹², or as 0 if x(z) is below e⁻¹⁰⁰. NaN without an accurate series.
+    /// Computes x(z) of several numbers with a relative error below 10⁻¹², or as 0 if x(z) is below e⁻¹⁰⁰. NaN without an accurate series.
     #[inline(always)]
-    pub(super) fn nearly(&self, z: f64) -> f64 {
-        match &self.logarithms {
-            // The logarithm has a series in every cell in which x has one, so that only one sum is needed.
-            Some(logarithms) => {
-                let logarithm = sum(logarithms, z);
-                if logarithm < -100.0 { 0.0 } else { exp_nearly(logarithm) }
-            }
-            None => sum(&self.cells, z),
-        }
-    }
-
-    /// Computes [`GammaMap::nearly`] of several numbers.
-    #[inline(always)]
-    pub(super) fn nearly_all<const N: usize>(&self, z: &[f64; N], x: &mut [f64; N]) {
+    pub(super) fn nearly<const N: usize>(&self, z: &[f64; N], x: &mut [f64; N]) {
+        // A logarithm has a series in every cell in which x has one, so that only one sum is needed.
         let Some(logarithms) = &self.logarithms else {
             return x.iter_mut().zip(z).for_each(|(x, z)| *x = sum(&self.cells, *z));
         };

@@ -17,8 +17,8 @@ impl Law {
     /// Mark of a delay that is not certain without computing the delay itself.
     pub(crate) const UNKNOWN: u64 = u64::MAX;
 
-    /// Returns [`Law::whole_at_normal`] of several numbers, with [`Law::UNKNOWN`] in place of `None`. One step at a time for all numbers, so that a processor
-    /// computes several of them together.
+    /// Returns [`Law::at_normal`] of several numbers, rounded to whole numbers, with [`Law::UNKNOWN`] where that is not certain without computing the delay
+    /// itself. The law is in nanoseconds. One step at a time for all numbers, so that a processor computes several of them together.
     #[inline(always)]
     pub(crate) fn whole_at_normals<const N: usize>(&self, z: &[f64; N]) -> [u64; N] {
         let mut x = [0.0; N];
@@ -28,7 +28,7 @@ impl Law {
                 LARGEST[0]
             }
             Standard::Gamma(map) => {
-                map.nearly_all(z, &mut x);
+                map.nearly(z, &mut x);
                 LARGEST[1]
             }
             Standard::Constant
@@ -43,39 +43,20 @@ impl Law {
         };
         let mut nanos = [0; N];
         for (nanos, x) in nanos.iter_mut().zip(&x) {
-            *nanos = self.whole_or_unknown(*x, largest);
+            let delay = self.fit.origin + self.fit.scale * x;
+            let nearest = delay + ROOM;
+            // A NaN fails the first comparison.
+            let is_certain = delay < largest && (delay - (nearest - ROOM)).abs() < 0.5 - MARGIN;
+            *nanos = if is_certain { nearest.to_bits().wrapping_sub(ROOM.to_bits()) } else { Self::UNKNOWN };
         }
         nanos
-    }
-
-    /// Returns the delay of a number of the standard law, rounded to a whole number, or [`Law::UNKNOWN`] where that is not certain.
-    #[inline(always)]
-    fn whole_or_unknown(&self, x: f64, largest: f64) -> u64 {
-        let delay = self.fit.origin + self.fit.scale * x;
-        let nearest = delay + ROOM;
-        // A NaN fails the first comparison.
-        let is_certain = delay < largest && (delay - (nearest - ROOM)).abs() < 0.5 - MARGIN;
-        if is_certain { nearest.to_bits().wrapping_sub(ROOM.to_bits()) } else { Self::UNKNOWN }
     }
 
     /// Returns [`Law::at_normal`], rounded to a whole number, or `None` where that is not certain without computing the delay itself. The law is in
     /// nanoseconds.
     #[inline(always)]
     pub(crate) fn whole_at_normal(&self, z: f64) -> Option<u64> {
-        let (x, largest) = match &self.fit.standard {
-            Standard::LogNormal { sigma } => (exp_nearly(sigma * z), LARGEST[0]),
-            Standard::Gamma(map) => (map.nearly(z), LARGEST[1]),
-            Standard::Constant
-            | Standard::Normal
-            | Standard::Uniform
-            | Standard::Pareto
-            | Standard::ParetoNormal
-            | Standard::Laplace
-            | Standard::Weibull { .. }
-            | Standard::Empirical(_)
-            | Standard::Table(_) => return None,
-        };
-        let nanos = self.whole_or_unknown(x, largest);
+        let [nanos] = self.whole_at_normals(&[z]);
         (nanos != Self::UNKNOWN).then_some(nanos)
     }
 }
