@@ -19,7 +19,7 @@ pub(crate) struct Judge {
     /// Positions of the two devices with a limited distance \[m\]; `None` before the first tick of the device's peer.
     devices: [Option<[f64; 3]>; 2],
     axes: usize,
-    /// True if only the targets matter, so that no judged instant is shown, and nothing is measured but the progress along a path.
+    /// True if only targets and outcome matter, so that no judged instant is shown, and nothing is measured but the progress along a path.
     only_targets: bool,
     /// End of the time for the task: `start` and the timeout, or the end of the scene.
     deadline: Instant,
@@ -56,7 +56,7 @@ impl Judge {
         Some(Self { axes, only_targets, targets, devices, deadline, copies, groups, now: None, measured: None, outcome: None, spec })
     }
 
-    /// Returns a judge who knows the targets of a run and measures nothing else; `None` for a scene without a task.
+    /// Returns a judge who knows the targets and the outcome of a run, and measures nothing else; `None` for a scene without a task.
     pub(crate) fn of_targets(scene: &Scene) -> Option<Self> {
         Self::of(scene).map(|judge| Self { only_targets: true, ..judge })
     }
@@ -64,7 +64,9 @@ impl Judge {
     /// Takes the state of a peer at a tick. The states of peers that are not judged have no effect. An instant is judged at the first row of a later instant,
     /// when the ticks of all peers of the instant are known.
     pub(crate) fn on_tick(&mut self, row: &TickRow<'_>, on_row: OnRow<'_>) {
-        self.judge_before(row.at, on_row);
+        if self.now.is_some_and(|at| at < row.at) {
+            self.settle(on_row);
+        }
         if let Some(place) = self.gap().and_then(|gap| gap.peers.iter().position(|peer| *peer == row.peer)) {
             self.devices[place] = Some(std::array::from_fn(|axis| row.device.position.get(axis).copied().unwrap_or(0.0)));
         }
@@ -79,13 +81,6 @@ impl Judge {
         copy.speed = norm(row.object.velocity);
         copy.force = norm(row.coupling_force);
         copy.has_ticked = true;
-    }
-
-    /// Judges the latest instant with rows seen by [`on_tick`](Self::on_tick) if the instant is before `now`, so that all its rows were seen.
-    pub(crate) fn judge_before(&mut self, now: Instant, on_row: OnRow<'_>) {
-        if self.now.is_some_and(|at| at < now) {
-            self.settle(on_row);
-        }
     }
 
     /// Judges the latest instant with rows, if this instant is not judged yet. For a caller that knows that no further peer ticks at this instant.
@@ -114,12 +109,13 @@ impl Judge {
         }
     }
 
-    /// Returns the position that the task asks the user of a peer for at an instant \[m\], and the largest distance that counts as there \[m\], zero for a
-    /// task without such a distance. All earlier instants must be judged: a target reached at an instant is replaced at the next one, as in `task.csv`. The user of a
-    /// peer that is not judged is asked for the target of the leading peers.
+    /// Returns the position that the task asks the user of a peer for at an instant \[m\], and the largest distance that counts as there \[m\], zero for a task
+    /// without such a distance. All earlier instants must be judged: a target reached at an instant is replaced at the next one, as in `task.csv`. The user of
+    /// a peer that is not judged is asked for the target of the leading peers.
     ///
-    /// `noise`: standard deviation of the end of the user's movement over the length of the movement. On a path of the width w the user aims w/(4·noise) ahead of
-    /// the progress of the copy, so that half of the width is two standard deviations of such a movement (Accot & Zhai 1997: the time grows as length over width).
+    /// `noise`: standard deviation of the end of the user's movement over the length of the movement. On a path of the width w the user aims w/(4·noise) ahead
+    /// of the progress of the copy, so that half of the width is two standard deviations of such a movement (Accot & Zhai 1997: the time grows as length over
+    /// width).
     pub(crate) fn asks(&self, peer: usize, at: Instant, noise: f64) -> ([f64; 3], f64) {
         let copy = self.copies.binary_search_by_key(&peer, |copy| copy.peer).ok();
         let of_copy = copy.and_then(|copy| self.groups.iter().position(|group| group.places().contains(&copy)));

@@ -4,11 +4,11 @@
 //! file, socket or clock of the machine is known here.
 
 mod changes;
+mod judging;
 pub(crate) mod live;
 mod member;
 mod operators;
 mod remote;
-mod stopping;
 mod turning;
 mod watch;
 
@@ -32,10 +32,10 @@ use crate::schedule::Schedule;
 use crate::summary::{AccessSummary, Ending, LinkSummaries, PeerSummary, Summary};
 
 use changes::{ParameterChange, parameter_changes};
+use judging::Judging;
 use member::{DeviceModel, Member};
 use operators::Operators;
 pub(crate) use remote::{Arriving, NoRemote, Remote};
-use stopping::Stopping;
 use turning::Turning;
 pub(crate) use watch::Watch;
 
@@ -64,8 +64,8 @@ pub(crate) struct World<const A: usize, S, E: Remote<A> = NoRemote> {
     topology: Option<Arc<Topology>>,
     /// End of the run: the end of the scene, or the outcome of a task that ends the run.
     end: Instant,
-    /// Ends the run at the outcome of the task; `None` for a run to the end of the scene.
-    stopping: Option<Box<Stopping>>,
+    /// Judge of the task; `None` for a scene without a task.
+    judging: Option<Box<Judging>>,
     now: Instant,
     /// Position of each copy at its latest tick \[m\], indexed by peer. NaN for a silent peer in another process.
     latest: Vec<[f64; A]>,
@@ -126,6 +126,7 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             parameters: parameter_changes(scene),
             turning: Turning::new(scene),
             members,
+            judging: Judging::of(scene, operators.is_some()),
             operators,
             network: network(scene, plan),
             schedule: Schedule::new(plan.ticking, scene.peers.iter().map(|peer| &peer.clock).enumerate()),
@@ -135,7 +136,6 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                 .collect(),
             topology: scene.topology.clone(),
             end: Instant::ZERO.saturating_add(scene.duration),
-            stopping: None,
             now: Instant::ZERO,
             max_discrepancy: 0.0,
             finite: true,
@@ -147,8 +147,10 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
 
     /// Lets the outcome of the task end the run, if the task says so.
     pub(crate) fn stopping_with_task(mut self, scene: &Scene) -> Self {
-        self.stopping = Stopping::of(scene);
-        self.stop_at_outcome();
+        if let Some(judging) = self.judging.as_mut().filter(|_| scene.ends_with_task()) {
+            judging.stop();
+        }
+        self.judge_instant();
         self
     }
 
@@ -184,8 +186,8 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             self.deliver(now, observer, watch)?;
         }
         // A person sees what has arrived by now, and the hand pulls during the tick that begins now.
-        if let Some(operators) = &mut self.operators {
-            operators.act(now, &self.ticking, &mut self.members);
+        if let (Some(operators), Some(judging)) = (&mut self.operators, &self.judging) {
+            operators.act(now, &self.ticking, &mut self.members, judging.judge());
         }
         self.compute_and_move(now, observer, watch)?;
         // `latest` holds the positions before the move, so the discrepancy belongs to `now`.
@@ -193,14 +195,14 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
         if watch.instants {
             observer.on_instant(&InstantRow { at: now, discrepancy })?;
         }
-        self.stop_at_outcome();
+        self.judge_instant();
         Ok(Step::Ticked)
     }
 
-    /// Ends the run at the outcome of its task, if the task is decided and says so. The next step then finds the run at its end.
-    fn stop_at_outcome(&mut self) {
-        if let Some(stopping) = &mut self.stopping
-            && let Some(end) = stopping.end(self.schedule.next_instant())
+    /// Judges the task after all ticks of an instant, and ends the run at the outcome if the task says so. The next step then finds the run at its end.
+    fn judge_instant(&mut self) {
+        if let Some(judging) = &mut self.judging
+            && let Some(end) = judging.end(self.schedule.next_instant())
         {
             self.end = self.end.min(end);
         }
@@ -334,8 +336,8 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
             }
             Schedule::EventDriven(_) => None,
         };
-        let judged = self.operators.as_ref().is_some_and(|operators| operators.needs_ticks());
-        let shows_ticks = watch.ticks || judged || self.stopping.is_some();
+        let mut judging = self.judging.as_mut().filter(|judging| judging.takes_ticks());
+        let shows_ticks = watch.ticks || judging.is_some();
         if let (Some(span), false, true) = (lockstep, shows_ticks || watch.steps, E::IS_EMPTY) {
             self.move_together(now, span);
             return Ok(());
@@ -368,13 +370,9 @@ impl<const A: usize, S: Strategy<A>, E: Remote<A>> World<A, S, E> {
                     coordination_force: &forces.coordination[..axes],
                     turn: None,
                 };
-                let (operators, stopping) = (self.operators.as_mut().filter(|_| judged), &mut self.stopping);
-                let show = |row: &TickRow<'_>| {
-                    if let Some(operators) = operators {
-                        operators.judge(row);
-                    }
-                    if let Some(stopping) = stopping {
-                        stopping.judge(row);
+                let mut show = |row: &TickRow<'_>| {
+                    if let Some(judging) = &mut judging {
+                        judging.on_tick(row);
                     }
                     if watch.ticks { observer.on_tick(row) } else { Ok(()) }
                 };

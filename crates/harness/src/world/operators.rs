@@ -7,7 +7,6 @@ use cohaptic_units::Instant;
 use cohaptic_wan::random::{Purpose, Stream};
 
 use super::member::{DeviceModel, Member};
-use crate::TickRow;
 use crate::task::Judge;
 
 /// Modelled persons of a scene.
@@ -15,8 +14,6 @@ use crate::task::Judge;
 pub(super) struct Operators<const A: usize> {
     /// Persons in the order of their peers.
     persons: Vec<Person<A>>,
-    /// Judge of the task, which knows the present target. The judge of an observer is another one, because observers must not change a run.
-    judge: Judge,
     /// First instant of the task.
     start: Instant,
     /// Number of axes of the scene, at most A. Nobody moves along the other axes.
@@ -58,27 +55,16 @@ impl<const A: usize> Operators<A> {
         if persons.is_empty() {
             return None;
         }
-        let (judge, start) = (Judge::of_targets(scene)?, scene.task.as_ref()?.start);
-        Some(Box::new(Self { persons, judge, start, axes: scene.axes.count() }))
+        Some(Box::new(Self { persons, start: scene.task.as_ref()?.start, axes: scene.axes.count() }))
     }
 
-    /// Returns whether [`Operators::judge`] must be called for the ticks of all peers: the target depends on where the copies were.
-    pub(super) fn needs_ticks(&self) -> bool {
-        self.judge.target_follows_copies()
-    }
-
-    /// Takes in the tick of a peer, for the target of later instants.
-    pub(super) fn judge(&mut self, row: &TickRow<'_>) {
-        self.judge.on_tick(row, &mut |_, _| ());
-    }
-
-    /// Lets each person whose peer ticks see and move, after the deliveries of the instant. `ticking` has the peers that tick, in ascending order.
-    pub(super) fn act<S: Strategy<A>, D: Device<A>>(&mut self, now: Instant, ticking: &[usize], members: &mut [Member<A, S, D>]) {
+    /// Lets each person whose peer ticks see and move, after the deliveries of the instant. `ticking` has the peers that tick, in ascending order. `judge` has
+    /// judged all earlier instants, and knows the present targets.
+    pub(super) fn act<S: Strategy<A>, D: Device<A>>(&mut self, now: Instant, ticking: &[usize], members: &mut [Member<A, S, D>], judge: &Judge) {
         if now < self.start {
             return;
         }
-        let Self { persons, judge, axes, .. } = self;
-        judge.judge_before(now, &mut |_, _| ());
+        let Self { persons, axes, .. } = self;
         for Person { peer, operator, arm, sees, noise, draws } in persons {
             let member = &mut members[*peer];
             if ticking.binary_search(peer).is_err() {
