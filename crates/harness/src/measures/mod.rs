@@ -1,9 +1,9 @@
-//! Measures: numbers that summarise a run, computed during the run, in one pass and, but for smoothness and lag of motions, constant
-//! memory. Sums are added in the order of ticks, so a measure has the same bits with every [`Model`].
+//! Measures: numbers that summarise a run, computed during the run, in one pass and, but for smoothness and lag of motions, constant memory. Sums are added in
+//! the order of ticks, so a measure has the same bits with every [`Model`].
 //!
-//! [`Measures`] is an [`Observer`]. A scene without measures and task has no such observer, and its runs are unwatched. [`cohaptic_scene::Measure`] has names, units and
-//! descriptions. Each file of this module accumulates one quantity and gives the measures of this quantity. A new quantity is a new file, a line in the list
-//! below, and lines in [`cohaptic_scene::Measure`].
+//! [`Measures`] is an [`Observer`]. A scene without measures and task has no such observer, and its runs are unwatched. [`cohaptic_scene::Measure`] has names,
+//! units and descriptions. Each file of this module accumulates one quantity and gives the measures of this quantity. A new quantity is a new file, a line in
+//! the list below, and lines in [`cohaptic_scene::Measure`].
 //!
 //! ```
 //! use cohaptic_harness::measures::Measures;

@@ -18,7 +18,7 @@ pub(crate) struct Targets {
     seen: Seen,
 }
 
-/// What the judge has seen.
+/// Targets and their instants, as the judge has seen them.
 #[derive(Clone, Debug)]
 struct Seen {
     /// Position of the target along each axis \[m\].

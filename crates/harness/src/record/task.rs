@@ -12,7 +12,8 @@ use crate::{Summary, TickRow};
 /// Writes the columns `t,goal,gx,error_m,inside` of `task.csv`, with `gy` and `gz` after `gx` for further axes and `error_rad` after `error_m` for targets with
 /// orientations, and `t,peer,event,goal` of `task-events.csv`.
 ///
-/// Targets are counted from 1, in the order of reaching. `inside` is 1 or 0, and empty for a task without a radius. `peer` is empty for an event of all judged peers together.
+/// Targets are counted from 1, in the order of reaching. `inside` is 1 or 0, and empty for a task without a radius. `peer` is empty for an event of all judged
+/// peers together.
 #[derive(Debug)]
 pub(crate) struct TaskRecord {
     judge: Judge,

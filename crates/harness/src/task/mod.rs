@@ -61,7 +61,7 @@ pub struct TaskResult {
     pub failure: Option<Failure>,
 }
 
-/// What there is to see of a task at an instant of a run that goes on, of the judged copies with the most reached targets.
+/// State of a task at an instant of a run that goes on, of the judged copies with the most reached targets.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct TaskView {
     /// The target of the instant.

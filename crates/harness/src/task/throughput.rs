@@ -40,8 +40,9 @@ fn information_rate(distance: f64, width: f64, time: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Distance, effective width [inch] and time \[s\] of the light stylus in the tapping experiment of Fitts (1954, table 1). MacKenzie (1991, table 1) gives
-    /// the effective widths, which follow from the errors: the nominal width times 2.066 by the normal quantile of half the errors.
+    /// Distance, effective width [inch] and time \[s\] of the light stylus in the tapping experiment of Fitts (1954, table 1). The effective widths were
+    /// computed for this test and not read: 2.066 times the nominal width, by the normal quantile of half the share of errors. Distances, times and errors were
+    /// recalled from that table.
     const FITTS: [(f64, f64, f64); 16] = [
         (2.0, 1.020, 0.180),
         (2.0, 0.725, 0.212),
@@ -61,6 +62,8 @@ mod tests {
         (16.0, 0.247, 0.731),
     ];
 
+    /// The width of the first row, its 8.70 bit/s and the mean of 8.968 bit/s are those of MacKenzie (1991, table 1), so that wrong recalled numbers would
+    /// show.
     #[test]
     fn tapping_has_the_throughput_that_fitts_found() {
         let rates = FITTS.map(|(distance, width, time)| information_rate(distance, width, time));

@@ -1,7 +1,7 @@
 //! Lag of each copy: how much later the copy does what it follows, and how different it moves apart from the lag.
 //!
-//! The target of a task that tracks is followed; in other tasks, the copy of the first peer. The position of each copy is sampled every 10 ms of the task, at the
-//! first tick at or after each such instant.
+//! The target of a task that tracks is followed; in other tasks, the copy of the first peer. The position of each copy is sampled every 10 ms of the task, at
+//! the first tick at or after each such instant.
 
 use std::time::Duration;
 
@@ -53,12 +53,12 @@ impl Following {
 
     pub(super) fn on_tick(&mut self, row: &TickRow<'_>) {
         let copies = &mut self.copies[row.peer];
-        if !is_due(self.start, copies.len(), row.at) {
-            return;
-        }
-        copies.push(std::array::from_fn(|axis| row.object.position.get(axis).copied().unwrap_or(0.0)));
-        if let Some(track) = &self.track {
-            self.targets[row.peer].push(track.target(row.at.saturating_duration_since(self.start)));
+        // A tick longer than the time between samples gives several samples.
+        while is_due(self.start, copies.len(), row.at) {
+            copies.push(std::array::from_fn(|axis| row.object.position.get(axis).copied().unwrap_or(0.0)));
+            if let Some(track) = &self.track {
+                self.targets[row.peer].push(track.target(row.at.saturating_duration_since(self.start)));
+            }
         }
     }
 
@@ -73,9 +73,9 @@ impl Following {
     }
 }
 
-/// Returns the number of samples, at most [`MOST`], by which `followed` must be shifted to later instants for the least root mean square distance from `copy`, and
-/// this distance \[m\]. The least shift of several equal ones counts. All shifts are compared over the same samples of `copy`: those from `warm_up` and from
-/// [`MOST`] on. `None` without such samples.
+/// Returns the number of samples, at most [`MOST`], by which `followed` must be shifted to later instants for the least root mean square distance from `copy`,
+/// and this distance \[m\]. The least shift of several equal ones counts. All shifts are compared over the same samples of `copy`: those from `warm_up` and
+/// from [`MOST`] on. `None` without such samples.
 #[expect(clippy::cast_precision_loss, reason = "fewer samples than 2^53")]
 fn shift(copy: &[[f64; 3]], followed: &[[f64; 3]], warm_up: usize) -> Option<(usize, f64)> {
     let (first, end) = (warm_up.max(MOST), copy.len().min(followed.len()));
@@ -93,6 +93,7 @@ fn shift(copy: &[[f64; 3]], followed: &[[f64; 3]], warm_up: usize) -> Option<(us
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::rows::StateRow;
 
     /// Samples of a motion along two axes, `late` \[s\] later.
     fn motion(late: f64) -> Vec<[f64; 3]> {
@@ -105,6 +106,8 @@ mod tests {
         let (lag, residual) = shift(&motion(0.05), &motion(0.0), 0).unwrap();
         assert!(lag == 5 && residual < 1e-12, "{lag} {residual}");
         assert_eq!(shift(&motion(0.0), &motion(0.0), 0), Some((0, 0.0)));
+        let still = [[0.1; 3]; 200];
+        assert_eq!(shift(&still, &still, 0), Some((0, 0.0)));
         let (lag, residual) = shift(&motion(1.0), &motion(0.0), 150).unwrap();
         assert!(lag == MOST && residual < 1e-12, "{lag} {residual}");
     }
@@ -115,6 +118,50 @@ mod tests {
         let offset: Vec<[f64; 3]> = motion(0.2).iter().map(|[x, y, _]| [*x, *y, 0.003]).collect();
         let (lag, residual) = shift(&offset, &motion(0.0), 0).unwrap();
         assert!(lag == 20 && (residual - 0.003).abs() < 1e-12, "{lag} {residual}");
+    }
+
+    /// Figures of a peer whose copy is at `position`, a function of the time since the beginning of the scene \[s\] and of the peer.
+    fn figures(task: &str, millis: u64, peer: usize, position: impl Fn(f64, usize) -> f64) -> (f64, f64) {
+        let text = format!(
+            "scene = {{ duration = \"10s\", count = 2 }}
+             object = {{ mass = 1 }}
+             coordination = {{ strategy = \"average-position\", stiffness = 1, update = \"{millis}ms\" }}
+             peer = {{ device = {{ mass = 1 }}, coupling = {{ stiffness = 1 }}, tick = \"{millis}ms\" }}
+             task = {{ {task} }}"
+        );
+        let scene = Scene::parse(&text, "test.toml".as_ref(), &[]).unwrap_or_else(|error| panic!("{error}"));
+        let mut following = Following::new(&scene);
+        let start = scene.task.as_ref().unwrap().start;
+        for at in (0..10_000).step_by(usize::try_from(millis).unwrap()).map(|milli| Instant::from_nanos(1_000_000 * milli)).filter(|at| *at >= start)
+        {
+            for peer in 0..2 {
+                let state = StateRow { position: &[position(at.as_secs_f64(), peer)], velocity: &[0.0] };
+                let [coupling_force, coordination_force] = [&[0.0][..]; 2];
+                following.on_tick(&TickRow { at, peer, device: state, object: state, target: state, coupling_force, coordination_force, turn: None });
+            }
+        }
+        (following.value(Figure::Lag, peer).unwrap(), following.value(Figure::Residual, peer).unwrap())
+    }
+
+    /// A target that moves from the start of the task on is followed by 0.15 s, after a warm-up in which nobody follows the target.
+    #[test]
+    fn a_target_is_followed_after_the_warm_up() {
+        let task = r#"kind = "track", sines = [{ amplitude = 0.02, frequency = 0.3 }], start = "700ms", warm-up = "3s""#;
+        for tick in [1, 2] {
+            let follows = |t: f64, _| if t < 3.7 { 0.5 } else { 0.02 * (std::f64::consts::TAU * 0.3 * (t - 0.7 - 0.15)).sin() };
+            let (lag, residual) = figures(task, tick, 1, follows);
+            assert!((lag - 0.15).abs() < 1e-12 && residual < 1e-12, "{lag} {residual}");
+        }
+    }
+
+    /// Without a target the first copy is followed. A tick of 20 ms is longer than the time between two samples.
+    #[test]
+    fn the_first_copy_is_followed_at_any_tick() {
+        for tick in [1, 10, 20] {
+            let moves = |t: f64, peer: usize| (3.0 * (t - if peer == 0 { 0.0 } else { 0.4 })).sin();
+            let (lag, residual) = figures(r#"kind = "hold", target = 0, radius = 2"#, tick, 1, moves);
+            assert!((lag - 0.4).abs() < 1e-12 && residual < 1e-12, "{tick} ms: {lag} {residual}");
+        }
     }
 
     #[test]

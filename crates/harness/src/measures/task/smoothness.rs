@@ -39,7 +39,8 @@ impl Smoothness {
 
     pub(super) fn on_tick(&mut self, row: &TickRow<'_>) {
         let speeds = &mut self.speeds[row.peer];
-        if is_due(self.start, speeds.len(), row.at) {
+        // A tick longer than the time between samples gives several samples.
+        while is_due(self.start, speeds.len(), row.at) {
             speeds.push(libm::sqrt(row.object.velocity.iter().map(|component| component * component).sum()));
         }
     }
