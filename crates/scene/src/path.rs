@@ -7,11 +7,11 @@ pub struct PathTask {
     pub points: Vec<[f64; 3]>,
     /// Width of the lane around the line \[m\]; above zero. A copy farther than half of the width from the line is outside.
     pub width: f64,
-    /// What follows when a copy leaves the lane.
+    /// Effect of a copy that leaves the lane.
     pub leave: Leave,
 }
 
-/// What follows when a copy leaves the lane of a path.
+/// Effect of a copy that leaves the lane of a path.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Leave {
     /// The time outside is measured.
@@ -112,6 +112,18 @@ mod tests {
         // Around the corner, and across it: the nearest point of the whole line is 0.2 m further.
         assert_eq!(near([0.103, 0.02], 0.09), (120_000.0, 3_000.0));
         assert_eq!(near([0.1, 0.2], 0.05), (100_000.0, 200_000.0));
-        assert_eq!(path.nearest([0.1, 0.7, 0.0], 0.27).0.to_bits(), path.length().to_bits());
+        // A point beside the leg before, which is behind the progress.
+        assert_eq!(near([0.13, 0.0], 0.15), (150_000.0, 58_310.0));
+        for place in 1..100 {
+            let up = 0.013 * f64::from(place);
+            let path = PathTask { points: vec![[0.0; 3], [0.1, 0.0, 0.0], [0.1, up, 0.0]], ..corner() };
+            assert_eq!(path.nearest([0.1, 2.0, 0.0], path.length() - 0.01).0.to_bits(), path.length().to_bits(), "{up}");
+        }
+    }
+
+    #[test]
+    fn the_first_of_equally_near_points_counts() {
+        let path = PathTask { points: vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 2.0, 0.0]], width: 1.0, leave: Leave::Count };
+        assert_eq!(path.nearest([0.75, 0.25, 0.0], 0.5), (0.75, 0.25));
     }
 }

@@ -99,8 +99,8 @@ impl Scene {
             let idle = match &spec.hand {
                 None => true,
                 Some(Hand::Force(force)) => is_idle(force),
-                // An arm with the initial position of the device as its wanted position does not pull.
                 Some(Hand::Operator { .. }) => false,
+                // An arm with the initial position of the device as its wanted position does not pull.
                 Some(Hand::Arm { follows, .. }) => matches!(follows, Signal::Constant(wanted) if same(*wanted, start)),
             };
             let untwisted = peer.device.as_ref().and_then(|device| device.torque.as_ref()).is_none_or(is_idle);

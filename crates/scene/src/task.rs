@@ -21,11 +21,11 @@ pub struct TaskSpec {
     pub who: Judged,
     /// Norm of the coupling force FC \[N\] above which a judged peer has dropped the object and the task has failed; `None` for no such limit.
     pub fail_force: Option<f64>,
-    /// What follows after the outcome.
+    /// Continuation of the run after the outcome.
     pub end: TaskEnd,
 }
 
-/// What follows after the outcome of a task.
+/// Continuation of a run after the outcome of its task.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum TaskEnd {
     /// The scene goes on to its end.

@@ -155,12 +155,14 @@ fn noise_has_the_address_of_the_movement() {
         device.1
     };
     let left = "{ name = \"left\", contact = \"none\", hand = { operator = {} } }";
+    let still = device(&format!("{}, {{ name = \"right\" }}", left.replace("{}", "{ noise = 0 }")), &[]);
     let alone = device(&format!("{left}, {{ name = \"right\" }}"), &[]);
     let others = "{ name = \"right\" }, { name = \"third\", contact = \"none\", hand = { operator = { noise = 0.3 } } }";
     assert_eq!(alone, device(&format!("{others}, {left}"), &["link.jitter=5ms", "link.loss=10%"]));
-    // Noise of both axes differs from zero and from axis to axis. A different seed or name has different noise.
+    // Noise of different numbers moves the device along both axes, as seen after the first movement. Another seed has other numbers.
     let at = |device: &[u64], axis: usize| f64::from_bits(device[2 * 700 + axis]);
-    assert!(at(&alone, 1) != 0.0 && (at(&alone, 0) - 0.1).abs() > 1e-6 && (at(&alone, 0) - 0.1 - at(&alone, 1)).abs() > 1e-6);
+    let noise = [0, 1].map(|axis| at(&alone, axis) - at(&still, axis));
+    assert!(noise[0].abs() > 1e-6 && noise[1].abs() > 1e-6 && (noise[0] - noise[1]).abs() > 1e-6, "{noise:?}");
     assert!(alone != device(&format!("{left}, {{ name = \"right\" }}"), &["scene.seed=4"]));
 }
 
@@ -171,6 +173,44 @@ fn an_operator_waits_for_the_task() {
     let later: Vec<u128> = from("0s").iter().map(|at| at + 1504).collect();
     // 1504 ms is a whole number of periods of sending, so samples go at the same ticks of the task.
     assert_eq!(from("1504ms"), later);
+}
+
+/// Positions of the device of a peer.
+fn device_of(scene: &Scene, peer: usize) -> Vec<f64> {
+    let mut device = DeviceOf(peer, Vec::new());
+    let Ok(_) = Simulation::new(scene, Model::Least).run(&mut device);
+    device.1.into_iter().map(f64::from_bits).collect()
+}
+
+/// Before the first movement, and without need of a movement, the arm holds the device where the scene begins.
+#[test]
+fn an_operator_at_the_target_rests() {
+    let scene = scene(&["object.position=0.1", "scene.duration=2s", "task.start=300ms"]);
+    let device = device_of(&scene, 0);
+    assert!(device.iter().all(|position| (position - 0.1).abs() < 1e-12), "{device:?}");
+}
+
+/// Without noise a person on a path makes a movement to its end, as for a target there.
+#[test]
+fn a_path_without_noise_is_a_target_at_its_end() {
+    let device = |task: &str| device_of(&scene(&[&format!("task={{ {task} }}"), "scene.duration=3s"]), 0);
+    let path = device(r#"kind = "path", points = [0.0, 0.04, 0.1], width = 0.02"#);
+    let target = device(r#"kind = "reach", targets = [0.1, 0.1], radius = 1e-300"#);
+    assert!(path == target && path.iter().any(|position| *position > 0.09));
+}
+
+/// Copies that hardly act on each other, each judged alone: a person who reacts 100 ms later moves 100 ms later, for the targets of the own copy.
+#[test]
+fn each_operator_goes_for_the_target_of_the_own_copy() {
+    let later = r#"peers.right.hand={ operator = { noise = 0.0, reaction = "350ms" } }"#;
+    let scene = scene(&["task.who=any", "task.targets=[0.1, 0.0, 0.1]", "coordination.stiffness=1e-9", "coordination.damping=0", later]);
+    let reached = reached(&scene);
+    let [left, right] = [0, 1].map(|peer| device_of(&scene, peer));
+    // The task ends when the left copy is at the third target.
+    let end = usize::try_from(reached[2]).unwrap();
+    for tick in 0..end - 100 {
+        assert!((right[tick + 100] - left[tick]).abs() < 1e-6, "{tick}: {} {}", right[tick + 100], left[tick]);
+    }
 }
 
 #[test]

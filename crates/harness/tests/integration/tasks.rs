@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 
+use cohaptic_harness::check::check;
 use cohaptic_harness::live::LiveScene;
 use cohaptic_harness::measures::{MeasuredRun, Measures};
 use cohaptic_harness::record::Recorder;
@@ -113,6 +114,30 @@ fn a_run_that_ends_at_the_outcome_is_a_prefix() {
     }
 }
 
+/// A run that its task has ended says nothing about later instants, and something about earlier ones.
+#[test]
+fn what_is_expected_after_the_outcome_is_not_known() {
+    let failures = |end: &str, at: &str| {
+        let task = REACH.replace("radius", &format!("end = \"{end}\", radius"));
+        let expect = format!("expect = {{ position = [{{ peer = \"left\", at = \"{at}\", min = -10.0 }}] }}");
+        check(&scene(&format!("{SCENE}\n{task}\n{expect}")), Model::Least, || true)
+    };
+    for (end, at) in [("continue", "1.9s"), ("continue", "100ms"), ("stop", "100ms")] {
+        assert!(failures(end, at).is_empty(), "{:?}", failures(end, at));
+    }
+    let late = failures("stop", "1.9s");
+    assert!(late.len() == 1 && late[0].contains("the run ended at") && late[0].contains("with its task"), "{late:?}");
+}
+
+/// A timeout between the end of the scene and the tick that would come next does not make the run longer.
+#[test]
+fn a_timeout_after_the_end_changes_nothing() {
+    let task = REACH.replace("radius = 0.01", "radius = 0.00001, timeout = \"1999700us\", end = \"stop\"");
+    let scene = scene(&format!("{SCENE}\n{task}").replace("duration = \"2s\"", "duration = \"1999500us\""));
+    let MeasuredRun { summary, task: Some(result), .. } = Measures::run(&scene, Model::Least) else { panic!("the scene has a task") };
+    assert_eq!((result.outcome, summary.duration), (TaskOutcome::Unfinished, std::time::Duration::from_micros(1_999_500)));
+}
+
 /// Columns `t`, `peer`, `xo` and `vo` of a trajectory.
 fn states(trajectory: &[u8]) -> Vec<(f64, usize, f64, f64)> {
     let text = std::str::from_utf8(trajectory).unwrap();
@@ -202,6 +227,64 @@ fn measures_of_a_task_are_those_of_the_recorded_rows() {
     }
     assert!((value(1) - (squares / count).sqrt()).abs() < 1e-12, "{} {}", value(1), (squares / count).sqrt());
     assert!((value(2) / effort - 1.0).abs() < 1e-12);
+}
+
+/// Work, forces and shares of the recorded rows, by their definitions: F_C of a tick acts until the next tick of the peer.
+#[test]
+fn work_and_forces_are_those_of_the_recorded_rows() {
+    let of_peer = |name: &str| format!("\"peers.left.{name}\", \"peers.right.{name}\"");
+    let [given, taken, share] = ["given_j", "taken_j", "load_share"].map(of_peer);
+    let names = format!("\"motion_force_n\", \"internal_force_n\", {given}, {taken}, {share}");
+    // The right hand holds the object back.
+    let text = SCENE.replace("{ name = \"right\" }", "{ name = \"right\", hand = { arm = { mass = 0.3, damping = 5.0, stiffness = 30.0 } } }");
+    let keys = REACH.replace("radius = 0.01", "radius = 0.00001, start = \"100ms\", timeout = \"900ms\"");
+    let scene = scene(&format!("{text}\n{keys}\nmeasure = {{ names = [{names}] }}"));
+    let files = recorded(&scene);
+    let rows: Vec<(f64, usize, f64, f64)> = {
+        let text = std::str::from_utf8(&files.iter().find(|(name, _)| name == "trajectory.csv").unwrap().1).unwrap();
+        let row = |line: &str| {
+            let cells: Vec<&str> = line.split(',').collect();
+            let number = |place: usize| cells[place].parse::<f64>().unwrap();
+            (number(0), usize::from(cells[1] == "right"), number(2), number(8))
+        };
+        text.lines().skip(1).map(row).filter(|row| row.0 > 0.0995 && row.0 < 1.0005).collect()
+    };
+    let [left, right] = [0, 1].map(|peer| rows.iter().filter(|row| row.1 == peer).map(|row| (row.2, row.3)).collect::<Vec<_>>());
+    let work = |rows: &[(f64, f64)], sign: f64| -> f64 {
+        rows.windows(2).map(|pair| pair[0].1 * (pair[1].0 - pair[0].0)).map(|work| (sign * work).max(0.0)).sum::<f64>() * sign
+    };
+    let mut expected: Vec<(String, f64)> = Vec::new();
+    for (peer, rows) in [("left", &left), ("right", &right)] {
+        expected.push((format!("peers.{peer}.given_j"), work(rows, 1.0)));
+        expected.push((format!("peers.{peer}.taken_j"), work(rows, -1.0)));
+    }
+    let count = 901.0;
+    let (mut motion, mut internal, mut shares) = (0.0, 0.0, [0.0; 2]);
+    for (left, right) in left.iter().zip(&right) {
+        let (positive, negative) = (left.1.max(0.0) + right.1.max(0.0), (-left.1).max(0.0) + (-right.1).max(0.0));
+        motion += (positive - negative).abs() / count;
+        internal += positive.min(negative) / count;
+        let along = [left.1, right.1].map(|force| (force * (positive - negative).signum()).max(0.0));
+        (0..2).for_each(|peer| shares[peer] += along[peer] / (along[0] + along[1]) / count);
+    }
+    expected.extend([("motion_force_n".to_owned(), motion), ("internal_force_n".to_owned(), internal)]);
+    expected.extend([("peers.left.load_share".to_owned(), shares[0]), ("peers.right.load_share".to_owned(), shares[1])]);
+    let values = Measures::run(&scene, Model::Least).values;
+    assert_eq!(values.len(), expected.len());
+    for (name, expected) in expected {
+        let found = values.iter().find(|value| value.name.text(&scene) == name).unwrap().value.unwrap();
+        assert!((found - expected).abs() <= 1e-9 * expected.abs(), "{name}: {found}, expected {expected}");
+    }
+    assert!(left.len() == 901 && right.len() == 901 && work(&left, 1.0) > 0.0 && work(&right, -1.0) < 0.0 && internal > 0.0 && shares[1] > 0.0);
+}
+
+#[test]
+fn only_a_done_task_has_a_time() {
+    let time = |timeout: &str| {
+        let task = REACH.replace("radius", &format!("timeout = \"{timeout}\", radius"));
+        Measures::run(&scene(&format!("{SCENE}\n{task}\nmeasure = {{ names = [\"task_time_s\"] }}")), Model::Least).values[0].value
+    };
+    assert!(time("2s").is_some() && time("100ms").is_none());
 }
 
 /// A run in which copies are a metre apart has diverged, also if its numbers are finite, and so has its task.

@@ -19,7 +19,7 @@ use moves::Moves;
 
 pub use config::{MovesConfig, OperatorConfig, OperatorLaw, Seen};
 
-/// What the person of an operator sees at a tick.
+/// Positions of object and target that the person of an operator sees at a tick.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct View<const A: usize> {
     /// Position of the copy of the object \[m\].
@@ -71,7 +71,7 @@ impl<const A: usize> Operator<A> {
     }
 
     /// Returns all that a person who tracks remembers: the wanted position at the next tick \[m\], and the views that are still to be used, the newest first.
-    /// There are no views before the first tick. `None` for a person who makes movements.
+    /// No views before the first tick. `None` for a person who makes movements.
     pub fn tracking(&self) -> Option<([f64; A], impl Iterator<Item = &View<A>>)> {
         let Law::Crossover(crossover) = &self.law else { return None };
         Some((crossover.position(), self.views.waiting()))

@@ -130,7 +130,7 @@ fn follow(operator: &mut Operator<1>, delay: usize, ticks: usize, target: impl F
 }
 
 proptest! {
-    /// Who waits for the delay pays for it with each correction, but not with the first movement: N·T + (N − 1)·(τ + D) (as Ferrell 1965).
+    /// A person who waits for the delay pays the delay with each correction, but not with the first movement: N·T + (N − 1)·(τ + D) (as Ferrell 1965).
     #[test]
     fn each_correction_costs_the_delay(count in 1_u64..6, duration in 2_u64..40, visual in 0_u64..40, delay in 0_u64..60, reaction in 0_u64..50) {
         let config = MovesConfig { reaction: millis(reaction), duration: millis(duration), step: Some(1.0), ..PLAIN };
@@ -161,8 +161,8 @@ proptest! {
     }
 }
 
-/// Who does not wait corrects an error that the next two movements have corrected already: e⁺ = e − e⁻⁻. The errors of movements grow by |x| = 1.1510 each, where
-/// x³ = x² − 1, if the delay is at least 2T + τ and at most 2·(T + τ).
+/// A person who does not wait corrects an error that the next two movements have corrected already: e⁺ = e − e⁻⁻. The errors of movements grow by |x| = 1.1510
+/// each, where x³ = x² − 1, if the delay is at least 2T + τ and at most 2·(T + τ).
 #[test]
 fn who_does_not_wait_overshoots_more_and_more() {
     let (duration, visual) = (20, 30);
@@ -182,14 +182,25 @@ fn who_does_not_wait_overshoots_more_and_more() {
                 "{delay}: {place} of {errors:?}"
             );
         }
-        // Of x³ − x² + 1 the pair of complex roots has the modulus 1/√r, where −r is the real root. A sequence of that pair alone has products e·e⁺⁺ − e⁺·e⁺ that
-        // grow by the square of the modulus; the third root has died out.
+        // Of x³ − x² + 1 the pair of complex roots has the modulus 1/√r, where −r is the real root. A sequence of that pair alone has products e·e⁺⁺ − e⁺·e⁺
+        // that grow by the square of the modulus; the third root has died out.
         let product = |place: usize| errors[place] * errors[place + 2] - errors[place + 1] * errors[place + 1];
         let growth = (product(51) / product(50)).sqrt();
         assert!((growth - 1.1510).abs() < 5e-5, "{delay}: {growth}");
     }
     let root = 0.754_877_666_246_692_8_f64;
     assert!((root.powi(3) + root.powi(2) - 1.0).abs() < 1e-15 && (root.recip().sqrt() - 1.1510).abs() < 5e-5);
+}
+
+/// A copy at the edge of the radius is at the target.
+#[test]
+fn nobody_moves_from_the_edge_of_the_target() {
+    let ends = |radius: f64| {
+        let config = MovesConfig { reaction: Duration::ZERO, ..PLAIN };
+        let mut operator = Operator::<1>::new(&person(OperatorLaw::Moves(config), Duration::ZERO), millis(1), Duration::ZERO, [0.0]);
+        (0..=250).map(|_| operator.tick(&View { position: [0.0], target: [0.5], radius }, |_| [0.0]).position[0]).fold(0.0, f64::max)
+    };
+    assert_eq!((ends(0.5), ends(0.499)), (0.0, 0.5));
 }
 
 /// A person of whom nothing comes through waits for the reaction time, plans again, and does not believe in a smaller gain.

@@ -128,8 +128,7 @@ pub(super) fn read_hand_torque(hand: &Node, context: SceneContext<'_>) -> Option
 }
 
 /// Returns false after a fault if the peer's ticks cannot sample the sine of the hand, or the peer cannot hold all that an operator has not seen yet, otherwise
-/// true. A hand is computed once per tick, so that a sine of half
-/// the rate of ticks or faster has the values of a slower sine, or zeros alone (Shannon 1949).
+/// true. A hand is computed once per tick, so that a sine of half the rate of ticks or faster has the values of a slower sine, or zeros alone (Shannon 1949).
 pub(crate) fn hand_is_sampled(hand: Option<&Hand>, tick: Duration, node: &Node, context: Context<'_>) -> bool {
     let (signal, path): (&Signal, &[&str]) = match hand {
         Some(Hand::Force(signal)) => (signal, &["sine", "frequency"]),

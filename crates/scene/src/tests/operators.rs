@@ -40,6 +40,12 @@ fn an_operator_has_defaults_by_the_task() {
     assert_eq!(hand(written, REACH), Hand::Operator { arm: ArmConfig { mass: 0.4, ..arm }, operator: Box::new(operator) });
 }
 
+#[test]
+fn an_operator_may_look_back_by_ten_thousand_ticks() {
+    let scene = parse(&with("{ visual-delay = \"10s\" }", REACH), &[]).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(scene.operator(0).unwrap().visual_ticks(Duration::from_millis(1)), 10_000);
+}
+
 /// A person who sees another peer expects the delays of both ways, and access lines are parts of a way. A person who sees the own copy expects no delay.
 #[test]
 fn an_operator_expects_the_delays_of_the_scene() {
@@ -90,7 +96,7 @@ fn a_wrong_operator_is_refused_where_it_stands() {
     }
 }
 
-/// Neither the end of a line of peers nor two clients of a server hear each other.
+/// The ends of a line of peers do not hear each other, nor do two clients of a server.
 #[test]
 fn an_operator_sees_only_what_its_peer_hears() {
     let three = with("{ sees = \"third\" }", REACH).replace("[link]", "[[peers]]\nname = \"third\"\n[link]");

@@ -44,6 +44,7 @@ fn a_wrong_task_is_refused_where_it_stands() {
         (&carry("level = 0.1"), "task.level: this is about an object that turns: expected object.inertia"),
         (&carry("gap = { peers = [\"left\", \"left\"], max = 0.1 }"), "task.gap.peers: not two peers"),
         (&carry("gap = { peers = [\"left\", \"right\"], min = 0.2, max = 0.1 }"), "task.gap: min 0.2 is not below max 0.1"),
+        (&carry("gap = { peers = [\"left\", \"right\"], min = 0.1, max = 0.1 }"), "task.gap: min 0.1 is not below max 0.1"),
         (&format!("{REACH}position = 0.1\n"), "task.position: only a task of kind track takes this key: expected target, targets or points"),
         ("\n[task]\nkind = \"reach\"\nradius = 0.1\n", "task.targets: missing key: expected a list of targets such as [0.1, 0.0]"),
         ("\n[task]\nkind = \"hold\"\ntarget = 0.1\n", "task.radius: missing key: expected a distance [m] above zero"),
@@ -63,8 +64,10 @@ fn a_wrong_task_is_refused_where_it_stands() {
         assert!(beginning(&message).starts_with(expected), "{text}: {message}");
     }
     let walls = format!("{SCENE}{REACH}").replace("[object]", "[object]\nenclosure = { min = 0.0, max = 0.15, stiffness = 1000.0, damping = 1.0 }");
-    let message = refused(&walls, &[]).to_string();
-    assert!(beginning(&message).starts_with("task.targets.1: 0.2 is outside of object.enclosure"), "{message}");
+    for (walls, expected) in [(walls.clone(), "task.targets.1: 0.2"), (walls.replace("[0.1, 0.2]", "[-0.1, 0.1]"), "task.targets.0: -0.1")] {
+        let message = refused(&walls, &[]).to_string();
+        assert!(beginning(&message).starts_with(&format!("{expected} is outside of object.enclosure")), "{message}");
+    }
     let message = refused(&format!("{SCENE}{REACH}"), &["peer.contact=none"]).to_string();
     assert!(beginning(&message).starts_with("task: no device touches the object"), "{message}");
 }
