@@ -47,8 +47,8 @@ pub struct Scene {
     pub relay: bool,
     /// Directed links between the peers. An entry between two peers that are not neighbours in the topology has no effect.
     pub links: LinkTable,
-    /// Links of the library that the scene names, with versions: `starlink@1/down`. A link with equal directions has no direction in its name. The configurations
-    /// above and in the timeline hold the keys of these links, and the names only tell where the keys are from.
+    /// Links of the library that the scene names, with versions: `starlink@1/down`. A link with equal directions has no direction in its name. The
+    /// configurations above and in the timeline hold the keys of these links, and the names only tell where the keys are from.
     pub profiles: Vec<String>,
     /// Changes during the run, in order of time; changes at the same instant are in the order of the file.
     pub timeline: Vec<Change>,
@@ -449,6 +449,24 @@ pub enum ChangeKind {
     Parameters(Box<LawSettings>),
     /// The dead bands of samples change at every peer.
     SendWhen(SendWhen),
+}
+
+impl ChangeKind {
+    /// Returns the configurations that links take; empty for a change of something else.
+    #[must_use]
+    pub fn link_configs(&self) -> &[Arc<LinkModel>] {
+        match self {
+            Self::Link(link) => core::slice::from_ref(&link.config),
+            Self::AllLinks(links) => links.configs(),
+            Self::Contact { .. }
+            | Self::Hand { .. }
+            | Self::HandTorque { .. }
+            | Self::Coordination(_)
+            | Self::RotationalGains(_)
+            | Self::Parameters(_)
+            | Self::SendWhen(_) => &[],
+        }
+    }
 }
 
 /// Required results of a run, for `cohaptic check`. An absent entry is not checked.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use cohaptic_scene::{ChangeKind, Measure, Scene, Scope};
+use cohaptic_scene::{Measure, Scene, Scope};
 use cohaptic_wan::DropCause;
 use serde::{Deserialize, Serialize};
 
@@ -148,17 +148,7 @@ impl Roster {
 /// Returns whether a link or an access line of a scene has cross-traffic, at the start or after a change of the timeline.
 fn has_cross_traffic(scene: &Scene) -> bool {
     let lines = scene.peers.iter().flat_map(|peer| [&peer.uplink, &peer.downlink]).flatten();
-    let changed = scene.timeline.iter().flat_map(|change| match &change.what {
-        ChangeKind::Link(link) => std::slice::from_ref(&link.config),
-        ChangeKind::AllLinks(links) => links.configs(),
-        ChangeKind::Contact { .. }
-        | ChangeKind::Hand { .. }
-        | ChangeKind::HandTorque { .. }
-        | ChangeKind::Coordination(_)
-        | ChangeKind::RotationalGains(_)
-        | ChangeKind::Parameters(_)
-        | ChangeKind::SendWhen(_) => &[],
-    });
+    let changed = scene.timeline.iter().flat_map(|change| change.what.link_configs());
     scene.links.configs().iter().chain(lines).chain(changed).any(|link| link.has_cross_traffic())
 }
 
@@ -188,6 +178,9 @@ mod tests {
         assert_eq!((all.peers.join(" "), all.always, all.axes, all.fewest_axes), ("a b c".to_owned(), 2, 2, 1));
         all.add(&roster(&["a", "d", "b"], 1));
         assert_eq!((all.peers.join(" "), all.always), ("a b c d".to_owned(), 1));
+        assert!(!all.tasks);
+        all.add(&Roster { tasks: true, ..roster(&["a", "b"], 1) });
+        assert!(all.tasks);
         let before = all.clone();
         all.add(&roster(&["a", "b"], 1));
         assert_eq!(all, before);

@@ -240,7 +240,7 @@ fn a_parquet_file_says_what_it_is_and_nothing_of_when() {
 fn the_task_of_each_run_stands_in_its_row() {
     let mut bench = Bench::new(&["task.radius=1,1e-9"], 2);
     bench.format = Format::Csv;
-    bench.set = vec!["task={ kind = \"reach\", targets = [0.5], timeout = \"20ms\", radius = 1 }".to_owned()];
+    bench.set = vec!["task={ kind = \"reach\", targets = [0.5], start = \"2ms\", timeout = \"20ms\", radius = 1 }".to_owned()];
     bench.finish("out", 2);
     let (header, rows) = comma_separated(&bench.path("out/runs.csv"));
     let place = header.iter().position(|name| name == "task.outcome").unwrap();

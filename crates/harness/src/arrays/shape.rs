@@ -130,7 +130,7 @@ impl Shape {
         let clock = scene.peers[0].clock;
         let load = load(scene);
         let links = scene.used_links();
-        let links_change = scene.timeline.iter().any(|change| matches!(change.what, ChangeKind::Link(_) | ChangeKind::AllLinks(_)));
+        let links_change = models_to_come(scene).next().is_some();
         // A change of a link can alter the fate of packets under way, so changing links need the instants of later packets.
         let are_direct = !links_change && links.iter().all(|(link, _)| DirectLinks::takes(link, load));
         let delay = one_delay(scene, load).filter(|_| !links_change);
@@ -194,17 +194,7 @@ fn sends_by_difference(scene: &Scene) -> bool {
 
 /// Returns the link models set by the timeline.
 fn models_to_come(scene: &Scene) -> impl Iterator<Item = &LinkModel> {
-    scene.timeline.iter().flat_map(|change| match &change.what {
-        ChangeKind::Link(link) => vec![&*link.config],
-        ChangeKind::AllLinks(links) => links.configs().iter().map(|link| &**link).collect(),
-        ChangeKind::Contact { .. }
-        | ChangeKind::Hand { .. }
-        | ChangeKind::HandTorque { .. }
-        | ChangeKind::Coordination(_)
-        | ChangeKind::RotationalGains(_)
-        | ChangeKind::Parameters(_)
-        | ChangeKind::SendWhen(_) => Vec::new(),
-    })
+    scene.timeline.iter().flat_map(|change| change.what.link_configs()).map(|link| &**link)
 }
 
 /// Returns why the fate of a packet over a link may be unknown when the sender sends the next packet; `None` if the fate is known by then.

@@ -6,7 +6,7 @@ mod tests;
 
 use cohaptic_peer::coordination::{Law, LawValue, Pull, UsedGains};
 use cohaptic_peer::{Contact, Hand, Integrator, SendWhen};
-use cohaptic_scene::{Axes, ChangeKind, FromScene, PeerSpec, RotationPart, RotationParts, Scaling, Scene, TopologyKind};
+use cohaptic_scene::{Axes, FromScene, PeerSpec, RotationPart, RotationParts, Scaling, Scene, TopologyKind};
 use cohaptic_units::print::{Counted, Number, Span};
 use cohaptic_wan::LinkModel;
 
@@ -330,7 +330,7 @@ impl Rows {
                 self.model(&part, config.words(), "a chain of the stages that are configured");
             }
         }
-        let links_change = scene.timeline.iter().any(|change| matches!(change.what, ChangeKind::Link(_) | ChangeKind::AllLinks(_)));
+        let links_change = scene.timeline.iter().any(|change| !change.what.link_configs().is_empty());
         // A ring needs arrivals in the order of sending: a broadcast, or equal delays at all times and no access lines.
         let one_delay = scene.topology.is_none() && used.len() == 1 && used.iter().all(|(config, _)| config.is_constant_delay());
         if is_broadcast || one_delay && !links_change && scene.peers.iter().all(|peer| peer.uplink.is_none() && peer.downlink.is_none()) {
@@ -343,10 +343,7 @@ impl Rows {
             self.model(&format!("{direction} of {peer}"), line.words(), "shared by all that passes it");
         }
         // A later change can bring chance into links without chance at the start.
-        let timeline_is_random = scene.timeline.iter().any(|change| {
-            matches!(&change.what, ChangeKind::Link(link) if link.config.has_chance())
-                || matches!(&change.what, ChangeKind::AllLinks(links) if links.configs().iter().any(|link| link.has_chance()))
-        });
+        let timeline_is_random = scene.timeline.iter().flat_map(|change| change.what.link_configs()).any(|link| link.has_chance());
         let lines_are_random = access_lines(scene).iter().any(|(_, _, line)| line.has_chance());
         let people_are_random = operators::has_noise(scene);
         if used.iter().all(|(config, _)| !config.has_chance()) && !lines_are_random && !timeline_is_random && !people_are_random {
