@@ -126,7 +126,8 @@ mod tests {
             }
         }
 
-        /// The digits are those of the standard library, and exponents have no plus sign.
+        /// There are as many digits as in the standard library, which takes another one of two equally near numbers, such as 1547520063066896.3 for
+        /// 1547520063066896.25. Exponents have no plus sign.
         #[test]
         fn numbers_are_written_with_the_fewest_digits(bits in any::<u64>(), small in -1e3..1e3_f64, large in 1e15..1e25_f64) {
             for value in [f64::from_bits(bits), small, large, -large] {
@@ -134,7 +135,7 @@ mod tests {
                 if value.is_finite() {
                     prop_assert_eq!(text.parse::<f64>().unwrap().to_bits(), value.to_bits());
                     let digits = |text: &str| text.split('e').next().unwrap_or_default().replace(['-', '.'], "").trim_matches('0').to_owned();
-                    prop_assert_eq!(digits(&text), digits(&format!("{value:e}")));
+                    prop_assert_eq!(digits(&text).len(), digits(&format!("{value:e}")).len());
                 }
                 prop_assert!(!text.contains('+'));
             }
