@@ -1,5 +1,5 @@
-//! `cohaptic campaign`: many runs into one table. Each is compared with `cohaptic run` of the same scene and seed, and a campaign that was interrupted, killed or
-//! found no room with one that was not, byte by byte.
+//! `cohaptic campaign`: many runs into one table. Each is compared with `cohaptic run` of the same scene and seed, and a campaign that was interrupted, killed
+//! or found no room with one that was not, byte by byte.
 
 use std::fs;
 

@@ -39,7 +39,8 @@ fn spans_of_numbers_change_where_single_verdicts_do() {
     assert!(text.contains("equal to peer1, proven in the mean square:\n    stable    for 2 <= N <= 9\n"), "{text}");
 }
 
-/// Numbers whose eigenvalue lies on the circle, beyond those that are followed, near a limit on the circle, with bounds that overflow, and in the mean square: each has a reason. Numbers that a certificate leaves open are named.
+/// Numbers whose eigenvalue lies on the circle, beyond those that are followed, near a limit on the circle, with bounds that overflow, and in the mean square:
+/// each has a reason. Numbers that a certificate leaves open are named.
 #[test]
 fn undecided_numbers_have_a_reason_and_uncertified_ones_a_note() {
     let desk = Desk::with("equal.toml", EQUAL);

@@ -162,7 +162,6 @@ impl real::io::AsyncWrite for Sender {
 
     /// As with tokio, the pipe ends when its end is dropped.
     fn poll_shutdown(self: Pin<&mut Self>, _cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        // As with tokio, a pipe ends when its sender is dropped, and not before.
         Poll::Ready(Ok(()))
     }
 }
