@@ -15,7 +15,8 @@ macro_rules! registry {
             /// Every measure, in the order of display.
             pub const ALL: &'static [Self] = &[$(Self::$measure,)+];
 
-            /// Returns the name, which ends in the unit if there is one. The full name of a measure of a peer begins with the peer's name: see [`MeasureName::text`].
+            /// Returns the name, which ends in the unit if there is one. The full name of a measure of a peer begins with the peer's name: see
+            /// [`MeasureName::text`].
             #[must_use]
             pub const fn name(self) -> &'static str {
                 match self {

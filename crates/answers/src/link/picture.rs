@@ -112,8 +112,8 @@ impl LinkPicture {
         picture.svg()
     }
 
-    /// Returns delays \[ms\], each with the share of arrived packets whose delay is at most as long. Of many packets only some are returned, because a picture has
-    /// no more points across.
+    /// Returns delays \[ms\], each with the share of arrived packets whose delay is at most as long. Of many packets only some are returned, because a picture
+    /// has no more points across.
     fn quantiles(&self) -> Vec<(f64, f64)> {
         let mut delays: Vec<f64> = self.packets.iter().map(|(_, delay)| *delay).filter(|delay| !delay.is_nan()).collect();
         delays.sort_by(f64::total_cmp);
