@@ -34,7 +34,7 @@ fn scene(name: &str, overrides: &[&str]) -> Scene {
     Scene::parse(case["scene"].as_str().unwrap(), name.as_ref(), &overrides).unwrap()
 }
 
-/// Of a motion z(n) = Re(c·λⁿ), z(n−1)·z(n+1) − z(n)² is a constant times |λ|²ⁿ.
+/// For a motion z(n) = Re(c·λⁿ), z(n−1)·z(n+1) − z(n)² is a constant times |λ|²ⁿ.
 #[track_caller]
 fn comes_to_rest_by_its_radius(name: &str, overrides: &[&str]) {
     let scene = scene(name, overrides);
@@ -44,7 +44,7 @@ fn comes_to_rest_by_its_radius(name: &str, overrides: &[&str]) {
     let at_frames = log.ticks.iter().filter(|tick| tick.peer == 0 && u128::from(tick.at.as_nanos()) % frame == 0);
     let left: Vec<f64> = at_frames.map(|tick| tick.object.position[0] - TARGET).collect();
     let size = |n: usize| left[n - 1] * left[n + 1] - left[n] * left[n];
-    // The slowest motion alone is left when it has come to a ten-thousandth, or at the end of the run.
+    // Faster motions have died out when the slowest motion has come to a ten-thousandth, or at the end of the run.
     let late = (1..left.len() - APART - 1).find(|n| libm::pow(radius, count(*n)) < 1e-4).unwrap_or(left.len() - APART - 2);
     let found = libm::pow(size(late + APART) / size(late), 0.5 / count(APART));
     assert!((found - radius).abs() < 1e-6, "{name} {overrides:?}: a run falls by {found} a frame, and the radius is {radius}");
@@ -54,6 +54,28 @@ fn comes_to_rest_by_its_radius(name: &str, overrides: &[&str]) {
 fn a_run_with_a_person_comes_to_rest_by_the_spectral_radius() {
     for name in PAIRS {
         comes_to_rest_by_its_radius(name, &[]);
+    }
+}
+
+/// Changes that give a scene a server, and two clients of which a person leads the first.
+const SERVER: [&str; 5] = [
+    "coordination.strategy=client-server",
+    "coordination.stiffness=0",
+    "peer.coupling={ stiffness = 100, damping = 5 }",
+    "link.delay=8ms",
+    r#"peers=[{ name = "server", contact = "none" }, { name = "a", hand = { operator = { law = "crossover" } } }, { name = "b" }]"#,
+];
+
+/// Strategies without a linear form take the general path, of which no other program's radii with people are known.
+#[test]
+fn a_run_with_waves_or_a_server_comes_to_rest_by_the_radius_of_the_general_path() {
+    const WAVE: &str = "coordination.strategy=wave";
+    comes_to_rest_by_its_radius("own", &[WAVE]);
+    comes_to_rest_by_its_radius("own", &[WAVE, "peers.a.hand.operator.crossover=8"]);
+    comes_to_rest_by_its_radius("within-a-frame", &[WAVE, "peers.a.hand.operator.crossover=20"]);
+    comes_to_rest_by_its_radius("own", &SERVER);
+    for more in ["peers.a.hand.operator.crossover=6", "peers.a.hand.operator.sees=server", "coordination.client-server.returns=object"] {
+        comes_to_rest_by_its_radius("own", &[&SERVER[..], &[more]].concat());
     }
 }
 

@@ -1,7 +1,7 @@
 //! Operators whose law is linear, as a scene describes them.
 //!
-//! Of the law crossover the linear part is followed: what is seen, the visual delay, and the velocity of the wanted place. Of the law moves the arm alone is
-//! followed, as if the wanted place stood still: movements are planned one after the other, which is not linear.
+//! The analysis follows the linear part of the law crossover: the seen place, the visual delay, and the velocity of the wanted place. Of the law moves it follows
+//! the arm alone, as if the wanted place stood still: movements are planned one after the other, which is not linear.
 
 use cohaptic_peer::ArmConfig;
 use cohaptic_peer::operator::{OperatorLaw, Seen};

@@ -296,7 +296,7 @@ pub(crate) fn common_time(scene: &Scene, frame: Duration, coordination: Gains, p
 /// Returns the classes of peers equal in each of the scenes. A pair of peers is never in one class if `apart` returns true for the pair.
 pub fn classes(scenes: &[&Scene], network: &NominalNetwork, contacts: &Contacts, apart: impl Fn(usize, usize) -> bool) -> Vec<Vec<usize>> {
     let mut classes: Vec<Vec<usize>> = Vec::new();
-    // What an operator sees of another peer is that peer's own motion, not the average of a class.
+    // A peer that an operator sees is seen with its own motion, not with the average of a class.
     let seen_by = |scene: &Scene, peer: usize| Crossover::of(scene, peer)?.seen_peer();
     let seen: BTreeSet<usize> = scenes.iter().flat_map(|scene| (0..scene.peers.len()).filter_map(|peer| seen_by(scene, peer))).collect();
     for place in 0..scenes[0].peers.len() {

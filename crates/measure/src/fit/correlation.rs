@@ -145,7 +145,7 @@ mod tests {
             assert!(se < 0.1 * time, "{fit:?}");
             let rho = (-0.008 / time).exp();
             assert!((fit.lag_one - rho).abs() < 4.0 * fit.lag_one_se.unwrap(), "{fit:?}");
-            // One correlation time is all of the memory, so that nothing is left.
+            // The correlation time is all of the memory, so that the innovations are independent.
             assert!(super::super::independence::test(&innovations.into_iter().map(Some).collect::<Vec<_>>()).unwrap().holds());
             // With even gaps and few losses the standard error is that of an autoregression, √((1 − φ²)/n), of 18 000 to 20 000 packets.
             if even {

@@ -1,7 +1,8 @@
 //! Test of independent delays: the rank correlations of neighbours and of packets farther apart.
 //!
-//! Input is the delays in the order of sending, with gaps for lost packets, or what a correlation time leaves of them; output is an [`Independence`]. Ranks serve in place of delays, so that the test does
-//! not depend on the law, and one absurd delay moves nothing. With the correlation rₖ of the ranks over the nₖ pairs of arrived packets that are k packets apart,
+//! Input is the delays in the order of sending, with gaps for lost packets, or the innovations that a correlation time leaves of them; output is an
+//! [`Independence`]. Ranks serve in place of delays, so that the test does not depend on the law, and one absurd delay moves nothing. With the correlation rₖ of
+//! the ranks over the nₖ pairs of arrived packets that are k packets apart,
 //!
 //! ```text
 //! r₁ ± 1/√n₁          Q = Σ nₖ·rₖ² over the lags k = 1 … K, of χ² with K degrees of freedom for independent delays
@@ -107,7 +108,7 @@ mod tests {
         (0..packets).map(delay).collect()
     }
 
-    /// Of 400 measurements with independent delays, each part of the test refuses 2 on average. 8 and more of one part have probability 0.001.
+    /// Each part of the test refuses 2 of 400 measurements with independent delays on average. 8 and more refusals of one part have probability 0.001.
     #[test]
     fn independent_delays_pass_but_for_one_in_a_hundred() {
         let found: Vec<Independence> = (0..400).map(|seed| test(&delays(seed, 0.0, 1, 600)).unwrap()).collect();
@@ -147,5 +148,14 @@ mod tests {
         // Ranks 1, 2, 3 are −√1.5, 0, √1.5: both products of neighbours are zero.
         let found = test(&[Some(1.0), Some(5.0), Some(9.0)]).unwrap();
         assert_eq!((found.neighbours, found.lags), (0.0, 1));
+    }
+
+    /// Ranks of 1, 1, 4, 1 are 2, 2, 4, 2: less their mean −½, −½, 3/2, −½, with the variance ¾. The lost packet leaves two pairs of neighbours with the products
+    /// ¼ and −¾, so that r₁ is −⅓ and Q is 2/9. The probability of a larger square of a normal number is erfc(√(Q/2)) = erfc(⅓).
+    #[test]
+    fn equal_delays_share_their_mean_rank_and_a_lost_packet_leaves_no_pair() {
+        let found = test(&[Some(1.0), Some(1.0), None, Some(4.0), Some(1.0)]).unwrap();
+        assert!((found.neighbours + 1.0 / 3.0).abs() < 1e-15 && (found.statistic - 2.0 / 9.0).abs() < 1e-15, "{found:?}");
+        assert!((found.neighbours_se - 0.5_f64.sqrt()).abs() < 1e-15 && (found.p_value - 0.6373518882339371).abs() < 1e-12, "{found:?}");
     }
 }

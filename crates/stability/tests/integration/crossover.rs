@@ -2,8 +2,8 @@
 
 use cohaptic_scene::Scene;
 use cohaptic_stability::{
-    Admittance, AdmittanceError, Analysis, AnalysisError, Family, FamilyScratch, Graph, GraphError, KeyRange, Method, StateKind, Verdict, analyse,
-    analyse_on, judge, mean_square, monodromy,
+    Admittance, AdmittanceError, Analysis, AnalysisError, Family, FamilyScratch, Graph, GraphError, KeyRange, Method, StateKind, Unwatched, Verdict,
+    analyse, analyse_loaded, analyse_on, analyse_spinning, judge, mean_square, monodromy,
 };
 use serde_json::Value;
 
@@ -167,6 +167,7 @@ fn maps_and_lines_follow_the_keys_of_a_person() {
             let scene = parsed(&text, &[&range.text(value)]);
             let expected = analyse(&scene, Method::Reduced).unwrap().radius;
             assert!((found.radius.value - expected.value).abs() < 1e-12, "{key} at {value}: {found:?} is not {expected:?}");
+            assert!(found.radius.error < 1e-6, "{key} at {value}: a bound of {:e} says little", found.radius.error);
         }
     }
 }
@@ -188,6 +189,44 @@ fn what_does_not_follow_a_person_says_so_by_name() {
     refused::<()>("a graph", Err(error));
 }
 
+/// Overrides that give the object an inertia, so that it turns.
+const TURNS: [&str; 4] = [
+    "scene.axes=3",
+    "object={ mass = 0.45, inertia = [3e-4, 3e-4, 3e-4] }",
+    "coordination={ strategy = \"average-position\", stiffness = 1000.0, damping = 5.0, update = \"8ms\", rotational-stiffness = 2.0, \
+     rotational-damping = 0.02 }",
+    "task.sines=[{ amplitude = [0.02, 0.0, 0.0], frequency = 0.1 }]",
+];
+
+/// Topologies and objects that turn are refused on every way to a radius.
+#[test]
+fn neither_topologies_nor_objects_that_turn_follow_a_person() {
+    let case = case("three");
+    for (what, overrides) in [("a graph", &["topology.kind=ring"][..]), ("the analysis of an object that turns", &TURNS)] {
+        let scene = parsed(&case.text, overrides);
+        refused(what, analyse(&scene, Method::Reduced));
+        let overrides: Vec<String> = overrides.iter().map(|text| (*text).to_owned()).collect();
+        let family = Family::new(&case.text, "three.toml".as_ref(), &overrides, vec![KeyRange::parse("coordination.damping=1..10").unwrap()]);
+        let error = family.and_then(|family| family.bounded_radius(&[5.0], &mut FamilyScratch::default())).unwrap_err().to_string();
+        assert!(error.contains(&format!("{what} does not follow the operator of a, whose law is \"crossover\": ")), "{error}");
+    }
+    let turns = parsed(&case.text, &TURNS);
+    let what = "the analysis of an object that turns";
+    refused(what, analyse(&turns, Method::Full));
+    refused(what, analyse_loaded(&turns, Method::Reduced, &Unwatched));
+    refused(what, analyse_spinning(&turns, &Unwatched));
+}
+
+/// Waves carry no position, so that a person who watches the copy of another peer moves that copy to the target, and the own copy stays where it came to rest.
+#[test]
+fn waves_leave_the_own_copy_of_who_watches_another_where_it_is() {
+    let waves = ["coordination.strategy=wave", "peers.a.hand.operator.visual-delay=3ms"];
+    let [own, other] = ["own", "sees-the-second"].map(|name| analyse(&parsed(&case(name).text, &waves), Method::Reduced).unwrap());
+    assert_eq!((own.verdict(), own.rigid_modes), (Verdict::Stable, 1));
+    assert_eq!((other.verdict(), other.rigid_modes), (Verdict::Marginal, 0));
+    assert!((other.radius.value - 1.0).abs() < 1e-9 && other.radius.error < 1e-9, "{:?}", other.radius);
+}
+
 /// A loss leaves the verdict nominal, with the reason.
 #[test]
 fn with_chance_the_verdict_on_a_person_is_nominal() {
@@ -197,4 +236,10 @@ fn with_chance_the_verdict_on_a_person_is_nominal() {
     assert!(
         judged.mean_square.is_none() && judged.analysis.notes.iter().any(|note| note.contains("the mean square does not follow the operator of a"))
     );
+    // A map has the second moment of equal people over equal links, or its nominal value: the square of the radius.
+    let keys = vec![KeyRange::parse("coordination.damping=1..10").unwrap()];
+    let both = case("both-own");
+    let family = Family::new(&both.text, "both.toml".as_ref(), &["link.loss=10%".to_owned()], keys).unwrap();
+    let found = family.radius(&[5.0], &mut FamilyScratch::default()).unwrap();
+    assert!(found.is_nominal && (found.radius - both.radius.powi(2)).abs() < 1e-9, "{found:?}");
 }
