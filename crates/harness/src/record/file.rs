@@ -126,7 +126,7 @@ mod tests {
             }
         }
 
-        /// There are as many digits as in the standard library, which takes another one of two equally near numbers, such as 1547520063066896.3 for
+        /// The number of digits is that of the standard library, which takes the other one of two equally near numbers, such as 1547520063066896.3 for
         /// 1547520063066896.25. Exponents have no plus sign.
         #[test]
         fn numbers_are_written_with_the_fewest_digits(bits in any::<u64>(), small in -1e3..1e3_f64, large in 1e15..1e25_f64) {

@@ -85,6 +85,34 @@ fn acknowledgements_report_the_mark_of_each_segment() {
     assert_eq!(reports, [(2, false), (3, false), (4, true), (6, true), (7, false), (8, true), (10, true), (11, false)]);
 }
 
+/// A segment after a reduction tells the peer about the reduction, as in RFC 3168, and later segments do not (RFC 8257, section 3.3).
+#[test]
+fn the_segment_after_a_reduction_has_cwr() {
+    let (mut a, mut b, data) = pair();
+    for (place, segment) in data.iter().enumerate() {
+        let segment = Segment { ecn: if place == 0 { Ecn::Congestion } else { Ecn::Capable1 }, ..segment.clone() };
+        b.handle_segment(millis(50), &segment);
+        while let Some(answer) = b.poll_transmit(millis(50)) {
+            a.handle_segment(millis(60), &answer);
+        }
+    }
+    a.write(&[7; 1448 * 3]).unwrap();
+    let told: Vec<bool> = std::iter::from_fn(|| a.poll_transmit(millis(70))).map(|segment| segment.flags.has(Flags::CWR)).collect();
+    assert_eq!(told, [true, false, false]);
+}
+
+/// A SYN that does not ask for ECN has no codepoint either, because a middlebox may have dropped the first SYN for its codepoint.
+#[test]
+fn a_syn_without_ecn_has_no_codepoint() {
+    let world = World::new("delay 10ms", 1).config(&dctcp()).programs(Program::default(), Program::writes(10_000)).logged();
+    let mut world = world.dropping(|side, segment| side == 0 && segment.flags.has(Flags::SYN | Flags::ECE)).connect();
+    world.run_until(millis(5_000));
+    let syns = world.log.iter().flatten().map(|left| &left.segment).filter(|syn| syn.flags.has(Flags::SYN) && !syn.flags.has(Flags::ACK));
+    let seen: Vec<(bool, Ecn)> = syns.map(|syn| (syn.flags.has(Flags::ECE), syn.ecn)).collect();
+    assert_eq!(seen, [(true, Ecn::Capable1), (false, Ecn::NotCapable)]);
+    assert_eq!(world.programs[0].read, 10_000);
+}
+
 /// W·p/2 segments less in each round, and 1 − p more: 2·(1 − p)/p. Where every n-th segment is marked, the share is 1/n.
 #[test]
 fn the_window_settles_at_two_marks_a_round() {

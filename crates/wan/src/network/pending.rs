@@ -171,3 +171,25 @@ impl<P> Event for Pending<P> {
         (self.at, self.turn, self.sequence, self.path, self.size.copy())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Sizes from 2²³ on count as 2²³ − 1. Flags change neither the size nor the codepoint.
+    #[test]
+    fn sizes_and_codepoints_come_back() {
+        for (size, expected) in [(0, 0), (1500, 1500), ((1 << 23) - 1, (1 << 23) - 1), (1 << 23, (1 << 23) - 1), (u64::MAX, (1 << 23) - 1)] {
+            for ecn in [Ecn::NotCapable, Ecn::Capable0, Ecn::Capable1, Ecn::Congestion] {
+                let packet = SizeAndMarks::new(PacketInfo { size: Bytes::new(size), ecn });
+                let flags = [SizeAndMarks::MARKED, SizeAndMarks::DAMAGED, SizeAndMarks::DISCARDED_ON_ARRIVAL];
+                assert!(flags.iter().all(|flag| !packet.has(*flag)) && packet.copy() == 0);
+                let flagged = flags.iter().fold(packet, |packet, flag| packet.with(*flag, true));
+                for packet in [packet, flagged] {
+                    assert_eq!(packet.info(), PacketInfo { size: Bytes::new(expected), ecn }, "{size}");
+                }
+                assert_eq!(flags.iter().fold(flagged, |packet, flag| packet.with(*flag, false)), packet);
+            }
+        }
+    }
+}

@@ -89,7 +89,8 @@ impl Asked {
     fn table(self, table: &Arc<DistTable>) -> Fit {
         let scale = self.sd / DistTable::ONE_DEVIATION;
         let (mean, sd) = table.moments((self.floor - self.mean) / scale);
-        let delivered = Moments { mean: self.mean + scale * mean, sd: scale * sd };
+        // Without the floor, rounding would put the mean of a table that is cut altogether just below the least delay.
+        let delivered = Moments { mean: (self.mean + scale * mean).max(self.floor), sd: scale * sd };
         Fit { standard: Standard::Table(Arc::clone(table)), origin: self.mean, scale, delivered }
     }
 

@@ -139,15 +139,24 @@ mod tests {
         ] {
             let law = Law::new(&distribution, mean, sd, Some(floor)).unwrap();
             let (mut known, mut all) = (0, 0);
+            // Delays whose last digits decide the whole number.
+            let mut close = 0;
             for z in numbers.iter().copied().chain([-40.0, 40.0, f64::NAN]) {
                 let found = law.whole_at_normal(z);
                 if let Some(found) = found {
                     assert_eq!(found, libm::rint(law.at_normal(z)) as u64, "{z} around {mean} ± {sd}");
                 }
+                let delay = law.at_normal(z);
+                if (delay - delay.floor() - 0.5).abs() < MARGIN / 2.0 {
+                    assert_eq!(found, None, "{delay} around {mean} ± {sd}");
+                    close += 1;
+                }
                 let is_usual = z.abs() < 3.0;
                 (known, all) = (known + u32::from(is_usual && found.is_some()), all + u32::from(is_usual));
             }
             assert!(f64::from(known) > usual * f64::from(all), "{known} of {all} around {mean} ± {sd}");
+            // A thousandth of the numbers, or fewer where most delays are at the floor.
+            assert!(close > 10, "{close} delays at a half around {mean} ± {sd}");
             // Numbers together have the delays of numbers alone.
             for z in numbers.chunks_exact(8) {
                 let z: &[f64; 8] = z.try_into().unwrap();

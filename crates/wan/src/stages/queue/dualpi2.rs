@@ -117,6 +117,7 @@ impl<P> DualQueues<P> {
 
     /// Appends a packet to its queue `now`.
     pub(crate) fn push<R: Rules<P>>(&mut self, now: Instant, rules: &R, dualpi2: &DualPi2, packet: P) {
+        // The result would be the same without this call, but the updates of empty queues take no time only as long as the queues are empty.
         self.pass(now, rules, dualpi2);
         let queue = match rules.ecn(&packet) {
             Ecn::Capable1 | Ecn::Congestion => &mut self.low_latency,
@@ -397,6 +398,14 @@ mod tests {
             state.pass(Instant::MAX, &dualpi2, oldest);
             assert_eq!(state.updates, Instant::MAX.as_nanos() / 16_000_000);
         }
+    }
+
+    #[test]
+    fn a_time_of_zero_between_two_updates_counts_as_a_nanosecond() {
+        let dualpi2 = DualPi2 { tupdate: Duration::ZERO, ..DualPi2::default() };
+        let mut state = Controller { probability: 0.5, delay_before: Duration::ZERO, updates: 0 };
+        state.pass(Instant::from_nanos(5), &dualpi2, Some(Instant::ZERO));
+        assert_eq!(state.updates, 5);
     }
 
     #[test]
