@@ -107,6 +107,13 @@ fn what_people_see_counts_in_what_makes_peers_equal() {
     assert_eq!(parts("two-see-a-third"), [together, ("apart", Some(0), 1)]);
     // A scene of one person and of two peers without a person.
     assert_eq!(parts("three"), [together, ("apart", Some(1), 1)]);
+    // Two equal peers without a person, of which the person sees the first or the second: each is a class alone. The general path knows no classes.
+    for sees in ["b", "c"] {
+        let scene = parsed(&case("three").text, &[&format!("peers.a.hand.operator.sees={sees}")]);
+        let (found, witness) = (analyse(&scene, Method::Reduced).unwrap(), analyse(&scene, Method::Full).unwrap());
+        assert_eq!(found.modes[0].parts.iter().map(|part| part.kind.word()).collect::<Vec<_>>(), ["together"], "{sees}");
+        assert!((found.radius.value - witness.radius.value).abs() < 1e-9, "{sees}: {:?} {:?}", found.radius, witness.radius);
+    }
 }
 
 /// Where both people watch one copy, hands may pull against each other without moving this copy. No person sees and corrects the pull, so the pull stays.
